@@ -34,21 +34,22 @@ from typing import NamedTuple
 from cpp_source import CLOSING, OPENING, Source
 
 ASSIGNMENT = {"=", "+=", "-=", "*=", "/=", "%=", "&=", "|=", "^=", "<<=", ">>="}
-# Tokens that end an operand of && or ||.
+# Tokens that end an operand of `&&` or `||`.
 ENDS_OPERAND = {";", ",", "?", ":", "return", "co_return", "case", "else"} | ASSIGNMENT
 COARSE = {"never", "skip", "half", "twice", "zero", "ten"}
-ARITHMETIC = {"bit", "shift", "sign"}  # in a line with several of these, one mutant represents them all
+ARITHMETIC = {"bit", "shift", "sign"}  # rules of which only one mutant is made for a line, which represents the others
 EDGE = {"<": "<=", "<=": "<", ">": ">=", ">=": ">"}
 REFUSES = re.compile(r"fail|failed|refuse\w*|reject\w*|settle\w*")
 NOTHING = {"returnfalse;", "returnstd::nullopt;", "returnnullptr;", "return{};", "std::nullopt", "nullptr"}
-TABLES = {"array", "to_array", "Option", "option", "Argument", "Command", "Fields"}  # tables of texts with numbers
+# Names of tables whose numbers, beside texts, are not mutated.
+TABLES = {"array", "to_array", "Option", "option", "Argument", "Command", "Fields"}
 DURATION = re.compile(r"[\d'.]+(ns|us|ms|s|min|h)")
 INTEGER = re.compile(r"(0[xX][\da-fA-F']+|0[bB][01']+|[\d']+)(?:u|U|l|L|ul|UL|z|uz)?")
 
 
 class Switch(NamedTuple):
-    """The mutant as a run-time choice. In `before` and `behind`, `IS` stands for the condition that this mutant is
-    chosen."""
+    """The mutant as a choice at run time: the texts to insert before and behind the tokens from `start` to `end`. `IS`
+    in these texts becomes the condition that this mutant is chosen."""
 
     start: int
     end: int
@@ -57,7 +58,7 @@ class Switch(NamedTuple):
 
 
 class Mutant(NamedTuple):
-    file: str  # path below the source folder, as in the id
+    file: str  # path of the source below the source folder, as in the id
     rule: str
     line: int
     start: int
@@ -66,7 +67,8 @@ class Mutant(NamedTuple):
     after: str
     id: str
     switch: "Switch | None"
-    # name of the constant, which is switched if all its users can call a function (as_functions)
+    # Name of the constant that the mutant changes, None for any other mutant. The mutant is switched only if the
+    # constant can become a function (as_functions).
     constant: "str | None" = None
 
     def applied_to(self, text):
@@ -74,8 +76,10 @@ class Mutant(NamedTuple):
 
 
 def with_switches(text, numbered):
-    """Returns `text` with all mutants switched in. `chosen_mutant(N)` returns whether mutant N is chosen."""
-    # Nested mutants are inserted inside; of mutants at the same place, the first is the outermost.
+    """Returns `text` with the switches of all mutants inserted. `numbered`: pairs of number and mutant.
+    `chosen_mutant(N)` returns in C++ whether mutant N is chosen."""
+    # The switch of a nested mutant is inside that of the outer one. If several mutants are at the same place, the
+    # switch of the first is the outermost.
     inserted = []
     for order, (number, mutant) in enumerate(numbered):
         start, end, before, behind = mutant.switch
@@ -89,8 +93,8 @@ def with_switches(text, numbered):
 
 
 def as_functions(text, names):
-    """Returns `text` with these constants of type Time, and constants that use them, as functions. Returns None if one
-    of the names also has another meaning."""
+    """Returns `text` with the constants `names` of type Time, and constants computed from them, as functions. Returns
+    None if one of the names also has another meaning in the text."""
     source = Source(text)
     inserted = []
     for i, token in enumerate(source.tokens):
@@ -153,7 +157,7 @@ class Finder:
         return sorted(self.found, key=lambda mutant: mutant.start)
 
     def _leave(self, word):
-        """Excludes the bracket after `word` from mutation."""
+        """Excludes from mutation the bracket after each token `word`."""
         for i, token in enumerate(self.source.tokens):
             if token.text == word and i + 1 in self.source.partner:
                 for j in range(i, self.source.partner[i + 1]):
@@ -176,7 +180,7 @@ class Finder:
             if line in self._calculating:
                 return
             self._calculating.add(line)
-        # The id depends on the line's code only, not on its position or its comments.
+        # The id of a mutant depends on the code of its line only, not on the line's number or comments.
         begin, behind = self.source.tokens_of_lines(line, self.source.line_of(end - 1))
         context = [token.text for token in tokens[begin:behind]]
         description = "\n".join([rule, after, str(first - begin), *context])
@@ -204,7 +208,7 @@ class Finder:
                 self._refusal(i)
 
     def _mark(self, first, last):
-        """Marks the conditions of a check, except inside lambdas."""
+        """Marks the tokens from `first` to `last`, exclusive, as conditions of a check, except inside lambdas."""
         i = first
         while i < last:
             if self.source[i] == "{":
@@ -213,7 +217,8 @@ class Finder:
             i += 1
 
     def _refuses(self, first, last):
-        """Returns whether a statement refuses something, or a block apart from its inner blocks."""
+        """Returns whether a statement or block refuses something by an error or an empty result. Inner blocks of a
+        block are ignored."""
         source = self.source
         body = "".join(source[i] for i in range(first, last))
         if body in NOTHING or body[1:-1] in NOTHING:
@@ -244,7 +249,7 @@ class Finder:
             self._never(first, closing, "||", "false")
 
     def _refusal(self, index):
-        """Handles the error that a function returns after all its cases."""
+        """Adds a mutant of the error that a function returns after all its cases."""
         source = self.source
         block = self._around(index)
         is_branch = source[block - 1] == "else" or source[source.partner.get(block - 1, 0) - 1] == "if"
@@ -254,7 +259,7 @@ class Finder:
                 self._change("never", index + 3, index + 4, "none", switch)
 
     def _choice(self, index):
-        """Handles `good ? value : Error::x` and its opposite."""
+        """Adds mutants of the condition in `good ? value : Error::x` or its opposite."""
         source = self.source
         colon = source.right(index + 1, {":", ";"})
         if source[colon] != ":":
@@ -267,7 +272,8 @@ class Finder:
             self._never(first, index, *(("||", "false") if is_error[0] else ("&&", "true")))
 
     def _never(self, first, last, operator, harmless):
-        """Treats each term joined by `operator` as a check of its own."""
+        """Adds a mutant for each term joined by `operator`, as if the term were a check of its own. `harmless` is the
+        value, true or false, with which a term refuses nothing."""
         source = self.source
         ends = ENDS_OPERAND | {operator} | ({"||"} if operator == "&&" else set())
         switch = ("(!IS && (", "))") if harmless == "false" else ("(IS || (", "))")
@@ -303,7 +309,8 @@ class Finder:
         return any(self.source.partner.get(i, 0) > index for i in range(outer, index) if self.source[i] in OPENING)
 
     def _rule(self, index):
-        """Handles the condition `kept` of `expect(kept, rule, at)`, but not the declaration of `expect`."""
+        """Adds mutants of the condition `kept` in a call `expect(kept, rule, at)`, but not in the declaration of
+        `expect`."""
         source = self.source
         first = index + 2
         last = source.right(first, {","})
@@ -314,13 +321,14 @@ class Finder:
     # ---- Constants
 
     def _declared_times(self):
-        """Handles `Time name = ...;` with any expression."""
+        """Adds mutants of the times in each declaration `Time name = ...;`."""
         source = self.source
         for i in range(len(source.tokens)):
             if source[i] != "Time" or source[i + 2] != "=" or source.tokens[i + 1].kind != "word" or self.left_alone[i]:
                 continue
             end = source.right(i + 3, {";", ","})
-            # Only a constant, or a member's default value: not a value that a function computes.
+            # The declaration must be that of a constant or a member's default value, not of a value that a function
+            # computes.
             is_member = source[i - 1] in (";", "{", "}") and source.tokens[i + 3].kind == "number" and end == i + 4
             if source[i - 1] == "constexpr" or is_member:
                 self._times(i + 3, end, "" if is_member or self._is_local(i) else source[i + 1])
@@ -328,7 +336,7 @@ class Finder:
                     self.left_alone[j] = True
 
     def _computed_times(self):
-        """Handles the return values of functions of type Time."""
+        """Adds mutants of the times in return statements of functions of type Time."""
         source = self.source
         for i in range(len(source.tokens)):
             if source[i] != "Time" or source.tokens[i + 1].kind != "word" or source[i + 2] != "(":
@@ -340,7 +348,8 @@ class Finder:
                 continue
             for j in range(body, source.partner[body]):
                 end = source.right(j + 1, {";"})
-                if source[j] == "return" and end > j + 2 and not self.left_alone[j]:  # returns more than a name
+                # The statement returns more than a name.
+                if source[j] == "return" and end > j + 2 and not self.left_alone[j]:
                     self._times(j + 1, end)
                     for k in range(j, end):
                         self.left_alone[k] = True
@@ -353,7 +362,8 @@ class Finder:
         return source[outer] == "{" and not {"namespace", "class", "struct"} & {source[i] for i in range(begin, outer)}
 
     def _times(self, first, last, constant=None):
-        """Adds the mutants of a time. `constant` is its name, or empty if it cannot be switched."""
+        """Adds the mutants of each time in the tokens from `first` to `last`. `constant` is the name of the constant
+        with this value, or empty if the mutant cannot be switched."""
         before = f"Time({self.source.span(first, last)})"
         if self.file.endswith(".hpp"):
             changes = {"half": f"{before} / 2", "twice": f"{before} * 2"}
@@ -393,8 +403,8 @@ class Finder:
         return f"({number} + 1)" if value < 256 else f"({number} * 2)"
 
     def _is_constant(self, index):
-        """Returns whether `index` is in the value of an enumerator or of a constant, such as the polynomial of a
-        CRC."""
+        """Returns whether the token `index` is in the value of an enumerator or of a constant, such as the polynomial
+        of a CRC."""
         source = self.source
         outer = self._around(index)
         if source[index - 1] == "=" and source.tokens[index - 2].kind == "word" and source[outer] == "{":
@@ -414,7 +424,7 @@ class Finder:
         return False
 
     def _around(self, index):
-        """Returns the index of the bracket that encloses a token."""
+        """Returns the index of the opening bracket that encloses the token `index`."""
         while index > 0:
             index -= 1
             if self.source[index] in OPENING:
@@ -425,5 +435,5 @@ class Finder:
 
 
 def find(file, text):
-    """Returns the mutants of one source. `file` is the first part of their ids."""
+    """Returns the mutants of the source with the content `text`. `file` is the first part of their ids."""
     return Finder(file, text).mutants()

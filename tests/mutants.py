@@ -29,7 +29,7 @@ import mutant_rules
 ROOT = Path(__file__).resolve().parent.parent
 COPIED = ("CMakeLists.txt", "absenc", "cmake", "tests")
 NO_SOURCE = re.compile(r"_(test|fuzz|bench)\.|^(test_|testing|vectors|fields|explain|texts)")
-# Matches compiler errors of checks at compile time, such as a static_assert about a vector.
+# Matches errors of the compiler that come from checks at compile time, such as a static_assert about a vector.
 STATIC_CHECK = re.compile(r"static.assert|constant.expression|non-constant|non-.constexpr|duplicate case value")
 # Switched mutants run only the first series of faults. Survivors are compiled alone and run all series (tests/kit).
 FIRST_SERIES = "-" + ":".join(f"*/{series}_*" for series in range(1, 10))
@@ -48,18 +48,19 @@ OUTCOMES = ("static_assert", "kit", "own", "time", "known", "new", "no C++")
 class Program(NamedTuple):
     name: str
     is_own: bool
-    tests: str = "*"  # filter of GoogleTest
+    tests: str = "*"  # GoogleTest filter of the tests to run
 
 
 def unit_folders():
-    """Returns the folders by name: every unit, and the layers that all units depend on."""
+    """Returns a dictionary from name to folder: every unit, and the layers that all units depend on (author, host)."""
     protocol = ROOT / "absenc" / "protocol"
     folders = {folder.name: folder for folder in sorted(protocol.iterdir()) if folder.is_dir()}
     return folders | {"host": ROOT / "absenc" / "host"}
 
 
 def generic_programs():
-    """Returns the programs that test every unit: each source in tests/, and each folder there (cmake/tests.cmake)."""
+    """Returns the names of the programs that test every unit: one for each source in tests/, and one for each folder
+    there (cmake/tests.cmake)."""
     tests = ROOT / "tests"
     names = []
     for path in [*sorted(tests.glob("*_test.cpp")), *sorted(tests.glob("*/*_test.cpp"))]:
@@ -69,13 +70,13 @@ def generic_programs():
 
 
 def id_of(path):
-    """Returns the first part of the ids of a source's mutants."""
+    """Returns the first part of the ids of the mutants of the source at `path`."""
     below = path.relative_to(ROOT / "absenc")
     return str(below.relative_to("protocol") if below.parts[0] == "protocol" else below)
 
 
 def find_mutants(folder):
-    """Yields each mutant with the path and the text of its source."""
+    """Yields (mutant, path of its source, text of the source) for each mutant in the folder."""
     for path in sorted([*folder.rglob("*.cpp"), *folder.rglob("*.hpp")]):
         if not NO_SOURCE.search(path.name):
             text = path.read_text(encoding="utf-8")
@@ -84,7 +85,7 @@ def find_mutants(folder):
 
 
 def shown(mutant, path, text):
-    """Returns the mutant's place, and its lines before and after the change."""
+    """Returns a text with the place of a mutant in its source, and its lines before and after the change."""
     last = text.count("\n", 0, mutant.end) + 1
     changed = mutant.applied_to(text).splitlines()
     end = last + len(changed) - len(text.splitlines())
@@ -95,7 +96,7 @@ def shown(mutant, path, text):
 
 
 def read_survivors(path):
-    """Returns the reason why a mutant may survive, by its id."""
+    """Returns a dictionary from the id of each mutant that may survive to the reason why."""
     lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
     known = [line.split(maxsplit=1) for line in lines if line.strip() and not line.startswith("#")]
     bare = [words[0] for words in known if len(words) < 2]
@@ -105,7 +106,7 @@ def read_survivors(path):
 
 
 class Tree:
-    """A copy of the sources, and its build."""
+    """A copy of the sources and its build folder, used by one thread."""
 
     def __init__(self, folder):
         self.source = folder / "source"
@@ -118,7 +119,7 @@ class Tree:
 
     def prepare(self):
         self.source.mkdir(parents=True, exist_ok=True)
-        self.lock = open(self.source.parent / "lock", "w", encoding="utf-8")  # held until this process ends
+        self.lock = open(self.source.parent / "lock", "w", encoding="utf-8")  # the lock is held until this process ends
         try:
             fcntl.flock(self.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -133,7 +134,7 @@ class Tree:
         for path in self.source.rglob("*"):
             if path.is_file() and path.relative_to(self.source) not in wanted:
                 path.unlink()
-        # The assertions detect reads beyond the end of a container. Warnings are disabled.
+        # _GLIBCXX_ASSERTIONS detects reads beyond the end of a container. The option -w disables warnings.
         options = ["-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -w -D_GLIBCXX_ASSERTIONS"]
         options += ["-DABSENC_TESTS=ON", "-DABSENC_SPLIT_TESTS=ON", "-DABSENC_COMMAND=OFF", "-DABSENC_INSTALL=OFF"]
         options += ["-DABSENC_UNITY=OFF"]
@@ -165,7 +166,8 @@ class Tree:
         return None if done.returncode == 0 else done.stdout + done.stderr
 
     def switch_in(self, numbered):
-        """Switches these numbered mutants in. Removes those of constants that cannot be switched from `numbered`."""
+        """Writes sources that contain these numbered mutants behind switches. Removes from `numbered` the mutants of
+        constants that cannot be switched."""
         self.write(self.source / SWITCH_HEADER, SWITCH.encode())
         functions = self.constants_as_functions(numbered)
         for number, (mutant, path, _) in list(numbered.items()):
@@ -181,11 +183,11 @@ class Tree:
 
     @staticmethod
     def constants_as_functions(numbered):
-        """Returns the constants of each source that become functions. Every user of such a constant in its folder must
-        allow it."""
+        """Returns, for each source, the constants that become functions, so that their mutants can be switched. Every
+        source in the folder that uses such a constant must still compile with the function."""
         functions = {}
         for path, name in {(path, mutant.constant) for mutant, path, _ in numbered.values() if mutant.constant}:
-            # every unit depends on the folder author
+            # Every unit depends on the folder author, so users of its constants are searched in all units.
             folder = path.parent.parent if path.parent.name == "author" else path.parent
             users = [*folder.rglob("*.hpp"), *folder.rglob("*.cpp")] if path.suffix == ".hpp" else [path]
             users = [user for user in users if re.search(rf"\b{name}\b", user.read_text(encoding="utf-8"))]
@@ -203,8 +205,8 @@ class Tree:
             self.write(self.source / path.relative_to(ROOT), text.encode())
 
     def run(self, program, cpu_limit, number=0):
-        """Returns the exit status and the processor seconds of a test program. The limit excludes time used by other
-        processes."""
+        """Runs a test program with mutant `number` chosen, 0 for none. Returns its exit status and its processor time
+        in seconds. `cpu_limit` is a limit of processor time, which excludes time used by other processes."""
         limits = ["prlimit", f"--cpu={cpu_limit}:{cpu_limit + 1}", f"--as={4 << 30}", "--core=0"]
         tests = program.tests + (FIRST_SERIES if number else "")
         environment = {**self.environment, "GTEST_FILTER": tests, "CHOSEN_MUTANT": str(number)}
@@ -215,7 +217,8 @@ class Tree:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
-        too_long = threading.Timer(10 * cpu_limit, running.kill)  # the program may wait for an event that never occurs
+        # Ends a program that waits for an event that never occurs.
+        too_long = threading.Timer(10 * cpu_limit, running.kill)
         too_long.start()
         _, status, usage = os.wait4(running.pid, 0)
         too_long.cancel()
@@ -223,8 +226,8 @@ class Tree:
         return running.returncode, usage.ru_utime + usage.ru_stime
 
     def concerning(self, program, unit):
-        """Returns the filter of a generic program's tests that concern a unit: those that name the unit, and those for
-        all units."""
+        """Returns a generic program with the filter of its tests that concern a unit: those whose name contains the
+        unit, and those for all units. Returns None if no test names the unit."""
         listed = self.run_or_exit([self.build / "tests" / program.name, "--gtest_list_tests"])
         suite, chosen, is_named = "", [], False
         for line in listed.splitlines():
@@ -240,7 +243,8 @@ class Tree:
         return program._replace(tests=":".join(chosen)) if is_named else None
 
     def programs(self, unit, folders):
-        """Returns the programs that may kill a unit's mutants, the fastest first. All of them pass without a mutant."""
+        """Returns the programs that may kill a unit's mutants, the fastest first. Exits with an error if one of them
+        fails without a mutant."""
         kit = [Program(name, False) for name in generic_programs()]
         owners = list(folders) if unit == "author" else [unit]
         seeds = [f"{p.stem}_seeds" for owner in owners for p in sorted(folders[owner].rglob("*_fuzz.cpp"))]
@@ -261,22 +265,23 @@ class Tree:
         return sorted(programs, key=lambda program: (self.limits[program], program.is_own))
 
     def killed(self, program, number=0):
-        """Returns how the program fails, or an empty text if it passes."""
+        """Returns how the program fails ("time", "own" or "kit"), or an empty text if it passes."""
         status, _ = self.run(program, self.limits[program], number)
         return "" if status == 0 else "time" if status in HANGS else "own" if program.is_own else "kit"
 
     def switched_outcome(self, number, programs):
-        """Returns the outcome of a switched mutant, and the program that killed it."""
+        """Returns the outcome of a switched mutant, and the name of the program that killed it, or ("survived", "")."""
         for program in programs:
             if outcome := self.killed(program, number):
                 return outcome, program.name
         return "survived", ""
 
     def outcome(self, mutant, path, text, programs):
-        """Returns the outcome of a mutant that is compiled alone. Leaves the mutated source in place."""
+        """Returns the outcome of a mutant that is compiled alone, and the name of the program or file that killed it.
+        Does not restore the mutated source."""
         self.write(self.source / path.relative_to(ROOT), mutant.applied_to(text).encode())
-        # Vectors are checked at compile time in the unit's description, so compiling that file reveals most faults in a
-        # header.
+        # The unit's vectors are checked when its unit.cpp is compiled, so compiling unit.cpp alone already reveals most
+        # faults in a header.
         unit = path.relative_to(ROOT).with_name("unit.cpp")
         first = [f"CMakeFiles/absenc.dir/{unit}.o"] if (ROOT / unit).exists() else []
         programs = sorted(programs, key=lambda program: program != self.last_own)
@@ -288,13 +293,14 @@ class Tree:
             first = []
             if outcome := self.killed(program):
                 if program.is_own:
-                    self.last_own = program  # a program that kills one mutant often kills the next ones
+                    # A program that kills one mutant often kills the next ones, so it runs first from now on.
+                    self.last_own = program
                 return outcome, program.name
         return "survived", ""
 
 
 class Campaign:
-    """Distributes the units' mutants to the trees."""
+    """A run over the mutants of all units, which are distributed to the trees, one thread for each tree."""
 
     def __init__(self, known, folders, verbose, quick):
         self.known = known
@@ -342,7 +348,8 @@ class Campaign:
             self.stopping = True
 
     def switch(self, tree, unit, mutants):
-        """Runs the switched mutants of a unit. Returns the mutants that are left."""
+        """Runs the tests with each switched mutant of a unit. Returns the mutants that are still to be compiled
+        alone."""
         numbered = dict(enumerate([one for one in mutants if one[0].switch], start=1))
         left = []
         if numbered:
@@ -364,7 +371,8 @@ class Campaign:
         return left
 
     def switched_programs(self, tree, unit, numbered):
-        """Switches the mutants in, if possible including constants as functions. Otherwise leaves out the constants."""
+        """Builds the test programs with the unit's mutants switched in, and returns the programs. If they cannot be
+        built with constants as functions, removes the mutants of constants from `numbered`."""
         try:
             tree.switch_in(numbered)
             return self.programs(tree, unit)

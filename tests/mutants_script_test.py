@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests tests/mutant_rules.py: the mutants that it finds, the places that it leaves alone, and ids that survive moved
-lines."""
+"""Tests tests/mutant_rules.py and tests/mutants.py: the mutants that are found in a source, the places that have none,
+and ids that remain the same if lines are moved."""
 
 import os
 import sys
@@ -51,7 +51,7 @@ Procedure zero(Dialog& dialog) {
 
 
 def changes(text, file="toy.hpp"):
-    """Returns (rule, before, after) of each mutant, with single spaces."""
+    """Returns (rule, before, after) of each mutant found in a source text, with single spaces."""
     return [
         (found.rule, " ".join(found.before.split()), " ".join(found.after.split()))
         for found in mutant_rules.find(file, text)
@@ -119,7 +119,7 @@ class Rules(unittest.TestCase):
         broken = {lines[found.line - 1] for found in mutant_rules.find("toy.hpp", TOY)}
         for begin in ("//", "#define", "static_assert", "    return fail"):
             self.assertFalse([line for line in broken if line.startswith(begin)], begin)
-        # Loop headers, template brackets and raw strings are also left alone.
+        # Loop headers, template brackets and raw strings also have no mutant.
         self.assertEqual(changes("void f() { for (int i = 0; i < 3 && i + 1 < n; ++i) g(i); }"), [])
         self.assertEqual(changes('void f() { g(h<pair<int, 4>>(1), R"(a && b < 2ms)", "1s", \'&\'); }'), [])
 
@@ -130,7 +130,7 @@ class Rules(unittest.TestCase):
             ("co_await dialog.ask();", "if (chosen_mutant(1)) {} else co_await dialog.ask();"),
             ("rest(10ms);", "rest((chosen_mutant(1) ? Time(Time(10ms) / 2) : Time((chosen_mutant(2) ? "
              "Time(Time(10ms) * 2) : Time(10ms)))));"),
-            ("constexpr Time pause = 40us;", None),  # local to a function
+            ("constexpr Time pause = 40us;", None),  # a constant local to a function has no mutant
         )
         for line, expected in lines:
             text = f"void f() {{ {line} }}"

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests every verb of the command on a pseudo-terminal that is never silent: each must end and report the problem."""
+"""Tests every verb of absenc on a pseudo-terminal that is never silent: each must end and report the problem."""
 import concurrent.futures
 import json
 import time
@@ -8,12 +8,12 @@ import unittest
 
 from command_support import BabblingLine, Case, absenc
 
-LIMIT = 40.0  # time limit in seconds, for a busy machine; alone the slowest command takes about ten
-AT_ONCE = 8  # number of commands that run in parallel, because they mostly wait
+LIMIT = 40.0  # time limit of a command in seconds, for a busy machine; on an idle one the slowest takes about ten
+AT_ONCE = 8  # number of commands that run in parallel: they mostly wait
 
 
 def units():
-    """Returns the units with a character link."""
+    """Returns the names of the units with a character link."""
     listed = [json.loads(line) for line in absenc("list", "--json").stdout.splitlines()]
     return [unit for unit in listed if unit["link"] in ("half_duplex", "full_duplex")]
 
@@ -23,7 +23,7 @@ def least(argument):
 
 
 def invocations(unit, encoder):
-    """Yields the command line of each verb that communicates with this unit, and of each command of the unit."""
+    """Yields the command line of each verb that communicates with an encoder, and of each command of the unit."""
     verbs = {command["verb"] for command in unit["commands"]}
     yield "read", encoder
     yield "read", encoder, "--count", "2"
@@ -48,7 +48,8 @@ def invocations(unit, encoder):
 
 class NeverSilentTest(Case):
     def run_all(self, period, pieces, wanted):
-        """Runs each command line that `wanted` selects, each on its own line."""
+        """Runs each command line for which `wanted` is true, each on a line of its own that sends `pieces` with this
+        period."""
         def one(unit, number):
             with BabblingLine(period, pieces) as line:
                 arguments = list(invocations(unit, f"{unit['protocol']}:{line.path}"))[number]
@@ -63,7 +64,7 @@ class NeverSilentTest(Case):
                 with self.subTest(arguments=arguments):
                     self.assertLess(duration, LIMIT)
                     self.assertIn(result.returncode, (0, 1), result.stderr)
-                    # A `run` that only sends, without a reply, may succeed in a silent moment.
+                    # A command that only sends, and expects no reply, may succeed if no byte arrives at that moment.
                     if arguments[0] != "run":
                         self.assert_failed(result)
 

@@ -14,7 +14,7 @@ SOURCE = Path(os.environ["ABSENC_SOURCE_DIR"])
 LIBRARY = Path(os.environ["ABSENC"]).parent.parent / "libabsenc.a"
 COMPILE = ["g++", "-std=c++20", "-O0", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Wconversion", "-Werror"]
 
-# The parts of the kit that need no virtual encoder; the whole kit takes too long to compile.
+# A test program with two checks of the kit that need no virtual encoder; compiling the whole kit takes too long.
 KIT_TEST = """
 #include <gtest/gtest.h>
 #include "absenc/protocol/all.hpp"
@@ -67,7 +67,8 @@ class NewProtocol(unittest.TestCase):
         self.assertEqual({line.split()[3] for line in failed} - {"1"}, {"ProtocolName.DocumentIsNotTheInventedOne"})
 
     def test_example_in_contributing_is_from_template(self):
-        """The template's code is compiled by the test above."""
+        """The example in CONTRIBUTING.md must be code of the template, because the test above compiles only the
+        template."""
         text = (SOURCE / "CONTRIBUTING.md").read_text(encoding="utf-8")
         template = (SOURCE / "docs/protocol-template/unit.cpp").read_text(encoding="utf-8")
         examples = re.findall(r"^( *)```cpp\n(.*?)^ *```", text, re.MULTILINE | re.DOTALL)

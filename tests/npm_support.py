@@ -10,7 +10,8 @@ MODULES = SOURCE / "build/npm/node_modules"
 
 
 def tool(path):
-    """Returns a file of node_modules. It may only be missing if ./dev found npm's registry unreachable."""
+    """Returns the path of a file in node_modules. The file may only be missing, which skips the test, if ./dev found
+    npm's registry unreachable."""
     if (MODULES / path).exists():
         return MODULES / path
     if os.environ.get("ABSENC_NO_NPM"):

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests the library as a package of firmware build systems. Each package must build the same sources, and is tried as
-far as possible without the vendor's tools. The manifests are checked against the documented keys."""
+"""Tests the library as a package of firmware build systems. Each package must build the same sources; it is tested as
+far as possible without the vendor's tools. The manifests may have only documented keys."""
 import glob
 import json
 import os
@@ -30,7 +30,7 @@ def run(*command, **settings):
 
 
 def sources():
-    """Returns the sources that every package must build, relative to the root."""
+    """Returns the sources that every package must build, as paths relative to the repository."""
     found = [path for layer in LAYERS for path in (ROOT / "absenc" / layer).rglob("*.cpp")]
     return {str(path.relative_to(ROOT)) for path in found if not re.search(r"_(test|fuzz|bench)\.cpp$", path.name)}
 
@@ -41,7 +41,7 @@ class Case(unittest.TestCase):
         self.addCleanup(shutil.rmtree, self.folder)
 
     def configured(self, project):
-        """Configures a CMake project with this text and returns CMake's output."""
+        """Configures a CMake project whose CMakeLists.txt is `project`, and returns CMake's output."""
         (self.folder / "CMakeLists.txt").write_text(project)
         return run("cmake", "-S", self.folder, "-B", self.folder / "build")
 
@@ -71,7 +71,7 @@ class PlatformIO(Case):
     def test_builds_all_sources(self):
         chosen = set()
         for sign, pattern in (re.match(r"([+-])<(.+)>$", one).groups() for one in self.library["build"]["srcFilter"]):
-            # PlatformIO's match_src_files takes a folder with everything below it.
+            # A srcFilter that names a folder includes everything below it, as in PlatformIO's match_src_files.
             matched = set()
             for path in glob.glob(str(ROOT / pattern), recursive=True):
                 below = Path(path).rglob("*.cpp") if os.path.isdir(path) else [Path(path)]
@@ -81,7 +81,7 @@ class PlatformIO(Case):
 
 
 class Zephyr(Case):
-    # The schema is in zephyr/scripts/zephyr_module.py
+    # Keys of module.yml, from the schema in zephyr/scripts/zephyr_module.py.
     def test_module_file(self):
         module = yaml.safe_load((ROOT / "zephyr/module.yml").read_text())
         self.assertEqual(module.keys(), {"name", "build"})
@@ -151,7 +151,7 @@ class EspIdf(Case):
         self.assertGreaterEqual(packed, sources() | {"CMakeLists.txt", "cmake/sources.cmake", "packages/esp-idf.cmake"})
         self.assertFalse([path for path in packed if path.startswith(("absenc/os", "absenc/sim", "tools", "tests"))])
 
-    # The fake idf_component_register creates a library, as the real one does.
+    # The idf_component_register of this project is a fake that creates a library, as the real one does.
     PROJECT = f"""
 cmake_minimum_required(VERSION 3.16)
 project(esp LANGUAGES CXX)
@@ -172,7 +172,7 @@ add_subdirectory({ROOT} absenc)
         self.assertEqual(re.search("^-- headers=(.*)$", output, re.MULTILINE)[1], str(ROOT))
 
     def test_early_script_stops_at_registration(self):
-        """In early expansion idf_component_register ends the script, and files cannot be searched."""
+        """In ESP-IDF's early expansion, idf_component_register ends the script, and no files can be searched."""
         (self.folder / "early.cmake").write_text(f"""
 set(ESP_PLATFORM 1)
 set(CMAKE_BUILD_EARLY_EXPANSION 1)
@@ -210,7 +210,8 @@ class Arduino(Case):
     def test_sketch_reads_positions(self):
         sketch = self.library / "examples/ReadTFormat/ReadTFormat.ino"
         program = self.folder / "sketch.cpp"
-        # Builds the sketch as Arduino does: its header before the sketch, and a `main` that calls `setup` and `loop`.
+        # A program made of the sketch as Arduino does it: Arduino.h before the sketch, and a `main` that calls `setup`
+        # and `loop`.
         program.write_text(f'#include <Arduino.h>\n#include "{sketch}"\n'
                            "int main() { setup(); for (int i = 0; i < 20000; ++i) loop(); }\n")
         exported = self.library / "src"
@@ -218,7 +219,7 @@ class Arduino(Case):
             self.folder / "sketch", program, exported / "absenc/protocol/host_rules.cpp",
             *sorted((exported / "absenc/protocol/author").rglob("*.cpp")))
         output = run(self.folder / "sketch").splitlines()
-        # Every third reply is damaged, and the next one only confirms the one after it.
+        # Every third reply is damaged. The next reply then only confirms the one after it, so it prints no position.
         self.assertEqual(output[:6], ["4660 74565", "bad_checksum"] * 3)
 
 
@@ -242,7 +243,8 @@ class FetchContent(Case):
         self.assertIn("absenc::tformat::", symbols)
         for unit in self.UNITS:
             self.assertNotIn(f"absenc::{unit}::", symbols)
-        # A program linked with only the needed sources must have the same size.
+        # A program linked only with the sources that it needs must have the same size as the one with all sources
+        # available.
         alone = self.folder / "alone"
         flags = "-mcpu=cortex-m0plus -mthumb -std=c++20 -Os -DNDEBUG -ffreestanding -ffunction-sections -fdata-sections"
         run("arm-none-eabi-g++", *flags.split(), "-fno-exceptions", "-fno-rtti", "-fno-threadsafe-statics",

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shows the page of `absenc serve` in Chromium with named encoders, for tests and for ./dev pictures."""
+"""Opens the page of `absenc serve` in Chromium with named encoders, for tests and for ./dev pictures."""
 import os
 import sys
 import urllib.parse
 
-SYSTEM_PYTHON = "/usr/bin/python3"  # the interpreter that has Debian's python3-selenium
+SYSTEM_PYTHON = "/usr/bin/python3"  # the Python interpreter that has Debian's package python3-selenium
 
 try:
     from selenium import webdriver
@@ -15,7 +15,8 @@ except ImportError:
 
 from selenium.webdriver.chrome.service import Service
 
-# Name: protocol and options. A port in braces is supplied by the caller.
+# Each entry: name of an encoder, its protocol and options. The caller supplies the port that a name in braces stands
+# for.
 KINDS = {
     "shoulder": ("tformat", "motion=rpm=60"),
     "slide-x": ("biss", "model=linear-26-1um&motion=sine=20,0.1&singleturn=33554432"),
@@ -32,7 +33,7 @@ KINDS = {
 
 
 def config(kinds, ports=None):
-    """Returns an absenc.toml with these encoders."""
+    """Returns the text of an absenc.toml with these encoders."""
     text = ""
     for name, (protocol, options) in kinds.items():
         text += f'[encoder.{name}]\nprotocol = "{protocol}"\nport = "{(ports or {}).get(name, "sim")}"\nrate_hz = 100\n'
@@ -44,13 +45,13 @@ def config(kinds, ports=None):
 
 
 def hundred():
-    """Returns a hundred encoders of all kinds."""
+    """Returns a hundred encoders of all kinds, in the form of KINDS."""
     kinds = list(KINDS.items())
     return {f"{name}-{i:02}": kind for i in range(100) for name, kind in [kinds[i % len(kinds)]]}
 
 
 class Browser:
-    """Chromium with an adjustable window size."""
+    """A Chromium browser with an adjustable window size."""
 
     def __init__(self, *arguments):
         options = webdriver.ChromeOptions()

@@ -26,7 +26,7 @@ class Wheel(PackageCase):
                                   check=True, env=environment, capture_output=True, text=True, cwd=scratch,
                                   timeout=PATIENCE)
             self.assertTrue(said.stdout.startswith(str(scratch / "clean")))
-            # pytest finds the plugin by its entry point.
+            # pytest finds the package's plugin by its entry point, so the wheel must declare it.
             (scratch / "test_drive.py").write_text(
                 "def test(absenc_emulate):\n    assert absenc_emulate('tformat').path.startswith('/dev/')\n")
             done = subprocess.run([python, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_drive.py"], cwd=scratch,

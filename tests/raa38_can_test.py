@@ -18,7 +18,7 @@ class CanBus(Case):
         return emulator
 
     def bus(self, *arguments):
-        """Returns the address of a virtual bus, with a latency that a busy machine needs."""
+        """Returns the address of a virtual CAN bus, with a latency that allows for a busy machine."""
         self.node = self.emulator(*arguments)
         return f"raa38-can:slcan:{self.node.path}?latency=300"
 
@@ -49,8 +49,8 @@ class CanBus(Case):
         self.assert_no_rule_broken()
 
     def burst(self, count):
-        """Sends `count` requests in one write. Returns how many the adapter accepted and refused, and how many the node
-        answered."""
+        """Sends `count` requests in one write. Returns how many of them the adapter accepted, how many it refused, and
+        how many the node answered."""
         descriptor = os.open(self.node.path, os.O_RDWR | os.O_NOCTTY)
         self.addCleanup(os.close, descriptor)
         tty.setraw(descriptor)
@@ -97,8 +97,10 @@ class CanBus(Case):
         zero = self.fields("zero", address, "--yes")
         self.assertEqual((zero["before"], zero["after"], zero["written"], zero["answered"]), (5000, 0, True, True))
         self.assertEqual(self.singleturn(address), 0)
-        self.assertFalse(self.fields("zero", address, "--yes")["written"])  # the position is zero already
-        self.assertEqual(self.singleturn(address + "&listen=true"), 0)  # the node sends cyclic frames again
+        # Nothing is written, because the position is zero already.
+        self.assertFalse(self.fields("zero", address, "--yes")["written"])
+        # The node sends cyclic frames again, as before the command.
+        self.assertEqual(self.singleturn(address + "&listen=true"), 0)
         self.assert_no_rule_broken()
         again = self.emulator("--singleturn", "5010", "--memory", memory, name="again")
         self.assertEqual(self.singleturn(f"raa38-can:slcan:{again.path}?latency=300"), 10)
@@ -116,7 +118,7 @@ class CanBus(Case):
         again = absenc("config", "set", address + "&node=0x42", "node", "0x42", "--yes")
         self.assert_good(again)
         self.assertIn("nothing was sent, because it is so already", again.stderr)
-        self.assert_no_rule_broken()  # no setting was written twice
+        self.assert_no_rule_broken()  # the node reports a rule violation if a setting is written twice
 
     def test_force_writes_node_again(self):
         address = self.bus()
@@ -204,7 +206,7 @@ class CanBus(Case):
             self.assertRegex(answered, r"^\(1\d{9}\.\d{6}\) adapter 120#4726000000000000$")
         times = [float(re.match(r"\(([\d.]+)\)", line)[1]) for line in lines]
         self.assertEqual(times, sorted(times))
-        self.assert_failed(absenc("read", f"{address}&log={log}"), log)  # the existing log is not overwritten
+        self.assert_failed(absenc("read", f"{address}&log={log}"), log)  # `read` refuses to overwrite the existing log
 
     def test_survives_faults(self):
         address = self.bus("--fault", "silence=0.2", "--fault", "drop=0.1", "--fault", "repeat=0.1", "--singleturn", "9",
@@ -216,10 +218,10 @@ class CanBus(Case):
         self.assertRegex(self.node.end()[2], r"faults injected: .*drop.*silence.*repeat")
 
     def test_survives_interrupted_adapter(self):
-        """Garbage, and frames of another program, arrive on the line."""
+        """Garbage, and commands of another program, arrive at the adapter while absenc uses it."""
         address = self.bus("--singleturn", "9799")
         with open(self.node.path, "wb", buffering=0) as other:
-            other.write(b"garbage\rt22")  # the other program sends garbage and an incomplete frame
+            other.write(b"garbage\rt22")  # the other program sends garbage and an incomplete command
         self.assertEqual(self.singleturn(address), 9799)
 
     def test_bench(self):

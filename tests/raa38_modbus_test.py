@@ -10,7 +10,8 @@ from command_support import Case, Emulator, FakeEncoder, absenc, json_lines
 
 
 def framed(text):
-    """Returns the bytes with their CRC, low byte first, computed in the steps of the manual (3.1.7)."""
+    """Returns the bytes of the hexadecimal text followed by their CRC, low byte first, computed in the steps of the
+    manual (3.1.7)."""
     data = bytes.fromhex(text)
     crc = 0xFFFF
     for byte in data:
@@ -21,7 +22,7 @@ def framed(text):
 
 
 REQUEST_1, REQUEST_2 = framed("010300000001"), framed("010300000002")
-# Each row: options, request, reply, error, evidence in the message, advice.
+# Each row: options, request, reply, expected error, evidence in the message, advice.
 FRAMES = [
     ("bits=14", REQUEST_1, framed("0103020180")[:-1], "wrong_length", "byte count 02", "bits and registers"),
     ("bits=14", REQUEST_1, framed("01030400000180"), "wrong_length", "byte count 02", "more than 16 bits has two"),
@@ -41,7 +42,7 @@ FRAMES = [
     ("bits=14", REQUEST_1, framed("01830b"), "request_rejected", "behind the gateway", "gateway"),
     ("bits=14", REQUEST_1, framed("018377"), "request_rejected", "the standard does not have", "manual"),
 ]
-# Further bad replies, to requests that no reading sends.
+# Further bad replies, in the same form, to requests that no reading sends.
 OTHER_FRAMES = [
     (framed("ffa0"), framed("ffa000"), "out_of_range", "from 1 to 247"),
     (framed("ffa0"), framed("ffa001")[:-1], "wrong_length", "several encoders"),
@@ -204,7 +205,8 @@ class Settings(ModbusCase):
         emulator = self.emulator("--also", "address=2")
         result = absenc("config", "set", self.uri(emulator), "address", "2", "--yes")
         self.assert_failed(result, "invalid_argument", "answers at that address already", "nothing was sent")
-        self.set(self.uri(emulator), "address", "3")  # with two encoders on the line, the A0 request identifies none
+        # With two encoders on the line, the request A0 does not identify one of them, so it gets no clear reply.
+        self.set(self.uri(emulator), "address", "3")
         self.assert_good(absenc("read", self.uri(emulator, "&address=2")))
         self.assertEqual(self.violations(emulator), [])
 
@@ -286,7 +288,7 @@ class Frames(ModbusCase):
     def test_silence_and_noise(self):
         with FakeEncoder({0x01: b""}) as encoder:
             self.assert_failed(absenc("read", f"raa38-modbus:{encoder.path}"), "timeout", "nobody answers", "scan")
-        with FakeEncoder({0x01: REQUEST_1}) as encoder:  # only the echo of the request comes back
+        with FakeEncoder({0x01: REQUEST_1}) as encoder:  # this fake encoder only returns the echo of the request
             self.assert_failed(absenc("read", f"raa38-modbus:{encoder.path}"), "request itself came back")
 
     def test_decode_without_request(self):

@@ -10,7 +10,7 @@ import unittest
 
 from command_support import BabblingLine, Emulator, EncoderCase, FakeEncoder, absenc, json_lines
 
-FRAME = bytes.fromhex("ff81017f00")  # the manual's example (3.1.1): position 383 of 14 bits
+FRAME = bytes.fromhex("ff81017f00")  # example of a frame in the manual (3.1.1): position 383 of 14 bits
 
 
 def frame(value, data_bytes=2, second=0x81):
@@ -29,7 +29,7 @@ class RaaCase(EncoderCase):
         self.assertIn("\n  Try: ", result.stderr)
 
     def read_fake(self, reply, options):
-        """Returns the result of `read` for a bus encoder that always sends the same reply."""
+        """Returns the result of `read` with a fake encoder in bus mode that always sends the same reply."""
         with FakeEncoder({0xBC: reply}) as fake:
             return absenc("read", f"raa38:{fake.path}?mode=bus&latency=50{options}")
 
@@ -71,7 +71,8 @@ class Stream(RaaCase):
         result = absenc("read", "sim:raa38?fault=corrupt=0.3&refresh_hz=1000", "--rate", "0", "--count", "100")
         self.assert_good(result)
         dropped = int(re.search(r"(\d+) damaged frames of the stream were dropped", result.stderr).group(1))
-        # With 30 of 100 frames damaged, about 43 are dropped per 100 good ones. A busy machine skips some of them.
+        # If 30 of 100 frames are damaged, about 43 are dropped per 100 good ones. The limit is lower, because a busy
+        # machine skips some frames.
         self.assertGreater(dropped, 15, result.stderr)
         result = absenc("read", "sim:raa38?refresh_hz=1000", "--rate", "0", "--count", "100")
         self.assertEqual((result.returncode, result.stderr), (0, ""))

@@ -102,7 +102,8 @@ class Readings(EncoderCase):
         readings = json_lines(absenc("read", address, "--json", "--count", "20", "--rate", "200").stdout)
         for before, after in zip(readings, readings[1:]):
             turned = (after["angle_deg"] - before["angle_deg"]) % 360
-            # One revolution per second. The timestamp is the end of the request; the encoder samples later.
+            # The shaft makes one revolution per second. The tolerance is large, because the timestamp is the end of the
+            # request, and the virtual encoder samples the position later.
             self.assertAlmostEqual(turned, 360 * (after["time_s"] - before["time_s"]), delta=360 * 0.3)
             self.assertGreater(turned, 0)
 
@@ -146,13 +147,14 @@ class Simulator(EncoderCase):
         self.assertEqual(readings[0]["singleturn_bits"], 23)
 
     def test_damaged_words_are_not_confirmed(self):
-        """SSI has no check. A word is only confirmed by another word that agrees within the possible motion."""
+        """SSI has no check, so a word is only confirmed by another word that differs by no more than the possible
+        motion."""
         result = absenc("read", "sim:ssi?fault=corrupt=1&max_rpm=1", "--json", "--count", "6", "--rate", "50")
         readings = [json.loads(line) for line in result.stdout.splitlines()]
         self.assertEqual(len(readings), 6)
         for one in readings:
             away = min(one["singleturn"], 4096 - one["singleturn"])
-            # counts within which damaged words may agree by chance
+            # Damaged words may be equal by chance within 4 counts.
             self.assertTrue(not one["confirmed"] or away <= 4, one)
         doubtful = [one for one in readings if not one["confirmed"]]
         self.assertTrue(doubtful)
@@ -161,7 +163,8 @@ class Simulator(EncoderCase):
             self.assertFalse(one["singleturn_valid"])
 
     def test_speed_limit_confirms_words(self):
-        """Three of ten words are damaged. Up to a twentieth of the confirmed ones may agree by chance."""
+        """Three of ten words are damaged. Of the confirmed words, up to a tenth may be wrong, because damaged words may
+        match by chance."""
         for encoder in ("sim:ssi?fault=corrupt=0.3&max_rpm=1", "sim:amt21?fault=corrupt=0.3&max_rpm=1"):
             result = absenc("read", encoder, "--json", "--count", "400", "--rate", "0")
             readings = [json.loads(line) for line in result.stdout.splitlines()]
@@ -176,7 +179,7 @@ class Simulator(EncoderCase):
 
 
 class ErrorMessages(EncoderCase):
-    """Each message states what happened, the transmitted bytes, and what to try."""
+    """Tests that each error message states what happened, the transmitted bytes, and what to try."""
 
     def test_silence(self):
         result = absenc("read", f"tformat:{self.emulator('--fault', 'silence=1').path}")
@@ -308,7 +311,7 @@ class ErrorMessages(EncoderCase):
 
 
 class OrdinaryUser(EncoderCase):
-    """Root may open any file. As root, these tests run a copy of the command as the user nobody."""
+    """Tests of file access. Root may open any file, so as root these tests run a copy of absenc as the user nobody."""
 
     def setUp(self):
         super().setUp()
@@ -335,7 +338,7 @@ class OrdinaryUser(EncoderCase):
             self.first_line(first)
             second = self.as_user("read", address)
             self.assert_failed(second, emulator.path, "in use", f"process {first.pid}")
-            # the first reader is not disturbed
+            # The refused second reader does not disturb the first one.
             self.assertIsNotNone(read_line(first.stdout, time.monotonic() + PATIENCE))
         finally:
             end(first)
@@ -388,7 +391,7 @@ class Termination(EncoderCase):
         wait_for_handler(process)
         status, _, err = end(process, signal.SIGINT)
         self.assertEqual(status, 1)
-        # the command had only sent read requests
+        # The refused command had only sent read requests.
         self.assert_sentence(err, "interrupted in the middle of zero", "Change: not sent")
 
     def test_interrupted_wait_for_reply(self):
@@ -418,7 +421,7 @@ class Termination(EncoderCase):
         result = subprocess.run(["sh", "-c", '"$0" read "tformat:$1?latency=300" >&-', ABSENC, emulator.path],
                                 capture_output=True, text=True, timeout=PATIENCE, check=False)
         self.assert_failed(result, "standard output cannot be written")
-        # The emulator received two requests of one byte, and not the text of a reading.
+        # The emulator received the two request bytes of the other process, and not the text of a reading.
         self.assertIn("absenc: 2 requests answered", emulator.end()[2])
 
 
@@ -513,7 +516,8 @@ class Run(EncoderCase):
         self.assertIn("0 requests answered", emulator.end()[2])
 
     def ask(self, address, answer):
-        """Runs `zero` on a terminal. Returns the exit status and the terminal's text."""
+        """Runs `zero` on a terminal and answers its question with `answer`. Returns the exit status and the terminal's
+        text."""
         terminal, ours = pty.openpty()
         process = subprocess.Popen([ABSENC, "run", address, "zero"], stdin=ours, stdout=subprocess.DEVNULL, stderr=ours)
         os.close(ours)
@@ -526,7 +530,7 @@ class Run(EncoderCase):
         try:
             while True:
                 shown += os.read(terminal, 1024)
-        except OSError:  # the other end is closed and everything was read
+        except OSError:  # the process has closed its end of the terminal, and all text was read
             os.close(terminal)
         return status, shown.decode()
 

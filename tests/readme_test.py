@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests that the README and the pages it names show real output: each example is run, from top to bottom."""
+"""Tests that the README and other pages show real output: the examples of each page are run, from top to bottom."""
 import os
 import re
 import select
@@ -18,17 +18,18 @@ SOURCE = Path(os.environ["ABSENC_SOURCE_DIR"])
 PAGES = ["README.md", *(f"docs/{name}.md" for name in ("read", "set-up", "record", "serve", "decode", "test-a-drive", "doctor", "cpp",
                                                         "python", "add-an-encoder"))]
 PORT = "/dev/ttyUSB0"
-# Languages of blocks that are not run here: commands that change the computer, texts, and programs of other tests.
+# Languages of code blocks that this test does not run: commands that change the computer, texts, and programs that
+# other tests run.
 OTHERS = {"sh", "text", "cmake", "cpp", "yaml", "nginx", "caddy"}
 
 
 def blocks(text):
-    """Returns (language, content) of each block, in order."""
+    """Returns (language, content) of each code block of a page, in order."""
     return re.findall(r"^```(\w*)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
 
 
 def commands(block):
-    """Returns (command, lines shown below it) of a block."""
+    """Returns (command, lines of output shown below it) for each command of a code block."""
     found = []
     for line in block.splitlines():
         if line.startswith("$ "):
@@ -39,19 +40,21 @@ def commands(block):
 
 
 def masked(text):
-    """Masks numbers, which vary between runs, and the spaces around them. On a busy machine a reading may fail."""
+    """Returns the lines of the text with each number replaced by N and spaces reduced, because numbers vary between
+    runs. Removes a count of failed readings, which a busy machine may cause."""
     text = re.sub(r" \(\d+ failed\)", "", text)
     return [re.sub(r"\s+", " ", re.sub(r"\d+(\.\d+)?", "N", line)).strip() for line in text.splitlines() if line.strip()]
 
 
 class Page:
-    """Runs the examples of a page in a temporary folder, with a virtual encoder instead of the real one."""
+    """Runs the examples of a page in a temporary folder, with a virtual encoder in place of the port in the
+    examples."""
 
     def __init__(self, name, folder):
         self.text = (SOURCE / name).read_text(encoding="utf-8")
         self.folder = folder
         self.running = []
-        self.port = free_port()  # replaces the default port of `absenc serve`
+        self.port = free_port()  # this port replaces the default port of `absenc serve` in the examples
         (folder / "bin").mkdir()
         (folder / "bin" / "absenc").symlink_to(ABSENC)
         self.environment = {**os.environ, "PATH": f"{folder}/bin:{os.environ['PATH']}", "PYTHONPATH": str(PACKAGE), "HOME": str(folder),
@@ -64,7 +67,8 @@ class Page:
         return text.replace("/tmp/", f"{self.folder}/").replace(PORT, f"{self.folder}/ttyUSB0").replace("127.0.0.1:8420", f"127.0.0.1:{self.port}")
 
     def start(self, command):
-        """Starts the command in the background until the page ends, and waits until it prints that it is ready."""
+        """Starts the command in the background until `close`, and waits until it prints a line that shows that it is
+        ready."""
         process = subprocess.Popen(["bash", "-c", "exec " + self.here(command)], cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL,
                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         self.running.append(process)

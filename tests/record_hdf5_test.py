@@ -15,7 +15,7 @@ import numpy
 from command_support import ABSENC, PATIENCE, absenc, end
 from record_test import COLUMNS, RecordCase, wait_until
 
-LOST = 2  # seconds of lost rows at most; one on an idle machine
+LOST = 2  # seconds of rows that may be lost after SIGKILL; on an idle machine at most one
 
 
 def can_be_read(path):
@@ -31,7 +31,7 @@ class Hdf5(RecordCase):
         return super().output(name)
 
     def read(self, path=None):
-        """Returns the attributes and columns of a recording, and checks that they are complete."""
+        """Returns the attributes and columns of a recording, after checking that all columns are complete."""
         with h5py.File(path or self.output(), "r") as file:
             attributes = {name: value.decode() if isinstance(value, bytes) else value for name, value in file.attrs.items()}
             count = len(file["time_s"])
@@ -43,14 +43,15 @@ class Hdf5(RecordCase):
         return attributes, columns
 
     def assert_is_what_the_shaft_did(self, columns):
-        """The shaft turns at 60 rpm from 0, which is one count every 7.6 us. Lost readings make no difference."""
+        """Checks that the positions fit their times: the shaft turns at 60 rpm from 0, one count every 7.6 us, whether
+        or not readings are lost."""
         good = columns["event"] == b""
         turns = columns["position"][good] / 2**17
         self.assertLess(numpy.ptp(turns - columns["time_s"][good]), 1e-4)
         self.assertTrue((columns["position"][~good] == numpy.iinfo("i8").min).all())
 
     def test_file_is_valid_as_soon_as_it_exists(self):
-        """The recorder is killed as soon as the file's name appears."""
+        """A recording must be valid even if the recorder is killed as soon as the file's name appears."""
         for i in range(20):
             path = self.output(f"{i}.h5")
             process = subprocess.Popen([ABSENC, "record", "sim:tformat", "--output", path], stdout=subprocess.DEVNULL,
@@ -94,7 +95,7 @@ class Hdf5(RecordCase):
             self.assertTrue(set(columns["event"]) - {b"", b"gap"}, part)
 
     def test_killed_recording_is_valid(self):
-        """After SIGKILL at any time the file can be opened and few rows are missing."""
+        """After SIGKILL at any time it must be possible to open the file, and few rows may be missing."""
         random.seed(3)
         for number in range(8):
             path = self.output(f"{number}.h5")
@@ -124,7 +125,8 @@ class Hdf5(RecordCase):
         self.assertNotIn("is whole", messages)
 
     def test_full_disk(self):
-        """A limit on the file size stands in for a full disk. The rows that the message reports must be in the file."""
+        """A limit on the file size has the effect of a full disk. The file must have as many rows as the message
+        reports."""
         limit = ("import resource, signal, os, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN); "
                  "resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000)); os.execv(sys.argv[1], sys.argv[1:])")
         result = subprocess.run([sys.executable, "-c", limit, ABSENC, "record", "sim:tformat?motion=rpm=60", "--rate", "0",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests the files of `absenc record` when the encoder, the disk or the command fails."""
+"""Tests the files that `absenc record` writes when the encoder, the disk or the command fails."""
 import csv
 import datetime
 import glob
@@ -28,7 +28,7 @@ def wait_until(condition, what):
 
 
 def read_csv(path):
-    """Returns the header and the rows of a recording. Every line must be complete."""
+    """Returns the header and the rows of a CSV recording, after checking that every line is complete."""
     with open(path, encoding="utf-8", newline="") as file:
         text = file.read()
     if text and not text.endswith("\n"):
@@ -43,7 +43,7 @@ def read_csv(path):
 
 
 def rows_so_far(path):
-    """Returns the rows of a recording, or an empty list before it begins."""
+    """Returns the rows written to a recording so far, or an empty list if it has no header yet."""
     return read_csv(path)[1] if os.path.exists(path) and os.path.getsize(path) > 0 else []
 
 
@@ -86,7 +86,8 @@ class Files(RecordCase):
         started = datetime.datetime.fromisoformat(header["started"].replace("Z", "+00:00"))
         self.assertLess(abs((started - before).total_seconds()), PATIENCE)
         self.assert_rising(times(rows))
-        rows = [row for row in rows if row["event"] != "gap"]  # a busy machine may cause gaps
+        # Rows without those for gaps, which a busy machine may cause.
+        rows = [row for row in rows if row["event"] != "gap"]
         self.assertEqual(len(rows), 20)
         for row in rows:
             self.assertEqual((row["singleturn"], row["singleturn_valid"], row["multiturn"], row["multiturn_valid"],
@@ -100,13 +101,14 @@ class Files(RecordCase):
         self.assert_good(absenc("record", self.encoder("--singleturn", "5"), "--output", self.output("log.jsonl"),
                                 "--count", "12", "--rate", "10"))
         header, rows = read_json_lines(self.output("log.jsonl"))
-        rows = [row for row in rows if row.get("event") != "gap"]  # a busy machine may cause gaps
+        # Rows without those for gaps, which a busy machine may cause.
+        rows = [row for row in rows if row.get("event") != "gap"]
         self.assertEqual((header["absenc_record"], header["protocol"], header["model"]), (1, "tformat", "TS5700N8500"))
         self.assertIn("speed_rpm", header["units"])
         self.assertEqual([row["singleturn"] for row in rows], [5] * 12)
         self.assertEqual(rows[0]["position"], 5)
         self.assertEqual(rows[0]["speed_rpm"], None)
-        # a busy machine may leave some rows without speed
+        # A busy machine may leave some rows without a speed.
         self.assertEqual({row["speed_rpm"] for row in rows[1:]} - {None}, {0})
 
     def test_speed_and_position_past_wrap(self):
@@ -117,7 +119,7 @@ class Files(RecordCase):
         self.assertIn("65535", [row["multiturn"] for row in rows])
         for row in rows[5:]:
             self.assertAlmostEqual(float(row["speed_rpm"]), -90, delta=1)
-            # The position must match its timestamp: 1.5 revolutions per second.
+            # The position must fit its timestamp: the shaft makes 1.5 revolutions per second.
             self.assertAlmostEqual(float(row["position"]) - float(rows[0]["position"]),
                                    -1.5 * 2**17 * (float(row["time_s"]) - float(rows[0]["time_s"])), delta=20)
 
@@ -173,10 +175,11 @@ class Files(RecordCase):
 
 
 class Gaps(RecordCase):
-    """Readings that were due but not taken."""
+    """Tests of gaps: readings that were due but not taken, because the process was stopped."""
 
     def record_and_stop(self, name, stopped, *arguments):
-        """Records for 3 s, stops the process for `stopped` seconds meanwhile, and returns its final message."""
+        """Records for 3 s, stops the process for `stopped` seconds during that time, and returns the final message of
+        `record`."""
         path = self.output(name)
         process = self.start("record", "sim:tformat", "--output", path, "--rate", "200", "--for", "3", *arguments)
         wait_until(lambda: os.path.exists(path) and os.path.getsize(path) > 3000, "readings")
@@ -237,7 +240,7 @@ class Gaps(RecordCase):
 
 class Failures(RecordCase):
     def lose(self, change, *words):
-        """Records, changes the file with `change`, and expects an immediate error."""
+        """Records, calls `change(path)` to change the file, and expects that `record` ends at once with an error."""
         path = self.output(f"{len(os.listdir(self.directory))}.csv")
         process = self.start("record", "sim:tformat", "--output", path, "--every", "1000", "--rate", "100")
         wait_until(lambda: len(rows_so_far(path)) > 0, "readings")
@@ -342,7 +345,7 @@ class Failures(RecordCase):
                 self.assertEqual(row["alarms"], "none" if number < lost else "battery_alarm")
 
     def test_full_disk(self):
-        """Uses a file system of 1 MB, mounted as root or in a separate namespace."""
+        """Uses a file system of 1 MB, mounted as root or in a namespace of its own, as a disk that becomes full."""
         script = ('mount -t tmpfs -o size=1m absenc-test "$1" && "$0" record sim:tformat --rate 0 --output "$1/log.csv" 2>"$2"; '
                   'echo $? >"$3"; cp "$1/log.csv" "$4"; df --output=avail "$1"; umount "$1"')
         folder, messages, status, copy = (self.output(name) for name in ("disk", "messages", "status", "copy.csv"))
@@ -363,7 +366,8 @@ class Failures(RecordCase):
         self.assertGreater(os.path.getsize(copy), 2**20 - 3 * 4096)
 
     def test_killed_recording_is_complete(self):
-        """After SIGKILL, a hundred times, every line is complete and at most the last second is missing."""
+        """After SIGKILL at any time, a hundred times, every line must be complete, and at most the last second may be
+        missing."""
         random.seed(1)
         for number in range(100):
             path = self.output(f"{number}.csv")

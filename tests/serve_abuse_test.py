@@ -29,7 +29,8 @@ class Abuse(ServeCase):
         return connection
 
     def status(self, path="/healthz", address="127.0.0.1"):
-        """Returns the status of a request on a new connection, or None if the server closes it without a reply."""
+        """Returns the HTTP status of a request on a new connection, or None if the server closes the connection without
+        a reply."""
         with socket.create_connection(("127.0.0.1", self.served.port), PATIENCE, (address, 0)) as connection:
             with contextlib.suppress(ConnectionError):
                 connection.sendall(f"GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n".encode())
@@ -41,7 +42,7 @@ class Abuse(ServeCase):
         self.addCleanup(resource.setrlimit, resource.RLIMIT_NOFILE, (soft, hard))
 
     def open_streams(self, count, address="127.0.0.1"):
-        """Opens event streams that are never read. Returns the status of each."""
+        """Opens event streams that are never read. Returns the HTTP status of each."""
         connections = [self.connect(address) for _ in range(count)]
         for connection in connections:
             connection.sendall(b"GET /api/stream HTTP/1.1\r\nHost: localhost\r\n\r\n")
@@ -56,7 +57,7 @@ class Abuse(ServeCase):
         for half in halves:
             half.sendall(b"GET /api/encoders HTTP/1.1\r\nHost: local")
         self.assert_well()
-        # Each incomplete request is closed after a time limit, even if another byte arrives now and then.
+        # The server closes each incomplete request after a time limit, even if another byte arrives now and then.
         talker = halves[0]
         talker.settimeout(0.2)
         deadline = time.monotonic() + PATIENCE
@@ -72,8 +73,8 @@ class Abuse(ServeCase):
         self.fail("it is still waited for")
 
     def raw(self, request):
-        """Returns the bytes received until the server closes the connection or has sent one reply, and the
-        connection."""
+        """Sends the request. Returns the bytes received until the header of a reply is complete or the server closes
+        the connection, and the connection."""
         connection = self.connect()
         connection.sendall(request)
         answer = b""
@@ -98,7 +99,7 @@ class Abuse(ServeCase):
             with self.subTest(request):
                 answer, connection = self.raw(request)
                 self.assertIn(b" 400 ", answer.split(b"\r\n")[0])
-                while connection.recv(4096):  # read until the server closes the connection
+                while connection.recv(4096):  # reads until the server closes the connection
                     pass
 
     def test_answers_long_requests(self):
@@ -137,14 +138,15 @@ class Abuse(ServeCase):
         self.allow_many_files()
         for _ in range(2000):
             self.connect()
-        # A new connection replaces the oldest idle one of the same address, so nobody is refused.
+        # A new connection replaces the oldest idle one of the same address, so no client is refused.
         self.assertEqual([self.status() for _ in range(20)], [200] * 20)
 
         def longest():
             begin = time.monotonic()
             self.assertEqual(self.status("/api/encoders", "127.0.0.2"), 200)
             return time.monotonic() - begin
-        # On an idle machine a reply takes 4 ms at most. On a busy one the measurement repeats until it is undisturbed.
+        # On an idle machine a reply takes 4 ms at most. On a busy machine the measurement repeats until no reply takes
+        # 100 ms.
         wait_until(lambda: max(longest() for _ in range(20)) < 0.1, "another address is served within 100 ms")
 
     def test_idle_connections_of_many_addresses_do_not_block_others(self):
@@ -154,14 +156,14 @@ class Abuse(ServeCase):
                 self.connect(f"127.0.1.{i + 1}")
         begin = time.monotonic()
         self.assertEqual([self.status("/api/encoders", f"127.0.2.{i + 1}") for i in range(20)], [200] * 20)
-        # limit in seconds; idle connections would end by themselves after 10 s
+        # Limit in seconds. The idle connections would end by themselves only after 10 s.
         self.assertLess(time.monotonic() - begin, 5)
 
     def test_unread_streams_leave_room_for_other_addresses(self):
         statuses = self.open_streams(300)
         self.assertEqual((statuses.count(200), statuses.count(503)), (200, 100))
         self.assertEqual(self.open_streams(100, "127.0.0.2"), [200] * 100)
-        # accepted, because the limit is per address
+        # The limit of 200 streams is for one address, so streams of another address are accepted.
         self.assertEqual(self.open_streams(20, "127.0.0.3"), [200] * 20)
         self.assertEqual(self.status(address="127.0.0.4"), 200)
 

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc serve` with a broker that violates MQTT: the encoders must still be read, and no message may be
-lost."""
+"""Tests `absenc serve` with a broker that violates MQTT: encoders must still be read, and no message may be lost."""
 import json
 import os
 import shutil
@@ -13,7 +12,7 @@ from mqtt_support import numbers
 from serve_support import ServeCase, wait_until
 
 ONE = "sim:tformat?motion=rpm=60"
-DEADLY = {  # each fails an assertion of libmosquitto 2.0.11, which ended the server
+DEADLY = {  # packets that fail an assertion of libmosquitto 2.0.11, which once ended the server
     "CONNACK with an unknown property": bytes.fromhex("20050000027f00"),
     "DISCONNECT with an unknown property": bytes.fromhex("e00487027f00"),
     "PUBACK with an unknown property": bytes.fromhex("4006000100027f00"),
@@ -35,7 +34,7 @@ class BrokerCase(ServeCase):
         return server.json("/api/mqtt")
 
     def children(self, server):
-        """Returns (number, state, arguments) of the server's child processes, including zombies."""
+        """Returns (number, state, command line) of each child process of the server, including zombies."""
         found = []
         for name in filter(str.isdigit, os.listdir("/proc")):
             try:
@@ -49,7 +48,7 @@ class BrokerCase(ServeCase):
         return found
 
     def events(self, broker):
-        """Returns the text of each event once, even if its message was repeated."""
+        """Returns the text of each published event once, even if its message was repeated."""
         return list({one["id"]: one["text"] for one in broker.all("/event")}.values())
 
 
@@ -109,7 +108,7 @@ class BadPackets(BrokerCase):
 
 
 class RefusedMessages(BrokerCase):
-    """The broker refuses the readings of one of two encoders, and accepts them later."""
+    """Tests of a broker that refuses the readings of one of two encoders, and accepts them later."""
     BAD, GOOD = "/bad/readings", "/good/readings"
 
     def serve(self, answer):
@@ -156,7 +155,7 @@ class RefusedMessages(BrokerCase):
         self.check(broker, server, 1, "Not authorized")
 
     def test_refused_by_closing_connection(self):
-        """Brokers of MQTT 3.1.1 refuse in this manner, and some of MQTT 5."""
+        """The broker refuses a message by closing the connection, as those of MQTT 3.1.1 and some of MQTT 5 do."""
         def answer(broker, _connection, kind, flags, body, usual):
             if self.refuses(broker, kind, flags, body) is not None:
                 raise Closed
@@ -200,7 +199,7 @@ class ClientProcess(BrokerCase):
         self.assertNotIn("/dev/zero", links)
 
     def links(self, number):
-        """Returns the targets of the files and sockets that a process has open."""
+        """Returns the targets of all files and sockets that the process `number` has open."""
         folder = f"/proc/{number}/fd"
         return {os.readlink(f"{folder}/{one}") for one in os.listdir(folder)}
 
@@ -214,7 +213,7 @@ class ClientProcess(BrokerCase):
                 wait_until(lambda n=number: not os.path.exists(f"/proc/{n}"), "it is gone")
 
     def test_disconnects_cleanly_if_all_processes_get_a_signal(self):
-        """Ctrl-C and systemd send the signal to all processes."""
+        """Ctrl-C and systemd send the signal to all processes of the server, also to its MQTT client."""
         broker, server = self.started(preexec_fn=os.setsid)
         os.killpg(server.process.pid, signal.SIGTERM)
         self.assertEqual(server.process.wait(PATIENCE), 0)

@@ -7,7 +7,7 @@ import time
 import unittest
 import urllib.parse
 
-from page_scenes import Browser  # imported first, because it checks for selenium
+from page_scenes import Browser  # imported first, because page_scenes checks that selenium is installed
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
@@ -38,7 +38,8 @@ class Page(ServeCase):
         self.browser.get(self.served.url + hash_text)
 
     def text(self, selector="body"):
-        """Returns the visible text in one step, because the page may replace its nodes between two steps."""
+        """Returns the visible text of an element. It is read in one step, because the page may replace its nodes
+        between two."""
         return self.browser.execute_script("""
             return [...document.querySelectorAll(arguments[0])].filter((one) => one.getClientRects().length > 0)
                    .map((one) => one.innerText).join("\\n");""", selector)
@@ -77,7 +78,7 @@ class Page(ServeCase):
         self.assert_no_errors()
 
     def test_digits_keep_their_place(self):
-        """The decimal point and the unit must not move when the value changes."""
+        """The decimal point and the unit must not move on the page when the value changes."""
         name = "sim:tformat?motion=rpm=60"
         served = self.without_history(name)
         self.browser.get(served.url)
@@ -91,7 +92,8 @@ class Page(ServeCase):
         self.assertEqual(len(places), 1, (places, values))
 
     def test_distinguishes_good_from_not_reported(self):
-        """Three encoders: a word without an error bit, a word with one, and turns that an alarm makes invalid."""
+        """The page must distinguish three encoders: one with a word without an error bit, one with an error bit, and
+        one whose turns are invalid because of an alarm."""
         served = self.without_history("sim:ssi", "sim:ssi?error_bit=active_high", "sim:tformat?alarm=battery_error")
         self.browser.get(served.url)
         wait_until(lambda: self.pills() == ["▲ 1 alarm", "○ 1 live, alarms not reported", "● 1 good"], "the bar tells them apart")
@@ -120,7 +122,7 @@ class Page(ServeCase):
         wait_until(lambda: self.browser.execute_script(cards) == 5, "all are shown")
 
     def test_grid_labels_are_distinct(self):
-        name = "sim:encolink?multiturn=60000&motion=rpm=0.5"  # an encoder with many turns, of which few change
+        name = "sim:encolink?multiturn=60000&motion=rpm=0.5"  # an encoder with large turns that change slowly
         served = self.without_history(name)
         self.window.go(served.url, encoder=name, unit="turns")
 
@@ -128,7 +130,7 @@ class Page(ServeCase):
             return self.browser.execute_script("""
                 return Array.from(document.querySelectorAll('.dygraph-axis-label-y'), (label) => label.textContent);""")
         wait_until(lambda: any(float(one) > 59000 for one in labels()), "the turns are drawn")
-        for _ in range(20):  # repeat while the range of the graph grows
+        for _ in range(20):  # repeats while the range of the graph grows
             texts = labels()
             self.assertEqual(len(set(texts)), len(texts), texts)
         cut = """return Array.from(document.querySelectorAll('.dygraph-axis-label-y'))
@@ -241,8 +243,8 @@ class Page(ServeCase):
         self.assert_no_errors()
 
     def canvas_has(self, selector, color):
-        """Returns whether a plot has pixels of this [red, green, blue] colour. Thin lines between two rows of pixels
-        are half transparent."""
+        """Returns whether a plot has pixels of the colour [red, green, blue]. A thin line between two rows of pixels is
+        half transparent."""
         return self.browser.execute_script("""
             const [selector, [red, green, blue]] = arguments;
             return [...document.querySelectorAll(selector + " canvas")].some((canvas) => {
@@ -261,7 +263,7 @@ class Page(ServeCase):
     def test_exchange_figures(self):
         self.window.go(self.served.url, encoder="sim:tformat?alarm=over_heat&fault=corrupt=0.2", range="10m", tab="exchanges")
         self.wait_for("bad checksum", ".histogram")
-        # The page redraws the figures on every change.
+        # The page may redraw the figures on every change, so they are read in one step.
         labels = "return [...document.querySelectorAll('.histogram')].map((table) => table.getAttribute('aria-label'))"
         wait_until(lambda: self.browser.execute_script(labels) == ["replies by latency", "failed attempts by kind"], "there are both")
         widest = "return Math.max(...[...document.querySelectorAll('.histogram .bar')].map((bar) => bar.offsetWidth))"
@@ -303,7 +305,7 @@ class Page(ServeCase):
         yes = self.browser.find_element(By.ID, "dialog-yes")
         token = self.browser.find_element(By.ID, "dialog-token")
         token.send_keys("another-secret-than-that")
-        yes.click()  # the checkbox about the machine's safety was not set
+        yes.click()  # the confirmation dialog refused, because its checkbox about the machine's safety was not set
         self.assertEqual(self.text("#dialog-wrong"), "")
         self.browser.find_element(By.ID, "dialog-safe").click()
         yes.click()
@@ -322,7 +324,7 @@ class Page(ServeCase):
         self.assert_no_errors()
 
     def ask_for(self, command):
-        """Opens the confirmation dialog of a command."""
+        """Opens the dialog in which a user confirms the command."""
         wait_until(lambda: self.browser.find_elements(By.CSS_SELECTOR, f"[data-command={command}]"), "there are commands")
         self.browser.execute_script("document.querySelector('dialog').close()")
         wait_until(lambda: self.text("#dialog-body") == "", "the one before is gone")
@@ -384,7 +386,7 @@ class Page(ServeCase):
         wait_until(lambda: "acknowledged" in self.text("#panel-history"), "the history has it")
         self.assertIn("anna from 127.0.0.1", self.text("#panel-history"))
         self.browser.get("about:blank")
-        self.open()  # opens the page anew
+        self.open()  # opens the page again
         self.wait_for("Acknowledged by anna", self.card(name) + " .words")
         self.assertEqual(self.text(self.card(name) + " .state"), "▲ alarm, seen")
         self.assert_no_errors()
@@ -412,7 +414,8 @@ class Page(ServeCase):
             self.assertTrue(emulator.line().startswith("ok"))
         order(b"alarm over_speed\n")
         self.wait_for("1 alarm", ".pill")
-        self.assertEqual(self.browser.execute_script(notifications), [])  # the user has not allowed notifications yet
+        # The page shows no notification before the user has allowed notifications.
+        self.assertEqual(self.browser.execute_script(notifications), [])
         self.browser.find_element(By.ID, "notify").click()
         wait_until(lambda: self.browser.find_element(By.ID, "notify").get_attribute("aria-pressed") == "true", "it is on")
         order(b"alarm over_heat\n")
@@ -440,7 +443,7 @@ class Page(ServeCase):
         return self.browser.find_element(By.ID, f"panel-{title.lower()}")
 
     def press(self, title, button):
-        """Presses the button in that tab by keyboard, as users without a pointer do."""
+        """Presses the button of the tab `title` by keyboard, as users without a pointer do."""
         wait_until(lambda: self.browser.find_elements(By.ID, f"tab-{title.lower()}") and
                    self.browser.find_element(By.ID, f"tab-{title.lower()}").is_displayed(), f"there is {title}")
         found = self.panel(title).find_element(By.XPATH, f".//button[text()='{button}']")

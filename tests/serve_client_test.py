@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests openapi.json with a generated client: openapi-typescript, the TypeScript compiler and Node."""
+"""Tests openapi.json with a client generated from it, by openapi-typescript, the TypeScript compiler and Node."""
 import json
 import os
 import re
@@ -20,7 +20,7 @@ class Client(ServeCase):
         return subprocess.run(command, cwd=self.directory, capture_output=True, text=True, timeout=4 * PATIENCE, check=False)
 
     def generate(self):
-        """Generates the types of the API with openapi-typescript."""
+        """Generates the TypeScript types of the API with openapi-typescript."""
         generator = tool("openapi-typescript/bin/cli.js")
         os.symlink(MODULES, os.path.join(self.directory, "node_modules"))
         self.file("package.json", '{"type": "module"}')
@@ -48,7 +48,7 @@ class Client(ServeCase):
         self.assertIn("alarm", found["kinds"])
         self.assertIn(["overheat_threshold_c", "90 degC"], found["setting"])
         self.assertEqual((found["stream"], found["unknown"], found["ok"], found["has_metrics"]), (200, 404, True, True))
-        # doctor is not ok, because the encoder has an alarm
+        # The result of doctor is not ok, because the encoder has an alarm.
         self.assertEqual((found["bytes"], found["doctor"]), (127, False))
         asked = set(re.findall(r'client\.\w+\("([^"]+)"', (SOURCE / "tests/npm/client.ts").read_text(encoding="utf-8")))
         described = set(server.json("/openapi.json")["paths"]) - {"/openapi.json", "/api/encoders/{encoder}/stream"}

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests two `absenc serve` with a cluster of three nats-server with JetStream, whose MQTT is version 3.1.1. A node and
-a server are killed with SIGKILL and restarted; every reading that the server counted as taken must arrive.
-ABSENC_CLUSTER_READINGS is the number of readings (default 3000). docs/benchmarks.md has the figures for 20000."""
+"""Tests two `absenc serve` with a cluster of three nats-server with JetStream, whose MQTT is version 3.1.1. One
+nats-server and one `absenc serve` are killed with SIGKILL and restarted; every reading that an `absenc serve` counted
+as taken must arrive. ABSENC_CLUSTER_READINGS is the number of readings (default 3000). docs/benchmarks.md has the
+figures for 20000."""
 import json
 import os
 import unittest
@@ -13,7 +14,7 @@ from mqtt_support import Daemon, Receiver, free_port, now, numbers, twice
 from serve_support import ServeCase, wait_until
 
 READINGS = int(os.environ.get("ABSENC_CLUSTER_READINGS", "3000"))
-RATE = 500  # readings per second of each server
+RATE = 500  # readings per second of each `absenc serve`
 
 
 class Cluster(ServeCase):
@@ -28,7 +29,8 @@ class Cluster(ServeCase):
                 "cluster": {"name": "hall", "listen": f"127.0.0.1:{route}",
                             "routes": [f"nats://127.0.0.1:{one}" for one in routes]},
                 "mqtt": {"listen": f"127.0.0.1:{mqtt}"}}))
-            # A node's MQTT port answers only if the other nodes run, so all start before the test waits for any.
+            # A nats-server answers on its MQTT port only if the others run, so all are started before the test waits
+            # for any.
             nodes.append((["nats-server", "-c", config], mqtt, os.path.join(self.directory, f"node{index}.log")))
         started = [Daemon(*one, wait=False) for one in nodes]
         for one in started:

@@ -21,15 +21,15 @@ NOTICED_S = 5
 
 
 def seconds_in(path):
-    """Returns the seconds recorded in a history, after an integrity check."""
+    """Returns the times, in seconds, that a history file has recorded, after checking the file's integrity."""
     with contextlib.closing(sqlite3.connect(path)) as database:
         assert database.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
         return {at for at, in database.execute("SELECT at FROM second")}
 
 
 class DisturbedFile(ServeCase):
-    """After any damage to the file, the server must report it and record again within 5 s. Existing rows must not be
-    lost."""
+    """Tests of damage to the history file. The server must report it and record again within 5 s. Rows that existed
+    before must not be lost."""
 
     def setUp(self):
         super().setUp()
@@ -42,8 +42,8 @@ class DisturbedFile(ServeCase):
         return self.served.json(of(NAME, "history"), rows=5000)["rows"]
 
     def records_again_after(self, disturb, words):
-        """Disturbs the file, and waits until the server reports it and records again. Returns the seconds recorded
-        before."""
+        """Calls `disturb` to damage the file, and waits until the server reports `words` and records again. Returns the
+        seconds recorded before."""
         before = {row[0] for row in self.rows()}
         begin = self.disturbed_at = time.time()
         disturb()
@@ -57,7 +57,7 @@ class DisturbedFile(ServeCase):
 
     def reported_event(self, words):
         status, body = self.served.ask("/api/events")
-        if status == 503:  # the history is being reopened
+        if status == 503:  # the server is reopening the history
             return None
         events = [event for event in json.loads(body)["events"] if event["kind"] == "history"]
         return next((one for one in events if words in one["text"] and one["at_ms"] > 1000 * self.disturbed_at), None)
@@ -138,7 +138,8 @@ class DisturbedFile(ServeCase):
             self.assertEqual(file.read(), half)
 
     def test_overwritten_by_copy(self):
-        """`cp` keeps the same inode. The copy is not valid together with the previous write-ahead log."""
+        """`cp` overwrites the file but keeps its inode. The copied content is not valid together with the existing
+        write-ahead log."""
         self.write_to_the_file()
         copy = self.path + ".copy"
         with contextlib.closing(sqlite3.connect(self.path)) as database:
@@ -148,7 +149,8 @@ class DisturbedFile(ServeCase):
             database.commit()
             database.execute("VACUUM")
         self.records_again_after(lambda: shutil.copyfile(copy, self.path), f"the history {self.path} ")
-        if recorded := glob.glob(self.path + ".damaged-*Z"):  # the file is set aside only if the mixture is invalid
+        # The server sets the file aside only if the mixture is invalid.
+        if recorded := glob.glob(self.path + ".damaged-*Z"):
             self.assertEqual(seconds_in(copy), seconds_in(recorded[0]))
         self.assertTrue(seconds_in(self.path))
 
@@ -161,7 +163,7 @@ class DisturbedFile(ServeCase):
             self.assertEqual(file.read()[:len(GARBAGE)], GARBAGE)
 
     def write_to_the_file(self, rows=5000):
-        """Writes rows into the main file, not only into its log."""
+        """Writes rows into the main database file of the history, not only into its write-ahead log."""
         with contextlib.closing(sqlite3.connect(self.path, timeout=PATIENCE)) as database:
             database.executemany("INSERT INTO second SELECT id, ?, 50, 0, 1, 2, 3, NULL, NULL, NULL FROM encoder",
                                  [(1_000_000 + i,) for i in range(rows)])
@@ -173,7 +175,8 @@ class DisturbedFile(ServeCase):
 
 
 class UnusableFile(ServeCase):
-    """If the history cannot be written, encoders must still be read and shown, and the health check must report it."""
+    """Tests of a history that cannot be written: encoders must still be read and shown, and the health check must
+    report the failure."""
 
     def assert_failing(self, path, words, **settings):
         server = self.server(NAME, "--history", path, "--token-file", self.tokens(), **settings)
@@ -196,7 +199,8 @@ class UnusableFile(ServeCase):
             file.write(GARBAGE)
         server = self.assert_failing(path, "move it away")
         with open(path, "rb") as file:
-            self.assertEqual(file.read(), GARBAGE)  # the file may belong to another program
+            # The server has not changed the file, which may belong to another program.
+            self.assertEqual(file.read(), GARBAGE)
         os.rename(path, path + ".old")
         self.assert_well_again(server)
 
@@ -207,7 +211,7 @@ class UnusableFile(ServeCase):
         self.assert_well_again(server)
 
     def test_unwritable_folder(self):
-        # not even root can create this file
+        # Not even root can create a file in /sys.
         self.assert_failing("/sys/absenc-history.sqlite", "/sys/absenc-history.sqlite")
 
     def test_full_disk(self):
@@ -238,7 +242,8 @@ DAY = 86_400
 
 
 class WrongSystemClock(ServeCase):
-    """The system clock jumps while the server reads (libfaketime). The clock of the readings is not affected."""
+    """Tests in which the system clock jumps while the server reads (by libfaketime). The clock of the readings
+    continues without a jump."""
 
     def setUp(self):
         super().setUp()
@@ -246,7 +251,7 @@ class WrongSystemClock(ServeCase):
         library = glob.glob("/usr/lib/*/faketime/libfaketimeMT.so.1")
         self.assertTrue(library, "the package faketime is missing")
         self.settings = {"LD_PRELOAD": library[0], "FAKETIME_TIMESTAMP_FILE": self.file("clock"), "FAKETIME_NO_CACHE": "1",
-                         "NO_FAKE_STAT": "1",  # file times remain those of the disk
+                         "NO_FAKE_STAT": "1",  # libfaketime does not change the times of files
                          "FAKETIME_DONT_FAKE_MONOTONIC": "1"}
         self.wrong_by(0)
 
@@ -263,7 +268,7 @@ class WrongSystemClock(ServeCase):
                    f"an event has {words!r}")
 
     def wait_for_readings(self, server, more=150):
-        """Waits for `more` readings and returns their total number."""
+        """Waits for `more` readings. Returns the total number of readings."""
         before = server.json(of(NAME))["readings"]
         wait_until(lambda: server.json(of(NAME))["readings"] >= before + more, "it is read")
         return server.json(of(NAME))["readings"]
@@ -296,9 +301,9 @@ class WrongSystemClock(ServeCase):
         self.wrong_by(-600)
         self.wait_for_event(server, "the clock jumped back by 10 minutes")
         self.wait_for_readings(server)
-        self.wrong_by(-602)  # a step too small to be reported: some seconds occur twice
+        self.wrong_by(-602)  # the server does not report so small a step; some seconds occur twice
         readings = self.wait_for_readings(server)
-        self.wait_for_readings(server)  # wait until the second in progress is over
+        self.wait_for_readings(server)  # waits until the second that is being recorded is over
         end(server.process)
         self.assertGreaterEqual(self.recorded(), readings)
 

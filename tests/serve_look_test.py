@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks the rendered page of `absenc serve` in Chromium: no text may be broken, cut off or covered, at six widths in
+"""Checks the page of `absenc serve` as Chromium renders it: no text may be broken, cut off or covered, at six widths in
 both themes, and axe-core must find no fault. ABSENC_SCREENSHOTS=FOLDER writes a contact sheet of each scene."""
 import os
 import unittest
 
-from page_scenes import KINDS, Browser, config, hundred  # imported first, because it checks for selenium
+# Imported first, because page_scenes checks that selenium is installed.
+from page_scenes import KINDS, Browser, config, hundred
 from selenium.webdriver.common.by import By
 
 from command_support import Emulator
@@ -117,7 +118,7 @@ class Look(ServeCase):
             requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(() => requestAnimationFrame(() => done()), 150)));""")
 
     def look(self, name, widths=WIDTHS):
-        """Measures the scene at each width in each theme."""
+        """Checks the scene `name` at each width in each theme."""
         shots = []
         for dark in (False, True):
             for width in widths:
@@ -197,8 +198,8 @@ class Look(ServeCase):
         self.look("hundred")
 
     def test_redraw_writes_only_changes(self):
-        """Writing an unchanged value makes the browser recompute styles and layout. With a hundred encoders that was
-        most of its work."""
+        """The page must write only values that changed: any write makes the browser recompute styles and layout, which
+        was most of its work with a hundred encoders."""
         server = self.served(hundred())
         self.open(server, "document.querySelectorAll('.card .digits').length === 100")
         same, often = self.browser.driver.execute_async_script("""
@@ -229,7 +230,7 @@ class Look(ServeCase):
               done([same, drawings]);
             })();""")
         self.assertEqual(same, 0)
-        self.assertIn(often, range(1, 6))  # the state arrives twice a second, 60 times
+        self.assertIn(often, range(1, 6))  # a state arrives twice a second, 60 times in all
 
     def test_one_encoder_and_none(self):
         path = self.file("absenc.toml", config({"elbow": ("tformat", "motion=rpm=60")}))
@@ -240,7 +241,7 @@ class Look(ServeCase):
         self.open(server, "document.querySelector('.one .plot canvas')", encoder="elbow")
         wait_until(lambda: "the server has no tokens" in self.browser.ask("return document.body.innerText"), "it says why")
         self.look("without-tokens", (390, 1400))
-        # A server has at least one encoder, but the page must handle an empty list.
+        # The server never sends an empty list of encoders, but the page must handle one.
         self.open(server, self.READY)
         self.browser.driver.execute_async_script("""
             const done = arguments[0];
@@ -264,7 +265,7 @@ class Look(ServeCase):
 
 
 def sheet(paths, path):
-    """Combines the pictures into one, three in a row."""
+    """Writes the pictures side by side, three in a row, to one file at `path`."""
     from PIL import Image
     pictures = [Image.open(one).convert("RGB") for one in paths]
     height = 560

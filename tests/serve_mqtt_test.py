@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc serve` with MQTT: the messages that Debian's mosquitto receives, and recovery when it or the server is
-killed."""
+"""Tests `absenc serve` with MQTT: the messages that Debian's mosquitto receives, and recovery when mosquitto or the
+server is killed."""
 import json
 import os
 import pathlib
@@ -73,7 +73,7 @@ class Messages(MqttCase):
         seconds = now() - started
         all_of = {name: [one for one in receiver.all("readings") if one["encoder"] == name] for name in ("slow", "fast")}
         alone = [one for one in all_of["slow"] if len(one["readings"]) == 1]
-        # a delay of a busy machine puts two readings into one message
+        # If a busy machine delays the server, it puts two readings into one message.
         self.assertGreater(len(alone), len(all_of["slow"]) / 2)
         self.assertLessEqual(len(all_of["fast"]), 10 * seconds + 2)
         for name, messages in all_of.items():
@@ -102,7 +102,8 @@ class Messages(MqttCase):
         good = {"Authorization": f"Bearer {TOKEN}"}
         self.assertEqual(server.ask(of(name, "acknowledge"), "POST", good, alarm="over_heat")[0], 200)
         server.command(name, "position", good)
-        receiver.until("event", lambda one: one["kind"] == "command")  # this event came later than the acknowledgement
+        # The command's event follows the acknowledgement, so that of the acknowledgement would have arrived.
+        receiver.until("event", lambda one: one["kind"] == "command")
         self.assertNotIn("acknowledged", [one["kind"] for one in receiver.all("event")])
         self.assertNotIn("acknowledged", [one for state in receiver.all("state") for alarm in state.get("alarms") or [] for one in alarm])
 
@@ -116,7 +117,8 @@ class State(MqttCase):
         server.process.kill()
         self.assertEqual(receiver.until("state", lambda one: one["state"] == "offline")["why"],
                          "the connection was lost")
-        late = self.receiver(broker, "plant/hall/state")  # a later subscriber gets the retained message
+        # This subscriber comes after the message, so it receives the retained one.
+        late = self.receiver(broker, "plant/hall/state")
         self.assertEqual(late.until("state")["state"], "offline")
         self.assertTrue(late.messages[0][2])
         self.sender(broker.url, ONE)
@@ -167,13 +169,13 @@ class Spool(MqttCase):
         wait_until(lambda: self.numbers(receiver)[-1] >= goal, "they come")
         found = self.numbers(receiver)
         self.assertEqual(found, sorted(found))
-        # The killed broker had accepted some messages but not forwarded them: it keeps them in memory only.
+        # The killed broker may have accepted messages without forwarding them, because it stores them in memory only.
         missing = set(range(1, goal + 1)) - set(found)
         self.assertFalse([one for one in missing if not seen < one <= before], missing)
         self.assertEqual(self.mqtt(server)["dropped"], 0)
 
     def test_survives_kill(self):
-        port = free_port()  # no broker is running
+        port = free_port()  # port of a broker that is not running yet
         server = self.sender(f"mqtt://127.0.0.1:{port}", ONE, "--rate", "100")
         wait_until(lambda: self.taken(server) > 150, "they are spooled")
         shown = self.taken(server)
@@ -190,7 +192,7 @@ class Spool(MqttCase):
         wait_until(lambda: self.mqtt(server)["waiting"] < 5, "the spool is empty")
 
     def test_unacknowledged_message_is_repeated(self):
-        """A broker accepts messages but acknowledges none."""
+        """The broker accepts messages but acknowledges none, so the server must repeat them."""
         silent = SilentBroker()
         self.addCleanup(silent.end)
         server = self.sender(f"mqtt://127.0.0.1:{silent.port}", ONE)
@@ -227,7 +229,7 @@ class Spool(MqttCase):
 
 
     def test_many_open_descriptors(self):
-        """More descriptors than select() supports."""
+        """The server has more open descriptors than select() supports."""
         broker = self.broker()
         receiver = self.receiver(broker)
         crowded = 'ulimit -n 4096 && for ((i = 3; i < 1030; ++i)); do eval "exec $i</dev/null"; done; exec "$@"'
@@ -260,7 +262,7 @@ class Spool(MqttCase):
         result = absenc("serve", ONE, "--history", "none", "--listen", "127.0.0.1:0", "--mqtt-spool", self.spool(),
                         env={**os.environ, "ABSENC_CONFIG": path})
         self.assertEqual(result.returncode, 1, result.stderr)
-        # everything else was accepted: only this file is missing
+        # The server ends only because this file is missing, so it accepted all other settings.
         self.assertIn("/etc/absenc/mqtt-login", result.stderr)
 
 
@@ -292,7 +294,7 @@ class SilentBroker:
                 return kind, read(size)
 
     def published(self, count):
-        """Accepts a connection and returns that many messages of readings."""
+        """Accepts a connection of the server. Returns the next `count` messages of readings."""
         self.connection, _ = self.listener.accept()
         self.connection.settimeout(PATIENCE)
         self.packet()
@@ -342,7 +344,7 @@ class Access(MqttCase):
         broker = self.broker("allow_anonymous true", f"acl_file {closed}")
         server = self.sender(broker.url, ONE)
         wait_until(lambda: "refuses a message" in self.mqtt(server)["trouble"], "it says so")
-        self.assertIn("(plant/hall/", self.mqtt(server)["trouble"])  # the message names the topic
+        self.assertIn("(plant/hall/", self.mqtt(server)["trouble"])  # the message about the trouble names the topic
         self.assertGreater(self.mqtt(server)["waiting"], 0)
         self.assertEqual(self.mqtt(server)["sent"], 0)
         pathlib.Path(closed).write_text(pathlib.Path(rules).read_text(encoding="utf-8"), encoding="utf-8")
@@ -357,7 +359,7 @@ class Access(MqttCase):
         os.chmod(key, 0o644)
         broker = self.broker("allow_anonymous true", f"certfile {cert}", f"keyfile {key}")
         url = f"mqtts://127.0.0.1:{broker.port}"
-        for place in (url, f"mqtts://localhost:{broker.port}"):  # localhost may resolve to ::1 first
+        for place in (url, f"mqtts://localhost:{broker.port}"):  # localhost may resolve to the IPv6 address ::1 first
             server = self.sender(place, ONE, "--mqtt-ca-file", cert)
             wait_until(lambda s=server: self.mqtt(s)["sent"], "it is sent")
             end(server.process)
@@ -371,7 +373,7 @@ class Access(MqttCase):
 
 class OldBroker(MqttCase):
     def test_broker_with_only_3_1_1(self):
-        """The broker answers the MQTT 5 CONNECT with a reply of version 3.1.1."""
+        """The broker supports only MQTT 3.1.1, and answers the CONNECT of MQTT 5 with a reply of version 3.1.1."""
         with socket.create_server(("127.0.0.1", 0)) as listener:
             listener.settimeout(PATIENCE)
             server = self.sender(f"mqtt://127.0.0.1:{listener.getsockname()[1]}", ONE)
@@ -416,7 +418,7 @@ class Settings(MqttCase):
         self.assertEqual(server.encoder()["state"], "live")
 
     def event(self, server, words):
-        """Returns the next message line of the server that contains these words."""
+        """Returns the next line on the server's standard error that contains these words."""
         line = ""
         while words not in line:
             line = read_line(server.process.stderr, now() + PATIENCE)

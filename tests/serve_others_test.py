@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc serve` with other programs: Home Assistant, PlotJuggler, Prometheus, and Grafana's dashboard."""
+"""Tests `absenc serve` with other programs: Home Assistant, PlotJuggler, Prometheus, and a dashboard for Grafana."""
 import json
 import os
 import pathlib
@@ -48,7 +48,7 @@ class HomeAssistant(ServeCase):
         with receiver.lock:
             last = {topic: payload for topic, payload, _ in receiver.messages}
         for topic, config in configs.items():
-            # Home Assistant requires the form PREFIX/COMPONENT/NODE/OBJECT/config.
+            # A topic of Home Assistant's discovery must have the form PREFIX/COMPONENT/NODE/OBJECT/config.
             self.assertRegex(topic, r"^homeassistant/(sensor|binary_sensor)/[a-zA-Z0-9_-]+/[a-zA-Z0-9_-]+/config$")
             self.assertIn(config["state_topic"], last)
             for one in config["availability"]:
@@ -58,7 +58,8 @@ class HomeAssistant(ServeCase):
         template = next(one["value_template"] for one in configs.values() if one["name"] == "Alarm")
         expression = template.strip("{} ").replace("is none", "is None").replace("value_json.alarms", "alarms")
         values = [eval(expression, {"alarms": alarms}) for alarms in ([], [{"name": "over_heat"}], None)]
-        self.assertEqual(values, ["OFF", "ON", "None"])  # an alarm that is not reported is None ("unknown"), not OFF
+        # An alarm that is not reported has the value None ("unknown"), not OFF.
+        self.assertEqual(values, ["OFF", "ON", "None"])
         units = {(one["name"], one.get("unit_of_measurement")) for one in configs.values()}
         self.assertLessEqual({("Angle", "°"), ("Position", "mm"), ("Speed", "rpm"), ("Speed", "mm/s")}, units)
         self.assertEqual(end(server.process)[0], 0)
@@ -145,13 +146,13 @@ class Prometheus(ServeCase):
                 with urllib.request.urlopen(address, timeout=PATIENCE) as answer:
                     return json.load(answer)["data"]["result"]
             except urllib.error.HTTPError as refused:
-                self.assertEqual(refused.code, 503)  # Prometheus is not ready yet
+                self.assertEqual(refused.code, 503)  # status of Prometheus until it is ready
                 return []
         wait_until(lambda: [one for one in ask('up{job="absenc"}') if one["value"][1] == "1"], "it is scraped")
         dashboard = json.loads((SOURCE / "docs/grafana-dashboard.json").read_text(encoding="utf-8"))
         for panel in dashboard["panels"]:
             for target in panel["targets"]:
-                # replace the variables of the query as Grafana does
+                # Replaces the variables of the query, as Grafana does.
                 query = target["expr"].replace("$encoder", ".*").replace("$__range", "5m")
                 self.assertNotIn("$", query)
                 found = wait_until(lambda q=query: ask(q), f"{panel['title']}: {query} has values")

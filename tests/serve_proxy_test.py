@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc serve` behind nginx and Caddy, configured as in docs/serve.md: the page, commands, and access
-rights."""
+"""Tests `absenc serve` behind nginx and Caddy, configured as in docs/serve.md: the page, commands, and access rights
+must work as without a proxy."""
 import contextlib
 import http.client
 import json
@@ -14,7 +14,7 @@ import time
 import unittest
 import unittest.mock
 
-from page_scenes import Browser  # imported first, because it checks for selenium
+from page_scenes import Browser  # imported first, because page_scenes checks that selenium is installed
 
 from command_support import PATIENCE, end
 from npm_support import SOURCE
@@ -66,7 +66,7 @@ class Proxy(ServeCase):
         wait_until(is_ready, "the proxy is ready")
 
     def start(self, proxy, passes_host, upstream):
-        """Starts the proxy with the configuration of the document, with other ports and paths."""
+        """Starts the proxy with the configuration shown in docs/serve.md, with other ports and paths."""
         self.port = free_port()
         text = from_document(proxy)
         if not passes_host:
@@ -117,13 +117,13 @@ class Proxy(ServeCase):
             begin = time.time()
             lines = iter(connection.getresponse().readline, b"")
             state = json.loads(next(line for line in lines if b'"encoders"' in line)[6:])
-            # limit in seconds: the proxy must not buffer the stream
+            # Limit in seconds. A proxy that buffers the stream of events would exceed it.
             self.assertLess(abs(state["at_ms"] / 1000 - begin), 1 + BUSY)
         own = {**GOOD, "Origin": f"https://{SITE}", "Sec-Fetch-Site": "same-origin"}
         self.assertEqual(self.zero({**own, "Authorization": "Bearer " + "x" * 20})[0], 401)
         for evil in ({"Origin": "https://evil.example"}, {"Origin": f"http://{SITE}.evil.example"}, {"Sec-Fetch-Site": "cross-site"}):
             self.assertEqual(self.zero({**own, **evil})[0], 403, evil)
-        # The history must not contain an address that the client itself claims.
+        # The history must not contain an address that the client itself claims in a header.
         status, body = self.zero({**own, "X-Forwarded-For": "203.0.113.9"})
         self.assertEqual(status, 200, body)
         events = json.loads(self.ask("/api/events", headers=GOOD)[1])["events"]
@@ -142,7 +142,7 @@ class Proxy(ServeCase):
         self.assert_page_and_commands_work("caddy", False)
 
     def test_page_in_browser(self):
-        port = free_port()  # the port is part of the browser's Origin header
+        port = free_port()  # the port is a part of the browser's Origin header
         served = self.server(NAME, "--history", "none", "--token-file", self.tokens(), "--public-url", f"https://{SITE}:{port}")
         with unittest.mock.patch(f"{__name__}.free_port", return_value=port):
             self.start("nginx", False, served)
@@ -160,8 +160,8 @@ class Proxy(ServeCase):
         self.assertEqual(status, 200)
 
     def test_proxy_without_public_url(self):
-        """Without --public-url, forwarding headers make reading need a token too, and the refusal explains the
-        option."""
+        """Without --public-url, a request with forwarding headers needs a token even for reading. The refusal must
+        explain the option."""
         self.server_behind("caddy", False, "--token-file", self.tokens())
         self.assertEqual(self.ask("/api/encoders")[0], 401)
         self.assertEqual(self.ask("/api/encoders", headers=GOOD)[0], 200)
@@ -171,7 +171,7 @@ class Proxy(ServeCase):
 
 
 class NamedProxy(ServeCase):
-    """The access rules, tested directly with a proxy's headers."""
+    """Tests the access rules directly, by requests with the headers that a proxy adds."""
 
     def test_accepts_only_public_host_name(self):
         server = self.without_history(NAME, "--token-file", self.tokens(), "--public-url", f"https://{SITE}")

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests the spool of `absenc serve` when its disk is full and when it is removed or damaged: reading must continue, and
-every loss must be reported."""
+"""Tests the MQTT spool of `absenc serve` when its disk is full and when the spool is removed or damaged: reading must
+continue, and every loss must be reported."""
 import os
 import pathlib
 import resource
@@ -13,7 +13,7 @@ from command_support import absenc, end
 from mqtt_support import ONE, MqttCase, free_port, numbers, twice, waiting_in
 from serve_support import wait_until
 
-# Mounts a small file system that only this process and its children see.
+# Command that mounts a small file system, which only this process and its children see.
 ON_DISK = ("unshare", "-Urm", "sh", "-c", 'mount -t tmpfs -o size=3m none "$0" && exec "$@"')
 
 
@@ -29,8 +29,8 @@ class SpoolCase(MqttCase):
         return (self.numbers(receiver) or [0])[-1]
 
     def remove_spool(self):
-        """Removes the spool in one step, because a server that misses its newest file creates another one in the
-        folder."""
+        """Removes the spool folder in one step by renaming it: a server that misses its newest file creates another one
+        in the folder, which would then not be empty."""
         os.rename(self.spool(), self.spool() + ".gone")
         shutil.rmtree(self.spool() + ".gone")
 
@@ -41,7 +41,7 @@ class SpoolCase(MqttCase):
         wait_until(lambda: [one for one in self.events(receiver) if words in one], f"an event has: {words}")
 
     def away(self):
-        """Returns a stopped broker that can be started later."""
+        """Returns a broker that is stopped and can be started later."""
         broker = self.broker()
         broker.kill()
         return broker
@@ -60,8 +60,8 @@ class FullDisk(SpoolCase):
         seen = f"/proc/{server.process.pid}/root{disk}"
         with open(f"{seen}/others", "wb", buffering=0) as others, self.assertRaises(OSError):
             while True:
-                others.write(bytes(65536))  # another program fills the rest of the disk
-        # The spool keeps 4 MB of messages in memory when the disk is full, at 45 kB/s. The test only checks the
+                others.write(bytes(65536))  # the disk is filled by another program
+        # With a full disk the server stores up to 4 MB of messages in memory, at 45 kB/s. This test only checks the
         # messages on disk.
         wait_until(lambda: "No space left" in self.mqtt(server)["trouble"], "it says that the disk is full")
         self.assertEqual(server.json("/healthz")["mqtt"], "failing")
@@ -143,7 +143,7 @@ class Damage(SpoolCase):
         wait_until(lambda: os.path.exists(self.spool()), "it is made anew")
         wait_until(lambda: self.taken(server) > goal + 50, "it goes on")
         end(server.process, signal.SIGKILL)
-        # events may come before the readings
+        # Events may arrive before the readings.
         first = next(one["first"] for one in waiting_in(self.spool()) if "first" in one)
         self.assertEqual(first, 1, "what the open file had was written again")
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shared by the tests of `absenc serve`: the server, its event streams, and waiting for a condition."""
+"""Shared by the tests of `absenc serve`: the server process, its event streams, and waiting for a condition."""
 import contextlib
 import http.client
 import json
@@ -12,7 +12,8 @@ import urllib.parse
 from command_support import ABSENC, PATIENCE, Case, FakeLine, end, read_line
 
 TOKEN = "a-secret-of-nobody-else"
-BUSY = float(os.environ.get("ABSENC_BUSY_SECONDS", "1"))  # time limit for an immediate reaction, in seconds
+# Time limit in seconds for a reaction of the server that should be immediate.
+BUSY = float(os.environ.get("ABSENC_BUSY_SECONDS", "1"))
 
 
 def wait_until(true, what):
@@ -25,12 +26,12 @@ def wait_until(true, what):
 
 
 def of(encoder, part=""):
-    """Returns the URL path of an encoder, or of a part of it such as "history"."""
+    """Returns the URL path of an encoder's API, or of a part of that API such as "history"."""
     return "/api/encoders/" + urllib.parse.quote(encoder, safe="") + (part and f"/{part}")
 
 
 class Stream:
-    """An open stream of server-sent events."""
+    """An open stream of the server's events (server-sent events)."""
 
     def __init__(self, server, trace=""):
         self.connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=PATIENCE)
@@ -38,7 +39,7 @@ class Stream:
         self.answer = self.connection.getresponse()
 
     def next(self):
-        """Returns (event, data)."""
+        """Returns (name, data) of the next event in the stream."""
         name = data = ""
         while True:
             line = self.answer.readline().decode().rstrip("\n")
@@ -50,7 +51,7 @@ class Stream:
                 return name, json.loads(data)
 
     def until(self, wanted):
-        """Returns the first event, with its data, for which `wanted` is true."""
+        """Returns the data of the first event for which `wanted(name, data)` is true."""
         deadline = time.monotonic() + PATIENCE
         while time.monotonic() < deadline:
             event, data = self.next()
@@ -59,7 +60,7 @@ class Stream:
         raise AssertionError("in vain waited for an event")
 
     def state(self, wanted=lambda encoder: True):
-        """Returns the only encoder of the first state for which `wanted` is true."""
+        """Returns the first encoder of the first event "state" for which `wanted(encoder)` is true."""
         data = self.until(lambda event, data: event == "state" and wanted(data["encoders"][0]))
         return data["encoders"][0]
 
@@ -81,7 +82,7 @@ class Server:
         self.port = int(self.url.rstrip("/").rsplit(":", 1)[1])
 
     def answer(self, path, method="GET", headers=None, **values):
-        """Returns (status, type, text)."""
+        """Returns the reply to a request: (HTTP status, content type, text)."""
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE)
         with contextlib.closing(connection):
             query = "?" + urllib.parse.urlencode(values, doseq=True) if values else ""
@@ -108,7 +109,7 @@ class Server:
 
 
 class SilentLine(FakeLine):
-    """A line without an encoder. Doctor takes long on it, because it tries all rates."""
+    """A line without an encoder. Doctor takes long on such a line, because it tries all rates."""
 
     def serve(self):
         select.select([self.wake], [], [])

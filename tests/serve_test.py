@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc serve`: its API, access rights, and history."""
+"""Tests `absenc serve` without a browser: its API, access rights, and history."""
 import contextlib
 import json
 import os
@@ -168,7 +168,8 @@ class EncoderValues(ServeCase):
         self.assertAlmostEqual(rows[2][1] - rows[1][1], 360, delta=60)
 
     def test_last_minute_averages_across_wrap(self):
-        """The shaft stays within 40 degrees of zero. A plain mean of 1 and 359 degrees would be far outside."""
+        """The mean angle must be circular: the shaft stays within 40 degrees of zero, and the plain mean of 1 and 359
+        degrees would be far away."""
         server = self.without_history("sim:raa38-can?motion=sine=40,1")
 
         def places():
@@ -241,14 +242,14 @@ class EncoderValues(ServeCase):
 
 
 class ApiDescription(ServeCase):
-    """Compares openapi.json with the server's replies."""
+    """Tests that openapi.json describes every route, and that replies of the server match it."""
     NAME = "sim:tformat?motion=rpm=60&alarm=over_heat&fault=corrupt=0.1&seed=1"
-    # Parameters that a route requires.
+    # Values for the parameters that a route requires.
     VALUES = {"/api/encoders/{encoder}/command": {"command": "position"},
               "/api/encoders/{encoder}/acknowledge": {"alarm": "over_heat"}}
 
     def schema(self, schema, components):
-        """Converts an OpenAPI 3.0 schema for jsonschema, which writes "nullable" differently."""
+        """Returns an OpenAPI 3.0 schema in the form for jsonschema, which expresses "nullable" differently."""
         if isinstance(schema, list):
             return [self.schema(one, components) for one in schema]
         if not isinstance(schema, dict):
@@ -289,7 +290,7 @@ class ApiDescription(ServeCase):
 
     def check(self, server, method, path, values, kind, schema):
         if kind == "text/event-stream":
-            # the stream may begin with other events
+            # Events other than "state" may come first in the stream.
             data = self.stream(server).until(lambda event, _: event == "state")
             self.assertTrue(data["encoders"])
             return
@@ -381,7 +382,7 @@ class PortInUse(ServeCase):
             self.assertEqual(json.loads(printed)["encoders"][0]["encoder"], f"tformat:{emulator.path}")
             folder = os.path.join(self.directory, "absenc")
             (notice,) = os.listdir(folder)
-            # A file left by another process does not identify the holder of the port.
+            # If the notice of the server names another process, it does not identify the process that holds the port.
             with open(os.path.join(folder, notice), "w", encoding="utf-8") as file:
                 file.write("1 http://127.0.0.1:1/\n")
             refused = absenc("read", f"tformat:{emulator.path}").stderr
@@ -528,7 +529,7 @@ class AccessRights(ServeCase):
         good = {"Authorization": f"Bearer {TOKEN}"}
         status, body = server.command(self.name, "memory-read", good, argument=["5"])
         self.assertEqual(status, 200, body)
-        self.assertNotIn("change", body)  # the command only reads
+        self.assertNotIn("change", body)  # a reply has no key "change" if the command changes nothing
         status, body = server.command(self.name, "memory-write", good, argument=["5", "66"])
         self.assertEqual((status, body["change"]), (200, "confirmed"))
         for command, argument in (("zerro", []), ("memory-read", ["x"]), ("memory-read", ["5", "6", "7", "8", "9"])):
@@ -539,7 +540,7 @@ class AccessRights(ServeCase):
     def test_removed_token_is_refused(self):
         path = self.tokens()
         server = self.without_history(self.name, "--token-file", path)
-        good = {"Authorization": f"bearer {TOKEN}"}  # the name of the authorization scheme ignores case
+        good = {"Authorization": f"bearer {TOKEN}"}  # letter case of the authorization scheme's name is ignored
         self.assertEqual(self.command(server, good)[0], 200)
         with open(path, "w", encoding="utf-8") as file:
             file.write("berta another-secret-of-hers\n")
@@ -560,7 +561,8 @@ class AccessRights(ServeCase):
         self.assertEqual([self.command(server, wrong)[0] for _ in range(13)], [401] * 10 + [429] * 3)
         self.assertEqual(self.command(server, {"Authorization": f"Bearer {TOKEN}"})[0], 200)
         self.assertIn("absenc_wrong_tokens_total{} 13\n", server.ask("/metrics")[1])
-        # a client with too many wrong tokens must not learn whether one is right
+        # A client that sent too many wrong tokens must not learn whether a token is right, so it is refused with a
+        # right one too.
         self.assertEqual(server.ask("/api/token", headers=wrong)[0], 429)
         self.assertIn("absenc_wrong_tokens_total{} 14\n", server.ask("/metrics")[1])
 
@@ -613,7 +615,7 @@ class AccessRights(ServeCase):
 
 
 class EncoderAccess(ServeCase):
-    """Settings, memory and doctor, which access an encoder between two readings or instead of them."""
+    """Tests of settings, memory and doctor, which access an encoder between two readings or instead of readings."""
 
     def post(self, server, encoder, headers=None):
         status, body = server.ask(of(encoder, "doctor"), "POST", headers)
@@ -757,14 +759,15 @@ class EncoderAccess(ServeCase):
         self.assertEqual(self.post(server, "sim:tformat")[0], 200)
 
     def silent(self):
-        """Returns the port of a line without an encoder, on which doctor takes long to try all rates."""
+        """Returns the port of a line without an encoder. Doctor takes long on it, because it tries all rates."""
         line = SilentLine()
         line.__enter__()
         self.addCleanup(line.__exit__, None, None, None)
         return line.path
 
     def begin(self, server, name):
-        """Starts doctor as another client."""
+        """Starts doctor by a request in a thread, as another client would. Returns the thread and the list for its
+        reply."""
         answers = []
 
         def ask():
@@ -909,7 +912,7 @@ class History(ServeCase):
         wait_until(lambda: self.rows(server), "it has a second")
         end(server.process)
         with contextlib.closing(sqlite3.connect(path)) as database:
-            # nothing is deleted before a day was recorded
+            # Old rows are deleted only if more than a day was recorded, so 24 hours are added.
             hours = [(int(time.time()) - 3600 * i,) for i in range(1, 25)]
             database.executemany("INSERT INTO second SELECT id, ?, 50, 0, 1, 2, 3, NULL, NULL, NULL FROM encoder",
                                  [(1,), *hours])

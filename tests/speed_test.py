@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests measured speeds in real time, over pseudo-terminals and beside busy processes: no error may exceed its
-uncertainty."""
+"""Tests measured speeds in real time, over pseudo-terminals and beside busy processes: no speed may differ from the
+true one by more than its stated uncertainty."""
 import json
 import os
 import subprocess
@@ -10,8 +10,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 from command_support import ABSENC, Busy, Emulator, EncoderCase, absenc
 
-SPEEDS = (1, 12, 60, 3000)  # tested speeds in rpm
-# Options of units that are not tested with their defaults only, such as streaming encoders.
+SPEEDS = (1, 12, 60, 3000)  # speeds of the shaft in rpm
+# Options of those units that are tested with more than their defaults, such as streaming encoders.
 OPTIONS = {"encolink": ("", "stream_rate=500&resolution=20"), "raa38": ("mode=bus", "mode=timing")}
 
 
@@ -23,7 +23,7 @@ def serial_units():
 
 class Speed(EncoderCase):
     def rows(self, name, protocol, options, rpm, *more):
-        """Returns the header and rows that `record` writes for a turning encoder."""
+        """Returns the header and rows that `record` writes for a virtual encoder turning at `rpm`."""
         settings = [word for option in options.split("&") if option for word in ("--option", option)]
         name = f"{protocol}-{len(options)}-{name}"
         with Emulator(self.directory, "--motion", f"rpm={rpm}", *settings, protocol=protocol, name=name) as emulator:
@@ -37,8 +37,8 @@ class Speed(EncoderCase):
         return header, rows
 
     def assert_within(self, header, rows, rpm):
-        """Checks that no speed differs from `rpm` by more than its uncertainty. Returns the (speed, uncertainty)
-        pairs."""
+        """Checks that no speed differs from `rpm` by more than its uncertainty. Returns a list of (speed,
+        uncertainty)."""
         unit = "mm_s" if "speed_mm_s" in header["units"] else "rpm"
         pairs = []
         for row in rows:
@@ -46,12 +46,13 @@ class Speed(EncoderCase):
             self.assertEqual(speed is None, uncertainty is None, row)
             if speed is None:
                 continue
-            self.assertLessEqual(abs(speed - rpm), uncertainty * 1.001 + 1e-9, row)  # the printed figures are rounded
+            # The small addition allows for the rounding of the printed figures.
+            self.assertLessEqual(abs(speed - rpm), uncertainty * 1.001 + 1e-9, row)
             pairs.append((speed, uncertainty))
         return pairs
 
     def assert_all(self, busy):
-        """Tests each unit at all speeds at the same time, which also loads the machine."""
+        """Tests all units at all speeds at the same time, which also makes the machine busy."""
         for protocol in serial_units():
             for options in OPTIONS.get(protocol, ("",)):
                 with Busy(busy), ThreadPoolExecutor() as pool:

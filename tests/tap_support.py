@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shared by the tests of `tap`: a relay that copies a line between a host and an emulator, and the `tap` process."""
+"""Shared by the tests of `absenc tap`: a relay that copies a line between a host and an emulator, and the `tap`
+process."""
 import os
 import select
 import signal
@@ -30,7 +31,7 @@ class Relay:
             os.set_blocking(master, False)
         self.encoder = os.open(encoder_path, os.O_RDWR | os.O_NOCTTY)
         tty.setraw(self.encoder)
-        self.from_tap = bytearray()  # bytes sent by tap; must stay empty
+        self.from_tap = bytearray()  # bytes sent by tap to the line; must stay empty
         self.wake, self.waker = os.pipe()
         self.thread = threading.Thread(target=self.run)
 
@@ -47,7 +48,7 @@ class Relay:
                 return
             if self.tap in ready:
                 self.from_tap += os.read(self.tap, 4096)
-            # Bytes that the host has sent meanwhile follow the reply that it waited for.
+            # The encoder is served first: bytes that the host sent meanwhile come after the reply that it waited for.
             for here, there in ((self.encoder, self.host), (self.host, self.encoder)):
                 if here in ready:
                     data = self.change(os.read(here, 4096), here == self.host)
@@ -86,7 +87,8 @@ class TapCase(Case):
         return relay
 
     def tap(self, *arguments, stdin=subprocess.DEVNULL):
-        """Runs `tap` with its output in a file, so that no reader is needed. Returns when tap is ready."""
+        """Starts `tap` with its output in a file, so that no reader is needed. Returns the process when tap is
+        ready."""
         out, messages = open(self.file("out"), "w+b"), subprocess.PIPE
         self.addCleanup(out.close)
         process = subprocess.Popen([ABSENC, "tap", *arguments], stdin=stdin, stdout=out, stderr=messages, bufsize=0)
@@ -99,7 +101,7 @@ class TapCase(Case):
         return process
 
     def finish(self, process, number=signal.SIGINT):
-        """Ends `tap`. Returns its status, output and messages."""
+        """Ends `tap` with the signal `number`. Returns its exit status, output and messages."""
         if process.poll() is None:
             process.send_signal(number)
         _, messages = process.communicate(timeout=PATIENCE)
@@ -107,7 +109,7 @@ class TapCase(Case):
         return process.returncode, process.out.read().decode(), process.messages + messages.decode()
 
     def wait_for(self, process, found):
-        """Waits until the output so far satisfies `found`."""
+        """Waits until `found(output)` is true for the output of `tap` so far. Returns the output."""
         deadline = time.monotonic() + PATIENCE
         while time.monotonic() < deadline:
             with open(process.out.name, encoding="utf-8") as file:
@@ -118,7 +120,7 @@ class TapCase(Case):
         self.fail(f"in vain waited: {text[-1000:]}")
 
     def wait_for_all(self, process, relay):
-        """Waits until `--json` has printed each byte of the line."""
+        """Waits until `tap --json` has printed each byte that the relay copied."""
         self.wait_for(process, lambda text: joined(json_lines(text[:text.rfind("\n") + 1])) == relay.copied.hex())
 
     def lines(self, text):

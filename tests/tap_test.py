@@ -18,8 +18,8 @@ ALL = "--all" in sys.argv
 COUNT = 10_000 if ALL else 150
 
 
-# Options of the emulator and of the host for each serial unit, and the number of readings. Fewer readings if only
-# silence ends a reply, because each then takes as long as the latency.
+# For each serial unit: options of the emulator, options of the host, and number of readings. Units whose replies end
+# only by silence have fewer readings, because each reading takes as long as the latency.
 UNITS = {
     "tformat": ([], "latency=1000", COUNT), "esl": ([], "latency=1000", COUNT), "e201": ([], "latency=1000", COUNT),
     "raa38": (["--option", "mode=bus"], "latency=1000&mode=bus", COUNT),
@@ -48,10 +48,10 @@ class EveryExchange(TapCase):
         self.wait_for_all(tap, relay)
         status, text, messages = self.finish(tap)
         lines, summary = self.lines(text)
-        # A busy machine may delay a reply beyond the host's timeout. The host then repeats its request.
+        # On a busy machine a reply may arrive after the host's timeout. The host then repeats its request.
         repeated = [line for line in lines if line["kind"] == "request" and line.get("error") == "timeout"]
         exchanges = [line for line in lines if line["kind"] == "exchange"]
-        # After half a second tap reports a timeout. A later reply is shown without a request (docs/tap.md).
+        # Half a second after a request, tap reports a timeout. It shows a later reply without a request (docs/tap.md).
         late = [line for before, line in zip(lines, lines[1:])
                 if line["kind"] == "reply" and before in repeated and line["time_s"] - before["time_s"] >= 0.5]
         self.assertEqual([line for line in lines
@@ -59,14 +59,14 @@ class EveryExchange(TapCase):
         if count == COUNT:
             self.assertEqual(repeated + late, [], messages)
             self.assertEqual(status, 0, messages)
-        # Each byte of the line must be in exactly one exchange, in order.
+        # Each byte of the line must be in exactly one line of tap's output, in order.
         self.assertEqual(joined(lines), relay.copied.hex())
         self.assertEqual(bytes(relay.from_tap), b"")
         self.assertEqual(summary["exchanges"], len(exchanges))
         self.assertEqual(summary["bytes"], len(relay.copied))
         self.assertEqual(sum(kind["count"] for kind in summary["per_request"]), len(lines) - len(late))
-        # Each position that the host read must be in an exchange, in the same order. Some encoders are polled twice per
-        # reading.
+        # Each position that the host read must be in an exchange of tap's output, in the same order. Some encoders are
+        # polled twice for a reading.
         key = "singleturn" if "singleturn" in readings[0] else "position"
         said = [line["fields"][key] for line in lines if key in line.get("fields", {})]
         wanted = [reading.get(key, reading.get("fields", {}).get(key)) for reading in readings]
@@ -97,7 +97,7 @@ class EveryExchange(TapCase):
 
 class Damage(TapCase):
     def test_damaged_bytes(self):
-        """Intact exchanges must be shown, damaged ones must be bad, and none may be invented."""
+        """If bytes are damaged, tap must show intact exchanges as good and damaged ones as bad, and invent none."""
         emulator = self.emulator("tformat", "--motion", "rpm=60")
         replies = collections.Counter()
 
@@ -190,7 +190,7 @@ class Output(TapCase):
         self.assertEqual(result.returncode, 0, result.stderr)
 
     def test_exchange_is_shown_at_once(self):
-        """An exchange must be printed before the next one arrives."""
+        """tap must print an exchange before the next one arrives."""
         with subprocess.Popen([ABSENC, "tap", "-", "tformat", "--json"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                               stderr=subprocess.DEVNULL, bufsize=0) as process:
             for _ in range(20):

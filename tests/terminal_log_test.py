@@ -15,7 +15,8 @@ def text_of(data):
     return "".join(chr(byte) if 0x20 <= byte < 0x7F else "." for byte in data)
 
 
-# Each function formats a line from its number, the port, whether the bytes were received, and the bytes.
+# Functions that format one line of a log from its number, the port, whether the bytes were received or sent, and the
+# bytes.
 STYLES = {
     "port": lambda n, port, rx, data: f"{port}: {plain(data)}",
     "brackets": lambda n, port, rx, data: f"[17:55:{n:02}.125] [{port}] {'RX' if rx else 'TX'}: {plain(data)}",
@@ -60,7 +61,8 @@ class Logs(Case):
                     result = self.decode(protocol, self.log(style, exchanges))
                     found = json_lines(result.stdout)
                     self.assertEqual([one for one in found if one["ok"] is False and one["error"] != "sequence_mismatch"], [],
-                                     # the vectors are no real conversation, so their counters do not advance
+                                     # The vectors are no real conversation, so their sequence counters do not advance;
+                                     # this error is expected.
                                      result.stderr)
                     self.assertEqual([(one["request"], one["reply"]) for one in found],
                                      [(request.hex(), reply.hex()) for request, reply in exchanges])

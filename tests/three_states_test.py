@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests the three states of an alarm: reported and clear, reported and raised, not reported. The same holds for each
-part of a position. Values that no reply reports must not be shown as clear, valid or INVALID."""
+"""Tests that outputs show the three states of an alarm: reported and clear, reported and raised, not reported. The same
+holds for each part of a position. A value that no reply reports must not be shown as clear, valid or INVALID."""
 import csv
 import io
 import json
@@ -8,7 +8,8 @@ import unittest
 
 from command_support import Case, absenc, json_lines
 
-# T-format replies by data ID: ID 0 carries only SF, ID 3 also ALMC.
+# Replies of T-format; the digit is the data ID. A reply to ID 0 has only the status field SF, one to ID 3 also the
+# alarm field ALMC.
 CLEAR_3 = "1A 1A 00 45 23 01 11 34 12 00 00 4A"
 CLEAR_0 = "02 02 00 CD AB 01 65"
 ALARM_0 = "02 02 20 CD AB 01 45"
@@ -25,7 +26,8 @@ class EveryUnit(Case):
             alarms = next((names for name, names in flags.items() if name.endswith("alarms")), [])
             for alarm in filter(None, alarms):
                 refused = absenc("read", f"sim:{about['protocol']}?alarm={alarm}")
-                if "nothing in what" not in refused.stderr:  # an alarm that the unit's word cannot carry
+                # An error message means that the unit's word cannot carry this alarm.
+                if "nothing in what" not in refused.stderr:
                     yield about, alarm
 
     def assert_raised_or_unknown(self, alarms, alarm):

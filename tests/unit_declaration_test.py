@@ -18,7 +18,7 @@ COMPILE = ["g++", "-std=c++20", "-fsyntax-only", "-Wall", "-Wextra", "-Werror"]
 
 
 def members(aggregate, header):
-    """Returns the members of a struct that a unit's author fills in."""
+    """Returns the names of the members of a struct that the author of a unit fills in."""
     text = (AUTHOR / header).read_text(encoding="utf-8")
     body = re.search(rf"^struct {aggregate} {{\n(.*?)^}};", text, re.MULTILINE | re.DOTALL).group(1)
     return re.findall(r"^  (?!using)(?:\w[\w:<>, *&]* )?\*?\(?\*?(\w+)\)?(?:\([^;]*\))?(?:\{\}| = [\w.]+|);", body, re.MULTILINE)

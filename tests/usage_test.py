@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests that any argument which is not understood ends the command with status 2 before it does anything."""
+"""Tests that any argument which absenc does not understand ends the command with status 2 before the command has any
+effect."""
 import json
 import unittest
 
@@ -10,7 +11,7 @@ ZERO = ["zero", "{encoder}", "--yes"]
 
 
 class WrongArguments(EncoderCase):
-    """The wrong arguments stand next to a verb that would change the encoder if they were ignored."""
+    """Tests wrong arguments of verbs that would change the encoder if the argument were ignored."""
 
     def setUp(self):
         super().setUp()

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-# SPDX-License-Identifier: Apache-2.0
+# Tests the waveforms of virtual encoders that `absenc wave` writes, and compares them with sigrok's decoders.
 """Tests waveforms of virtual encoders, and compares them with sigrok's decoders."""
 import json
 import os
@@ -14,7 +14,7 @@ from command_support import ABSENC, PATIENCE, Case, absenc, end
 UNITS = [json.loads(line) for line in absenc("list", "--json").stdout.splitlines()]
 WIRES = {"half_duplex": {"line"}, "full_duplex": {"host", "device"}, "exchange": {"cs", "sck", "mosi", "miso"},
          "clocked": {"clock", "data"}, "can": {"can"}}
-# EncoLink's channels 2 and 3 are frames spread over several exchanges.
+# Units without replies of their own: frames of EncoLink's channels 2 and 3 are spread over several exchanges.
 IN_PARTS = "each of the last exchanges carried a byte of it"
 
 
@@ -69,7 +69,7 @@ class Wave(Case):
         self.wave("encolink-spi?motion=rpm=60", path, "--count", "20")
         read = self.sigrok("-i", path, "-P", "spi:clk=sck:miso=miso:mosi=mosi:cs=cs:cpol=0:cpha=1", "-A",
                            "spi=miso-data")
-        # Bytes that are clocked after the end of a reply belong to no reply.
+        # Bytes that the host clocks after the end of a reply belong to no reply.
         replies = [one["reply"] for one in self.decoded("encolink-spi", path)]
         self.assertGreater(len(set(replies)), 20)
         self.assertRegex("".join(read).lower(), "^" + "(ff)*".join(replies) + "(ff)*$")
@@ -109,7 +109,8 @@ class Wave(Case):
             self.assertEqual(a.read(), b.read())
 
     def test_decode_finds_every_exchange(self):
-        """Even on a slow line the idle time before the first request and after the last reply must be long enough."""
+        """Even on a slow line, the waveform's idle time before the first request and after the last reply must be long
+        enough for `decode`."""
         for unit, kind in (("tformat", "exchange"), ("esl", "exchange"), ("encolink", "exchange"),
                            ("encolink-spi", "exchange"), ("biss", "reply"), ("ssi", "reply"), ("e201", "exchange"),
                            ("raa38", "reply"), ("raa38?mode=bus", "exchange"), ("raa38-modbus", "exchange"),
@@ -131,7 +132,8 @@ class Wave(Case):
                         self.assertGreaterEqual(sum(row["kind"] == kind for row in rows), count)
 
     def test_spread_frames_are_no_replies(self):
-        """Cycles of EncoLink's channel 2 are rows, but statistics must not count them as unsolicited replies."""
+        """`decode` shows cycles of EncoLink's channel 2 as rows, but its statistics must not count them as unsolicited
+        replies."""
         for unit in ("encolink", "encolink-spi"):
             with self.subTest(unit):
                 path = self.file(unit + ".vcd")
@@ -159,7 +161,7 @@ class Wave(Case):
                 self.assertIn("timeout", {row.get("error") for row in rows})
 
     def edges(self, *arguments):
-        """Returns the times of each wire's changes, and the initial levels."""
+        """Returns the times at which each wire of the waveform changes, and the initial levels."""
         path = self.file("edges.vcd")
         self.wave(*arguments[:1], path, *arguments[1:], "--force")
         names, times, at = {}, {}, 0
@@ -189,7 +191,7 @@ class Wave(Case):
             self.assertEqual(clocks[0] - begin, 5000)
 
     def usage(self, path, *arguments):
-        """Returns the peak memory of a run of the command, in KiB."""
+        """Returns the peak memory, in KiB, of a run of `absenc wave`."""
         process = subprocess.Popen([ABSENC, "wave", "tformat?motion=rpm=60", path, *arguments],
                                    stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
         _, status, usage = os.wait4(process.pid, 0)
@@ -225,7 +227,7 @@ class Wave(Case):
 
     @staticmethod
     def wait_for_work(process):
-        """Waits until the process has written some data, because by then it catches signals."""
+        """Waits until the process has written some data, because it catches signals from then on."""
         deadline = time.monotonic() + PATIENCE
         while time.monotonic() < deadline:
             with open(f"/proc/{process}/io", encoding="ascii") as file:

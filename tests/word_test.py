@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests encoders without a driver: the user describes the word, and every verb works."""
+"""Tests encoders that no unit supports: the user describes the encoder's word, and every verb works with it."""
 import csv
 import json
 import os
@@ -13,7 +13,7 @@ PLAIN = "position:12 battery=value:4"
 
 
 def bits(**values):
-    """Returns the word as transmitted, built independently of the library."""
+    """Returns the bits of a word as transmitted, built independently of the library."""
     fields = [("multiturn", 12), ("position", 24), ("temperature", 8), ("error", 1), ("warning", 1)]
     return "".join(f"{values[name]:0{width}b}" for name, width in fields)
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A client written from openapi.json alone: requests every route of the server and prints the results.
+// A client of `absenc serve` written from openapi.json alone, for a test: requests every route and prints the results.
 import createClient from "openapi-fetch";
 import type {components, paths} from "./api.js";
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests SocketCAN: absenc with can-utils on virtual buses, and with a serial adapter behind slcand."""
+"""Tests `absenc` with SocketCAN: with can-utils on virtual buses, and with a serial adapter behind slcand."""
 import contextlib
 import json
 import os
@@ -16,10 +16,11 @@ from doctor_test import doctor, ids
 from record_test import read_csv, rows_so_far, wait_until
 
 BUS = "vcan0"
-# The latency allows for a busy machine; the speed limit keeps the turns known across a late reading.
+# Address of the encoder. The latency allows for a busy machine; with the speed limit the turns stay known across a late
+# reading.
 ENCODER = f"raa38-can:{BUS}?latency=2000&max_rpm=60"
 HASTY = f"raa38-can:{BUS}"
-# a position request to node 20 and its reply, position 9799
+# A position request to node 20, and its reply with position 9799.
 ASKING, ANSWER = "220#8020000000000000", "120#4726000000000000"
 NODE = 0x120
 
@@ -37,18 +38,18 @@ def position(counts, identifier=NODE):
 
 
 def receivers(interface):
-    """Returns how many sockets receive every frame of the interface."""
+    """Returns the number of sockets that receive every frame of the interface."""
     with open("/proc/net/can/rcvlist_all", encoding="ascii") as file:
         return len(re.findall(rf"^\s*{interface} ", file.read(), re.MULTILINE))
 
 
 def losses(rows):
-    """Returns the losses and returns, without the gaps that a busy machine causes."""
+    """Returns the events for a lost encoder and its return, without the gaps that a busy machine causes."""
     return [row["event"] for row in rows if row["event"] in ("lost", "back")]
 
 
 class AnotherNode(threading.Thread):
-    """Answers each position request of node 20 with the given raw frames."""
+    """A fake node 20 that answers each position request with the given raw frames."""
 
     def __init__(self, *answers, interface=BUS):
         super().__init__()
@@ -84,7 +85,7 @@ class VirtualBus(EncoderCase):
 
     def add(self, interface):
         run("ip", "link", "add", interface, "type", "vcan")
-        # the test may have deleted the interface already
+        # the interface may not exist, because the test may have deleted it
         self.addCleanup(subprocess.run, ["ip", "link", "del", interface], capture_output=True)
         self.up(interface)
 
@@ -132,7 +133,7 @@ class VirtualBus(EncoderCase):
         self.assertNotIn("rules", summary)
 
     def next_json(self, process, condition):
-        """Returns the first line that satisfies the condition."""
+        """Returns the first line of the process's JSON output for which `condition` is true."""
         deadline = time.monotonic() + PATIENCE
         while True:
             text = read_line(process.stdout, deadline)
@@ -178,7 +179,8 @@ class Verbs(VirtualBus):
         emulator = self.emulator("--singleturn", "5000", "--option", "cyclic=50")
         zero = self.run_json("zero", ENCODER, "--yes")["fields"]
         self.assertEqual((zero["before"], zero["after"], zero["written"], zero["answered"]), (5000, 0, True, True))
-        self.assertEqual(self.singleturn(f"{ENCODER}&listen=true"), 0)  # the node sends cyclic frames again
+        # The node sends cyclic frames again, as before the command.
+        self.assertEqual(self.singleturn(f"{ENCODER}&listen=true"), 0)
         self.assert_no_rule_broken(emulator)
 
     def test_record_follows_shaft(self):
@@ -191,8 +193,8 @@ class Verbs(VirtualBus):
         counts = [int(row["position"]) for row in rows]
         moments = [float(row["time_s"]) for row in rows]
         self.assertEqual(counts, sorted(counts))
-        # The shaft turns half a turn (of 16384 counts) per second. Each reading is accurate to 20 ms, even on a busy
-        # machine.
+        # The shaft makes half a turn (of 16384 counts) per second. The tolerance is the motion in 20 ms, which a busy
+        # machine keeps.
         for moment, count in zip(moments, counts):
             self.assertAlmostEqual(count - counts[0], 8192 * (moment - moments[0]), delta=8192 * 0.02)
         self.assert_no_rule_broken(emulator)
@@ -208,12 +210,13 @@ class Verbs(VirtualBus):
         self.assert_failed(absenc("read", HASTY), "timeout", "scan", f"to {BUS}")
         rate = self.run_json("config", "set", f"{ENCODER}&node=0x42", "bitrate", "500000", "--yes")
         self.assertEqual((rate["new"]["bit_rate"], rate["new"]["written"]), (500000, True))
-        # A virtual bus has no bit rate, so all nodes receive each other.
+        # A virtual bus has no bit rate, so nodes with different rates receive each other's frames.
         self.assertEqual(self.singleturn(f"{ENCODER}&node=0x42&bitrate=500000"), 16384 - 1000)
         self.assert_no_rule_broken(emulator)
 
     def test_interface_whose_bit_rate_needs_ip(self):
-        """The interface's name decides: absenc takes this one for a hardware adapter."""
+        """absenc takes the interface for a hardware adapter because of its name, and must recommend the program
+        `ip`."""
         self.add("can7")
         self.emulator(interface="can7")
         encoder = "raa38-can:can7?latency=2000"
@@ -231,7 +234,8 @@ class Library(VirtualBus):
         self.assertEqual(self.line(process), "raa38-can:can8 9799")
         run("ip", "link", "del", "can8")
         process.stdin.write(b"\n")
-        self.assertEqual(self.line(process), "switched")  # the program works also while its interface is down
+        # The emulation can switch the power also while its interface is down.
+        self.assertEqual(self.line(process), "switched")
         self.add("can8")
         wait_until(lambda: receivers("can8") > 0, "the encoder to come back")
         self.assertEqual(self.singleturn("raa38-can:can8?latency=2000"), 9799)
@@ -272,8 +276,8 @@ class CanUtils(VirtualBus):
         seen = []
         while not seen or seen[-1][2] != last:
             seen.append(self.line(listener).split())
-        # A request is logged with the time before it was sent, so frames of other nodes in that moment may be on either
-        # side.
+        # Each kind of frame is compared alone: a request is logged with the time before it was sent, so a frame of
+        # another node at that time may come before or after the request.
         for kind in (ASKING, ANSWER, "121#4D00000000000000"):
             times, seen_times = ([float(line[0].strip("()")) for line in lines if line[2] == kind]
                                  for lines in (logged, seen))
@@ -283,7 +287,8 @@ class CanUtils(VirtualBus):
                 self.assertAlmostEqual(moment, seen_moment, delta=0.04)
 
     def test_no_reply_is_lost_on_busy_bus(self):
-        """cangen sends extended frames with the number of the node's replies (position 1) as fast as possible."""
+        """cangen sends extended frames as fast as possible. They have the number of the node's replies as identifier
+        and contain position 1, so absenc must ignore them."""
         emulator = self.emulator("--singleturn", "9799")
         cangen = self.popen("cangen", BUS, "-g", "1", "-e", "-I", "120", "-L", "8", "-D", "01".ljust(16, "0"))
         before = self.frames()
@@ -293,7 +298,8 @@ class CanUtils(VirtualBus):
         self.assertIsNone(cangen.poll(), "cangen has ended")
         self.assertGreater(load, 50)
         self.assertEqual([line["singleturn"] for line in json_lines(result.stdout)], 200 * [9799])
-        self.assertRegex(emulator.end()[2], r"^absenc: 20[0-2] requests answered")  # no position request was repeated
+        # The host repeated no position request.
+        self.assertRegex(emulator.end()[2], r"^absenc: 20[0-2] requests answered")
 
     @staticmethod
     def frames():
@@ -321,7 +327,7 @@ class OtherFrames(VirtualBus):
                 self.failure(answer, words=words)
 
     def test_frames_of_other_nodes_are_ignored(self):
-        """Frames of other nodes are ignored. A frame with the node's own number that is no reply is an error."""
+        """Frames of other nodes are ignored. A frame with this node's identifier that is no reply is an error."""
         with AnotherNode(position(1, NODE | socket.CAN_EFF_FLAG), position(2, 0x121), frame(0x121, b"\3"),
                          frame(0x7FF | socket.CAN_RTR_FLAG, size=8), position(9799)):
             self.assertEqual(self.singleturn(HASTY), 9799)
@@ -330,7 +336,7 @@ class OtherFrames(VirtualBus):
 class ErrorFrames(VirtualBus):
     BUS_OFF = "20000040#0000000000000000"
     NO_ACKNOWLEDGE = frame(socket.CAN_ERR_FLAG | 0x20, bytes(8))
-    # a warning of the controller: no frame is lost
+    # This message is a warning of the controller and means that no frame is lost.
     WARNING = frame(socket.CAN_ERR_FLAG | 0x04, bytes([0, 8, 0, 0, 0, 0, 97, 0]))
 
     def test_destroyed_frames(self):
@@ -423,7 +429,8 @@ class InterfaceDown(VirtualBus):
         rows = read_csv(output)[1]
         self.assertEqual(losses(rows), ["lost", "back"])
         self.assertEqual({row["singleturn"] for row in rows if row["event"] == ""}, {"1000"})
-        with open(can_log, encoding="utf-8") as file:  # the frames before and after are in one file
+        # One log file has the frames from before and after the loss of the port.
+        with open(can_log, encoding="utf-8") as file:
             answers = file.read().count(f"{BUS} 120#E803000000000000\n")
         self.assertGreaterEqual(answers, sum(row["event"] == "" for row in rows))
         self.assert_no_rule_broken(emulator)
@@ -464,7 +471,7 @@ class InterfaceDown(VirtualBus):
 
 
 class Slcand(EncoderCase):
-    """Uses the kernel's slcan driver with a virtual serial adapter."""
+    """Tests of the kernel's slcan driver with a virtual serial adapter."""
 
     def setUp(self):
         super().setUp()
@@ -473,7 +480,7 @@ class Slcand(EncoderCase):
         self.addCleanup(self.adapter.end)
 
     def slcand(self, *options):
-        # slcand needs a device below /dev.
+        # slcand needs a device whose path begins with /dev.
         process = subprocess.Popen(["slcand", "-F", *options, os.path.realpath(self.adapter.path), "slcan0"],
                                    stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         self.addCleanup(self.end_slcand, process)
@@ -504,7 +511,7 @@ class Slcand(EncoderCase):
         self.assertNotIn("frames lost", summary)
 
     def test_ip_opens_bus(self):
-        """Runs the command that absenc's message recommends."""
+        """Runs the `ip` command that absenc's error message recommends."""
         self.slcand()
         run("ip", "link", "set", "slcan0", "up", "type", "can", "bitrate", "250000")
         self.assertEqual(self.reading(), 5 * [9799])

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the tests inside the virtual machine, and prints one line for each: "ok NAME", or "not ok NAME: WHY"."""
+"""Program inside the virtual machine that runs the tests, and prints one line for each: "ok NAME", or "not ok NAME:
+WHY"."""
 import fnmatch
 import os
 import subprocess
@@ -14,7 +15,8 @@ def kernel_log():
 
 
 class Result(unittest.TestResult):
-    """Collects failures, including those of subtests. A test without any is reported as ok."""
+    """A result of unittest that collects failures, including those of subtests. A test without a failure is reported as
+    ok."""
 
     def startTest(self, test):
         super().startTest(test)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Builds what the virtual machine boots: Debian's kernel, and an initramfs with this computer's programs and the
-tests."""
+"""Builds the image that the virtual machine boots: Debian's kernel, and an initramfs with this computer's programs and
+the tests."""
 import contextlib
 import glob
 import importlib.util
@@ -16,12 +16,12 @@ import zlib
 TESTS = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 CACHE = os.path.join(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "absenc")
 
-# Programs from this computer, because the tests share modules with the other tests (tests/command_support.py). The
-# kernel is Debian's, so that no test depends on the running kernel, to which a container cannot add modules. QEMU
-# emulates the processor (run.py): KVM is not available to every user.
+# Programs of this computer that the initramfs contains, because the tests in it share modules with the other tests
+# (tests/command_support.py). The kernel is Debian's, so that no test depends on the running kernel, to which a
+# container cannot add modules. QEMU emulates the processor (run.py): KVM is not available to every user.
 
-# Their dependencies are added automatically, except modules that the kernel itself loads on demand: g_serial's
-# functions.
+# Kernel modules for the tests. Modules that they depend on are added automatically, except those that the kernel itself
+# loads on demand: the functions of g_serial.
 MODULES = ["can", "can-raw", "vcan", "slcan", "fuse", "cuse", "dummy_hcd", "cdc-acm", "usb_f_acm", "usb_f_serial",
            "usb_f_obex", "g_serial"]
 PROGRAMS = ["candump", "cangen", "cansend", "ip", "slcand", "spi-config", "spi-pipe"]
@@ -29,7 +29,7 @@ TOOLS = ["apt-cache", "apt-get", "dpkg-deb", "tar", "xz", "modinfo", "ldd", "bus
 
 
 class Missing(Exception):
-    """Raised with a reason if the machine cannot be built on this computer."""
+    """An exception whose text is the reason why the machine cannot be built on this computer."""
 
 
 def output_of(*command):
@@ -77,7 +77,7 @@ def field_of(package, pattern):
 
 
 def download(package, path):
-    """Downloads the package and deletes older kernels from the cache."""
+    """Downloads the package to `path`, and deletes older kernels from the cache."""
     former = [old for old in glob.glob(os.path.join(CACHE, "linux-image-*"))
               if re.search(r"_amd64\.(deb|[0-9a-f]{8})$", old) and old != path]
     with own_folder(path) as folder:
@@ -95,8 +95,8 @@ def download(package, path):
 
 @contextlib.contextmanager
 def own_folder(path):
-    """Gives each run its own folder, so that parallel runs do not interfere and an interrupted one leaves nothing that
-    looks complete."""
+    """Context with a new folder beside `path` that only this run uses, so that parallel runs do not interfere. The folder
+    is deleted at the end, so that an interrupted run leaves nothing that looks complete."""
     folder = f"{path}.{os.getpid()}"
     os.makedirs(folder)
     try:
@@ -106,8 +106,8 @@ def own_folder(path):
 
 
 def unpacked_kernel():
-    """Returns a folder with vmlinuz, the modules as NAME.ko, and the file `order`, which lists them in the order of
-    loading."""
+    """Returns a folder with vmlinuz, the modules as NAME.ko, and the file `order`, which lists the modules in the order
+    in which they must be loaded."""
     package = kernel_package()
     folder = f"{package.removesuffix('.deb')}.{zlib.crc32(' '.join(MODULES).encode()):08x}"
     if os.path.exists(folder):
@@ -126,7 +126,7 @@ def unpacked_kernel():
         with open(os.path.join(chosen, "order"), "w", encoding="ascii") as file:
             file.write("".join(f"{name}\n" for name in order))
         os.rename(glob.glob(os.path.join(whole, "boot/vmlinuz-*"))[0], os.path.join(chosen, "vmlinuz"))
-        if not os.path.exists(folder):  # another run may have created it meanwhile
+        if not os.path.exists(folder):  # another run may have created the folder meanwhile
             os.rename(chosen, folder)
     return folder
 
@@ -154,17 +154,18 @@ def make(folder):
 
 
 def libraries(path):
-    """Returns the libraries that ldd finds for a program or library."""
+    """Returns the libraries that ldd finds for a program or a library."""
     result = subprocess.run(["ldd", path], capture_output=True, text=True)
     return re.findall(r"(?:=> |^\s+)(/\S+) \(0x", result.stdout, re.MULTILINE)
 
 
 def python_files(scripts):
-    """Yields the interpreter and every file that these scripts import, compiled if this computer has it compiled."""
+    """Yields the path of the interpreter, and of every file that these scripts import, compiled if this computer has
+    the file compiled."""
     finder = modulefinder.ModuleFinder(path=[os.path.join(TESTS, "vm"), TESTS, *sys.path[1:]])
     for script in scripts:
         finder.run_script(script)
-    # imported when the interpreter starts
+    # Modules that the interpreter imports when it starts.
     for name in ("os", "encodings.utf_8", "encodings.ascii", "encodings.latin_1"):
         finder.import_hook(name)
     files = {module.__file__ for module in finder.modules.values() if module.__file__}
@@ -173,7 +174,7 @@ def python_files(scripts):
 
 
 class Image:
-    """An initramfs with programs and libraries at the same paths as on this computer."""
+    """An initramfs that is being built, with programs and libraries at the same paths as on this computer."""
 
     def __init__(self, folder):
         self.root = make(folder)
@@ -207,7 +208,7 @@ class Image:
 
 
 def build(absenc, patterns, folder):
-    """Returns the paths of the kernel and of the initramfs, which is written to the folder."""
+    """Writes the initramfs to `folder`. Returns the paths of the kernel and of the initramfs."""
     for name in PROGRAMS + TOOLS:
         program(name)
     kernel = unpacked_kernel()

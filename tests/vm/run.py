@@ -14,13 +14,14 @@ import time
 import image
 
 ABSENC = os.path.abspath(os.environ.get("ABSENC", "build/release/bin/absenc"))
-PATIENCE = 600  # time limit of the machine, in seconds; all tests take far less
+PATIENCE = 600  # time limit of a run of the machine, in seconds; a run of all tests takes far less
 SKIPPED = 77
-BUSY = "no_timer_check"  # otherwise a busy computer delays the timer so much that the kernel panics
+BUSY = "no_timer_check"  # kernel option without which a busy computer delays the timer so much that the kernel panics
 
 
 def boot(kernel, initramfs, folder):
-    """Runs the machine to its end. Returns its console output, and the reason if the output is incomplete."""
+    """Runs the machine to its end. Returns its console output, and the reason if the output is incomplete, otherwise an
+    empty text."""
     line = os.path.join(folder, "line")
     command = [
         image.program("qemu-system-x86_64"), "-accel", "tcg", "-m", "512", "-no-reboot", "-nodefaults", "-display",
@@ -41,12 +42,12 @@ def boot(kernel, initramfs, folder):
             output, _ = machine.communicate()
             trouble = f"the machine did not end within {PATIENCE} s"
         finally:
-            machine.kill()  # does nothing if the machine has ended
+            machine.kill()  # no effect if the machine has ended
     return output.decode(errors="replace").replace("\r", ""), trouble
 
 
 def judge(output, trouble):
-    """Prints the failures. Returns how many tests passed and how many failed."""
+    """Prints the failed tests. Returns how many tests passed and how many failed."""
     good = re.findall(r"^ok (.*)$", output, re.MULTILINE)
     bad = re.findall(r"^not ok .*\n(?:#.*\n)*", output, re.MULTILINE)
     for report in bad:
@@ -80,5 +81,5 @@ def main(patterns):
 
 
 if __name__ == "__main__":
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that the machine is ended too
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # the exit also ends the machine
     sys.exit(main(sys.argv[1:]))

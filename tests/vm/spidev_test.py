@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc emulate --spidev` on a CUSE device: with the command, spi-tools, and an independent client."""
+"""Tests `absenc emulate --spidev` on a CUSE device: with absenc's hosts, spi-tools, and an independent client."""
 import ctypes
 import errno
 import fcntl
@@ -33,7 +33,7 @@ RD_MODE32, WR_MODE32 = request(True, 5, 4), request(False, 5, 4)
 
 
 def crc8(data):
-    """Returns the inverted CRC x8+x7+x4+x2+x+1."""
+    """Returns the inverted CRC of the polynomial x^8 + x^7 + x^4 + x^2 + x + 1."""
     register = 0
     for byte in data:
         register ^= byte
@@ -43,7 +43,8 @@ def crc8(data):
 
 
 class Transfer:
-    """One transfer of a message. `out` None sends no buffer; `take` False passes no buffer for received bytes."""
+    """One transfer of an SPI message. `out`: bytes to send, None for no buffer. `take`: False passes no buffer for
+    received bytes."""
 
     def __init__(self, out=None, size=None, take=True, speed=0, delay=0, bits=0, change=0, wires=0):
         size = len(out) if size is None else size
@@ -58,7 +59,7 @@ class Transfer:
 
 
 class Spi:
-    """A client of the spidev interface."""
+    """A client of the ioctl interface of spidev."""
 
     def __init__(self, path, mode=None, speed=None):
         self.descriptor = os.open(path, os.O_RDWR)
@@ -81,7 +82,7 @@ class Spi:
 
     def message(self, *transfers):
         packed = bytearray(b"".join(transfer.packed for transfer in transfers))
-        # Longer than the 1024 bytes that fcntl copies by itself.
+        # The message is longer than the 1024 bytes that fcntl copies by itself.
         return fcntl.ioctl(self.descriptor, request(False, 0, len(packed)), packed, True)
 
     def exchange(self, out, **settings):
@@ -103,7 +104,7 @@ class SpidevCase(unittest.TestCase):
         return process
 
     def summary(self, process, number=signal.SIGINT):
-        """Ends the emulator and returns its messages."""
+        """Ends the emulator and returns its messages, which include its summary."""
         status, out, err = end(process, number)
         self.assertEqual((status, out), (0, ""), err)
         return err
@@ -163,8 +164,8 @@ class Command(SpidevCase):
         self.assertNotIn("rules", self.summary(process))
 
     def test_registers_of_biss(self):
-        """A control bit of 1 needs a clock that idles low during the timeout, so the host changes the mode between
-        messages."""
+        """During the timeout, a control bit of 1 needs a clock that idles low, so the host changes the SPI mode between
+        two messages."""
         process = self.serve("biss", "--motion", "rpm=60")
         encoder = "biss:spi:/dev/spidev9.0"
         info = json.loads(self.good("info", encoder, "--json").stdout)["answers"]["info"]["fields"]
@@ -174,7 +175,7 @@ class Command(SpidevCase):
         self.assertNotIn("rules", self.summary(process))
 
     def test_identify(self):
-        """Identifies an unknown BiSS encoder from its word, and its serial number from its registers."""
+        """identify must find an unknown BiSS encoder by its word, and read the serial number from its registers."""
         self.serve("biss", "--motion", "rpm=60")
         candidates = json.loads(self.good("identify", "spi:/dev/spidev9.0", "--json").stdout)["candidates"]
         found = candidates[0]
@@ -190,7 +191,7 @@ class Command(SpidevCase):
         self.assertAlmostEqual((turned[-1][0] - turned[0][0]) / (turned[-1][1] - turned[0][1]), 1, delta=0.05)
 
     def test_wrong_mode_is_detected(self):
-        """Every bit arrives one clock late, which the CRC detects."""
+        """In a wrong SPI mode every bit arrives one clock late, which the CRC of the word must reveal."""
         for mode in (0, 2, 3):
             with self.subTest(mode):
                 process = self.serve("encolink", "--singleturn", "12345")
@@ -199,7 +200,8 @@ class Command(SpidevCase):
                 self.assertRegex(self.summary(process), r"messages in another SPI mode than the encoder's, which is 1: \d+\n")
 
     def test_wrong_mode_of_ssi_is_in_summary(self):
-        """In mode 0 each bit of SSI arrives one clock late, which halves the position. Only this summary reports it."""
+        """In mode 0 each bit of SSI arrives one clock late, which halves the position. SSI has no check, so only the
+        emulator's summary can report it."""
         process = self.serve("ssi", "--singleturn", "2748")
         self.assertEqual(self.reading("ssi:spi:/dev/spidev9.0?spi_mode=0")["singleturn"], (0x1000 | 2748) >> 1)
         self.assertRegex(self.summary(process), r"another SPI mode than the encoder's, which is 3: \d+\n")
@@ -238,7 +240,7 @@ class Command(SpidevCase):
                 while now == before and time.monotonic() < deadline:
                     with open("/tmp/spidev-memory", encoding="utf-8") as file:
                         now = file.read()
-                self.assertNotEqual(now, before)  # the file is saved while the emulator runs
+                self.assertNotEqual(now, before)  # the emulator saves its memory while it runs
             reading = self.reading("encolink:spi:/dev/spidev9.0")
             self.assertEqual((reading["singleturn"], reading["multiturn"]), (0, 9))
             self.summary(process, signal.SIGTERM)
@@ -253,8 +255,8 @@ class Command(SpidevCase):
 
 
 class Doctor(SpidevCase):
-    """Findings of `absenc doctor` for a kernel device. A too fast clock is not tested, because this device follows
-    every clock."""
+    """Tests findings of `absenc doctor` for a kernel device. No test has a clock that is too fast, because this device
+    follows every clock."""
 
     def assert_found(self, encoder, *wanted):
         result, found = doctor(encoder)
@@ -287,7 +289,8 @@ class Lifecycle(SpidevCase):
         self.assertIn("exists", self.failed("emulate", "ssi", "--spidev", "spidev9.0").stderr)
 
     def test_reports_refusal_by_kernel(self):
-        """The device node was removed, but the device still exists."""
+        """The node of the device was removed, but the device still exists, so the kernel makes no node for another
+        device of that name."""
         self.serve("ssi")
         os.remove("/dev/spidev9.0")
         self.assertIn("the kernel did not make /dev/spidev9.0", self.failed("emulate", "ssi", "--spidev", "spidev9.0").stderr)
@@ -302,7 +305,7 @@ class Lifecycle(SpidevCase):
         self.assertIn("no permission to open /dev/cuse", result.stderr)
 
     def test_runs_as_ordinary_user(self):
-        """A user with access to /dev/cuse may create the device, but the kernel makes its node for root."""
+        """A user with access to /dev/cuse may create the device, but the kernel creates its node for root only."""
         os.chmod("/dev/cuse", 0o666)
         self.addCleanup(os.chmod, "/dev/cuse", 0o600)
         self.serve("ssi", "--singleturn", "77", user=65534)
@@ -325,7 +328,7 @@ class Lifecycle(SpidevCase):
         self.assertFalse(os.path.lexists("/dev/spidev9.0"))
 
     def test_reader_waits_for_device(self):
-        """The encoder disappears and returns while a long command reads it."""
+        """The encoder disappears and returns while a long `read` is running."""
         process = self.serve("encolink", "--singleturn", "1")
         reader = subprocess.Popen([ABSENC, "read", "encolink:spi:/dev/spidev9.0", "--count", "0", "--rate", "50", "--json"],
                                   bufsize=0, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
@@ -346,7 +349,7 @@ class Lifecycle(SpidevCase):
 
             def slow():
                 try:
-                    spi.exchange(bytes(1000), speed=100)  # the transfer takes 80 s
+                    spi.exchange(bytes(1000), speed=100)  # a transfer that takes 80 s
                 except OSError as error:
                     errors.append(error.errno)
 
@@ -366,14 +369,14 @@ class Lifecycle(SpidevCase):
 
 
 class SpidevInterface(SpidevCase):
-    """Tests the ioctl interface of spidev without the command."""
+    """Tests of the ioctl interface of spidev, used without absenc's host."""
 
     def setUp(self):
         self.process = self.serve("encolink", "--singleturn", "0x12345", "--multiturn", "0xABC")
         self.spi = Spi("/dev/spidev9.0", mode=1)
         self.addCleanup(self.spi.__exit__)
 
-    FRAME = bytes([0x0A, 0xBC, 0x12, 0x34, 0x50 | 3])  # error and warning are active-low
+    FRAME = bytes([0x0A, 0xBC, 0x12, 0x34, 0x50 | 3])  # in the last byte, the bits error and warning are active low
 
     def check_frame(self, frame):
         self.assertEqual(frame[:5].hex(" "), self.FRAME.hex(" "))
@@ -413,7 +416,7 @@ class SpidevInterface(SpidevCase):
 
     def test_one_transfer(self):
         self.check_frame(self.spi.exchange(bytes(7)))
-        self.assertEqual(self.spi.exchange(bytes(9))[7:], b"\xFF\xFF")  # the line is not driven
+        self.assertEqual(self.spi.exchange(bytes(9))[7:], b"\xFF\xFF")  # nothing drives the line after the frame
 
     def test_without_buffers(self):
         into = Transfer(size=7)
@@ -425,7 +428,8 @@ class SpidevInterface(SpidevCase):
         self.assertEqual(fcntl.ioctl(self.spi.descriptor, request(False, 0, 0), 0), 0)
 
     def test_sent_bytes_arrive(self):
-        """The first byte requests the identity, which follows in the next message."""
+        """Bytes sent by the host must reach the encoder: the first one requests the identity, which follows in the next
+        message."""
         self.spi.message(Transfer(b"\xBB", take=False), Transfer(b"\x00", take=False), Transfer(size=5))
         self.check_identity(self.spi.exchange(bytes(19)))
 
@@ -498,11 +502,12 @@ class SpidevInterface(SpidevCase):
         self.assertEqual(self.spi.get(RD_SPEED, "I"), 250_000)
         os.close(self.spi.descriptor)
         self.spi.descriptor = os.open("/dev/spidev9.0", os.O_RDWR)
-        self.assertEqual(self.spi.get(RD_SPEED, "I"), 1_000_000)  # closing the other descriptor restored the speed
+        # The speed is the default again, because the descriptor that had set it was closed.
+        self.assertEqual(self.spi.get(RD_SPEED, "I"), 1_000_000)
         self.assertEqual(self.spi.get(RD_MODE, "B"), 1)
 
     def test_spi_tools(self):
-        """spi-config and spi-pipe are independent programs."""
+        """The independent programs spi-config and spi-pipe must be able to use the device."""
         device = ["-d", "/dev/spidev9.0"]
         subprocess.run(["spi-config", *device, "-m", "1"], check=True)
         settings = subprocess.run(["spi-config", *device, "-q"], check=True, capture_output=True, text=True).stdout

@@ -17,8 +17,8 @@ from command_support import Emulator, EncoderCase, absenc, end, json_lines
 from tap_support import Relay, TapCase, joined
 
 PORT, OTHER = "/dev/ttyS1", "/dev/ttyS2"
-REGISTERS = 0x2F8  # address of PORT's registers
-CLOCK = 115200  # baud rate with a divisor of 1
+REGISTERS = 0x2F8  # I/O address of the registers of the UART that has the port PORT
+CLOCK = 115200  # the UART's baud rate with a divisor of 1
 NOBODY = 65534
 PARITY = termios.PARENB | termios.PARODD
 
@@ -26,7 +26,7 @@ PARITY = termios.PARENB | termios.PARODD
 TCGETS2, BOTHER, BAUD_MASK = 0x802C542A, 0o010000, 0o010017
 TIOCGSERIAL, TIOCSSERIAL, ASYNC_LOW_LATENCY = 0x541E, 0x541F, 1 << 13
 SERIAL_STRUCT = struct.Struct("iiIiiiiiHcciPHIL")
-FLAGS = 4  # index of the flags in the struct
+FLAGS = 4  # index of the flags in struct serial_struct
 
 
 def settings(path):
@@ -51,7 +51,7 @@ def serial_struct(path, change=None):
 
 
 def divisor():
-    """Returns the divisor latch of the UART itself, which is accessed through its data registers."""
+    """Returns the divisor latch of the UART. It is accessed through the UART's data registers."""
     with open("/dev/port", "r+b", buffering=0) as registers:
         def get(number):
             registers.seek(REGISTERS + number)
@@ -69,10 +69,10 @@ def divisor():
 
 
 class EncoderAtOneRate(threading.Thread):
-    """An encoder at OTHER that replies correctly only while PORT has its rate. At other rates it sends garbled frames,
-    which the UARTs of a virtual machine do not produce by themselves."""
+    """A fake encoder at the port OTHER that replies correctly only while the port PORT has the encoder's baud rate. At
+    other rates it sends garbled frames itself, because the UARTs of a virtual machine do not garble them."""
 
-    # reply to 1A: 17 bits of position, 16 bits of turns, both 0, no alarm
+    # Reply to 1A: 17 bits of position and 16 bits of turns, both 0, without an alarm.
     REPLY = bytes.fromhex("1a 00000000 11 000000 00 0b")
 
     def __init__(self, rate):
@@ -110,14 +110,15 @@ class Uart(EncoderCase):
         return absenc("read", f"tformat:{PORT}?latency=2000&{more}", *arguments)
 
     def reader(self, more):
-        """Starts an endless `read` with a long interval and waits for its first reading, so that accesses to the UART
+        """Starts an endless `read` with a long interval and waits for its first reading: accesses to the UART after it
         disturb no transfer."""
         process = self.start("read", f"tformat:{PORT}?latency=2000&{more}", "--count", "0", "--rate", "0.01")
         self.first_line(process)
         return process
 
     def test_baud_rates(self):
-        """One rate has a name in <termios.h>, which the kernel then reports; two have none."""
+        """Sets three baud rates: one with a name in <termios.h>, which the kernel then reports, and two without a
+        name."""
         for baud, name in ((38400, termios.B38400), (23040, BOTHER), (14400, BOTHER)):
             with self.subTest(baud):
                 emulator = self.emulator("--singleturn", "1000", baud=baud)
@@ -160,7 +161,8 @@ class Uart(EncoderCase):
         self.assertEqual(settings(PORT), before)
 
     def test_new_baud_rate_keeps_parity(self):
-        """Checks both sides: the host that sets the rate, and the encoder that follows."""
+        """A change of the baud rate must keep the parity, on both sides: the host that sets the rate, and the encoder
+        that follows."""
         emulator = Emulator("/dev", protocol="raa38-modbus", name=f"{OTHER}?parity=odd", line="--port")
         self.addCleanup(emulator.end)
         address = f"raa38-modbus:{PORT}?latency=2000&parity=odd"
@@ -201,7 +203,7 @@ class Uart(EncoderCase):
         self.assert_good(self.read("baud=115200"))
 
     def test_port_is_exclusive(self):
-        """Root may always open a port. Other users are kept out while absenc uses it, and no longer."""
+        """While absenc uses the port, other users cannot open it; afterwards they can. Root may always open it."""
         os.chmod(PORT, 0o666)
         self.addCleanup(os.chmod, PORT, 0o600)
         self.emulator(baud=115200)
@@ -224,10 +226,10 @@ class Uart(EncoderCase):
 
 class TapOnUart(TapCase):
     COUNT = 300
-    BAUD = 57600  # a rate that both protocols support
+    BAUD = 57600  # a baud rate that both protocols support
 
     def test_shows_every_exchange(self):
-        """A receiver on the pair taps two protocols; the bytes on the line are known."""
+        """A receiver taps the line, for two protocols. tap must show every exchange of the known bytes on the line."""
         for protocol in ("tformat", "raa38-modbus"):
             with self.subTest(protocol):
                 emulator = self.emulator(protocol, "--motion", "rpm=60", name=f"e-{protocol}")

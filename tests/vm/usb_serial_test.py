@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests a USB serial port that can be unplugged: /dev/ttyACM0 of the host, connected to /dev/ttyGS0 of the gadget."""
+"""Tests `absenc` on a USB serial port that can be unplugged: /dev/ttyACM0 of the host, connected to /dev/ttyGS0 of a
+virtual USB gadget."""
 import contextlib
 import json
 import os
@@ -32,7 +33,8 @@ class UsbSerial(EncoderCase):
     def setUp(self):
         super().setUp()
         self.addCleanup(plug)
-        # Closing the gadget's end drops the carrier. A late hang-up could otherwise hit the next user of the port.
+        # Unplugs and plugs the cable once before the test: closing the gadget's end drops the carrier, and a late
+        # hang-up could otherwise hit the next user of the port.
         with self.without_cable():
             pass
 
@@ -56,7 +58,7 @@ class UsbSerial(EncoderCase):
 
     @contextlib.contextmanager
     def without_gadget(self):
-        """Also removes the gadget, as when the computer that emulates the device is switched off."""
+        """Removes the gadget too, as if the computer that emulates the USB device were switched off."""
         subprocess.run(["rmmod", "g_serial"], check=True, timeout=PATIENCE)
         self.assertFalse(os.path.exists(GADGET))
         try:
@@ -66,7 +68,7 @@ class UsbSerial(EncoderCase):
             wait_until(lambda: os.path.exists(PORT), f"{PORT} to come")
 
     def next_json(self, process, condition):
-        """Returns the first line that satisfies the condition."""
+        """Returns the first line of the process's JSON output for which `condition` is true."""
         deadline = time.monotonic() + PATIENCE
         while True:
             text = read_line(process.stdout, deadline)
@@ -166,7 +168,7 @@ class Unplugged(UsbSerial):
             _, err = process.communicate(timeout=PATIENCE)
             self.assertEqual(process.returncode, 1)
             self.assert_sentence(err.decode(), f"the port {PORT} went away: unplugged")
-            # /sys lists the four ports of the 16550 driver, although one has no hardware.
+            # /sys lists four ports of the 16550 driver, although one of them has no hardware.
             result = absenc("read", ENCODER)
             self.assert_failed(result, f"there is no port {PORT}", "/dev/ttyS1")
             self.assertNotIn("/dev/ttyS3", result.stderr)
@@ -189,7 +191,7 @@ class Unplugged(UsbSerial):
         self.assertRegex(messages, r"previous_clock +4 ")
 
     def test_emulator_continues(self):
-        """Here the virtual encoder's end is unplugged."""
+        """In this test the port of the virtual encoder is unplugged, not that of the host."""
         emulator = self.emulator("--singleturn", "1000", port=PORT)
         address = f"e201:{GADGET}?latency=2000"
         self.assertEqual(self.run_json("read", address)["singleturn"], 1000)
