@@ -25,7 +25,7 @@ Procedure set_zero(Dialog& dialog, Found& found) {
   const Request position = request<Ask::position>(dialog.format());
   co_await may_set_zero(dialog, found, position);
   co_await dialog.ask(request<Ask::zero>(dialog.format())).or_say("whether the encoder obeyed is not known");
-  co_await dialog.rest(20ms);  // the encoder writes its memory
+  co_await dialog.rest(20ms);  // time in which the encoder writes its memory
   const std::uint64_t now = co_await look(dialog, found, position);
   if (!is_near(now, 0, 16))
     co_return {Error::cross_check_failed, "the position is still not zero",
@@ -35,7 +35,7 @@ Procedure set_zero(Dialog& dialog, Found& found) {
 
 // ---- The virtual encoder
 
-class Encoder final : public BusDevice<Protocol, Encoder, 4> {  // its memory is its zero
+class Encoder final : public BusDevice<Protocol, Encoder, 4> {  // 4: bytes of its memory, which holds its zero
  public:
   using BusDevice::BusDevice;
   [[nodiscard]] bool is_mine(const Request& asked) const { return asked.address == format().address; }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Maker and encoder: its frames. README.md draws them. This is an invented encoder: replace it by the encoder of your
-// document.
+// Template: frames, checks and times of an invented encoder. README.md draws the frames. Replace them by those of your
+// document, and this line by maker and encoder.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ using namespace std::chrono_literals;
 
 inline constexpr Time answer_limit = 100us;
 
-/// Properties of the frames that the options select.
+/// Properties of the encoder's frames that the unit's options select.
 struct Format {
   std::uint8_t address = 1;
 
@@ -42,12 +42,12 @@ struct Protocol {
   static constexpr author::HostTimes host_times(const Format&) {
     return {.answer_limit = answer_limit, .gap_limit = 50us};
   }
-  /// Requests that change the encoder are never repeated.
+  /// Returns how often a request is repeated after an error: requests that change the encoder never.
   static constexpr author::Manner manner(const Format&, const Request& request) {
     return {.repeats = request.ask == Ask::position ? 2u : 0u};
   }
 
-  // Request: code, address.
+  // Request: code, then address of the encoder.
   static constexpr ByteBuffer<2> encode(const Format&, const Request& request) {
     ByteBuffer<2> bytes;
     bytes.push_back(static_cast<std::uint8_t>(request.ask));
@@ -66,7 +66,8 @@ struct Protocol {
   // Reply: position, high byte first, then the sum of all bytes and the address.
   static constexpr std::size_t reply_size(const Format&, const Request&) { return longest_reply; }
   static constexpr std::size_t expected(const Format&, const Request&, Bytes) { return longest_reply; }
-  static constexpr bool is_whole(const Format&, Error) { return false; }  // after an error more bytes may follow
+  // after an error more bytes may follow, so the host waits for silence
+  static constexpr bool is_whole(const Format&, Error) { return false; }
   static constexpr std::uint8_t sum(std::uint8_t address, std::uint8_t high, std::uint8_t low) {
     return static_cast<std::uint8_t>(address + high + low);
   }
@@ -77,8 +78,8 @@ struct Protocol {
     for (const std::uint8_t byte : {high, low, sum(request.address, high, low)}) bytes.push_back(byte);
     return bytes;
   }
-  /// Decodes a reply. Checks in this order: length, checksum, echo or address, refusal, fixed bits, range, cross
-  /// checks.
+  /// Decodes a reply. Put the checks in this order: length, checksum, echo or address, refusal, fixed bits, range,
+  /// cross checks.
   static constexpr Result<Reply> decode(const Format&, const Request& request, Bytes bytes) {
     if (bytes.empty()) return Error::timeout;
     if (bytes.size() != longest_reply) return Error::wrong_length;
@@ -88,7 +89,7 @@ struct Protocol {
   static constexpr Reading reading(const Format&, const Request&, const Reply& reply) {
     return author::position_reading(reply.singleturn, 16);
   }
-  // The document does not state when the position is taken.
+  // The document does not state when the encoder takes the position.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
 
   static constexpr author::DeviceTimes device_times(const Format& format) {

@@ -14,26 +14,28 @@
 
 namespace absenc::modbus {
 
-inline constexpr CrcParameters crc_parameters{16, 0x8005, 0xFFFF, true, true, 0x0000};  ///< CRC of Modbus RTU (S 6.2.2)
+/// CRC of Modbus RTU (S 6.2.2).
+inline constexpr CrcParameters crc_parameters{16, 0x8005, 0xFFFF, true, true, 0x0000};
 
-inline constexpr std::size_t frame_capacity = 256;  ///< longest frame in bytes (S 2.5.1)
-inline constexpr std::size_t shortest_frame = 4;    ///< bytes of the shortest frame: address, function, CRC
+inline constexpr std::size_t frame_capacity = 256;  ///< Length of the longest frame in bytes (S 2.5.1).
+inline constexpr std::size_t shortest_frame = 4;    ///< Length of the shortest frame in bytes: address, function, CRC.
 inline constexpr std::size_t crc_size = 2;          ///< Length of the CRC in bytes.
-/// Bytes of a frame.
+/// Bytes of one frame.
 using FrameBytes = ByteBuffer<frame_capacity>;
 
-inline constexpr std::uint8_t first_address = 1;   ///< lowest address of a server; 0 is broadcast and never answered
-inline constexpr std::uint8_t last_address = 247;  ///< highest address of a server (S 2.2)
+inline constexpr std::uint8_t first_address = 1;   ///< Lowest address of a server; 0 is broadcast and never answered.
+inline constexpr std::uint8_t last_address = 247;  ///< Highest address of a server (S 2.2).
 
-inline constexpr std::uint8_t read_holding_registers = 0x03;  ///< Function: read holding registers.
-inline constexpr std::uint16_t most_registers = 125;          ///< most registers of one read request (A 6.3)
-/// Bit that a refusal sets in the function code; functions of the standard are below it.
+inline constexpr std::uint8_t read_holding_registers = 0x03;  ///< Function code that reads holding registers.
+/// Greatest number of registers in one read request (A 6.3).
+inline constexpr std::uint16_t most_registers = 125;
+/// Bit of the function code that marks a refusal; functions of the standard are below it.
 inline constexpr std::uint8_t refusal_bit = 0x80;
 
-/// Byte order of a received CRC. Two equal bytes count as `low_first`, the order of Modbus.
+/// Byte order of a received CRC, or `wrong`. Two equal bytes are reported as `low_first`, the order of Modbus.
 enum class CrcOrder : std::uint8_t { low_first, high_first, wrong };
 
-/// Returns the order of the CRC bytes with which a frame is right.
+/// Returns the byte order in which the last two bytes of a frame are its CRC; `wrong` if they are not.
 [[nodiscard]] constexpr CrcOrder crc_order(Bytes frame) {
   if (frame.size() < shortest_frame) return CrcOrder::wrong;
   const Bytes crc = frame.last(crc_size);
@@ -42,7 +44,7 @@ enum class CrcOrder : std::uint8_t { low_first, high_first, wrong };
   return right == (crc[1] | crc[0] << 8) ? CrcOrder::high_first : CrcOrder::wrong;
 }
 
-/// Appends the CRC. The buffer must have room for it.
+/// Appends the CRC of `frame` to it. The buffer must have room for two bytes.
 template <std::size_t Capacity>
 constexpr void append_crc(ByteBuffer<Capacity>& frame, CrcOrder order = CrcOrder::low_first) {
   const std::uint16_t crc = Crc<crc_parameters, CrcTable::nibble>::of(frame.view());
@@ -51,7 +53,7 @@ constexpr void append_crc(ByteBuffer<Capacity>& frame, CrcOrder order = CrcOrder
   frame.push_back(static_cast<std::uint8_t>(low_first ? crc >> 8 : crc));
 }
 
-/// Codes of a server's refusal (A 7).
+/// Codes with which a server refuses a request (A 7).
 enum class Exception : std::uint8_t {
   none = 0,
   illegal_function = 1,
@@ -59,13 +61,13 @@ enum class Exception : std::uint8_t {
   illegal_data_value = 3,
 };
 
-/// Returns the code of a refusal of `function`; nothing if the frame is none. Does not check the CRC.
+/// Returns the code in a refusal of `function`; no value if the frame is not a refusal. Does not check the CRC.
 [[nodiscard]] constexpr std::optional<std::uint8_t> refusal_code(Bytes frame, std::uint8_t function) {
   if (frame.size() != shortest_frame + 1 || frame[1] != (function | refusal_bit)) return std::nullopt;
   return frame[2];
 }
 
-/// Explains the code of a refusal (A 7).
+/// Returns cause and advice for the code of a refusal (A 7).
 [[nodiscard]] constexpr Explanation explain_refusal(std::uint8_t code) {
   switch (code) {
     case 0x01:

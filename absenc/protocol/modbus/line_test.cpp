@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A client with the times of this folder and its server on one line in virtual time: silence, damage, change of the
-// rate.
+// Tests of a client with the times of timing.hpp and a server on one line in virtual time: silence, damage, change of
+// the rate.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -101,7 +101,7 @@ struct Bench {
     sim::testing::RawHost raw_host(std::move(bytes), answer, gap, line.now() + pause);
     return run(raw_host).reply;
   }
-  /// Returns the rule that was broken; empty unless exactly one was.
+  /// Returns the rule that the client broke; empty unless it broke exactly one.
   [[nodiscard]] std::string_view broken_rule() const {
     return server.violation_count() == 1 ? server.violations()[0].rule : std::string_view{};
   }
@@ -109,8 +109,8 @@ struct Bench {
   ToyServer server;
   sim::Line<std::uint8_t> line{LinkKind::half_duplex, line_settings};
   std::optional<std::size_t> host;
-  Wire last_reply;             // the last reply to `ask`
-  std::vector<Time> silences;  // silences longer than a character
+  Wire last_reply;             // last reply that `ask` received
+  std::vector<Time> silences;  // durations of all silences on the line that were longer than a character
   Time last_end{};
 };
 
@@ -159,7 +159,7 @@ TEST(ModbusLine, ServerAnswersOnlyFramesBetweenSilences) {
   EXPECT_EQ(bench.server.violation_count(), 0u);
 }
 
-/// Sends characters with a pause before one of them and records the reply.
+/// Sends characters with a pause before one character and records the reply.
 class PausingHost final : public Machine<std::uint8_t> {
  public:
   PausingHost(const Wire& bytes, std::ptrdiff_t before, Time pause)
@@ -190,8 +190,10 @@ class PausingHost final : public Machine<std::uint8_t> {
 };
 
 TEST(ModbusLine, ServerReportsGapsInsideFrame) {
-  const std::tuple<int, Wire, std::string_view> rows[]{
-      {1, good_reply, ""}, {2, good_reply, "1.5 characters"}, {4, {}, ""}};  // the pause makes two frames, both invalid
+  const std::tuple<int, Wire, std::string_view> rows[]{// the pause makes two frames, which are both invalid
+                                                       {1, good_reply, ""},
+                                                       {2, good_reply, "1.5 characters"},
+                                                       {4, {}, ""}};
   for (const auto& [characters, reply, rule] : rows) {
     Bench bench;
     PausingHost pausing(good_request, 4, character * characters);
@@ -204,13 +206,13 @@ TEST(ModbusLine, ServerReportsGapsInsideFrame) {
 TEST(ModbusLine, ServerReportsRequestThatComesTooSoon) {
   Bench bench;
   bench.raw(good_request);
-  bench.raw(good_request, {}, 50ms, 1us);  // ends as soon as the reply is complete
+  bench.raw(good_request, {}, 50ms, 1us);  // the exchange ends as soon as the reply is complete
   EXPECT_EQ(bench.server.violation_count(), 0u) << "the one before waited 3 ms";
   EXPECT_EQ(bench.raw(good_request, character), good_reply);
   EXPECT_TRUE(says(bench.broken_rule(), "3.5 characters"));
 }
 
-// A server that was scheduled late cannot tell whether the client waited long enough, so it reports no broken rule.
+// If a server was scheduled late, it does not know whether the client waited long enough, so it reports no broken rule.
 TEST(ModbusLine, LateServerReportsNoMissingSilence) {
   using Kind = Event<std::uint8_t>::Kind;
   for (const auto& [late, rules] : {std::pair(Time(1ms), 1u), {Time(50ms), 0u}}) {
@@ -220,7 +222,7 @@ TEST(ModbusLine, LateServerReportsNoMissingSilence) {
       server.feed({.kind = Kind::received, .at = 50ms, .items = good_request});
       Time now = 50ms + frame_silence(line_settings) + late;
       server.feed({.kind = Kind::silence, .at = now});
-      static_cast<void>(server.next(now));  // takes the configure step
+      static_cast<void>(server.next(now));  // processes the configure step
       ASSERT_EQ(server.answer_count(), 1u);
       if (replied) server.feed({.kind = Kind::sent, .at = now});
       server.feed({.kind = Kind::received, .at = now + 100us, .items = good_request});

@@ -5,9 +5,9 @@ namespace absenc::modbus {
 
 namespace {
 
-// Time between the silence that ends a request and the reply; the standard gives none.
+// Time between the silence that ends a request and the reply; the standard states none.
 constexpr Time answer_time = 200us;
-// Delay of that silence after which the client may have timed out and sent the next request.
+// Delay after which a request counts as ended late: the client may have timed out and sent the next request.
 constexpr Time late = 20ms;
 constexpr std::string_view turn_rule = "something was sent during the encoder's transmission";
 
@@ -70,7 +70,7 @@ void Server::feed(const ByteEvent& event) {
 
 void Server::receive(const ByteEvent& event) {
   if (transmitting_) {
-    // A request during a transmission breaks the rule once, not with each of its bytes.
+    // A request during a transmission breaks the rule once, not once for each byte of the request.
     if (!expects_collision_ && !interrupted_ && !ended_late_) expect(false, turn_rule, event.at);
     interrupted_ = true;
     return;

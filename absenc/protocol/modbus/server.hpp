@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Server side of a Modbus RTU line: finds frames by silence, replies in time, and checks the client's timing. A
-// subclass decodes the frames.
+// Server side of a Modbus RTU line, for virtual encoders: finds frames by silence, replies in time, and checks the
+// client's timing. A subclass decodes the frames.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace absenc::modbus {
 
-/// A virtual Modbus RTU server.
+/// A virtual Modbus RTU server. Subclasses answer the requests.
 class Server : public Device<std::uint8_t> {
  public:
   /// Processes an event of the port, such as received data or silence.
@@ -32,27 +32,27 @@ class Server : public Device<std::uint8_t> {
   [[nodiscard]] std::uint64_t answer_count() const final { return answer_count_; }
 
  protected:
-  /// Answers on a line with these settings.
+  /// Creates a server on a line with these settings.
   explicit Server(const LineSettings& line) : line_(line) {}
   ~Server() = default;
 
-  /// Called at power on; must call `set_rate`.
+  /// Called at power on; the subclass must call `set_rate`.
   virtual void started() = 0;
-  /// Called for a frame with a valid CRC and any address; `body` is without the CRC. Appends the reply without its CRC,
-  /// or nothing. Must call `check_line_rules` if the frame is for this server.
+  /// Called for a frame with a valid CRC and any address; `body` is the frame without its CRC. The subclass appends the
+  /// reply without its CRC, or nothing. It must call `check_line_rules` if the frame is for this server.
   virtual void request(Bytes body, Time at, FrameBytes& reply) = 0;
 
-  /// Changes the rate after the present transmission.
+  /// Changes the baud rate when the present transmission is over.
   void set_rate(std::uint32_t rate);
-  /// Records whether the host kept a rule of the document; returns `satisfied`.
+  /// Records whether the host kept `rule` of the document; returns `satisfied`.
   bool expect(bool satisfied, std::string_view rule, Time at) { return rules_.expect(satisfied, rule, at); }
-  /// Checks the line timing of this frame. Frames for other servers are not checked.
+  /// Checks the timing of the frame that is being handled. Frames for other servers need not be checked.
   void check_line_rules(Time at);
-  /// Announces that other servers may answer this request at the same time.
+  /// Announces that other servers may answer the present request at the same time, so that a collision breaks no rule.
   void expect_collision() { expects_collision_ = true; }
-  /// Sets the CRC byte order of this reply; default is low_first.
+  /// Sets the byte order of the CRC in the present reply; without a call it is low_first.
   void set_crc_order(CrcOrder order) { crc_order_ = order; }
-  /// Appends a refusal.
+  /// Appends the refusal of `function` to `reply`, without a CRC.
   static void refuse(FrameBytes& reply, std::uint8_t address, std::uint8_t function, Exception exception);
 
  private:
@@ -66,19 +66,19 @@ class Server : public Device<std::uint8_t> {
   std::uint32_t next_rate_ = 0;
 
   FrameBytes frame_;
-  bool damaged_ = false;          // the frame has a damaged character, or too many characters
-  bool follows_traffic_ = false;  // something was received or sent before this frame
-  bool began_too_soon_ = false;   // the frame began too soon after it
-  bool has_gap_ = false;          // two characters of the frame were too far apart
+  bool damaged_ = false;          // the present frame has a damaged character, or too many characters
+  bool follows_traffic_ = false;  // something was received or sent before the present frame
+  bool began_too_soon_ = false;   // the silence before the present frame was shorter than 3.5 characters
+  bool has_gap_ = false;          // two characters of the present frame were more than 1.5 characters apart
   bool line_was_used_ = false;    // anything was received or sent since power on
-  bool ended_late_ = false;       // the frame ended so long ago that its client may have timed out
+  bool ended_late_ = false;       // the last frame ended so long ago that its client may have timed out
   bool expects_collision_ = false;
   Time quiet_since_{};
   FrameBytes reply_;
   CrcOrder crc_order_ = CrcOrder::low_first;
   bool reply_pending_ = false;
   bool transmitting_ = false;
-  bool interrupted_ = false;  // something was received during the transmission
+  bool interrupted_ = false;  // something was received during the present transmission
   Time reply_at_{};
   HostRules rules_;
   std::uint64_t answer_count_ = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Times of a Modbus RTU line: silence separates frames (MODBUS over Serial Line V1.02, 2.5.1.1).
+// Times of a Modbus RTU line, where silence separates frames (MODBUS over Serial Line V1.02, 2.5.1.1).
 #pragma once
 
 #include <cstdint>
@@ -12,15 +12,16 @@ namespace absenc::modbus {
 
 using namespace std::chrono_literals;
 
-/// Above this rate the silences no longer shrink with the characters.
+/// Above this baud rate the silences are constant instead of a number of characters.
 inline constexpr std::uint32_t fixed_times_above = 19'200;
 
-/// Returns 3.5 characters: the silence that ends a frame, and the shortest between two frames. `rate` must not be 0.
+/// Returns the silence that ends a frame, which is also the shortest between two frames: 3.5 characters. `rate` of the
+/// line must not be 0.
 [[nodiscard]] constexpr Time frame_silence(const LineSettings& line) {
   return line.rate > fixed_times_above ? 1750us : line.character() * 7 / 2;
 }
 
-/// Returns the silence that a client keeps before a request: half a character more, for servers that measure a little
+/// Returns the silence that a client keeps before a request: 4 characters, because some servers measure slightly too
 /// long.
 [[nodiscard]] constexpr Time request_silence(const LineSettings& line) {
   return frame_silence(line) + line.character() / 2;
@@ -31,12 +32,12 @@ inline constexpr std::uint32_t fixed_times_above = 19'200;
   return line.rate > fixed_times_above ? 750us : line.character() * 3 / 2;
 }
 
-/// Returns the times of a client on a line; a reply must begin within `answer_limit` after the request.
+/// Returns the timeouts of a client on a line; a reply must begin within `answer_limit` after its request.
 [[nodiscard]] constexpr author::HostTimes client_times(const LineSettings& line, Time answer_limit) {
   return {.answer_limit = answer_limit + line.character(),
           .gap_limit = frame_silence(line),
           .silence = request_silence(line),
-          .patience = 1s};  // longer than any reply, and longer than the delay with which a carrier reports silence
+          .patience = 1s};  // longer than any reply, and longer than the delay with which an adapter reports silence
 }
 
 }  // namespace absenc::modbus

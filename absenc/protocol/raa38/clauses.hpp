@@ -8,7 +8,7 @@
 
 namespace absenc::raa38 {
 
-/// Clauses of the document for the encoder on RS-485.
+/// Requirements of the document that an encoder on RS-485 must fulfil.
 inline constexpr auto serial_clauses = std::array{
     Clause{.id = "frames",
            .paragraph = "3.1.3, 3.1.5",
@@ -47,7 +47,7 @@ inline constexpr auto serial_clauses = std::array{
            .shown_with = "mode=bus&zeroing=command"},
 };
 
-/// Clauses of the document for the encoder with Modbus RTU.
+/// Requirements of the document that an encoder with Modbus RTU must fulfil.
 inline constexpr std::array<Clause, 10> modbus_clauses{{
     {"answer", "3.1.7", "function 03 is answered", Demand::answered},
     {"length", "3.1.7 (5)", "an answer has as many bytes as its registers need", Demand::whole},
@@ -88,7 +88,7 @@ inline constexpr std::array<Clause, 10> modbus_clauses{{
      .demand = Demand::zero},
 }};
 
-/// Clauses of the document for the encoder on CAN.
+/// Requirements of the document that an encoder on CAN must fulfil.
 inline constexpr auto can_clauses = std::array{
     Clause{"answer", "3.4.1 (3)", "command 80 is answered", Demand::answered},
     Clause{.id = "stream",
@@ -108,7 +108,7 @@ inline constexpr auto can_clauses = std::array{
            .demand = Demand::as_drawn,
            .errors = any_of(Error::out_of_range)},
     Clause{"node", "3.4.1 (3)", "a request to another node is not answered", Demand::foreign_silent},
-    // No clauses for setting the node number and the bit rate; README.md gives the reason.
+    // No requirements cover setting the node number and the bit rate; README.md gives the reason.
     Clause{.id = "cyclic",
            .paragraph = "3.4.1 (3) 7, 8",
            .words = "after command 31 the node sends as many readings a second as it was told",
@@ -129,7 +129,7 @@ inline constexpr auto can_clauses = std::array{
            .demand = Demand::zero},
 };
 
-// ---- Commands and frames of hosts that break a clause or just keep it
+// ---- Commands and frames of hosts that break a clause, or barely keep it
 
 namespace script {
 using std::chrono::milliseconds;
@@ -164,7 +164,7 @@ inline constexpr std::array rate_9{enter, HostStep{milliseconds(1), "7e5:1300090
 inline constexpr std::array rate_3{enter, HostStep{milliseconds(1), "7e5:1300030000000000"}};
 }  // namespace script
 
-/// Clauses of the document for the host with Modbus RTU.
+/// Requirements of the document that a host with Modbus RTU must fulfil.
 inline constexpr std::array<HostClause, 7> modbus_host_clauses{{
     {"asks", "3.1.7", "requests are as drawn", HostDemand::asks},
     {"silence", "3.1.7", "after no reply it asks again", HostDemand::after_silence},
@@ -187,7 +187,7 @@ inline constexpr std::array<HostClause, 7> modbus_host_clauses{{
      .breaks = {script::direction_often, script::zero_often}},
 }};
 
-/// Host clauses of the serial unit. Only in bus mode do bytes request a position.
+/// Requirements that a host on a serial line must fulfil. Only in bus mode do bytes request a position.
 inline constexpr std::array<HostClause, 4> serial_host_clauses{{
     {"asks", "3.1.5 (1)", "requests are as drawn", HostDemand::asks},
     {"silence", "3.1.5 (1)", "after no reply it asks again", HostDemand::after_silence},
@@ -201,7 +201,7 @@ inline constexpr std::array<HostClause, 4> serial_host_clauses{{
      .options = "acquisition_us=20000"},
 }};
 
-/// Clauses of the document for the host on CAN.
+/// Requirements of the document that a host on CAN must fulfil.
 inline constexpr std::array<HostClause, 10> can_host_clauses{{
     {"asks", "3.4.1 (3)", "requests are as drawn", HostDemand::asks},
     {"silence", "3.4.1 (3)", "after no reply it asks again", HostDemand::after_silence},

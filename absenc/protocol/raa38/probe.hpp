@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Judges the values of an option by captured frames: a value is impossible if one frame contradicts it.
+// Judges which values of an option fit captured frames: a value is impossible if one frame contradicts it.
 #pragma once
 
 #include <optional>
@@ -9,9 +9,10 @@
 
 namespace absenc::raa38 {
 
-/// Reports each value from `first` to `last` with its evidence. `contradiction(value, i)` returns why capture i
-/// contradicts the value, or an empty text. Returns whether a value is possible and sets `value` to it. A possible
-/// `value` is left unchanged, because the position of a shaft that stands still fits many numbers of bits.
+/// Puts each value of an option from `first` to `last` with its evidence into `sink`. `contradiction(value, i)` returns
+/// why capture i contradicts the value, or an empty text. If a value is possible, sets `value` to it and returns true.
+/// A `value` that is possible is left unchanged, because the position of a shaft at standstill fits many numbers of
+/// bits.
 template <class Contradiction>
 bool judge_option(EvidenceSink& sink, std::size_t option, std::int64_t first, std::int64_t last, std::size_t captures,
                   std::int64_t& value, std::string_view agrees, Contradiction&& contradiction) {

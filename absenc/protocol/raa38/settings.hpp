@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Settings that a virtual RAA38S6 keeps over power off, on lines with commands to change them. Each write wears the
+// Settings that a virtual RAA38S6 stores over power off, for lines with commands that change them. Each write wears the
 // memory.
 #pragma once
 
@@ -13,42 +13,42 @@
 
 namespace absenc::raa38 {
 
-/// Settings of a virtual encoder, in its memory.
+/// Settings of a virtual encoder, stored in a memory of a few bytes.
 class Settings {
  public:
-  /// Memory layout: number on the line, index of the bit rate, 1 if it counts down, shaft position at its zero in
-  /// counts, number of writes.
+  /// Index in the memory of the encoder's number on the line, 1 byte.
   static constexpr std::size_t number_at = 0;
-  static constexpr std::size_t rate_at = 1;       ///< Address of the rate.
-  static constexpr std::size_t direction_at = 2;  ///< Address of the direction.
-  static constexpr std::size_t zero_at = 3;       ///< Address of the zero position.
-  static constexpr std::size_t writes_at = 7;     ///< Address of the number of writes.
+  static constexpr std::size_t rate_at = 1;       ///< Index of the bit rate's index, 1 byte.
+  static constexpr std::size_t direction_at = 2;  ///< Index of the direction, 1 byte: 1 if the encoder counts down.
+  /// Index of the shaft position at the encoder's zero, 4 bytes in counts.
+  static constexpr std::size_t zero_at = 3;
+  static constexpr std::size_t writes_at = 7;  ///< Index of the number of writes, 4 bytes.
 
-  /// Begins with these settings; `shaft` must outlive it.
+  /// Creates settings with this number and rate; `shaft` must outlive them.
   Settings(std::uint8_t number, std::uint8_t rate, unsigned bits, const Shaft& shaft) : bits_(bits), shaft_(&shaft) {
     memory_[number_at] = number;
     memory_[rate_at] = rate;
   }
 
-  /// Returns the content of the memory.
+  /// Returns the bytes of the memory.
   [[nodiscard]] MutableBytes memory() { return memory_; }
-  /// Returns a number that changes with the memory.
+  /// Returns a number that changes with each write of the memory.
   [[nodiscard]] std::uint32_t version() const { return version_; }
-  /// Returns the address or node number.
+  /// Returns the number of the encoder on its line: address or node number.
   [[nodiscard]] std::uint8_t number() const { return memory_[number_at]; }
-  /// Returns the index of the rate.
+  /// Returns the index of the bit rate.
   [[nodiscard]] std::uint8_t rate() const { return memory_[rate_at]; }
-  /// Returns whether the direction is reversed.
+  /// Returns whether the encoder counts down.
   [[nodiscard]] bool counts_down() const { return memory_[direction_at] != 0; }
-  /// Returns the number of writes.
+  /// Returns how often settings were written.
   [[nodiscard]] std::uint32_t writes() const { return load(writes_at); }
 
-  /// Returns the position in counts. The direction mirrors it at the zero.
+  /// Returns the encoder's position in counts. Counting down mirrors it at the zero.
   [[nodiscard]] std::uint32_t position(Time at) const {
     const std::uint32_t up = counts(at) - load(zero_at);
     return static_cast<std::uint32_t>((counts_down() ? 0u - up : up) & low_mask(bits_));
   }
-  /// Writes a setting. Returns false if the memory had this value already.
+  /// Writes a setting at index `at` and counts the write. Returns false if the memory had this value already.
   bool write(std::size_t at, Bytes value) {
     const MutableBytes kept = MutableBytes(memory_).subspan(at, value.size());
     const bool changes = !std::equal(value.begin(), value.end(), kept.begin());
@@ -57,7 +57,7 @@ class Settings {
     ++version_;
     return changes;
   }
-  /// Makes the present shaft position the zero. Returns false as `write` does.
+  /// Makes the present shaft position the zero. Returns false if the memory had this zero already.
   bool write_zero(Time at) {
     std::array<std::uint8_t, 4> zero{};
     store_little_endian(zero, counts(at));

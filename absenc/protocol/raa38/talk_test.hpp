@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: encoders and a host on one line in virtual time, and the results of the unit's conversations.
+// For tests: encoders and a host on one line in virtual time, and the results of the host's conversations.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -34,12 +34,12 @@ struct Collector final : FieldSink {
   return text.find(words) != std::string_view::npos;
 }
 
-/// Result of a conversation.
+/// Result of a conversation, as a test compares it.
 struct CommandResult {
   Error error = Error::none;
-  std::string words{};   // detail and advice
+  std::string words{};   // detail and advice of the error
   std::string fields{};  // "name=value name=value ", without real numbers
-  std::string left{};    // the same for what report_left reports of an interrupted command
+  std::string left{};    // like `fields`, for the fields that report_left reports of an interrupted command
   std::optional<Reading> reading{};
   Time took{};
 
@@ -58,7 +58,7 @@ template <class Item>
   return end;
 }
 
-/// Checks the error and its words. With an error, fields and reading must be empty.
+/// Checks the error and its texts. If the conversation failed, fields and reading must be empty.
 [[nodiscard]] inline ::testing::AssertionResult ended(const CommandResult& end, Error error,
                                                       std::string_view words = {}) {
   const bool good = end.error == error && says(end.words, words);
@@ -67,12 +67,12 @@ template <class Item>
          << text_of(end.error).name << ": " << end.words << ": " << end.fields;
 }
 
-/// A line with one or more encoders and a host. `options_of(format)` must make the unit's options of a format.
+/// A line with one or more encoders and a host. `options_of(format)` must return the unit's options for a format.
 template <class Item, class Encoder, class Format, const Unit& unit>
 struct Bench {
   Bench(const Format& own, LinkKind kind, const LineSettings& settings) : format(own), line(kind, settings) {}
 
-  /// Adds an encoder to the line, on the same shaft.
+  /// Adds an encoder to the line, on the shaft of the others.
   Encoder& add(const Format& of_it) {
     encoders.emplace_back(of_it, shaft);
     encoders.back().power_on(line.now(), Device<Item>::PowerOn::skip);
@@ -81,13 +81,13 @@ struct Bench {
   }
   Encoder& encoder() { return encoders.front(); }
 
-  /// Runs a host to its end, or until `on_emit` returns false.
+  /// Runs a host until it ends, or until `on_emit` returns false.
   template <class Machine>
   Machine& run(Machine& machine, const std::function<bool()>& on_emit = {}) {
     const Time start = line.now();
     emitted = on_emit;
     if (host_end) {
-      line.replace(*host_end, machine);  // the new host starts at the rate that the host before has set
+      line.replace(*host_end, machine);  // the new host starts at the rate that the previous host has set
     } else {
       host_end = line.attach(sim::NodeRole::host, machine, [this] { return !emitted || emitted(); });
     }
@@ -123,7 +123,7 @@ struct Bench {
   Time took{};
 };
 
-/// Returns how long a conversation takes if something sends without a pause from its first request on.
+/// Returns how long a conversation takes if another sender never pauses from its first request on.
 inline Time time_with_noise(Conversation<std::uint8_t>& conversation) {
   using Kind = Step<std::uint8_t>::Kind;
   constexpr std::uint8_t noise = 0x55;

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// The RAA38S6 as units: one for each kind of line.
+// The RAA38S6 as units for the list of units: one for each kind of line.
 #pragma once
 
 #include "absenc/protocol/unit.hpp"
 
 namespace absenc::raa38 {
 
-extern constinit const Unit serial_unit;  ///< RS-485, RS-232, RS-422
-extern constinit const Unit modbus_unit;  ///< The unit for Modbus RTU.
-extern constinit const Unit can_unit;     ///< The unit for CAN.
+extern constinit const Unit serial_unit;  ///< RAA38S6 on RS-485, RS-232 or RS-422.
+extern constinit const Unit modbus_unit;  ///< RAA38S6 with Modbus RTU.
+extern constinit const Unit can_unit;     ///< RAA38S6 on CAN.
 
 }  // namespace absenc::raa38

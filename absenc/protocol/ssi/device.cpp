@@ -14,14 +14,14 @@ void VirtualEncoder::selected(Time at, Time period, bool, author::DrivenBits& bi
     const bool allowed = period >= period_of(format_.fastest_khz) && period <= period_of(format_.slowest_khz);
     expect(allowed, "clock outside min_clock_khz to max_clock_khz", at);
   }
-  // Within the monoflop time the shift register continues with the old word.
+  // Within the monoflop time the shift register still holds the old word.
   if (!expect(at >= free_at_, "clocked again within monoflop_us", at)) {
     shifted_ %= 2 * (format_.word.bits() + (format_.after_word == AfterWord::separated ? 1 : 0));
   } else {
     latched_ = word_of(format_.word, shaft_->at(at), raised());
     shifted_ = 0;
   }
-  // After ones the line stays high.
+  // If the bits after the word are ones, the line stays high.
   if (format_.after_word != AfterWord::one) hold_low(monoflop());
   BitBuffer<WordFormat::maximum_bits> coded;
   encode_whole(format_, latched_, coded);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual SSI encoder: a shift register that is loaded when the pause is over.
+// A virtual SSI encoder: a shift register that loads a new word when the pause is over.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 
 namespace absenc::ssi {
 
-/// A virtual encoder.
+/// A virtual SSI encoder.
 class VirtualEncoder final : public author::ClockedDevice {
  public:
   /// Creates an encoder that is off until `power_on`. `shaft` must outlive it.
@@ -27,7 +27,7 @@ class VirtualEncoder final : public author::ClockedDevice {
   Format format_;
   const Shaft* shaft_;
   Word latched_{};
-  std::size_t shifted_ = 0;  // bits of `latched_` that were clocked out
+  std::size_t shifted_ = 0;  // number of bits of `latched_` that were clocked out
   Time free_at_{};           // end of the pause after the last clock
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// SSI words, MSB first: encode, decode, the few checks that the line allows, and its times. README.md draws the frame.
+// SSI words, MSB first: encoding, decoding, the few checks that are possible, and times. README.md draws the frame.
 #pragma once
 
 #include <cstddef>
@@ -15,46 +15,49 @@ namespace absenc::ssi {
 
 using namespace std::chrono_literals;
 
-/// Settings of the line.
+/// Settings of an SSI line: 200 kHz, and the clock idles high.
 inline constexpr LineSettings line_settings{.rate = 200'000, .spi_mode = 3, .idle_clocks = 1};
-inline constexpr Time pause_margin = 10us;  ///< time that the host adds to the pause
+inline constexpr Time pause_margin = 10us;  ///< Time that the host adds to the pause between two words.
 
-/// Bits that the encoder sends if the clock continues after the word.
+/// Bits that the encoder sends if the clock continues after the word: the word again, zeros, ones, or the word
+/// separated.
 enum class AfterWord : std::uint8_t {
   repeat,
   zero,
   one,
-  separated,  ///< a zero, then the word again
+  separated,  ///< A zero, then the word again.
 };
 
 /// Frame layout and settings of one encoder, as the unit's options select them.
 struct Format {
   WordFormat word = "position:12"_word;      ///< Layout of the position word: its fields in the order of the line.
   AfterWord after_word = AfterWord::repeat;  ///< What the encoder sends after its word.
-  /// Clocks after the word, for comparison; with as many as the word has bits, the word is read twice.
+  /// Number of clocks after the word, to compare the bits; with as many as the word has bits, the word is read twice.
   unsigned extra_clocks = 0;
-  Scale scale{};              ///< Whether the encoder is linear, and the length of a count.
-  bool error_parity = false;  ///< the last bit is a parity that the encoder inverts if its position is wrong
-  bool padded = false;        ///< skipped bits of the word must be zero
-  /// The word is read once more, and the shaft may have moved with this speed; 0: read once.
+  Scale scale{};  ///< Whether the encoder is linear, and the length of a count.
+  /// Whether the last bit is a parity bit that the encoder inverts if its position is wrong.
+  bool error_parity = false;
+  bool padded = false;  ///< Whether skipped bits of the word must be zero.
+  /// Highest speed of the shaft between two words that the host reads to confirm the position; 0: reads one word.
   std::uint32_t confirm_rpm = 0;
   // ---- Values that vary by product (RAA38S6 3.5, note)
   /// Pause between two words; it must exceed the encoder's monoflop time Tm, or the old word continues.
   Time pause = 50us;
-  std::uint32_t clock_khz = 200;  ///< Clock in kHz.
-  /// Tm of the virtual encoder, at most `pause`; 0: equal to `pause`. Other encoders have 9 to 41 us.
+  std::uint32_t clock_khz = 200;  ///< Clock rate in kHz.
+  /// Monoflop time Tm of the virtual encoder, at most `pause`; 0: equal to `pause`. Other encoders have 9 to 41 us.
   Time monoflop = 20us;
-  /// Clock range of the virtual encoder. Tcs in the document also gives 250 kHz.
+  /// Slowest clock that the virtual encoder allows, in kHz. Tcs in the document also gives 250 kHz.
   std::uint32_t slowest_khz = 100;
-  std::uint32_t fastest_khz = 250;  ///< Fastest clock that the encoder allows, in kHz.
+  std::uint32_t fastest_khz = 250;  ///< Fastest clock that the virtual encoder allows, in kHz.
 };
 
 inline constexpr std::size_t frame_capacity = 2 * WordFormat::maximum_bits;  ///< Greatest number of bits of a frame.
 
-/// Returns the clocks of one reading.
+/// Returns the number of clocks of one reading: the word and the extra clocks.
 [[nodiscard]] constexpr unsigned clocks(const Format& format) { return format.word.bits() + format.extra_clocks; }
 
-/// Returns bit `index` (from 0) of a clock sequence that continues after the word. The word begins at `first`.
+/// Returns bit `index` (from 0) of an endless clock sequence: the word, then the bits after it. The word begins at
+/// `first`.
 [[nodiscard]] constexpr bool bit_after_word(const Format& format, BitView word, std::size_t index,
                                             std::size_t first = 0) {
   const std::size_t bits = format.word.bits();
@@ -73,7 +76,7 @@ namespace detail {
   const std::size_t both = 2 * word + (format.after_word == AfterWord::separated ? 1 : 0);
   const bool twice = format.extra_clocks == 0 && bits.size == both;
   if (bits.size == clocks(format) || twice) return Error::none;
-  // More clocks than the word has bits: taken as one number, the bits exceed any position.
+  // Checks more clocks than a word has bits: the bits as one number must not be a possible position.
   for (std::size_t i = 0; i + word < bits.size; ++i) {
     if (bits[i]) return Error::out_of_range;
   }
@@ -121,28 +124,28 @@ constexpr Result<typename Source::Word> decode_by(const Source& source, BitView 
 
 }  // namespace detail
 
-/// Decodes the word in `bits` from `first` on; all further bits must be those that the encoder sends after it. Errors:
-/// line_stuck (all bits alike although the bits after the word must differ), bad_checksum (parity), cross_check_failed
-/// (wrong bits after the word).
+/// Decodes the word in `bits` from `first` on; all further bits must be those that the encoder sends after a word.
+/// Errors: line_stuck (all bits alike although the bits after the word must differ), bad_checksum (parity),
+/// cross_check_failed (wrong bits after the word).
 [[nodiscard]] constexpr Result<Word> decode_clocked_on(const Format& format, BitView bits, std::size_t first = 0) {
   return detail::decode_clocked_on(Given<Format>{format, format.word}, bits, first);
 }
 
 /// Decodes a reading of `clocks(format)` bits, or the word twice if the format has no extra clocks. Errors:
-/// wrong_length, out_of_range (too many clocks, and their bits as one number exceed any position), those of
+/// wrong_length, out_of_range (too many clocks, and their bits as one number exceed any position), and those of
 /// decode_clocked_on.
 [[nodiscard]] constexpr Result<Word> decode(const Format& format, BitView bits) {
   return detail::decode_by(Given<Format>{format, format.word}, bits);
 }
 
-/// Decodes a word whose format is known at compile time, as fast as code written for it by hand. The result has
-/// `values` only if the format has some.
+/// Decodes a word whose format is known at compile time, as fast as code written for this format by hand. The result
+/// has the member `values` only if the format has further fields.
 template <const Format& format>
 [[nodiscard]] constexpr Result<typename Known<format>::Word> decode(BitView bits) {
   return detail::decode_by(Known<format>{}, bits);
 }
 
-/// Encodes the word. With `error_parity`, an error inverts the parity bit.
+/// Encodes the word in `word`. With `error_parity`, an error inverts the parity bit.
 template <std::size_t Capacity>
 constexpr bool encode_whole(const Format& format, const Word& word, BitBuffer<Capacity>& out) {
   BitBuffer<Capacity> right;
@@ -154,7 +157,7 @@ constexpr bool encode_whole(const Format& format, const Word& word, BitBuffer<Ca
   return true;
 }
 
-/// Appends the word and the bits after it, `count` bits in all. Returns false if `out` is too small.
+/// Appends the word and the bits after it to `out`, `count` bits in all. Returns false if `out` is too small.
 template <std::size_t Capacity>
 constexpr bool encode(const Format& format, const Word& word, std::size_t count, BitBuffer<Capacity>& out) {
   BitBuffer<WordFormat::maximum_bits> coded;
@@ -163,11 +166,11 @@ constexpr bool encode(const Format& format, const Word& word, std::size_t count,
   return true;
 }
 
-/// Whether a word has an error bit, and what it means.
+/// Whether a word has an error bit, and the level of the bit that reports an error.
 enum class ErrorBit : std::uint8_t { none, active_high, active_low };
 
-/// Returns the tree format, in which turns and position meet at a fixed clock: zeros before the turns and after the
-/// position fill up `turns` and `steps` bits.
+/// Returns the tree format, in which turns and position meet at a fixed clock: zeros fill up the turns to `turns` bits
+/// and the position to `steps` bits. Returns an empty format if either is too long.
 [[nodiscard]] constexpr WordFormat tree_format(const PositionBits& bits, unsigned turns, unsigned steps) {
   WordFormat word;
   const auto fill = [&word](unsigned count) {
@@ -181,15 +184,15 @@ enum class ErrorBit : std::uint8_t { none, active_high, active_low };
   return word;
 }
 
-/// Returns the usual words: counts, optionally Gray-coded, then an error bit and a parity bit over all bits before it
-/// if wanted.
+/// Appends to the counts in `word` the usual further bits: an error bit, and a parity bit over all bits before it.
+/// `gray`: the counts are Gray-coded. Returns the format.
 [[nodiscard]] constexpr WordFormat word_with(WordFormat word, bool gray, ErrorBit error, Parity parity) {
   if (gray) word.set_gray();
   if (error != ErrorBit::none) word.add({"error", Meaning::error, 1, error == ErrorBit::active_low});
   if (parity != Parity::none) word.add({"parity", Meaning::parity, 1, parity == Parity::odd});
   return word;
 }
-/// Returns the format of a word of position, turns, error bit and parity.
+/// Returns the format of a word with position, turns, error bit and parity bit.
 [[nodiscard]] constexpr WordFormat word_with(const PositionBits& bits, bool gray, ErrorBit error, Parity parity) {
   return word_with(word_format(bits), gray, error, parity);
 }

@@ -39,7 +39,7 @@ TEST(SsiFrame, RejectsTooManyClocks) {
 
 TEST(SsiFrame, ReadingTwiceDetectsAnyWrongBit) {
   const Format format{.extra_clocks = 12};
-  // the word twice is accepted without extra clocks too
+  // without extra clocks, the word twice is accepted too
   EXPECT_EQ(decode({}, "000111101111000111101111")->position, 495u);
   std::string text = "000111101111000111101111";
   for (char& c : text) {
@@ -50,7 +50,7 @@ TEST(SsiFrame, ReadingTwiceDetectsAnyWrongBit) {
   EXPECT_EQ(decode(format, text.substr(0, 12)).error(), Error::wrong_length);
 }
 
-// A reader with one bit too few or too many finds the error in the bits after the word.
+// A host that assumes one bit too few or too many detects this by the bits after the word.
 TEST(SsiFrame, ExtraClocksDetectWrongNumberOfBits) {
   unsigned missed = 0;
   for (std::uint64_t position = 0; position < 4096; ++position) {
@@ -103,7 +103,7 @@ void agree() {
     ASSERT_EQ(known.error(), given.error());
     if (!given) continue;
     ++good;
-    // An accepted word must equal the word that its fields encode, with the bits after it.
+    // Encoding the fields of an accepted word must give the same bits, with those after the word.
     BitBuffer<frame_capacity> again;
     EXPECT_TRUE(encode(format, *given, read.size(), again));
     for (std::size_t k = 0; k < again.size(); ++k) ASSERT_EQ(again.view()[k], (BitView{copy, read.size()}[k])) << k;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of SSI.
+// Host side of SSI: times, and conversations that read one word or two.
 #pragma once
 
 #include <algorithm>
@@ -9,21 +9,21 @@
 
 namespace absenc::ssi {
 
-/// SSI for the engine. The port is set to the clock rate already.
+/// The protocol, as author layers use it: word, clocks and times. The port is set to the clock rate already.
 struct Protocol {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = ssi::Format;
   /// Empty type: on a clocked link the host sends no requests.
   using Request = author::NoRequest;
-  /// Type of the encoder's replies.
+  /// Type of the decoded word.
   using Reply = Word;
   static constexpr unsigned most_clocks = frame_capacity;  ///< Greatest number of clocks in one transfer.
 
-  /// Returns how long a host waits for replies.
+  /// Returns the pause of the clock before each word.
   static constexpr author::ClockedHostTimes host_times(const Format& format) {
     return {.rest = format.pause + pause_margin};
   }
-  /// Returns the number of clocks of a transfer.
+  /// Returns the number of clocks of one reading.
   static constexpr unsigned clocks(const Format& format) { return ssi::clocks(format); }
   /// Decodes a reply with all checks; returns the first error if one fails.
   static constexpr Result<Word> decode(const Format& format, BitView bits) { return ssi::decode(format, bits); }
@@ -35,7 +35,8 @@ struct Protocol {
   }
 };
 
-/// Returns whether a shaft with at most `confirm_rpm` can have moved between the two words, in either direction.
+/// Returns whether a shaft with at most `confirm_rpm` can have moved from the word `before` to `after`, in either
+/// direction.
 [[nodiscard]] constexpr bool can_follow(const Format& format, const Word& before, const Word& after, Time between) {
   const unsigned bits = format.word.bits_of(Meaning::position);
   const unsigned turns = format.word.bits_of(Meaning::multiturn);
@@ -43,19 +44,19 @@ struct Protocol {
   const std::uint64_t difference =
       ((after.multiturn << bits | after.position) - (before.multiturn << bits | before.position));
   const std::uint64_t counts = std::min(difference & mask, (~difference + 1) & mask);
-  // In 2^-32 of a turn: at 60 rpm, which is one turn per second, the shaft moves 4295 per microsecond.
+  // Distance in 2^-32 of a turn: at 60 rpm, one turn per second, the shaft moves 4295 per microsecond.
   const auto distance = static_cast<std::uint64_t>(between.count()) / 1000 * format.confirm_rpm / 60 * 4295 + 1;
   const std::uint64_t reach = bits >= 32 ? distance << (bits - 32) : distance >> (32 - bits);
   return counts <= reach + 1;
 }
 
-/// Reads one word, with the bits after it that `format.extra_clocks` requests.
+/// Reads one word, and after it the number of bits that `format.extra_clocks` states.
 using ReadPosition = author::ReadClocked<Protocol>;
 
-/// Reads two words and takes the second. Error also: cross_check_failed (the shaft cannot have moved that far).
+/// Reads two words and reports the second. Error also: cross_check_failed (the shaft cannot have moved that far).
 class ConfirmPosition : public author::ClockedHostOf<Protocol> {
  public:
-  /// Reads twice, and confirms the position.
+  /// Creates a conversation that reads an encoder of this format twice.
   explicit ConfirmPosition(const Format& format) : ClockedHostOf(format) {}
 
  private:

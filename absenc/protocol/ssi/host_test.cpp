@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The host conversation and the virtual encoder against each other in virtual time.
+// Tests of the host's conversations with the virtual encoder in virtual time.
 #include "absenc/protocol/ssi/host.hpp"
 
 #include <gmock/gmock-matchers.h>
@@ -15,7 +15,7 @@
 namespace absenc::ssi {
 namespace {
 
-/// An encoder of 12 bits at 495, the example of the manual.
+/// An encoder of 12 bits at position 495, which is the example of the manual.
 struct Bench : biss::testing::ClockedBench<VirtualEncoder> {
   explicit Bench(const Format& format = {}) : ClockedBench(line_settings, format) {
     shaft.state.position = std::int64_t{495} << 20;

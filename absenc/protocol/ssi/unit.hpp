@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// SSI as a unit.
+// SSI as a unit for the list of units.
 #pragma once
 
 #include "absenc/protocol/unit.hpp"

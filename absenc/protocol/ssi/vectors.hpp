@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// SSI test words with their source.
+// SSI test words with the document that each is from.
 #pragma once
 
 #include <array>

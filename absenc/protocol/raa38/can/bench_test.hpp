@@ -29,7 +29,7 @@ struct Talk final : raa38::testing::Talk<CanFrame> {
       : raa38::testing::Talk<CanFrame>(can_unit, options_of({}), name, std::move(arguments)) {}
 };
 
-/// Sends one frame and records all received frames until `until`.
+/// Sends one frame and records all frames that are received until the time `until`.
 class RawHost final : public Machine<CanFrame> {
  public:
   RawHost(const CanFrame& request, Time until) : request_(request), until_(until) {}
@@ -58,15 +58,15 @@ struct Bench : raa38::testing::Bench<CanFrame, VirtualNode, Format, can_unit> {
       : raa38::testing::Bench<CanFrame, VirtualNode, Format, can_unit>(own, LinkKind::can, {.rate = own.bit_rate()}) {
     add(own);
   }
-  /// Adds a second node with the same number that counts down, so that its replies differ.
+  /// Adds a node that shares the number of the first node and counts down, so that its replies differ.
   void add_twin() {
     add({.positive = 1, .negative = 0, .cyclic = 0});
     static_cast<void>(raw(encode(Order::direction, 0x20, 0)));
     ASSERT_NE(encoders.front().settings().position(line.now()), encoders.back().settings().position(line.now()));
   }
-  /// Sets the position; `counts` are of the encoder's resolution.
+  /// Sets the position to `counts` in the encoder's resolution.
   void put(std::int64_t counts) { shaft.put(0, counts << (21 - format.bits)); }
-  /// Sends a request and returns the frames received within 20 ms.
+  /// Sends a request and returns the frames that were received within 20 ms.
   Frames raw(const CanFrame& request) {
     RawHost host(request, line.now() + 20ms);
     return run(host).received_frames;
@@ -78,7 +78,8 @@ struct Bench : raa38::testing::Bench<CanFrame, VirtualNode, Format, can_unit> {
   }
 };
 
-/// A node whose answers are made by a function of the received frame. It can also send frames cyclically.
+/// A node that answers with the frames that a function makes from each received frame. It can also send frames
+/// cyclically.
 struct Scripted final : Machine<CanFrame> {
   using Script = std::function<Frames(const CanFrame& received_frames)>;
   explicit Scripted(Script script_) : script(std::move(script_)) {}
@@ -106,7 +107,7 @@ struct Scripted final : Machine<CanFrame> {
   Script script;
   CanFrame unsolicited = encode_position(0x20, 49);
   Time period{};             // period of cyclic frames; 0: none
-  Time wobble{};             // periods are alternately shorter and longer by this time
+  Time wobble{};             // cyclic frames are alternately early and late by this time
   unsigned* left = nullptr;  // number of cyclic frames left to send; null: no limit
   std::uint32_t rate = 250'000;
   bool rate_changed = true;
@@ -128,7 +129,7 @@ inline CommandResult with(Scripted node, std::string_view command, std::vector<s
   return raa38::testing::result_of<CanFrame>(*talk);
 }
 
-/// Returns the correct answer of a node at position `counts`.
+/// Returns the answer that a correct node at position `counts` gives to a frame.
 [[nodiscard]] inline Frames correct_answer(const CanFrame& received_frames, std::uint64_t counts) {
   const OrderInfo& info = *order_of(received_frames);
   if (info.answer == Answer::position) return {encode_position(0x20, counts)};

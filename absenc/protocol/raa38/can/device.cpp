@@ -27,7 +27,7 @@ void VirtualNode::start_cyclic(std::uint8_t readings_per_s, Time from) {
 }
 
 void VirtualNode::power_on(Time now, PowerOn kind) {
-  // The memory may be from a file of another encoder.
+  // The memory may be from the file of an encoder with other settings.
   if (node() == 0) memory()[Settings::number_at] = format_.node;
   if (rate_of_index(settings_.rate()) == nullptr) memory()[Settings::rate_at] = rates[format_.rate].index;
   powered_ = true;
@@ -88,7 +88,7 @@ void VirtualNode::receive(const CanFrame& frame, Time at) {
   const bool for_all = function == Function::configuration;
   if (!for_all && (function != Function::command || node_of(frame) != node())) return;
   const bool sets = for_all && info != nullptr && info->answer == Answer::error;
-  // Answers of other nodes on 7E5 are received too and must be ignored.
+  // Other nodes answer on 7E5 too; these answers are received and must be ignored.
   if (sets && is_zero_from(frame, 1) && !configuring_) return;
   if (!rules_.expect(!frame.remote && frame.size == frame_size, "a frame without its 8 bytes of data", at)) return;
   if (!for_all && !rules_.expect(frame.data[1] == node(), "the second byte is not the node's number", at)) return;
@@ -112,7 +112,7 @@ void VirtualNode::answer(const CanFrame& frame, Time at) {
 
 void VirtualNode::execute(const OrderInfo& info, std::uint8_t value, Time at) {
   const bool changes = info.order == Order::zero || info.order == Order::direction;
-  // The answer could be taken for a position, and a position for the answer.
+  // Checks the rule against reading while cyclic frames are sent: an answer and a position could be confused.
   if (changes) rules_.expect(readings_per_s_ == 0, "a setting changed while the node sends by itself", at);
   if (info.order == Order::enter) configuring_ = value == 1;
   if (info.order == Order::start && readings_per_s_ == 0) start_cyclic(format_.cyclic, at);
@@ -128,7 +128,7 @@ void VirtualNode::execute(const OrderInfo& info, std::uint8_t value, Time at) {
   if (info.answer == Answer::code) answer(encode_answer(node(), info.order), at);
 }
 
-// Applies a setting. A new bit rate becomes active after the answer was sent.
+// Stores a setting. A new bit rate becomes active after the answer was sent.
 void VirtualNode::configure(const OrderInfo& info, std::uint8_t value, Time at) {
   const bool known = meaning_of(info, value).has_value();
   const bool is_rate = info.order == Order::rate;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual RAA38S6 on CAN: the node that the document describes, with settings in a memory that wears out.
+// A virtual RAA38S6 on CAN, as the document describes it, with settings in a memory that wears out.
 #pragma once
 
 #include "absenc/protocol/conversation.hpp"
@@ -9,10 +9,10 @@
 
 namespace absenc::raa38::can {
 
-/// A virtual encoder on a CAN bus.
+/// A virtual RAA38S6 on a CAN bus.
 class VirtualNode final : public Device<CanFrame> {
  public:
-  /// Follows `shaft`, which must outlive it.
+  /// Creates a node that is off until `power_on`. `shaft` must outlive it.
   VirtualNode(const Format& format, const Shaft& shaft)
       : format_(format), settings_(format.node, rates[format.rate].index, format.bits, shaft) {}
 
@@ -26,7 +26,7 @@ class VirtualNode final : public Device<CanFrame> {
   /// Switches the encoder off.
   void power_off(Time now) override;
   void raise_alarms(std::uint32_t) override {}
-  /// Ends the cause of raised alarms; latched alarms stay until a host clears them.
+  /// Does nothing: this encoder reports no alarms.
   void lower_alarms(std::uint32_t) override {}
   [[nodiscard]] MutableBytes memory() override { return settings_.memory(); }
   [[nodiscard]] std::uint32_t memory_version() const override { return settings_.version(); }
@@ -36,11 +36,11 @@ class VirtualNode final : public Device<CanFrame> {
   void watch_rules(RuleWatch* watch) override { rules_.watch(watch); }
   [[nodiscard]] std::uint64_t answer_count() const override { return answer_count_; }
 
-  /// Returns the stored settings.
+  /// Returns the settings in the node's memory.
   [[nodiscard]] const Settings& settings() const { return settings_; }
-  /// Returns its node number.
+  /// Returns the stored node number.
   [[nodiscard]] std::uint8_t node() const { return settings_.number(); }
-  /// Returns the bit rate that is stored, in bits per second.
+  /// Returns the stored bit rate in bits per second.
   [[nodiscard]] std::uint32_t rate() const { return rate_of_index(settings_.rate())->bits_per_second; }
 
  private:
@@ -61,13 +61,13 @@ class VirtualNode final : public Device<CanFrame> {
   Settings settings_;
 
   bool powered_ = false;
-  bool configuring_ = false;  // the node is in configuration mode
+  bool configuring_ = false;  // whether the node is in configuration mode
   bool sending_ = false;
-  bool switch_rate_ = false;   // the bit rate changes after the last pending answer
-  bool rate_changed_ = false;  // the node's end of the line must be set to its bit rate
+  bool switch_rate_ = false;   // whether the bit rate changes after the last pending answer
+  bool rate_changed_ = false;  // whether the port must be set to the new bit rate
   std::uint8_t readings_per_s_ = 0;
   Time next_cyclic_ = never;
-  Buffer<Pending, 8> pending_;  // answers, the earliest first
+  Buffer<Pending, 8> pending_;  // answers that are not sent yet, the earliest first
   CanFrame out_{};
   std::uint64_t answer_count_ = 0;
   HostRules rules_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// RAA38S6 on CAN: frames of 8 bytes. The document calls it CANopen, but the protocol is its own. README.md, section
-// CAN, draws the frames.
+// RAA38S6 on CAN: its frames of 8 bytes, orders and settings. The document calls the protocol CANopen, but it is
+// specific to this encoder. README.md, section CAN, draws the frames.
 #pragma once
 
 #include <array>
@@ -18,21 +18,21 @@ namespace absenc::raa38::can {
 
 inline constexpr std::uint8_t frame_size = 8;  ///< Number of data bytes of a frame.
 
-/// Purpose of a frame by its identifier; from the table of COB-IDs, with its two wrong numbers corrected.
+/// Purpose of a frame, which its identifier decides; from the table of COB-IDs, with its two wrong numbers corrected.
 enum class Function : std::uint8_t {
-  nmt,                  ///< identifier 000
-  sync,                 ///< identifier 080
-  emergency,            ///< identifiers 081 to 0FF
-  reply,                ///< identifiers 101 to 1FF: from the node
-  command,              ///< identifiers 201 to 2FF: to the node
-  sdo_reply,            ///< identifiers 581 to 5FF: from the node
-  sdo_request,          ///< identifiers 601 to 67F: to the node
-  configuration_reply,  ///< identifier 7E4, on which slaves of CiA 305 answer
-  configuration,        ///< identifier 7E5: to all nodes; RAA38S6 also answer on it
+  nmt,                  ///< Identifier 000.
+  sync,                 ///< Identifier 080.
+  emergency,            ///< Identifiers 081 to 0FF.
+  reply,                ///< Identifiers 101 to 1FF: from a node.
+  command,              ///< Identifiers 201 to 2FF: to a node.
+  sdo_reply,            ///< Identifiers 581 to 5FF: from a node.
+  sdo_request,          ///< Identifiers 601 to 67F: to a node.
+  configuration_reply,  ///< Identifier 7E4, on which slaves of CiA 305 answer.
+  configuration,        ///< Identifier 7E5: to all nodes; RAA38S6 also answer on it.
   unknown,
 };
 
-/// Returns the function of an identifier.
+/// Returns the purpose of a frame with this identifier.
 [[nodiscard]] constexpr Function function_of(std::uint32_t id) {
   if (id == 0) return Function::nmt;
   if (id == 0x80) return Function::sync;
@@ -45,46 +45,47 @@ enum class Function : std::uint8_t {
   if (id == 0x7E5) return Function::configuration;
   return Function::unknown;
 }
-/// Returns the function of a frame.
+/// Returns the purpose of a frame.
 [[nodiscard]] constexpr Function function_of(const CanFrame& frame) {
   return frame.extended ? Function::unknown : function_of(frame.id);
 }
 
-/// Returns the node number of a frame whose identifier contains one.
+/// Returns the node number in the identifier of a frame; only for purposes whose identifier contains one.
 [[nodiscard]] constexpr std::uint8_t node_of(const CanFrame& frame) {
   const Function function = function_of(frame);
   const bool has_eight_bits = function == Function::reply || function == Function::command;
   return static_cast<std::uint8_t>(frame.id & (has_eight_bits ? 0xFF : 0x7F));
 }
 
-/// Names of the CANopen functions that this encoder only lists; empty for the functions it uses.
+/// Names of the CANopen functions that the document lists but this encoder does not use; empty for the functions it
+/// uses.
 inline constexpr std::array<std::string_view, 10> function_names{"NMT", "SYNC", "EMCY", "", "", "SDO RX", "SDO TX"};
-/// Returns whether the document only names a function.
+/// Returns whether the document only names a function, without describing its frames.
 [[nodiscard]] constexpr bool is_only_named(Function function) {
   return !function_names[static_cast<std::size_t>(function)].empty();
 }
 
-/// Returns whether the frame is a setting or the answer to one.
+/// Returns whether a frame with this function is a setting or the answer to a setting.
 [[nodiscard]] constexpr bool is_setting(Function function) {
   return function == Function::configuration || function == Function::configuration_reply;
 }
 
-/// A bit rate of the document with its index in the table of CiA 305.
+/// A bit rate of the encoder with its index in the table of CiA 305.
 struct Rate {
   std::uint8_t index;             ///< Index of the rate in the table of CiA 305.
-  std::uint32_t bits_per_second;  ///< The rate in bits per second.
+  std::uint32_t bits_per_second;  ///< Bit rate in bits per second.
 };
-/// Bit rates of the encoder.
+/// All bit rates of the encoder.
 inline constexpr std::array<Rate, 3> rates{{{0, 1'000'000}, {2, 500'000}, {3, 250'000}}};
 
-/// Returns the rate of an index; null if the document does not have it.
+/// Returns the bit rate with this index of CiA 305; null if the encoder does not have it.
 [[nodiscard]] constexpr const Rate* rate_of_index(std::uint8_t index) {
   for (const Rate& rate : rates) {
     if (rate.index == index) return &rate;
   }
   return nullptr;
 }
-/// Returns the rate with these bits per second, or null.
+/// Returns the bit rate with these bits per second; null if the encoder does not have it.
 [[nodiscard]] constexpr const Rate* rate_of_bits(std::int64_t bits_per_second) {
   for (const Rate& rate : rates) {
     if (rate.bits_per_second == bits_per_second) return &rate;
@@ -94,65 +95,68 @@ inline constexpr std::array<Rate, 3> rates{{{0, 1'000'000}, {2, 500'000}, {3, 25
 
 /// Frame layout and settings of one encoder, as the unit's options select them.
 struct Format {
-  unsigned bits = 14;         ///< bits of the position, 10 to 21
-  std::uint8_t node = 0x20;   ///< number of the node, 1 to 255
-  std::uint8_t rate = 2;      ///< index into `rates`
-  bool listens = false;       ///< host: read the positions that the node sends without a request
-  std::uint8_t positive = 0;  ///< values of command 22 for counting up and down; the document does not state them
-  std::uint8_t negative = 1;  ///< Value of the setting for a negative direction.
-  /// Virtual encoder: positions per second that it sends without a request after power on; 0: none.
+  unsigned bits = 14;         ///< Number of bits of the position, 10 to 21.
+  std::uint8_t node = 0x20;   ///< Number of the node, 1 to 255.
+  std::uint8_t rate = 2;      ///< Index of the bit rate in `rates`.
+  bool listens = false;       ///< Host: whether to read the positions that the node sends without a request.
+  std::uint8_t positive = 0;  ///< Value of order 22 for counting up; the document does not state it.
+  std::uint8_t negative = 1;  ///< Value of order 22 for counting down; the document does not state it.
+  /// Virtual encoder: positions per second that the node sends without a request after power on; 0: none.
   std::uint8_t cyclic = 10;
-  bool answers_on_7e4 = false;  ///< virtual encoder: answers settings on 7E4 instead of 7E5
+  bool answers_on_7e4 = false;  ///< Virtual encoder: whether it answers settings on 7E4 instead of 7E5.
 
   /// Returns the bit rate in bits per second.
   [[nodiscard]] constexpr std::uint32_t bit_rate() const { return rates[rate].bits_per_second; }
-  /// Returns the identifier of replies to settings.
+  /// Returns the identifier on which the virtual encoder answers settings.
   [[nodiscard]] constexpr std::uint32_t answer_id() const { return answers_on_7e4 ? 0x7E4 : 0x7E5; }
 };
 
-/// Fields of frames and commands, in the order of the report.
+/// Values of frames and commands. Only members with a value are reported.
 struct Values {
-  /// A number that may be missing.
+  /// A number that may be absent.
   using Number = std::optional<std::int64_t>;
-  Number node{};                               ///< Value of the field `node`, if there is one.
-  std::optional<std::string_view> function{};  ///< Value of the field `function`, if there is one.
-  std::optional<Bytes> data{};                 ///< Value of the field `data`, if there is one.
-  std::optional<std::string_view> command{};   ///< Value of the field `command`, if there is one.
-  Number value{};                              ///< Value of the field `value`, if there is one.
-  Number new_node{};                           ///< Value of the field `new_node`, if there is one.
-  Number bit_rate{};                           ///< Value of the field `bit_rate`, if there is one.
-  std::optional<bool> clash{};                 ///< Value of the field `clash`, if there is one.
-  Number readings_per_s{};                     ///< Value of the field `readings_per_s`, if there is one.
-  std::optional<std::uint64_t> singleturn{};   ///< Value of the field `singleturn`, if there is one.
-  std::optional<double> angle{};               ///< Value of the field `angle`, if there is one.
-  std::optional<bool> written{};               ///< Value of the field `written`, if there is one.
-  std::optional<bool> answered{};              ///< Value of the field `answered`, if there is one.
-  std::optional<bool> mirrored{};              ///< Value of the field `mirrored`, if there is one.
-  std::optional<std::uint64_t> before{};       ///< Value of the field `before`, if there is one.
-  std::optional<std::uint64_t> after{};        ///< Value of the field `after`, if there is one.
+  Number node{};  ///< Number of the node, 1 to 255.
+  /// Meaning of the identifier in CANopen, for frames that this encoder does not use.
+  std::optional<std::string_view> function{};
+  std::optional<Bytes> data{};                ///< Data bytes of a frame that this encoder does not use.
+  std::optional<std::string_view> command{};  ///< Name of the order that is requested or answered.
+  Number value{};                             ///< Counting direction, as order 22 carries it.
+  Number new_node{};                          ///< Node number that a setting gives to the node.
+  Number bit_rate{};                          ///< Bit rate that a setting gives to the node, in bits per second.
+  std::optional<bool> clash{};                ///< Whether two nodes share this number, or the line is bad.
+  Number readings_per_s{};                    ///< Positions per second that the node sends without a request.
+  std::optional<std::uint64_t> singleturn{};  ///< Position within one revolution, in counts.
+  std::optional<double> angle{};              ///< Position within one revolution, in degrees.
+  std::optional<bool> written{};              ///< Whether a setting was written; false if the encoder has it already.
+  std::optional<bool> answered{};             ///< Whether the node answered the order.
+  /// Whether the position is mirrored since the order: the counting direction has changed.
+  std::optional<bool> mirrored{};
+  std::optional<std::uint64_t> before{};  ///< Position before the order, in counts.
+  std::optional<std::uint64_t> after{};   ///< Position after the order, in counts.
 };
 
 // ---- Orders to a node
 
-/// An order to the encoder.
+/// Orders that a host can send to nodes.
 enum class Order : std::uint8_t { start, zero, direction, cyclic, read, enter, node, rate };
 
-/// Kind of answer to an order.
+/// Kinds of answers to an order: no answer, a position, the code of the order, or an error code.
 enum class Answer : std::uint8_t { none, position, code, error };
 
-/// A row of the document's command tables.
+/// Description of an order, from the document's command tables.
 struct OrderInfo {
-  Order order;                              ///< The order.
-  std::uint8_t code;                        ///< value of byte 0
-  std::string_view name;                    ///< Name of the order.
-  bool for_all;                             ///< true: on 7E5 to all nodes; false: on 2NN with the node in byte 1
-  Answer answer;                            ///< How the encoder answers it.
-  std::uint8_t value_at = 0;                ///< index of the byte with the order's value; 0: the order has no value
-  std::uint8_t least = 0;                   ///< Lowest value.
-  std::uint8_t most = 255;                  ///< Highest value.
-  Values::Number Values::*shown = nullptr;  ///< Member that shows the value; null: none.
+  Order order;            ///< The order that is described.
+  std::uint8_t code;      ///< Value of byte 0, which identifies the order.
+  std::string_view name;  ///< Name of the order in fields.
+  /// True: sent on 7E5 to all nodes; false: sent on 2NN with the node number in byte 1.
+  bool for_all;
+  Answer answer;                            ///< Kind of the answer to the order.
+  std::uint8_t value_at = 0;                ///< Index of the byte with the order's value; 0: the order has no value.
+  std::uint8_t least = 0;                   ///< Lowest value of the order.
+  std::uint8_t most = 255;                  ///< Highest value of the order.
+  Values::Number Values::*shown = nullptr;  ///< Member in which the order's value is reported; null: none.
 };
-/// Descriptions of the orders.
+/// Descriptions of all orders, in the order of the enum.
 inline constexpr std::array<OrderInfo, 8> orders{{
     {Order::start, 0x01, "start", false, Answer::position},
     {Order::zero, 0x20, "zero", false, Answer::code},
@@ -166,7 +170,7 @@ inline constexpr std::array<OrderInfo, 8> orders{{
 /// Returns the description of an order.
 [[nodiscard]] constexpr const OrderInfo& info_of(Order order) { return orders[static_cast<std::size_t>(order)]; }
 
-/// Returns the order in a frame, or the one that a frame on 7E5 or 7E4 answers; null if there is none.
+/// Returns the order that a frame carries, or that it answers if it is on 7E5 or 7E4; null if there is no such order.
 [[nodiscard]] constexpr const OrderInfo* order_of(const CanFrame& frame) {
   const bool for_all = is_setting(function_of(frame));
   for (const OrderInfo& info : orders) {
@@ -175,14 +179,14 @@ inline constexpr std::array<OrderInfo, 8> orders{{
   return nullptr;
 }
 
-/// Returns the meaning of an order's value, such as a bit rate; nothing if the document does not have the value.
+/// Converts the value byte of an order to its meaning, such as a bit rate; no value if the document does not define it.
 [[nodiscard]] constexpr Values::Number meaning_of(const OrderInfo& info, std::uint8_t value) {
   if (info.order != Order::rate) return value < info.least || value > info.most ? Values::Number{} : value;
   const Rate* const rate = rate_of_index(value);
   return rate != nullptr ? Values::Number(rate->bits_per_second) : Values::Number{};
 }
 
-/// Returns the value that an order carries for a command's argument; nothing if the document does not have it.
+/// Converts the argument of a command to the value byte of an order; no value if the document does not define it.
 [[nodiscard]] constexpr std::optional<std::uint8_t> value_of(const Format& format, Order order, std::int64_t argument) {
   if (order == Order::direction) return argument == 0 ? format.positive : format.negative;
   if (order != Order::rate) return static_cast<std::uint8_t>(argument);
@@ -192,7 +196,7 @@ inline constexpr std::array<OrderInfo, 8> orders{{
 
 // ---- Frames
 
-/// Returns the frame of an order to `node`, or to all nodes.
+/// Returns the frame with an order to `node`, or to all nodes if the order is for all.
 [[nodiscard]] constexpr CanFrame encode(Order order, std::uint8_t node, std::uint8_t value = 0) {
   const OrderInfo& info = info_of(order);
   CanFrame frame{.id = info.for_all ? 0x7E5u : 0x200u | node, .size = frame_size, .data = {info.code}};
@@ -201,25 +205,26 @@ inline constexpr std::array<OrderInfo, 8> orders{{
   return frame;
 }
 
-/// Returns the frame of a position, `counts` least significant byte first.
+/// Returns the frame in which `node` sends a position; `counts` are sent least significant byte first.
 [[nodiscard]] constexpr CanFrame encode_position(std::uint8_t node, std::uint64_t counts) {
   CanFrame frame{.id = 0x100u | node, .size = frame_size};
   store_little_endian(frame.data, counts);
   return frame;
 }
 
-/// Returns the answer to zero, direction and cyclic. Its bits equal those of a position with the value of its code.
+/// Returns the answer of `node` to order zero, direction or cyclic. It equals the frame of a position with the value of
+/// the order's code.
 [[nodiscard]] constexpr CanFrame encode_answer(std::uint8_t node, Order order) {
   return encode_position(node, info_of(order).code);
 }
 
-/// Returns the answer to a setting. `error`: 0 for success.
+/// Returns the answer to a setting, sent with identifier `id`. `error`: 0 for success.
 [[nodiscard]] constexpr CanFrame encode_configuration_answer(std::uint32_t id, Order order, std::uint8_t error) {
   return {.id = id, .size = frame_size, .data = {info_of(order).code, error}};
 }
 
-/// Checks the form that all frames share. Errors: bad_framing (a remote frame), wrong_length, unexpected_reply (a
-/// 29-bit identifier).
+/// Checks what all frames have in common and returns the error: bad_framing (a remote frame), wrong_length,
+/// unexpected_reply (a 29-bit identifier), or none.
 [[nodiscard]] constexpr Error check_shape(const CanFrame& frame) {
   if (frame.remote) return Error::bad_framing;
   if (frame.size != frame_size) return Error::wrong_length;
@@ -244,8 +249,8 @@ inline constexpr std::array<OrderInfo, 8> orders{{
   return static_cast<std::uint32_t>(counts);
 }
 
-/// Checks the answer to a setting. Errors: those of `check_shape`, unexpected_reply (an answer to another order),
-/// out_of_range, request_rejected.
+/// Checks the answer to a setting and returns the error: those of `check_shape`, unexpected_reply (an answer to another
+/// order), out_of_range (bytes that must be 0), request_rejected, or none.
 [[nodiscard]] constexpr Error check_configuration_answer(Order order, const CanFrame& frame) {
   if (const Error error = check_shape(frame); error != Error::none) return error;
   if (const OrderInfo* const info = order_of(frame); info == nullptr || info->order != order || !info->for_all) {
@@ -255,14 +260,14 @@ inline constexpr std::array<OrderInfo, 8> orders{{
   return frame.data[1] == 0 ? Error::none : Error::request_rejected;
 }
 
-/// Returns whether the frame has the identifier of this node's replies.
+/// Returns whether the frame has the identifier with which `node` replies.
 [[nodiscard]] constexpr bool is_from(const CanFrame& frame, std::uint8_t node) {
   return function_of(frame) == Function::reply && node_of(frame) == node;
 }
 
 // ---- Fields of frames
 
-/// Returns the values of a position.
+/// Returns Values with the position `counts` of `node`.
 [[nodiscard]] constexpr Values values_of(const Format& format, std::uint8_t node, std::uint64_t counts) {
   return {.node = node, .singleturn = static_cast<std::int64_t>(counts), .angle = degrees(counts, format.bits)};
 }
@@ -299,7 +304,7 @@ constexpr Result<Values> decode_request(const CanFrame& frame) {
   return frame.data[1] == node_of(frame) ? Result<Values>(values) : Error::cross_check_failed;
 }
 
-// Decodes the answer of `node` to an order.
+// Decodes a frame as the answer of `node` to an order.
 constexpr Result<Values> decode_answer(const Format& format, const OrderInfo& info, std::uint8_t node,
                                        const CanFrame& frame) {
   switch (info.answer) {
@@ -322,8 +327,8 @@ constexpr Result<Values> decode_answer(const Format& format, const OrderInfo& in
 
 }  // namespace detail
 
-/// Decodes a reply to `request`, or `request` alone if `reply` is null. Both may be null. A frame of a node without a
-/// request is taken as a position.
+/// Decodes a reply to `request`, or only `request` if `reply` is null. If `request` is null, the reply of a node is
+/// taken as a position.
 [[nodiscard]] constexpr Result<Values> decode(const Format& format, const CanFrame* request, const CanFrame* reply) {
   if (reply == nullptr) return request == nullptr ? Error::wrong_length : detail::decode_request(*request);
   if (reply->remote) return Error::bad_framing;

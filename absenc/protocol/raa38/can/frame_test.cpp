@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Invalid and unexpected frames.
+// Tests of invalid and unexpected frames.
 #include "absenc/protocol/raa38/can/frame.hpp"
 
 #include <gtest/gtest.h>

@@ -14,7 +14,8 @@ Read::Read(const Format& format, Mode mode) : format_(format) {
 }
 
 void Read::heard(const CanFrame& frame, Time at) {
-  // A 29-bit frame may be another device's; it is kept because without a reply it is the evidence that the user needs.
+  // A 29-bit frame may be from another device; it is stored, because without a reply it is the evidence that the user
+  // needs.
   if (frame.extended && frame.id == encode_position(format_.node, 0).id) keep(frame, at);
   if (!is_from(frame, format_.node)) return;
   keep(frame, at);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host procedures of the RAA38S6 on CAN; README.md, section CAN, gives the reasons.
+// Host procedures of the RAA38S6 on CAN and their results; README.md, section CAN, gives the reasons.
 #pragma once
 
 #include <array>
@@ -14,13 +14,14 @@ namespace absenc::raa38::can {
 using namespace std::chrono_literals;
 
 // The document gives no times; these are far longer than any controller needs.
-inline constexpr Time answer_limit = 50ms;      ///< timeout of a reply on a bus without other frames
-inline constexpr Time busy_limit = 250ms;       ///< timeout of a reply on a bus that others keep busy
-inline constexpr Time listening_time = 1200ms;  ///< Time for which a survey listens.
+inline constexpr Time answer_limit = 50ms;  ///< Timeout of a reply on a bus without other frames.
+inline constexpr Time busy_limit = 250ms;   ///< Timeout of a reply on a bus that other nodes keep busy.
+/// Time for which the host listens for unsolicited frames before it sends requests.
+inline constexpr Time listening_time = 1200ms;
 
 /// The protocol, as author layers use it: frames, lengths and times.
 struct Protocol {
-  /// The line carries CAN frames.
+  /// Type of the items on the line.
   using Item = CanFrame;
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = can::Format;
@@ -29,11 +30,11 @@ struct Protocol {
   /// Type of the encoder's replies.
   using Reply = CanFrame;
 
-  /// Returns how a host sends a request (repetitions, pauses) and how the reply to it ends.
+  /// Returns how a host sends a frame; all frames are sent in the same manner.
   static constexpr author::Manner manner(const Format&, const CanFrame&) { return {}; }
-  /// Returns how long a host waits for replies.
+  /// Returns the timeouts of a reply on a quiet and on a busy bus.
   static constexpr author::CanHostTimes host_times(const Format&) { return {answer_limit, busy_limit}; }
-  /// Returns the frame as text, as "220:8020000000000000".
+  /// Returns a frame as text: identifier and data in hexadecimal, such as "220:8020000000000000".
   static constexpr ByteBuffer<4 + 2 * frame_size> encode(const Format&, const CanFrame& frame) {
     constexpr std::string_view digits = "0123456789abcdef";
     ByteBuffer<4 + 2 * frame_size> text;
@@ -48,21 +49,21 @@ struct Protocol {
   }
 };
 
-/// Explains the error of a frame. `request` or `reply` may be empty.
+/// Returns cause and advice for the error of a reply to a request; either may be empty.
 [[nodiscard]] Explanation explain(const Format& format, Error error, std::span<const CanFrame> request,
                                   std::span<const CanFrame> reply);
 
-/// Reads one position: requested (orders 80 and 01), or the next that the node sends without a request.
+/// Reads one position: requests it (orders 80 and 01), or waits for the next that the node sends without a request.
 class Read : public author::CanEngine {
  public:
   /// How the position is obtained: read request, start request, or listening.
   enum class Mode : std::uint8_t { ask, start, listen };
-  /// Reads one position in this mode.
+  /// Creates a conversation that reads one position in this mode.
   Read(const Format& format, Mode mode);
 
   /// Returns the format of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
-  /// Returns the last position.
+  /// Returns the position that was read; empty before it.
   [[nodiscard]] const Reading& found() const { return reading_; }
   [[nodiscard]] const Reading* reading() const final {
     return reading_.singleturn_bits != 0 ? &reading_ : nullptr;  // set only after a successful end
@@ -76,7 +77,7 @@ class Read : public author::CanEngine {
   Reading reading_{};
 };
 
-/// Returns the frame that requests a position; for `listen`, the single read request.
+/// Returns the frame that requests a position in this mode; for `listen`, the single read request.
 [[nodiscard]] constexpr CanFrame position_request(const Format& format, Read::Mode mode) {
   // Two calls with constant orders, so that the table of orders is not linked.
   return mode == Read::Mode::start ? encode(Order::start, format.node) : encode(Order::read, format.node);
@@ -87,30 +88,30 @@ using Dialog = author::DialogOf<Protocol>;
 
 // ---- One node
 
-/// Order 31: sets the number of positions per second that the node sends, 0 for none, and counts the received ones.
-/// Error: cross_check_failed (another number arrives).
+/// Sets with order 31 the number of positions per second that the node sends, 0 for none, and counts the frames that
+/// are received. Error: cross_check_failed (another number of frames arrives).
 author::Procedure set_cyclic(Dialog& dialog, Values& found, Arguments arguments);
 
 /// Changes the zero or the direction. Order 20 makes the present position 0, as the document suggests; the position is
 /// read before and after, and nothing is written if it is 0 already. Order 22 sets the counting direction, which no
-/// command reads; the position afterwards must be the same or mirrored. Errors: not_still (the shaft turns),
+/// command reads; the position afterwards must be unchanged or mirrored. Errors: not_still (the shaft turns),
 /// cross_check_failed (any other position), timeout (order 22 has neither an answer nor an effect).
 author::Procedure change(Dialog& dialog, Values& found, Order order, Arguments arguments);
 
-/// Reports the number of the node if it answers. No other number is requested: on a CANopen bus such requests are
+/// Reports the number of the node if the node answers. Requests no other number: on a CANopen bus such requests are
 /// process data of other devices. Errors: timeout, bad_framing (frames are destroyed: two nodes may share the number).
 author::Procedure find_node(Dialog& dialog, Values& found);
 
 // ---- All nodes on the bus
 
-/// Frames received from one node number.
+/// What a scan received from one node number.
 struct NodeFrames {
-  std::uint16_t unsolicited = 0;  ///< frames sent without a request
-  std::uint16_t per_second = 0;   ///< frames without a request in the first second
-  std::uint8_t answers = 0;       ///< answers to one request
-  std::uint8_t damaged = 0;       ///< requests during which frames were destroyed
-  bool readable = false;          ///< `counts` fits the format
-  std::uint32_t counts = 0;       ///< position in the last frame
+  std::uint16_t unsolicited = 0;  ///< Number of frames that the node sent without a request.
+  std::uint16_t per_second = 0;   ///< Number of frames that the node sent without a request in the first second.
+  std::uint8_t answers = 0;       ///< Number of answers to one request.
+  std::uint8_t damaged = 0;       ///< Number of requests during which frames were destroyed.
+  bool readable = false;          ///< Whether the last frame is a position that fits the format.
+  std::uint32_t counts = 0;       ///< Position in the last frame, in counts.
 
   /// Returns whether a node with this number was found.
   [[nodiscard]] constexpr bool is_there() const { return unsolicited != 0 || answers != 0 || damaged > 1; }
@@ -120,28 +121,29 @@ struct NodeFrames {
   }
 };
 
-/// Nodes that were found, by number.
+/// Result of a scan.
 struct Nodes {
-  std::array<NodeFrames, 256> at{};  ///< Frames of each node number.
+  std::array<NodeFrames, 256> at{};  ///< What was received from each node number.
 
-  /// Returns how many node numbers are in use.
+  /// Returns how many node numbers were found on the bus.
   [[nodiscard]] unsigned count() const;
 };
 
-/// Finds all nodes. Listens first, because nodes may send without a request after power on, then requests every number.
-/// Error: timeout if no node is found.
+/// Finds all nodes on the bus. Listens first, because nodes may send without a request after power on, then requests
+/// every number. Error: timeout if no node is found.
 author::Procedure scan(Dialog& dialog, Nodes& nodes);
 
-/// Result of a setting, with the nodes that were found on the bus.
+/// Result of a setting, and the nodes that were found on the bus before it.
 struct ConfigureResult : Values {
-  Nodes nodes{};          ///< Nodes that were found, by number.
-  bool verified = false;  ///< the written setting was verified
+  Nodes nodes{};          ///< Nodes that were found on the bus.
+  bool verified = false;  ///< Whether the written setting was verified.
 };
 
-/// Order 11 sets the node number; the node must answer under the new number and no longer under the old one. Order 13
-/// sets the bit rate; the host switches too, and back if the node does not answer. Both are sent on 7E5, which reaches
-/// every node, so only one node may be on the bus. Errors: invalid_argument (other nodes are on the bus, or the
-/// document does not have that rate), timeout, request_rejected, cross_check_failed (the node kept its old setting).
+/// Changes the node number (order 11) or the bit rate (order 13). The node must answer under the new number and no
+/// longer under the old one; for the bit rate the host switches too, and back if the node does not answer. Both orders
+/// are sent on 7E5, which reaches every node, so only one node may be on the bus. Errors: invalid_argument (other nodes
+/// are on the bus, or the document does not have that rate), timeout, request_rejected, cross_check_failed (the node
+/// kept its old setting).
 author::Procedure configure(Dialog& dialog, ConfigureResult& found, Order order, Arguments arguments);
 
 }  // namespace absenc::raa38::can

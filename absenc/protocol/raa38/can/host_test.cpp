@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One node: its position, cyclic positions, zero and direction.
+// Tests of the host with one node: its position, cyclic positions, zero and direction.
 #include "absenc/protocol/raa38/can/bench_test.hpp"
 
 namespace absenc::raa38::can {
@@ -7,7 +7,7 @@ namespace {
 
 using namespace testing;
 
-/// Drives a conversation without a bus: the test feeds each event.
+/// Drives a conversation without a bus: a test feeds each event.
 struct ByHand {
   explicit ByHand(std::string_view command) : talk(command) {}
   Step<CanFrame>::Kind next() { return talk->next(now).kind; }
@@ -57,10 +57,10 @@ TEST(Raa38CanRead, IgnoresFramesFromBeforeTheRequest) {
     ByHand by_hand(command);
     by_hand.next();
     if (command == "position") {
-      by_hand.receive(encode_position(0x20, 1));  // received before the request was sent
+      by_hand.receive(encode_position(0x20, 1));  // received before the request is sent
       by_hand.sent();
     }
-    by_hand.receive(encode_position(0x20, 2), -1ms);  // received from a queue, with an earlier time
+    by_hand.receive(encode_position(0x20, 2), -1ms);  // received from a queue, with a time before the request
     EXPECT_EQ(by_hand.next(), Kind::wait);
     by_hand.receive(encode_position(0x20, 3), 1ms);
     EXPECT_EQ(by_hand.next(), Kind::done);
@@ -123,7 +123,7 @@ TEST(Raa38CanCyclic, StartsAndStopsCyclicFrames) {
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
 }
 
-// A position of 49 looks like the answer: only the node's send rate decides.
+// A position of 49 equals the answer to order 31: only the node's send rate shows whether the order was obeyed.
 TEST(Raa38CanCyclic, FailsWhenSendRateDoesNotChange) {
   for (const std::int64_t rate : {0, 10}) {
     Scripted disobedient([](const CanFrame&) { return Frames{}; });
@@ -167,10 +167,9 @@ TEST(Raa38CanZero, RefusesWhileShaftTurns) {
   EXPECT_EQ(bench.encoder().settings().writes(), 0u);
 }
 
-// A node that uses command 20 for something else, or not at all: it answers correctly, but its position does not
-// change.
+// A node that uses order 20 for something else, or not at all: it answers correctly, but its position does not change.
 TEST(Raa38CanZero, FailsWhenPositionDoesNotBecomeZero) {
-  // 32 is the answer read as a position; at 21 bits that is near 0.
+  // The answer to order 20 is 32 if it is read as a position; at 21 bits that is near 0.
   for (const std::uint32_t counts : {32u << 10, 1'000'000u}) {
     Scripted stubborn([&](const CanFrame& request) { return correct_answer(request, counts); });
     const CommandResult zero = with(stubborn, "zero", {}, {.bits = 21});
@@ -195,7 +194,7 @@ TEST(Raa38CanZero, RejectsLateAnswerAsZeroPosition) {
   EXPECT_TRUE(ended(with(late, "zero", {}, {.bits = 21}), Error::cross_check_failed));
 }
 
-// The carrier delivers frames some milliseconds late: only many frames show the send rate.
+// The adapter delivers frames some milliseconds late: only many frames show the send rate.
 TEST(Raa38CanZero, RestoresSendRateThroughSlowCarrier) {
   unsigned left = 1000;
   unsigned rate = 0;
@@ -225,7 +224,7 @@ TEST(Raa38CanZero, ReportsNodeThatDoesNotResumeSending) {
   EXPECT_TRUE(ended(with(exhausted, "zero"), Error::cross_check_failed, "no longer sends"));
 }
 
-// The node sends one more frame after the stop order: its position is 32, which looks like the answer to order 20.
+// The node sends one more frame after the order to stop: its position is 32, which equals the answer to order 20.
 TEST(Raa38CanZero, RejectsCyclicPositionThatLooksLikeAnswer) {
   for (const Time period : {80ms, 100ms}) {
     unsigned left = 1000;

@@ -13,16 +13,16 @@ namespace {
 using namespace author;
 using MaybeFrame = std::optional<CanFrame>;
 
-// Enough frames to measure the send rate to 1 % if the carrier delivers frames some milliseconds late.
+// These numbers of frames measure the send rate to 1 % even if the adapter delivers frames some milliseconds late.
 constexpr unsigned enough_frames = 4;
 constexpr Time enough_time = 500ms;
-constexpr unsigned most_measurements = 3;  // attempts to measure the send rate
+constexpr unsigned most_measurements = 3;  // greatest number of attempts to measure the send rate
 constexpr Time slowest_period = 1s;        // longest period of a node that sends cyclically: TT = 1
-// Time for which answers to a command are received. It is never shortened, because a cyclic position may look like the
+// Time for which answers to an order are received. It is never shortened, because a cyclic position may equal the
 // answer.
 constexpr Time command_window = answer_limit;
 
-/// Measures how often a node sends without a request.
+/// Measures the rate at which a node sends frames without a request.
 struct SendRate {
   unsigned count = 0;
   Time first{};
@@ -32,22 +32,23 @@ struct SendRate {
     if (count++ == 0) first = at;
     last = at;
   }
-  /// Returns the mean period, 0 with fewer than two frames.
+  /// Returns the mean time between frames; 0 with fewer than two frames.
   [[nodiscard]] Time period() const { return count < 2 ? Time{} : (last - first) / (count - 1); }
-  /// Returns the rounded frames per second; 1 for a single frame.
+  /// Returns the frames per second, rounded, 1 to 255; 0 without a frame.
   [[nodiscard]] unsigned per_second() const {
     if (count == 0) return 0;
     const Time mean = period();
     if (mean <= Time{}) return 1;
     return std::clamp(static_cast<unsigned>((Time(1s) + mean / 2) / mean), 1u, 255u);
   }
-  /// Returns the time after which a node without a frame is silent: two periods and a margin.
+  /// Returns the time after which a node without a frame counts as silent: two periods and a margin.
   [[nodiscard]] Time pause() const { return count < 2 ? listening_time : 2 * period() + answer_limit; }
 };
 
 // ---- Receiving until a time is over
 
-// Measures how often the node sends; with `until_enough`, only until enough frames were received.
+// Measures the send rate of the node until the listening time is over; with `until_enough`, ends as soon as enough
+// frames were received.
 Part<SendRate> count_frames(Dialog& dialog, bool until_enough = false) {
   SendRate cadence;
   for (;;) {
@@ -60,7 +61,7 @@ Part<SendRate> count_frames(Dialog& dialog, bool until_enough = false) {
   co_return cadence;
 }
 
-// Sends an order and returns whether its answer arrives.
+// Sends an order and returns whether the node answers it.
 Part<bool> is_answered(Dialog& dialog, Order order, std::uint8_t value) {
   const std::uint8_t node = dialog.format().node;
   bool answered = false;
@@ -73,7 +74,7 @@ Part<bool> is_answered(Dialog& dialog, Order order, std::uint8_t value) {
   co_return answered;
 }
 
-// Requests the position of a node and returns the reply.
+// Requests the position of a node and returns the reply; no value if none arrives.
 Part<MaybeFrame> read(Dialog& dialog, std::uint8_t node, Time pause = {}) {
   dialog.ask(encode(Order::read, node), pause);
   MaybeFrame frame;
@@ -84,7 +85,7 @@ Part<MaybeFrame> read(Dialog& dialog, std::uint8_t node, Time pause = {}) {
   co_return frame;
 }
 
-// A position, or the reason that it is missing.
+// A position, or the error because of which it is missing.
 struct PositionResult {
   Outcome outcome{};
   std::uint32_t counts = 0;
@@ -93,14 +94,14 @@ struct PositionResult {
 Part<PositionResult> read_position(Dialog& dialog, Time pause = {}) {
   const MaybeFrame frame = co_await read(dialog, dialog.format().node, pause);
   const Result<std::uint32_t> counts = frame ? decode_position(dialog.format(), *frame) : dialog.missing();
-  // The exchange is copied, because other frames may follow before the procedure ends.
+  // The exchange is copied, because more frames may follow before the procedure ends.
   const Exchange<CanFrame> exchange = dialog.exchange();
   const Explanation words = explain(dialog.format(), counts.error(), exchange.sent, exchange.received);
   co_return PositionResult{counts ? done : only(counts.error(), words.detail, words.advice), *counts};
 }
 
-// ---- Commands whose answer looks like a position. The node is stopped first and restarted with its old rate
-// afterwards; no position is accepted until the time for the answer is over.
+// ---- Orders whose answer equals a position. The procedures stop the node first and restart it with its old rate
+// afterwards; they accept no position until the time for the answer is over.
 
 Part<SendRate> stop_cyclic_frames(Dialog& dialog) {
   dialog.listen(listening_time);
@@ -108,7 +109,7 @@ Part<SendRate> stop_cyclic_frames(Dialog& dialog) {
   if (before.count != 0) {
     co_await is_answered(dialog, Order::cyclic, 0);
     dialog.listen(before.pause());
-    // If the node cannot be stopped, the command continues all the same.
+    // If the node does not stop, the procedure continues nevertheless.
     co_await count_frames(dialog);
   }
   co_return before;
@@ -126,7 +127,7 @@ Part<Outcome> restore_cyclic_frames(Dialog& dialog, SendRate before, Outcome out
   co_return outcome;
 }
 
-// Reads the position twice; fails if the shaft turns.
+// Reads the position twice; fails if the positions show that the shaft turns.
 Part<PositionResult> read_at_rest(Dialog& dialog) {
   const PositionResult first = co_await read_position(dialog);
   if (first.outcome.error != Error::none) co_return first;
@@ -140,7 +141,7 @@ Part<PositionResult> read_at_rest(Dialog& dialog) {
   co_return second;
 }
 
-// Takes two positions, because the first may be a late answer that looks like position 32.
+// Reads the position twice, because the first frame may be a late answer that equals position 32.
 Outcome check_zero(const Format& format, const Values& found, std::uint32_t first, std::uint32_t second) {
   if (is_near(first, 0, format.bits, zero_millidegrees) && is_near(second, 0, format.bits, zero_millidegrees)) {
     return done;
@@ -152,7 +153,7 @@ Outcome check_zero(const Format& format, const Values& found, std::uint32_t firs
 }
 
 Outcome check_direction(const Format& format, Values& found, std::uint32_t first, std::uint32_t second) {
-  // The shaft may have vibrated before and after.
+  // Checks that two positions are near each other, because the shaft may have vibrated.
   const auto is_at = [&](std::uint64_t place) {
     return is_near(second, place, format.bits, 2 * standstill_millidegrees);
   };
@@ -187,7 +188,7 @@ Part<Outcome> change_quietly(Dialog& dialog, Values& found, Order order, std::ui
                     : check_direction(dialog.format(), found, first.counts, second.counts);
 }
 
-// Compares the number of received frames, not their times: the carrier may deliver them in bursts.
+// Compares the number of received frames, not their times: the adapter may deliver frames in bursts.
 Outcome check_cyclic(Dialog& dialog, unsigned wanted, bool answered, const SendRate& heard) {
   if (wanted == 0) {
     if (heard.count == 0) return done;
@@ -202,7 +203,7 @@ Outcome check_cyclic(Dialog& dialog, unsigned wanted, bool answered, const SendR
 
 }  // namespace
 
-// ---- Commands for one node
+// ---- Procedures for one node
 
 Procedure set_cyclic(Dialog& dialog, Values& found, Arguments arguments) {
   const unsigned wanted = arguments.empty() ? 0 : static_cast<unsigned>(arguments[0]);
@@ -211,7 +212,7 @@ Procedure set_cyclic(Dialog& dialog, Values& found, Arguments arguments) {
   dialog.changes();
   found.answered = co_await is_answered(dialog, Order::cyclic, static_cast<std::uint8_t>(wanted));
   Outcome outcome = done;
-  // The carrier may deliver frames late; a repeated measurement corrects that.
+  // If the adapter delivers frames late, a repeated measurement corrects the result.
   for (unsigned measurements = 0; measurements < most_measurements; ++measurements) {
     dialog.listen(wanted == 0 ? listening_time : std::max(5 * slowest_period / wanted / 2, enough_time) + answer_limit);
     const SendRate heard = co_await count_frames(dialog);
@@ -239,16 +240,16 @@ Procedure change(Dialog& dialog, Values& found, Order order, Arguments arguments
   co_return end;
 }
 
-// ---- Commands for all nodes
+// ---- Procedures for all nodes
 
 namespace {
 
-constexpr Time between_requests = 2ms;  // the request and one answer take 1 ms at 250 kbit/s
+constexpr Time between_requests = 2ms;  // time between two requests; one request and one answer take 1 ms at 250 kbit/s
 constexpr unsigned answering = 10;      // a frame this many requests later counts as unsolicited, not as an answer
 constexpr Time last_answers = 100ms;
 constexpr Time entering_time = 20ms;  // time after "enter configuration", which is not answered
 constexpr Time answer_window = 100ms;
-constexpr Time switching_time = 50ms;  // time that a controller needs to rejoin the bus with another bit rate
+constexpr Time switching_time = 50ms;  // time that a controller needs to rejoin the bus after a change of its bit rate
 constexpr int rate_attempts = 3;
 constexpr auto most_clashes = 16;  // more shared numbers than this indicate a bad line
 
@@ -256,11 +257,11 @@ constexpr std::string_view connect_alone = "connect this one alone: 7E5 reaches 
 constexpr std::string_view number_shared = "two nodes share the number, or the line is bad";
 constexpr std::string_view scan_hint = "`absenc scan` shows which: set node=";
 
-// Values of `asked`: no number was requested yet, or all were.
+// Values of `asked` outside the node numbers: before the first request, and after the last request.
 constexpr unsigned before_requests = 0;
 constexpr unsigned after_requests = 256;
 
-// Counts the frames of all nodes until the time is over. `asked`: the last number that was requested.
+// Counts the frames of all nodes until the listening time is over. `asked`: the last number that was requested.
 Part<bool> count_node_frames(Dialog& dialog, Nodes& nodes, unsigned asked) {
   Time from = never;
   while (const MaybeFrame frame = co_await dialog.heard()) {
@@ -270,7 +271,7 @@ Part<bool> count_node_frames(Dialog& dialog, Nodes& nodes, unsigned asked) {
     NodeFrames& node = nodes.at[number];
     if (from == never) from = dialog.heard_at();
     if (asked == before_requests && dialog.heard_at() - from < 1s) ++node.per_second;
-    // Late answers arrive while the next numbers are requested; no answer arrives before its own request.
+    // Late answers arrive while later numbers are requested; no answer arrives before the request for its number.
     const unsigned early = dialog.came_early() && node.damaged == 0 ? 1 : 0;
     const bool was_asked = asked == after_requests || (number + early <= asked && number + answering > asked);
     if (!was_asked) {
@@ -303,7 +304,7 @@ Part<bool> survey(Dialog& dialog, Nodes& nodes) {
   co_return true;
 }
 
-// Stops the procedure unless this node is the only one on the bus, because 7E5 reaches every node.
+// Stops the procedure unless the node of the format is alone on the bus, because 7E5 reaches every node.
 Part<bool> require_single_node(Dialog& dialog, Nodes& nodes) {
   co_await survey(dialog, nodes);
   const NodeFrames& node = nodes.at[dialog.format().node];
@@ -325,7 +326,7 @@ Part<bool> wait_until_over(Dialog& dialog) {
   co_return true;
 }
 
-// Writes a setting. It may take effect even if the answer is lost.
+// Writes a setting. The node may obey even if its answer is lost.
 Part<bool> write(Dialog& dialog, ConfigureResult& found, Order order, std::uint8_t value) {
   dialog.ask_for(encode(Order::enter, 0, 1), entering_time);
   co_await wait_until_over(dialog);
@@ -358,7 +359,7 @@ Part<Outcome> verify_node(Dialog& dialog, std::uint8_t before, std::uint8_t node
   co_return only(Error::timeout, "it answers neither under its old number nor under the new one", supply);
 }
 
-// Sets the host to the new rate, which takes `switching_time`, and checks whether the node answers.
+// Sets the host to the new rate, waits `switching_time`, and checks whether the node answers.
 Part<Outcome> verify_rate(Dialog& dialog, std::uint32_t bits_per_second) {
   const Format& format = dialog.format();
   dialog.configure(bits_per_second, switching_time);

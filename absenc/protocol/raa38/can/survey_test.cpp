@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// All nodes on the bus: finding them, and the settings that reach all of them.
+// Tests of procedures for all nodes on the bus: the scan, and the settings that reach every node.
 #include "absenc/protocol/raa38/can/bench_test.hpp"
 
 namespace absenc::raa38::can {
@@ -46,7 +46,7 @@ TEST(Raa38CanScan, ReportsWrongBitRateInsteadOfClashes) {
   EXPECT_TRUE(ended(with(noise, "scan", {}, {}, 500'000), Error::bad_framing, "bit rate"));
 }
 
-/// Returns all identifiers that a host sends with one command on a bus where no node answers.
+/// Returns the identifiers of all frames that a host sends with one command on a bus where no node answers.
 std::vector<std::uint32_t> identifiers_of(std::string_view command, const Format& format) {
   sim::Line<CanFrame> line(LinkKind::can, {.rate = format.bit_rate()});
   std::vector<std::uint32_t> sent;
@@ -64,7 +64,7 @@ TEST(Raa38CanNode, PollsGivenNodeOnly) {
   EXPECT_EQ(identifiers_of("scan", {.node = 0x42}).size(), 255u);
 }
 
-// The text `disturbs` warns users before the command is sent.
+// The text `disturbs` of a command warns users before the command is sent.
 TEST(Raa38CanNode, CommandsThatPollOtherNodesWarn) {
   for (const Command& command : can_unit.commands) {
     if (!command.arguments.empty() && command.verb != Verb::config_set) continue;
@@ -89,7 +89,8 @@ TEST(Raa38CanNode, ReportsNodeThatAnswers) {
   EXPECT_TRUE(ended(bench.run_command(Format{}, "node"), Error::timeout, "`absenc scan` asks them all"));
 }
 
-// A slow adapter delivers answers while the next number is requested. A frame before the request for its number is no
+// A slow adapter delivers answers while later numbers are requested. A frame before the request for its number is no
+// answer.
 // answer.
 TEST(Raa38CanScan, AcceptsAnswersWhileSendingNextRequest) {
   for (const bool unasked_too : {false, true}) {
@@ -166,11 +167,11 @@ TEST(Raa38CanSetNode, RefusesWithOtherNodesOnTheBus) {
   EXPECT_TRUE(ended(bench.run_command("set-node", {0x42}), Error::timeout, "no node answers"));
 }
 
-/// A node that may answer a setting, but does not apply it.
+/// A node that may answer a setting, but does not obey it.
 struct Settings {
   Frames answer{};
-  bool dies = false;         // it answers nothing afterwards
-  std::uint8_t appears = 0;  // number of another node that answers afterwards
+  bool dies = false;         // whether the node answers nothing after a setting
+  std::uint8_t appears = 0;  // number of another node that answers after a setting; 0: none
 };
 
 CommandResult set(const Settings& one, std::string_view command, std::int64_t value) {

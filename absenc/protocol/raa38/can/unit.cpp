@@ -46,7 +46,7 @@ constexpr std::array<Argument, 2> node_arguments{{{"node", "new number", 1, 255}
 constexpr std::array<Argument, 2> rate_arguments{{{"rate", "1000000, 500000 or 250000", 1, 1'000'000}, force}};
 constexpr std::array<Argument, 1> direction_arguments{{{"direction", "0: positive, 1: negative", 0, 1}}};
 
-/// Returns the one frame that does a command's work.
+/// Returns the frame of the order that a command sends; procedures send more frames.
 template <Order order>
 constexpr Result<CanFrame> to(const Format& format, Arguments arguments) {
   const auto value = value_of(format, order, arguments.empty() ? 0 : arguments[0]);
@@ -76,7 +76,7 @@ constexpr auto fields = author::fields_of<Values>(
     field<&Values::before>("before", "counts", "position before the command"),
     field<&Values::after>("after", "counts", "position after it"));
 
-// Reports the fields, and the position as a reading.
+// Puts the fields into `sink`, and the position as a reading.
 constexpr void put_found(FieldSink& sink, const Format& format, const Values& found) {
   fields.put(sink, found);
   if (!found.singleturn) return;
@@ -174,14 +174,14 @@ constexpr Error decode_frames(const Format& format, Frame request, Frame reply, 
 constexpr FrameEnd end_of_frame(const Options&, Direction, Bytes bytes) {
   return {FrameEnd::Kind::complete, bytes.size()};
 }
-// Returns whether a wrong bit is detected by this protocol. The CRC of CAN is checked by the controller; here only bits
-// with a fixed value are checked.
+// Returns whether this protocol detects a wrong bit. The controller checks the CRC of CAN; here only bits with a fixed
+// value are checked.
 bool is_checked(const Options& values, Frame request, Frame reply, std::size_t bit) {
   if (is_only_named(function_of(*reply.can))) return false;
   const OrderInfo* const asked = request.can != nullptr ? order_of(*request.can) : &info_of(Order::read);
   return (asked != nullptr && asked->answer != Answer::position) || bit >= options.format(values).bits;
 }
-// Returns the bits of a field. The node number is in the identifier, so it has none.
+// Returns the bits of a field in the data. The node number is in the identifier, so it has no bits.
 BitRanges bits_in(const Options& values, Frame, Frame, const FieldInfo& field) {
   if (&field != fields.of<&Values::singleturn>()) return {};
   return author::bits_of(0, 0, options.format(values).bits);

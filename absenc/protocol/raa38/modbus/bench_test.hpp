@@ -31,7 +31,7 @@ struct Talk final : raa38::testing::Talk<std::uint8_t> {
       : raa38::testing::Talk<std::uint8_t>(modbus_unit, options_of(format), name, std::move(arguments)) {}
 };
 
-/// Returns the frame of `body` with its CRC.
+/// Returns the frame that consists of `body` and its CRC.
 [[nodiscard]] inline Wire framed(const Wire& body) {
   modbus::FrameBytes frame;
   frame.append(body);
@@ -45,9 +45,9 @@ struct Bench : raa38::testing::Bench<std::uint8_t, VirtualEncoder, Format, modbu
                                                                                  own.line()) {
     add(own);
   }
-  /// Sets the position; `counts` are of the encoder's resolution.
+  /// Sets the position to `counts` in the encoder's resolution.
   void put(std::int64_t counts) { shaft.put(0, counts << (21 - format.bits)); }
-  /// Sends `request` unchanged after 20 ms of silence and returns the reply.
+  /// Sends `request` as it is after 20 ms of silence and returns the reply.
   Wire raw(const Wire& request) {
     sim::testing::RawHost host(request, 100ms, 20ms, line.now() + 20ms);
     return run(host).reply;
@@ -61,7 +61,7 @@ struct Bench : raa38::testing::Bench<std::uint8_t, VirtualEncoder, Format, modbu
   }
 };
 
-/// A slave whose reply to each request is made by a function of the request and of the number of earlier requests.
+/// A slave whose replies a function makes from the request and the number of earlier requests.
 class Scripted final : public Machine<std::uint8_t> {
  public:
   using Script = std::function<Wire(Bytes request, unsigned before)>;

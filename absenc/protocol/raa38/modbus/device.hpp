@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A virtual RAA38S6 as a Modbus RTU slave. Address, baud rate, direction and zero survive power off, and writing them
-// wears the memory. It reports timing and settings errors of its host. Several of them can share a line.
+// wears the memory. The slave reports timing errors and too many settings of its host. Several slaves can share a line.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace absenc::raa38::rtu {
 
-/// A virtual encoder.
+/// A virtual RAA38S6 that is a Modbus RTU slave.
 class VirtualEncoder final : public modbus::Server {
  public:
   /// Creates an encoder that is off until `power_on`. `shaft` must outlive it.
@@ -21,16 +21,16 @@ class VirtualEncoder final : public modbus::Server {
         settings_(format.address, static_cast<std::uint8_t>(format.baud), format.bits, shaft) {}
 
   void raise_alarms(std::uint32_t) override {}
-  /// Ends the cause of raised alarms; latched alarms stay until a host clears them.
+  /// Does nothing: this encoder reports no alarms.
   void lower_alarms(std::uint32_t) override {}
   [[nodiscard]] MutableBytes memory() override { return settings_.memory(); }
   [[nodiscard]] std::uint32_t memory_version() const override { return settings_.version(); }
 
-  /// Returns the stored settings.
+  /// Returns the settings in the encoder's memory.
   [[nodiscard]] const Settings& settings() const { return settings_; }
-  /// Returns its address.
+  /// Returns the stored address.
   [[nodiscard]] std::uint8_t address() const { return settings_.number(); }
-  /// Returns the stored rate in bits per second.
+  /// Returns the stored baud rate in bits per second.
   [[nodiscard]] std::uint32_t baud() const { return bauds[settings_.rate()]; }
 
  private:
@@ -45,7 +45,7 @@ class VirtualEncoder final : public modbus::Server {
 
   Format format_;
   Settings settings_;
-  std::uint32_t recent_settings_ = 0;  // number of settings within the last minute
+  std::uint32_t recent_settings_ = 0;  // number of settings within the minute that began at `recent_since_`
   Time recent_since_{};
 };
 

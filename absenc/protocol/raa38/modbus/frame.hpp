@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Requests and replies of an RAA38S6 over Modbus RTU (RAA38S6 Operation Manual, 3.1.7): encode, decode, check.
+// Requests and replies of an RAA38S6 over Modbus RTU (RAA38S6 Operation Manual, 3.1.7): encoding, decoding, all checks.
 #pragma once
 
 #include <array>
@@ -18,30 +18,31 @@ namespace absenc::raa38::rtu {
 using modbus::CrcOrder;
 
 namespace function {
-inline constexpr std::uint8_t read = modbus::read_holding_registers;  ///< Reads registers.
-inline constexpr std::uint8_t read_address = 0xA0;   ///< functions A0, A1 and CC are specific to the maker
-inline constexpr std::uint8_t set_address = 0xA1;    ///< Sets the address.
-inline constexpr std::uint8_t set_parameter = 0xCC;  ///< Sets a parameter.
+inline constexpr std::uint8_t read = modbus::read_holding_registers;  ///< Function code that reads registers.
+/// Function code that reads the address; A0, A1 and CC are specific to the maker.
+inline constexpr std::uint8_t read_address = 0xA0;
+inline constexpr std::uint8_t set_address = 0xA1;    ///< Function code that sets the address.
+inline constexpr std::uint8_t set_parameter = 0xCC;  ///< Function code that sets a parameter.
 
-/// Returns whether a function exists.
+/// Returns whether the encoder has a function with this code.
 [[nodiscard]] constexpr bool is_known(std::uint8_t code) {
   return code == read || code == read_address || code == set_address || code == set_parameter;
 }
 }  // namespace function
 
-inline constexpr std::uint8_t any_address = 0xFF;  ///< address in the request for the encoder's address
+inline constexpr std::uint8_t any_address = 0xFF;  ///< Address to which the request for the encoder's address is sent.
 
 namespace parameter {
-inline constexpr std::uint8_t zero = 0x00;      ///< Sets the zero at this position.
-inline constexpr std::uint8_t positive = 0x01;  ///< Sets the positive direction.
-inline constexpr std::uint8_t negative = 0x02;  ///< Sets the negative direction.
+inline constexpr std::uint8_t zero = 0x00;      ///< Parameter that makes the present position zero.
+inline constexpr std::uint8_t positive = 0x01;  ///< Parameter that sets the positive direction.
+inline constexpr std::uint8_t negative = 0x02;  ///< Parameter that sets the negative direction.
 }  // namespace parameter
 
-/// Rates of the line in bits per second.
+/// Baud rates of the encoder in bits per second.
 inline constexpr std::array<std::uint32_t, 5> bauds{2400, 4800, 9600, 19'200, 57'600};
-/// Values of the setting for these rates.
+/// Parameters of function CC that set the rates in `bauds`.
 inline constexpr std::array<std::uint8_t, bauds.size()> baud_parameters{0x24, 0x48, 0x96, 0x19, 0x57};
-inline constexpr std::size_t baud_at_shipping = 3;  ///< Index of the rate at shipping.
+inline constexpr std::size_t baud_at_shipping = 3;  ///< Index in `bauds` of the rate at shipping.
 
 /// Returns the meaning of a parameter of function CC, in words.
 [[nodiscard]] constexpr std::string_view name_of_setting(std::uint8_t value) {
@@ -55,7 +56,7 @@ inline constexpr std::size_t baud_at_shipping = 3;  ///< Index of the rate at sh
   return "unknown";
 }
 
-/// Returns the index of a baud rate; nothing if the encoder does not have it.
+/// Returns the index of a baud rate in `bauds`; no value if the encoder does not have the rate.
 [[nodiscard]] constexpr std::optional<std::size_t> baud_index(std::uint64_t baud) {
   for (std::size_t i = 0; i < bauds.size(); ++i) {
     if (bauds[i] == baud) return i;
@@ -63,43 +64,44 @@ inline constexpr std::size_t baud_at_shipping = 3;  ///< Index of the rate at sh
   return std::nullopt;
 }
 
-inline constexpr LineSettings line_settings{.rate = bauds[baud_at_shipping]};  ///< Settings of the line.
+inline constexpr LineSettings line_settings{.rate = bauds[baud_at_shipping]};  ///< Settings of the line at shipping.
 
-/// Form of the virtual encoder's reply to a request of two registers; the document has all three.
+/// Form of the virtual encoder's reply to a request of two registers; the document contains all three forms.
 enum class Data : std::uint8_t {
-  four_bytes,     ///< byte count 04, four bytes of data
-  three_bytes,    ///< byte count 03, three bytes of data
-  three_as_four,  ///< byte count 04, but three bytes of data
+  four_bytes,     ///< Byte count 04, four bytes of data.
+  three_bytes,    ///< Byte count 03, three bytes of data.
+  three_as_four,  ///< Byte count 04, but three bytes of data.
 };
 
 /// Frame layout and settings of one encoder, as the unit's options select them.
 struct Format {
   std::uint8_t address = 1;             ///< Address of the encoder, 1 to 247.
-  unsigned bits = 14;                   ///< bits of the position, 10 to 21
-  unsigned registers = 0;               ///< number of registers to request, 1 or 2; 0: as many as the bits need
-  std::size_t baud = baud_at_shipping;  ///< Index of the rate.
-  Data data = Data::four_bytes;         ///< Form of the data in a reply.
-  /// Virtual encoder: byte order of the CRC in its reply to A0, low_first or high_first.
+  unsigned bits = 14;                   ///< Number of bits of the position, 10 to 21.
+  unsigned registers = 0;               ///< Number of registers to request, 1 or 2; 0: as many as the bits need.
+  std::size_t baud = baud_at_shipping;  ///< Index of the baud rate in `bauds`.
+  Data data = Data::four_bytes;         ///< Form of the virtual encoder's reply to a request of two registers.
+  /// Byte order of the CRC in the virtual encoder's reply to A0, low_first or high_first.
   CrcOrder address_crc = CrcOrder::low_first;
 
-  /// Returns the number of registers that are requested.
+  /// Returns the number of registers that the host requests.
   [[nodiscard]] constexpr unsigned register_count() const { return registers != 0 ? registers : bits > 16 ? 2 : 1; }
-  /// Returns the settings of the line.
+  /// Returns the line settings with the baud rate of the format.
   [[nodiscard]] constexpr LineSettings line() const { return {.rate = bauds[baud]}; }
-  /// Returns the bits of position and turns.
+  /// Returns the number of bits of the position.
   [[nodiscard]] constexpr Resolution resolution() const { return {.singleturn_bits = bits}; }
 };
 
 /// A request to the encoder.
 struct Request {
-  std::uint8_t function = function::read;  ///< Code of the function.
-  std::uint8_t address = 1;                ///< Address of the encoder.
-  std::uint8_t value = 0;                  ///< set_address: the new address; set_parameter: the parameter
-  std::uint16_t first_register = 0;        ///< register to read first; only for the function `read`
-  std::uint16_t registers = 1;             ///< Number of registers.
+  std::uint8_t function = function::read;  ///< Function code of the request.
+  std::uint8_t address = 1;                ///< Address to which the request is sent.
+  /// Only for set_address: the new address; only for set_parameter: the parameter.
+  std::uint8_t value = 0;
+  std::uint16_t first_register = 0;  ///< Only for the function `read`: the first register to read.
+  std::uint16_t registers = 1;       ///< Only for the function `read`: number of registers to read.
 };
 
-/// Bytes of a request.
+/// Bytes of one request.
 using RequestBytes = ByteBuffer<8>;
 
 /// Returns the length of a request in bytes.
@@ -108,7 +110,7 @@ using RequestBytes = ByteBuffer<8>;
   return code == function::read_address ? 4 : 5;
 }
 
-/// Returns the bytes of `request` as they are sent.
+/// Returns the bytes of `request`, with their CRC.
 [[nodiscard]] constexpr RequestBytes encode_request(const Request& request) {
   RequestBytes bytes;
   bytes.push_back(request.address);
@@ -150,17 +152,18 @@ using RequestBytes = ByteBuffer<8>;
   return request;
 }
 
-/// A reply of the encoder.
+/// A decoded reply of the encoder.
 struct Reply {
-  std::uint8_t function = function::read;  ///< Code of the function.
-  std::uint8_t address = 1;                ///< ask_address: the encoder's address; set_address: the new address
-  std::uint32_t singleturn = 0;            ///< position; only for the function `read`
-  std::uint8_t value = 0;                  ///< parameter; only for the function `set_parameter`
-  CrcOrder order = CrcOrder::low_first;    ///< Order of the bytes of the CRC.
-  std::size_t doubtful_size = 0;  ///< length of a reply to `read` if the CRC cannot prove this length; otherwise 0
+  std::uint8_t function = function::read;  ///< Function code of the reply.
+  std::uint8_t address = 1;                ///< Address of the encoder; in the reply to set_address, the new address.
+  std::uint32_t singleturn = 0;            ///< Only for the function `read`: position in counts.
+  std::uint8_t value = 0;                  ///< Only for the function `set_parameter`: the parameter.
+  CrcOrder order = CrcOrder::low_first;    ///< Byte order of the CRC in the reply.
+  /// Length of a reply to `read` in bytes if the CRC cannot prove this length; otherwise 0.
+  std::size_t doubtful_size = 0;
 };
 
-/// Returns whether a valid reply to a read request would still be valid without its last byte, or with a 00 appended:
+/// Returns whether a valid reply to a read request would also be valid without its last byte, or with a 00 appended:
 /// the CRC then does not prove whether the reply has three bytes of data or four.
 [[nodiscard]] constexpr bool length_is_doubtful(Bytes reply) {
   return reply.size() > 7 && reply[1] == function::read && reply[2] == 4 && (reply.size() == 8 || reply.back() == 0);
@@ -173,8 +176,8 @@ struct Reply {
 
 namespace detail {
 
-// Returns the exception code of a refusal. Refusals of A0 and CC have the form of a reply and are not recognised; that
-// of A1 has another length.
+// Returns the exception code of a refusal; no value if the reply is not one. Refusals of A0 and CC have the form of a
+// reply and are not recognised; a refusal of A1 has another length than its reply.
 constexpr std::optional<std::uint8_t> refusal_of(const Request& request, Bytes reply) {
   if (request.function != function::read && request.function != function::set_address) return std::nullopt;
   return modbus::refusal_code(reply, request.function);
@@ -210,8 +213,8 @@ constexpr bool is_answer(const Request& request, Bytes reply) {
 
 }  // namespace detail
 
-/// Decodes a reply. Errors: wrong_length, bad_checksum, unexpected_reply, request_rejected, unsupported (reading other
-/// registers), out_of_range.
+/// Decodes a reply with all checks. Errors: wrong_length, bad_checksum, unexpected_reply, request_rejected, unsupported
+/// (the request reads other registers), out_of_range.
 [[nodiscard]] constexpr Result<Reply> decode_reply(const Format& format, const Request& request, Bytes bytes) {
   const std::optional<std::uint8_t> refusal = detail::refusal_of(request, bytes);
   if (!refusal && !detail::length_is_right(request, bytes)) return Error::wrong_length;
@@ -236,7 +239,7 @@ constexpr bool is_answer(const Request& request, Bytes reply) {
   return reply;
 }
 
-/// Returns the request that a captured reply seems to answer.
+/// Returns the request that a captured reply seems to answer, judged by its function code.
 [[nodiscard]] constexpr Request assumed_request(const Format& format, Bytes reply) {
   Request request = read_request(format);
   if (reply.size() < modbus::shortest_frame) return request;
@@ -247,7 +250,8 @@ constexpr bool is_answer(const Request& request, Bytes reply) {
   return request;
 }
 
-/// Returns the length of a reply that begins with `begun`. Two registers counted as four bytes may be one byte shorter.
+/// Returns the length of a reply that begins with `begun`, in bytes. A reply with byte count 04 may be one byte
+/// shorter.
 [[nodiscard]] constexpr std::size_t reply_length(const Request& request, Bytes begun) {
   if (request.function == function::set_address) return 4;
   if (request.function != function::read) return 5;
@@ -271,13 +275,13 @@ struct Protocol {
   using Reply = rtu::Reply;
   static constexpr std::size_t longest_reply = 9;  ///< Greatest length of a reply in bytes.
 
-  /// Returns how long a host waits for replies.
+  /// Returns the host's times on a line with this baud rate: timeouts, and the silence before a request.
   static constexpr author::HostTimes host_times(const Format&, std::uint32_t rate) {
     return modbus::client_times({.rate = rate}, answer_limit);
   }
-  /// Returns how long a host waits for replies.
+  /// Returns the host's times on a line with the baud rate of the format.
   static constexpr author::HostTimes host_times(const Format& format) { return host_times(format, format.line().rate); }
-  /// Settings wear the memory: the engine repeats no request.
+  /// Returns that requests are never repeated, because each setting wears the memory.
   static constexpr author::Manner manner(const Format&, const Request&) { return {}; }
   /// Returns the bytes of `request` as they are sent.
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
@@ -300,9 +304,9 @@ struct Protocol {
   }
   /// Returns when the encoder latched the position that answers a request sent at `sent_at`.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
-  /// Returns whether a second reply must confirm this one.
+  /// Returns whether a second reply must confirm this reply, because its length is in doubt.
   static constexpr bool needs_another(const Format&, const Reply& reply) { return reply.doubtful_size != 0; }
-  /// Returns whether two replies agree.
+  /// Compares a reply with the second one; returns wrong_length if the length is still in doubt, otherwise none.
   static constexpr Error agree(const Format&, const Reply& first, const Reply& second, Time) {
     return differ_doubtfully(first, second) ? Error::wrong_length : Error::none;
   }

@@ -68,7 +68,7 @@ TEST(Raa38ModbusFrame, ChecksAddressRangeAndExplainsEachRefusal) {
   }
   EXPECT_EQ(error_of({}, ask, {0x01, 0xA0, 0x01}), Error::unexpected_reply);
   EXPECT_EQ(error_of({}, one_register, {2, 0x83, 2}), Error::unexpected_reply);
-  // A refusal of CC would look like an echo.
+  // A refusal of CC would equal the echo of a request.
   EXPECT_EQ(error_of({}, {.function = function::set_parameter, .value = 0x19}, {1, 0xCC, 1}), Error::unexpected_reply);
 }
 
@@ -88,7 +88,7 @@ TEST(Raa38ModbusFrame, AssumesRequestFromReply) {
   EXPECT_EQ(assumed_request({}, {}).function, function::read);
 }
 
-// A valid frame followed by 00 has a valid CRC again.
+// A valid frame with 00 appended has a valid CRC too.
 TEST(Raa38ModbusFrame, RecognizesLengthThatTheCrcDoesNotProve) {
   Wire followed = framed({1, 3, 4, 0x00, 0x00, 0x05});
   EXPECT_TRUE(decode_reply(fine, two_registers, followed));
@@ -141,7 +141,7 @@ TEST(Raa38ModbusProbe, FindsRegistersAndLeastBits) {
   Evidence evidence;
   ASSERT_TRUE(modbus_unit.probe(options, std::vector<Capture>{{{}, hex<"010304001fabcd7550">}}, evidence));
   EXPECT_EQ(options.values, options_of(fine).values) << "two registers are what so many bits need";
-  EXPECT_EQ(evidence.possible, 3u);  // 21 bits; registers auto and 2
+  EXPECT_EQ(evidence.possible, 3u);  // 21 bits; register counts auto and 2
   const std::vector<Capture> damaged{{{}, hex<"010302017ff834">}, {{}, hex<"010302017ff835">}};
   EXPECT_FALSE(modbus_unit.probe(options, damaged, evidence));
   EXPECT_TRUE(says(evidence.reasons, "checksum"));

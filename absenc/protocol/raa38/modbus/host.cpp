@@ -114,7 +114,7 @@ constexpr Request setting(const Format& format, std::uint8_t value) {
   return {.function = function::set_parameter, .address = format.address, .value = value};
 }
 
-// Reads the position, up to `attempts` times; stops if the encoder refuses.
+// Reads the position, up to `attempts` times; ends early if the encoder refuses.
 Part<Result<Reply>> read_position(Dialog& dialog, std::uint8_t address, unsigned attempts) {
   Request request = read_request(dialog.format());
   request.address = address;
@@ -138,8 +138,8 @@ void set_rate(Dialog& dialog, std::uint32_t rate) {
   dialog.set_rate(rate, Protocol::host_times(dialog.format(), rate));
 }
 
-// Called when no encoder answered at the address of the format. Sends A0 and ends the command if an encoder reports
-// another address. `baud`: rate to which the line is set.
+// Sends A0 after no encoder answered at the address of the format; ends the command if an encoder reports another
+// address. `baud`: rate to which the line is set.
 Part<bool> check_other_address(Dialog& dialog, CommandValues& found, std::uint32_t baud) {
   const std::uint8_t asked = dialog.format().address;
   const Result<Reply> reply_to_a0 = co_await dialog.attempt(address_request).repeated(2);
@@ -169,14 +169,15 @@ Part<Reply> read_own_position(Dialog& dialog, CommandValues& found, unsigned att
   co_return *reply;
 }
 
-// Stores the position of the last reply in `found`.
+// Stores the last position that was received in `found`.
 void show_position(const Dialog& dialog, CommandValues& found) {
   found.reading = dialog.last_reading();
   found.singleturn = dialog.last().singleturn;
   found.angle = degrees(dialog.last().singleturn, dialog.format().bits);
 }
 
-// Checks where the encoder answers after a setting: with the new one, or with the old one if it was not accepted.
+// Checks at which setting the encoder answers after a change: at the new one, or at the old one if the change was not
+// accepted.
 Part<Outcome> verify_setting(Dialog& dialog, std::uint8_t address, std::uint32_t rate,
                              std::string_view at_the_old_one) {
   const Format& format = dialog.format();
@@ -226,7 +227,8 @@ Procedure find_baud(Dialog& dialog, CommandValues& found) {
   const std::size_t own = dialog.format().baud;
   found.baud = bauds[own];
   const Result<Reply> first = co_await read_position(dialog, dialog.format().address, 2);
-  if (first || first.error() == Error::request_rejected) co_return done;  // an encoder that refuses is there too
+  // an encoder that refuses answers at this rate too
+  if (first || first.error() == Error::request_rejected) co_return done;
   if (dialog.is_noisy()) co_return {first.error()};
   const Explanation reason = explain_reply(read_request(dialog.format()), first.error(), dialog.reply());
   if (first.error() == Error::timeout) co_await check_other_address(dialog, found, bauds[own]);
@@ -322,11 +324,12 @@ Procedure set_baud(Dialog& dialog, CommandValues& found, Arguments arguments) {
   }
   found.baud = bauds[*baud];
   found.written = false;
-  set_rate(dialog, format.line().rate);  // a port that cannot change its rate must fail before the encoder has changed
+  // a port that cannot change its rate must fail here, before the encoder changes its rate
+  set_rate(dialog, format.line().rate);
   co_await read_own_position(dialog, found, 3);
   if (*baud == format.baud && arguments[1] == 0) co_return done;
   found.written = true;
-  // The reply may be sent at the new rate, so it is ignored.
+  // The encoder may send its reply at the new rate, so the reply is ignored.
   static_cast<void>(co_await dialog.attempt(setting(format, baud_parameters[*baud])).changes());
   const Outcome end =
       co_await verify_setting(dialog, format.address, bauds[*baud],
@@ -372,7 +375,7 @@ Procedure set_zero(Dialog& dialog, CommandValues& found, Arguments arguments) {
   found.written = second.singleturn != 0 || arguments[0] != 0;
   if (!*found.written) co_return done;
   static_cast<void>(
-      // ignored: the zero may be set without a reply
+      // the result is ignored, because the encoder may set the zero without a reply
       co_await dialog.attempt(setting(dialog.format(), parameter::zero)).changes());
   co_await dialog.rest(memory_time);
   const Result<Reply> now = co_await read_position(dialog, dialog.format().address, 3);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host procedures of an RAA38S6 over Modbus RTU; README.md gives the reasons. A setting is sent once, and not at all if
-// the encoder has it already, because its memory wears out. Each setting is read back if the protocol allows it.
+// Host procedures of an RAA38S6 over Modbus RTU; README.md gives the reasons. Because the memory wears out, a setting
+// is sent once, and not at all if the encoder has it already. Each setting is read back if the protocol allows it.
 #pragma once
 
 #include <array>
@@ -14,78 +14,82 @@
 
 namespace absenc::raa38::rtu {
 
-/// Explains an error: of `reply` to `request`, which may be empty; with an empty reply, why none was received or what
-/// is wrong with the request.
+/// Returns cause and advice for the error of `reply` to `request`. `request` may be empty; with an empty reply,
+/// explains why no reply was received, or what is wrong with the request.
 [[nodiscard]] Explanation explain(const Format& format, Error error, Bytes request, Bytes reply);
 
-/// Fields of frames and commands, in the order of the report.
+/// Values of frames and commands. Only members with a value are reported.
 struct Values {
-  std::optional<std::uint16_t> address{};          ///< Address.
-  std::optional<std::uint16_t> function{};         ///< Value of the field `function`, if there is one.
-  std::optional<std::uint16_t> first_register{};   ///< Value of the field `first_register`, if there is one.
-  std::optional<std::uint16_t> registers{};        ///< Value of the field `registers`, if there is one.
-  std::optional<std::uint32_t> singleturn{};       ///< Value of the field `singleturn`, if there is one.
-  std::optional<double> angle{};                   ///< Value of the field `angle`, if there is one.
-  std::optional<std::uint16_t> new_address{};      ///< Value of the field `new_address`, if there is one.
-  std::optional<std::uint16_t> parameter{};        ///< Value of the field `parameter`, if there is one.
-  std::optional<std::string_view> setting{};       ///< Value of the field `setting`, if there is one.
-  std::optional<std::string_view> crc_order{};     ///< Value of the field `crc_order`, if there is one.
-  std::optional<std::uint32_t> baud{};             ///< Value of the field `baud`, if there is one.
-  std::optional<std::string_view> direction{};     ///< Value of the field `direction`, if there is one.
-  std::optional<std::string_view> effect{};        ///< Value of the field `effect`, if there is one.
-  std::optional<bool> written{};                   ///< Value of the field `written`, if there is one.
-  std::optional<std::uint16_t> encoder_address{};  ///< Value of the field `encoder_address`, if there is one.
-  std::optional<bool> clash{};                     ///< Value of the field `clash`, if there is one.
-  std::optional<bool> refuses{};                   ///< Value of the field `refuses`, if there is one.
+  std::optional<std::uint16_t> address{};         ///< Address of the encoder.
+  std::optional<std::uint16_t> function{};        ///< Function code of the frame.
+  std::optional<std::uint16_t> first_register{};  ///< First register that the request reads.
+  std::optional<std::uint16_t> registers{};       ///< Number of registers that the request reads.
+  std::optional<std::uint32_t> singleturn{};      ///< Position within the turn, in counts.
+  std::optional<double> angle{};                  ///< Position within the turn, in degrees.
+  std::optional<std::uint16_t> new_address{};     ///< Address that the encoder has after a setting.
+  std::optional<std::uint16_t> parameter{};       ///< Parameter of function CC.
+  std::optional<std::string_view> setting{};      ///< Meaning of the parameter in words.
+  std::optional<std::string_view> crc_order{};    ///< Byte order of the CRC: low_first or high_first.
+  std::optional<std::uint32_t> baud{};            ///< Baud rate at which the encoder answers, in bits per second.
+  std::optional<std::string_view> direction{};    ///< Sentence about the counting direction, which no command reads.
+  /// Sentence about the change of the position by a direction setting.
+  std::optional<std::string_view> effect{};
+  std::optional<bool> written{};                   ///< Whether a setting was sent; false if the encoder has it already.
+  std::optional<std::uint16_t> encoder_address{};  ///< Address that answered during a scan.
+  std::optional<bool> clash{};                     ///< Whether the answers of this address were damaged every time.
+  /// True: this address answers with an exception; otherwise no value.
+  std::optional<bool> refuses{};
 };
 
-/// Result of a command.
+/// Result of a command: values, reading and error text.
 struct CommandValues : Values {
-  Reading reading{};  ///< The position.
-  Sentence words{};   ///< text of the error's detail
+  Reading reading{};  ///< Position as a reading; empty if none was read.
+  Sentence words{};   ///< Storage of the text that explains an error.
 };
 
 /// Interface by which procedures send requests and await replies.
 using Dialog = author::DialogOf<Protocol>;
 
-// If no encoder answers at the address of the format, all these procedures send A0 and name the address in its reply.
+// If no encoder answers at the address of the format, each of these procedures sends A0 and names the address in the
+// reply.
 
-/// Reads the position once.
+/// Reads the position once and reports it.
 author::Procedure read_position_once(Dialog& dialog, CommandValues& found);
 
-/// Reads the position: no command reads the direction, so the position is all that can be reported.
+/// Reads the position for the direction command: no request reads the direction, so only the position can be reported.
 author::Procedure read_direction(Dialog& dialog, CommandValues& found);
 
 /// Reads the address with A0. If A0 gets no valid reply, as with several encoders on the line, checks whether the
 /// encoder at the address of the format answers.
 author::Procedure read_address(Dialog& dialog, CommandValues& found);
 
-/// Finds the baud rate at which the encoder answers: first that of the format, then the others. Leaves the line at its
-/// old rate. Error: timeout, or that of the reply at the rate of the format.
+/// Finds the baud rate at which the encoder answers: tries the rate of the format first, then the others. Leaves the
+/// line at its old rate. Errors: timeout, or the error of the reply at the rate of the format.
 author::Procedure find_baud(Dialog& dialog, CommandValues& found);
 
-/// Finds the slaves on a line. Sends A0 first, which a single encoder answers, otherwise requests every address from
-/// the first argument to the second. If all replies of an address are damaged, two encoders share it or the line is
-/// bad. Error: timeout if no slave answers.
+/// Result of a scan of the slaves on a line. The scan sends A0 first, which a single encoder answers; otherwise it
+/// requests every address from the first argument to the second. If all replies of an address are damaged, two encoders
+/// share it or the line is bad. Error: timeout if no slave answers.
 struct Slaves {
-  /// Result of polling an address.
+  /// Result of polling one address: no answer, a valid answer, only damaged answers, or a refusal.
   enum class Kind : std::uint8_t { none, answers, clash, refuses };
-  std::array<Kind, modbus::last_address + 1> at{};  ///< Result of polling each address.
+  std::array<Kind, modbus::last_address + 1> at{};  ///< Result of each address; the index is the address.
 };
-/// Procedure that finds all encoders on a line.
+/// Scans the line for slaves.
 author::Procedure scan(Dialog& dialog, Slaves& found, Arguments arguments);
 
-/// Sets the address with A1. Refuses an address at which another slave answers (invalid_argument). Reads the position
-/// at the new address to verify; errors: cross_check_failed (it still has its old address), timeout (it answers at
-/// neither).
+/// Sets the address with A1. Refuses an address at which another slave answers (invalid_argument). Then reads the
+/// position at the new address to verify. Errors: cross_check_failed (the encoder still has its old address), timeout
+/// (the encoder answers at neither address).
 author::Procedure set_address(Dialog& dialog, CommandValues& found, Arguments arguments);
 
-/// Sets the baud rate with CC, sets the line to it and verifies there. Errors: invalid_argument (the encoder does not
-/// have this rate), cross_check_failed (it still has its old rate), timeout (it answers at neither). After an error the
-/// line has its old rate.
+/// Sets the baud rate of encoder and line with CC and verifies that the encoder answers. Errors: invalid_argument (the
+/// encoder does not have this rate), cross_check_failed (the encoder still has its old rate), timeout (the encoder
+/// answers at neither rate). After an error the line has its old rate.
 author::Procedure set_baud(Dialog& dialog, CommandValues& found, Arguments arguments);
 
-/// Sets the direction with CC. Only the echo of the request confirms it. Reports how the position changed.
+/// Sets the counting direction with CC and reports how the position changed. Only the echo of the request confirms the
+/// setting.
 author::Procedure set_direction(Dialog& dialog, CommandValues& found, Arguments arguments);
 
 /// Makes the present position zero with CC 00. Errors also: not_still (the shaft turns), cross_check_failed (the

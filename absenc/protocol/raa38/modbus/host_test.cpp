@@ -14,7 +14,7 @@ const Wire position_of_1 = framed({1, 3, 2, 0, 9});
 
 // ---- Reading
 
-// Compares the positions per second with the limit that the silences on the line set.
+// Compares the number of positions per second with the limit that the silences on the line set.
 TEST(Raa38ModbusHost, ReadsAsFastAsSilencesAllow) {
   for (std::size_t baud = 0; baud < bauds.size(); ++baud) {
     Bench bench({.baud = baud});
@@ -54,7 +54,7 @@ TEST(Raa38ModbusHost, RefusesOneRegisterFor17Bits) {
 }
 
 // One position in 256 has a CRC that ends with 00: without its last byte the frame is a valid frame of another form.
-// Reader and procedures must both detect it.
+// Both ReadPosition and the procedures must detect it.
 TEST(Raa38ModbusHost, RejectsReplyThatLostItsLastByte) {
   Wire whole;
   std::uint32_t position = 0x100000;

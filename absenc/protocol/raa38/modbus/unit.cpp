@@ -53,7 +53,7 @@ constexpr std::array<Argument, 2> scan_arguments{
     {{"first", "address to ask", modbus::first_address, modbus::last_address, modbus::first_address, false},
      {"last", "address to ask", modbus::first_address, modbus::last_address, modbus::last_address, false}}};
 
-// ---- Requests. Each is the one that does the command's work; procedures send more.
+// ---- Requests: each is the main request of a command; procedures send more
 
 constexpr Request to_read(const Format& format, Arguments) { return read_request(format); }
 constexpr Request to_ask_address(const Format&, Arguments) {
@@ -83,9 +83,9 @@ constexpr bool is_good(Bytes bytes, std::size_t size) {
   return bytes.size() >= size && modbus::crc_order(bytes.first(size)) == CrcOrder::low_first;
 }
 
-// Returns the length of a reply in bytes without pauses. On the line, silence separates frames. Without it, the CRC
-// decides between three and four data bytes after byte count 04; a following 00 leaves the CRC valid, so the range of
-// the position decides then.
+// Returns the length of a reply in a byte stream without pauses. On the line, silence separates frames. In a stream,
+// the CRC decides between three and four data bytes after byte count 04; if a 00 follows, the CRC is valid for both,
+// and the range of the position decides.
 std::size_t length_in_run(const Format& format, const Request& request, Bytes bytes) {
   const std::size_t length = reply_length(request, bytes);
   if (length != 9 || !is_good(bytes, 8)) return length;
@@ -110,9 +110,10 @@ FrameEnd frame_end(const Options& values, Direction way, Bytes bytes) {
   return {bytes.size() < length ? FrameEnd::Kind::incomplete : FrameEnd::Kind::complete, length};
 }
 
-// ---- Evidence of captured frames. Their address does not matter.
+// ---- Evidence of captured frames for options; their address does not matter
 
-/// Content of a valid capture, or why it is invalid with any options. `reply` is empty if there was none.
+/// Content of a valid captured reply, or the error that it has with any options. `reply` is empty if the capture has
+/// none.
 struct CaptureContent {
   Request request{};
   std::optional<Reply> reply{};
@@ -288,8 +289,8 @@ constexpr author::Declaration<Protocol, VirtualEncoder> declaration{
     .frame_end = frame_end,
     .bits = bits_in,
     .probe = probe,
-    // Pause that separates frames: above 1.5 characters, the longest pause inside a frame, and below 3.5, the shortest
-    // between frames.
+    // Pause that separates frames: longer than 1.5 characters, the longest pause inside a frame, and shorter than 3.5
+    // characters, the shortest pause between frames.
     .timing = {.pause_bits = 25, .turnaround_limit = answer_limit},
 };
 

@@ -37,7 +37,8 @@ struct Talk final : raa38::testing::Talk<std::uint8_t> {
       : raa38::testing::Talk<std::uint8_t>(serial_unit, options_of(format), name) {}
 };
 
-/// A virtual encoder whose frames a test can change. Frames are counted from 0; an emptied frame is not sent.
+/// A virtual encoder whose frames a test can change. Frames are counted from 0; a frame that a test empties is not
+/// sent.
 struct Tampered final : Device<std::uint8_t> {
   using Tamper = author::testing::Tamper;
   Tampered(const Format& format, const Shaft& shaft) : encoder(format, shaft) {}
@@ -77,9 +78,9 @@ struct Bench : raa38::testing::Bench<std::uint8_t, Tampered, Format, serial_unit
     put(383);
     add(own);
   }
-  /// Adds an encoder whose zero differs by one count from that of the others.
+  /// Adds an encoder whose zero differs by one count from that of the first encoder.
   void add_twin(const Format& of_it) { add(of_it).memory()[2] = 4; }
-  /// Sets the position in counts of 14 bits.
+  /// Sets the position to `counts` of 14 bits.
   void put(std::int64_t counts) { shaft.put(0, counts << 7); }
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual RAA38S6 on an asynchronous line: transmits by itself, on a pulse, or on a request with its number.
+// A virtual RAA38S6 on an asynchronous line: transmits at its own rate, on a pulse, or on a request with its number.
 #pragma once
 
 #include <optional>
@@ -8,7 +8,8 @@
 
 namespace absenc::raa38::serial {
 
-/// A virtual encoder; its memory is its zero. Unknown members of the format have the values of frame.hpp.
+/// A virtual RAA38S6 on an asynchronous line; its memory holds its zero. Times that the format leaves unknown are those
+/// of frame.hpp.
 class VirtualEncoder final : public author::BusDevice<Protocol, VirtualEncoder, 4> {
  public:
   using BusDevice::BusDevice;
@@ -20,9 +21,9 @@ class VirtualEncoder final : public author::BusDevice<Protocol, VirtualEncoder, 
   /// Switches the encoder off.
   void power_off(Time now) override;
 
-  /// Returns whether a request is for this encoder.
+  /// Returns whether a request has the number of this encoder.
   [[nodiscard]] bool is_mine(const Request& request) const;
-  /// Returns the reply to a request; none: it is not answered.
+  /// Returns the reply to a request; no value if the encoder does not answer it.
   std::optional<Position> answer(const Request& request, Time at);
 
  private:
@@ -32,13 +33,13 @@ class VirtualEncoder final : public author::BusDevice<Protocol, VirtualEncoder, 
   [[nodiscard]] Position position(Time at) const;
   [[nodiscard]] Step<std::uint8_t> character();
 
-  Time due_{};  // timing mode: start of the next frame
-  // State of a frame that is sent character by character.
+  Time due_{};  // in timing mode: time of the next frame
+  // State of a transmission that is sent character by character.
   Bytes frame_{};
   Time frame_at_{};
   std::size_t sent_ = 0;
   bool pending_ = false;
-  std::uint32_t last_characters_ = 0;  // the last three characters received while a frame is sent
+  std::uint32_t last_characters_ = 0;  // last three characters that were received during the present transmission
 };
 
 }  // namespace absenc::raa38::serial

@@ -19,67 +19,76 @@ namespace absenc::raa38::serial {
 
 using namespace std::chrono_literals;
 
-/// The event that starts a frame.
+/// Event on which the encoder sends a frame.
 enum class Mode : std::uint8_t {
-  timing,     ///< the encoder itself, at its refresh rate
-  handshake,  ///< a falling edge on CLK
-  bus,        ///< a request with the encoder's number
+  timing,     ///< Each period of its refresh rate: the encoder sends without a request.
+  handshake,  ///< A falling edge on CLK.
+  bus,        ///< A request with the encoder's number.
 };
 
-/// Second byte of a frame: 81 in the document's tables, the encoder's number in its text about the bus.
+/// Value of the second byte of a frame: 81 in the document's tables, Bx with the encoder's number in its text about the
+/// bus.
 enum class SecondByte : std::uint8_t { automatic, fixed, echo };
 
-/// How the zero of an encoder is set, as ordered.
+/// How the zero of an encoder is set; this depends on the order.
 enum class Zeroing : std::uint8_t {
   none,
-  line,     ///< a pulse on CLR
-  command,  ///< BC AA Cx, on a bus
+  line,     ///< By a pulse on CLR.
+  command,  ///< By the request BC AA Cx, on a bus.
 };
 
-inline constexpr std::uint8_t header = 0xFF;             ///< First byte of each frame.
-inline constexpr std::uint8_t fixed_second_byte = 0x81;  ///< Second byte of a position that has no other meaning.
-inline constexpr std::uint8_t number_mark = 0xB0;        ///< bx: read unit x
-inline constexpr std::uint8_t clear_mark = 0xC0;         ///< cx: set the zero of unit x
-inline constexpr unsigned unit_count = 16;               ///< x is one hexadecimal digit
-inline constexpr unsigned least_bits = 10;               ///< Lowest number of bits of the position.
-inline constexpr unsigned most_bits = 21;                ///< Highest number of bits of the position.
-inline constexpr std::size_t request_bytes = 3;          ///< Length of the longest request in bytes.
-inline constexpr std::size_t frame_capacity = 6;         ///< Length of the longest frame in bytes.
+inline constexpr std::uint8_t header = 0xFF;  ///< First byte of each frame.
+/// Second byte of a frame that does not contain the encoder's number.
+inline constexpr std::uint8_t fixed_second_byte = 0x81;
+inline constexpr std::uint8_t number_mark = 0xB0;  ///< Third byte Bx of a request: read unit x.
+inline constexpr std::uint8_t clear_mark = 0xC0;   ///< Third byte Cx of a request: set the zero of unit x.
+inline constexpr unsigned unit_count = 16;         ///< Number of units on a bus: x is one hexadecimal digit.
+inline constexpr unsigned least_bits = 10;         ///< Lowest number of bits of the position that can be ordered.
+/// Highest number of bits of the position that can be ordered.
+inline constexpr unsigned most_bits = 21;
+inline constexpr std::size_t request_bytes = 3;   ///< Length of a request in bytes.
+inline constexpr std::size_t frame_capacity = 6;  ///< Length of the longest frame in bytes.
 
 // ---- Times. The document states only T2; all others are assumed.
 
-inline constexpr Time trigger_width = 10us;  ///< T2: shortest pulse on CLK (3.1.3)
-inline constexpr Time clear_width = 1ms;     ///< width of the pulse on CLR
+inline constexpr Time trigger_width = 10us;  ///< Time T2: shortest pulse on CLK (3.1.3).
+inline constexpr Time clear_width = 1ms;     ///< Width of the pulse on CLR.
 
 // Timeouts of the host if the options do not give the ordered times.
-inline constexpr Time answer_limit = 100ms;  ///< timeout of a reply: T3, or from a request to its reply
-inline constexpr Time answer_slack = 5ms;    ///< added to a T3 that the options give
-inline constexpr Time gap_limit = 10ms;      ///< timeout between two characters; suits 1200 baud
-inline constexpr Time patience = 1s;  ///< timeout on a line that is never silent; two frames at 1200 baud take 130 ms
-inline constexpr Time listen_limit = 1s;     ///< timeout of a stream without a valid frame
-inline constexpr Time scan_silence = 200ms;  ///< listening before a scan; longer than the period of most refresh rates
-inline constexpr Time zero_limit = 500ms;    ///< time within which the position must become zero
-inline constexpr Time zero_poll = 10ms;      ///< Time between two looks at a position that becomes zero.
+/// Timeout of a reply: longest T3, or longest time from a request to its reply.
+inline constexpr Time answer_limit = 100ms;
+inline constexpr Time answer_slack = 5ms;  ///< Time added to a T3 from the options to get the timeout.
+inline constexpr Time gap_limit = 10ms;    ///< Timeout between two characters of a frame; suits 1200 baud.
+inline constexpr Time patience = 1s;  ///< Timeout on a line that is never silent; two frames at 1200 baud take 130 ms.
+inline constexpr Time listen_limit = 1s;  ///< Timeout of a stream without a valid frame.
+/// Time for which the host listens before a scan; longer than the period of most refresh rates.
+inline constexpr Time scan_silence = 200ms;
+inline constexpr Time zero_limit = 500ms;  ///< Time within which the position must become zero after zero clearing.
+inline constexpr Time zero_poll = 10ms;    ///< Time between two polls of the position after zero clearing.
 
 // Times of the virtual encoder if the options do not give them.
-inline constexpr Time virtual_period = 10ms;        ///< time between frames: refresh rate 100 Hz
-inline constexpr Time virtual_acquisition = 100us;  ///< T3 of the virtual encoder
-inline constexpr Time most_backlog = 50ms;          ///< a stream that was delayed longer drops frames
-inline constexpr Time request_gap = 2ms;            ///< silence after which an incomplete request is dropped
+inline constexpr Time virtual_period = 10ms;        ///< Time between the virtual encoder's frames: refresh rate 100 Hz.
+inline constexpr Time virtual_acquisition = 100us;  ///< Time T3 of the virtual encoder.
+inline constexpr Time most_backlog = 50ms;          ///< Delay above which a stream of the virtual encoder drops frames.
+/// Silence after which the virtual encoder drops an incomplete request.
+inline constexpr Time request_gap = 2ms;
 
-/// Configuration of an encoder, as it was ordered.
+/// Properties with which an encoder was ordered, as the unit's options select them.
 struct Format {
-  unsigned bits = 14;                              ///< bits of a turn, 10 to 21
-  SecondByte second_byte = SecondByte::automatic;  ///< Meaning of the second byte.
-  Mode mode = Mode::timing;                        ///< Mode of the encoder.
-  std::uint8_t unit = 1;                           ///< Unit number of the encoder.
-  Zeroing zeroing = Zeroing::none;                 ///< How the zero is set.
-  std::int32_t zero_unit = -1;                     ///< the x of Cx; -1: as in Bx
-  std::int64_t refresh_millihertz = 0;             ///< frames per second in 0.001 Hz; 0: unknown
-  Time acquisition{};                              ///< T3, or the time from a request to its reply; 0: unknown
-  Time transmission{};                             ///< T1 - T3, duration of a frame; 0: as long as its characters take
+  unsigned bits = 14;                              ///< Number of bits of the position in a turn, 10 to 21.
+  SecondByte second_byte = SecondByte::automatic;  ///< Value of the second byte of the encoder's frames.
+  Mode mode = Mode::timing;                        ///< Event on which the encoder sends a frame.
+  std::uint8_t unit = 1;                           ///< Number of the encoder on a bus, 0 to 15.
+  Zeroing zeroing = Zeroing::none;                 ///< How the zero of the encoder is set.
+  /// Number x in the request Cx that sets the zero; -1: the same as in Bx.
+  std::int32_t zero_unit = -1;
+  std::int64_t refresh_millihertz = 0;  ///< Frames per second in timing mode, in 0.001 Hz; 0: unknown.
+  /// Time T3, or on a bus the time from a request to its reply; 0: unknown.
+  Time acquisition{};
+  /// Time T1 - T3, the duration of a frame; 0: as long as its characters take.
+  Time transmission{};
 
-  /// Returns the number of data bytes.
+  /// Returns the number of data bytes of a frame.
   [[nodiscard]] constexpr std::size_t data_bytes() const { return bits <= 16 ? 2 : 3; }
   /// Returns the length of a frame in bytes.
   [[nodiscard]] constexpr std::size_t frame_bytes() const { return data_bytes() + 3; }
@@ -87,31 +96,32 @@ struct Format {
   [[nodiscard]] constexpr Time period() const {
     return refresh_millihertz > 0 ? Time(1'000'000'000'000 / refresh_millihertz) : Time{};
   }
-  /// Returns the unit number for a request that sets zero.
+  /// Returns the number of the encoder in a request that sets its zero.
   [[nodiscard]] constexpr std::uint8_t zeroed_unit() const {
     return zero_unit < 0 ? unit : static_cast<std::uint8_t>(zero_unit);
   }
-  /// Returns the second byte of the encoder's own frames.
+  /// Returns the second byte of the frames that the encoder with number `unit` sends: 81, or Bx.
   [[nodiscard]] constexpr std::uint8_t own_second_byte() const {
     return second_byte == SecondByte::echo ? static_cast<std::uint8_t>(number_mark | unit) : fixed_second_byte;
   }
 };
 
-/// A position that the encoder sent.
+/// A decoded frame: the position that the encoder sent, and the second byte of the frame.
 struct Position {
-  std::uint32_t singleturn = 0;                  ///< Position in counts.
-  std::uint8_t second_byte = fixed_second_byte;  ///< The second byte of the frame.
+  std::uint32_t singleturn = 0;                  ///< Position within the turn, in counts.
+  std::uint8_t second_byte = fixed_second_byte;  ///< Second byte of the frame.
 
-  /// Compares all members.
+  /// Returns whether all members are equal.
   friend constexpr bool operator==(const Position&, const Position&) = default;
 };
 
-/// Bytes of a frame.
+/// Bytes of one frame.
 using FrameBytes = ByteBuffer<frame_capacity>;
-/// Bytes of a request.
+/// Bytes of one request.
 using RequestBytes = ByteBuffer<request_bytes>;
 
-/// Returns the checksum: "Sum of the first n bytes, the bottom eight bits". It does not detect exchanged bytes.
+/// Returns the checksum of `bytes`: "Sum of the first n bytes, the bottom eight bits". It does not detect exchanged
+/// bytes.
 [[nodiscard]] constexpr std::uint8_t checksum(Bytes bytes) {
   unsigned sum = 0;
   for (const std::uint8_t byte : bytes) sum += byte;
@@ -130,18 +140,18 @@ using RequestBytes = ByteBuffer<request_bytes>;
   return bytes;
 }
 
-/// Matches a frame of any unit. Used without a request, where the frame itself shows its unit.
+/// Number that accepts a frame of any unit. Used without a request, where the frame itself shows its unit.
 inline constexpr int any_unit = -1;
 
-/// Returns whether the second byte is that of a unit.
+/// Returns whether `second_byte` is valid in a frame of `unit`.
 [[nodiscard]] constexpr bool second_byte_fits(const Format& format, int unit, std::uint8_t second_byte) {
   const bool numbered = unit == any_unit ? (second_byte & 0xF0) == number_mark : second_byte == (number_mark | unit);
   if (format.second_byte == SecondByte::fixed) return second_byte == fixed_second_byte;
   return numbered || (format.second_byte == SecondByte::automatic && second_byte == fixed_second_byte);
 }
 
-/// Decodes a frame of `unit`, 0 to 15, or `any_unit`. Errors: wrong_length, bad_checksum, unexpected_reply,
-/// out_of_range.
+/// Decodes a frame of `unit`, 0 to 15, or of `any_unit`. Errors: wrong_length, bad_checksum, unexpected_reply (another
+/// second byte), out_of_range.
 [[nodiscard]] constexpr Result<Position> decode_position(const Format& format, Bytes bytes, int unit = any_unit) {
   if (bytes.size() != format.frame_bytes()) return Error::wrong_length;
   if (checksum(bytes.first(bytes.size() - 1)) != bytes.back()) return Error::bad_checksum;
@@ -153,14 +163,14 @@ inline constexpr int any_unit = -1;
 
 /// A request to the encoder.
 struct Request {
-  /// Kind of the request.
+  /// Kinds of requests.
   enum class Kind : std::uint8_t {
-    read,                 ///< BC AA Bx
-    zero_clear,           ///< BC AA Cx
-    trigger,              ///< a pulse on CLK, without bytes
-    clear,                ///< a pulse on CLR
+    read,                 ///< The bytes BC AA Bx: read the position of a unit.
+    zero_clear,           ///< The bytes BC AA Cx: set the zero of a unit.
+    trigger,              ///< A pulse on CLK, without bytes: send a frame.
+    clear,                ///< A pulse on CLR, without bytes: set the zero.
   } kind = Kind::read;    ///< Purpose of the request.
-  std::uint8_t unit = 0;  ///< number of the unit, 0 to 15
+  std::uint8_t unit = 0;  ///< Number of the unit in the bytes of a request, 0 to 15.
 };
 
 /// Returns the bytes of a request; empty for a pulse.
@@ -185,20 +195,22 @@ struct Request {
                  static_cast<std::uint8_t>(bytes[2] & 0x0Fu)};
 }
 
-/// Fields of frames and commands, in the order of the report.
+/// Values of frames and commands. Only members with a value are reported.
 struct Values {
-  std::optional<std::uint8_t> encoder_address{};  ///< Value of the field `encoder_address`, if there is one.
-  std::optional<bool> clash{};                    ///< Value of the field `clash`, if there is one.
-  std::optional<std::uint32_t> before{};          ///< Value of the field `before`, if there is one.
-  std::optional<std::uint32_t> singleturn{};      ///< Value of the field `singleturn`, if there is one.
-  std::optional<std::uint8_t> second_byte{};      ///< Value of the field `second_byte`, if there is one.
-  std::optional<double> angle{};                  ///< Value of the field `angle`, if there is one.
-  std::optional<std::string_view> command{};      ///< Value of the field `command`, if there is one.
-  std::optional<std::uint8_t> unit{};             ///< Value of the field `unit`, if there is one.
-  std::optional<std::uint64_t> skipped{};         ///< Value of the field `skipped`, if there is one.
+  std::optional<std::uint8_t> encoder_address{};  ///< Number of a unit that answered during a scan, 0 to 15.
+  /// Whether every answer of the unit was damaged: two encoders with one number, or a bad line.
+  std::optional<bool> clash{};
+  std::optional<std::uint32_t> before{};      ///< Position before the zero was set, in counts.
+  std::optional<std::uint32_t> singleturn{};  ///< Position within the turn, in counts.
+  /// Second byte of the frame: 81, or on a bus Bx with the encoder's number.
+  std::optional<std::uint8_t> second_byte{};
+  std::optional<double> angle{};              ///< Position within the turn, in degrees.
+  std::optional<std::string_view> command{};  ///< Name of the request: read or zero_clear.
+  std::optional<std::uint8_t> unit{};         ///< Number of the unit in the request, 0 to 15.
+  std::optional<std::uint64_t> skipped{};     ///< Number of received bytes that belong to no valid frame.
 };
 
-/// Returns the values of a position.
+/// Returns Values with the position in a frame.
 [[nodiscard]] constexpr Values values_of(const Format& format, const Position& position) {
   return {.singleturn = position.singleturn,
           .second_byte = position.second_byte,
@@ -215,7 +227,7 @@ struct Protocol {
   using Reply = Position;
   static constexpr std::size_t longest_reply = frame_capacity;  ///< Greatest length of a reply in bytes.
 
-  /// Returns how long a host waits for replies.
+  /// Returns the host's timeouts: for a reply, between two of its characters, and for a line that is never silent.
   static constexpr author::HostTimes host_times(const Format& format) {
     return {.answer_limit = format.acquisition > Time{} ? format.acquisition + answer_slack : answer_limit,
             .gap_limit = std::max(format.transmission, gap_limit),
@@ -271,12 +283,12 @@ struct Protocol {
   }
 };
 
-/// Returns the request that makes this encoder send a position.
+/// Returns the request on which this encoder sends a position: bytes on a bus, otherwise a pulse.
 [[nodiscard]] constexpr Request position_request(const Format& format) {
   return {format.mode == Mode::bus ? Request::Kind::read : Request::Kind::trigger, format.unit};
 }
 
-/// Reads one position of an encoder that is not streaming.
+/// Reads one position of an encoder that sends on a request or a pulse.
 using ReadPosition = author::ReadPosition<Protocol>;
 
 }  // namespace absenc::raa38::serial

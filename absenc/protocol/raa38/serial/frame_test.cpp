@@ -24,7 +24,7 @@ TEST(Raa38SerialFrame, FirstFailingCheckGivesError) {
   EXPECT_EQ(error({0xFF, 0xB2, 0x01, 0x7F, 0x31}), Error::none);
 }
 
-// An encoder that stands still repeats its frame. For all its frame sizes, reading the repetition from another byte on
+// An encoder at standstill repeats its frame. For all its frame sizes, decoding the repetition from another byte on
 // never gives another position, so a search cannot align wrongly.
 TEST(Raa38SerialFrame, RepeatedFrameHasNoOtherAlignment) {
   for (const unsigned bits : {10u, 14u, 16u, 17u, 21u}) {

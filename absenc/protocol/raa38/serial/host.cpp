@@ -11,7 +11,7 @@ namespace absenc::raa38::serial {
 
 namespace {
 
-// Returns whether bus rules apply: a bus request proves it, whatever the option mode is.
+// Returns whether the rules of a bus apply: a bus request proves this, whatever the option mode is.
 bool is_on_bus(const Format& format, Bytes request) {
   return format.mode == Mode::bus || decode_request(request).has_value();
 }
@@ -27,7 +27,7 @@ Explanation explain_other(const Format& format, Bytes request, Bytes reply) {
           "check unit and second_byte; `absenc scan` shows who answers"};
 }
 
-// Explains why a stream has no valid frame.
+// Returns cause and advice for the error of a stream without a valid frame.
 Explanation explain_stream(Error error) {
   switch (error) {
     case Error::timeout:
@@ -80,10 +80,10 @@ ByteStep Listen::next(Time now) {
     restart_timeout_ = true;
     return {.kind = ByteStep::Kind::emit};
   }
-  // The timeout restarts here: the time that the caller takes with a result does not count.
+  // The timeout restarts here: the time that the caller takes to process a result does not count.
   if (restart_timeout_) deadline_ = now + std::max(listen_limit, 4 * format_.period());
   restart_timeout_ = false;
-  // Bytes that are no frames do not extend the deadline, so it is checked even while they arrive.
+  // Bytes that form no frames do not extend the deadline, so the deadline is checked even while bytes arrive.
   if (!done_ && now >= deadline_) end_stream();
   if (done_) return {.kind = ByteStep::Kind::done};
   return {.at = deadline_};
@@ -168,7 +168,7 @@ using namespace author;
 
 constexpr unsigned scan_attempts = 2;
 
-// Returns the newest frame of the first bytes with a valid frame.
+// Listens until a valid frame is received and returns the newest valid position; an error if none arrives in time.
 Part<Result<Position>> receive_frame(Dialog& dialog) {
   StreamDecoder decoder(dialog.format());
   Position position{.second_byte = dialog.format().own_second_byte()};
@@ -193,7 +193,7 @@ Part<Result<Position>> receive_frame(Dialog& dialog) {
   co_return position;
 }
 
-// Reads the next position in any mode.
+// Reads the next position: from the stream in timing mode, otherwise by a request or a pulse.
 Part<Result<Position>> read_next_position(Dialog& dialog) {
   Result<Position> position = Error::timeout;
   if (dialog.format().mode == Mode::timing) {

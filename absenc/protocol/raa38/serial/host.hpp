@@ -11,7 +11,7 @@
 
 namespace absenc::raa38::serial {
 
-/// Fields of requests and replies.
+/// Fields in which Values are reported.
 inline constexpr auto fields = author::fields_of<Values>(
     author::field<&Values::encoder_address>("encoder_address", "", "the number behind B", Role::encoder),
     author::field<&Values::clash>("clash", "", "every answer is damaged: two encoders, or a bad line", Role::clash),
@@ -23,15 +23,15 @@ inline constexpr auto fields = author::fields_of<Values>(
     author::field<&Values::unit>("unit", "", "the number behind B or C"),
     author::field<&Values::skipped>("skipped", "bytes", "received so far that belong to no valid frame"));
 
-/// Explains an error of `reply` to `request`, which is empty for a pulse; with an empty reply, why none was received or
-/// what is wrong with the request.
+/// Returns cause and advice for an error of `reply` to `request`, which is empty for a pulse. With an empty reply,
+/// explains why no reply was received, or what is wrong with the request.
 [[nodiscard]] Explanation explain(const Format& format, Error error, Bytes request, Bytes reply);
 
 /// Receives the frames of a streaming encoder and sends nothing. Emits every frame, and every loss of frames with its
 /// error. Ends when no valid frame arrives any more: timeout, bad_framing, out_of_range.
 class Listen final : public Conversation<std::uint8_t> {
  public:
-  /// Listens to an encoder of this format.
+  /// Creates a conversation that receives an encoder of this format.
   explicit Listen(const Format& format);
 
   /// Processes an event of the port, such as received data or silence.
@@ -44,14 +44,14 @@ class Listen final : public Conversation<std::uint8_t> {
   [[nodiscard]] std::string_view advice() const override { return words_.advice; }
   [[nodiscard]] const Reading* reading() const override;
   void report(FieldSink& sink) const override;
-  /// Returns the bytes of the last exchange.
+  /// Returns the bytes of the last frame.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const override;
 
-  /// Returns the decoder of the stream.
+  /// Returns the decoder that finds the frames in the stream.
   [[nodiscard]] const StreamDecoder& decoder() const { return decoder_; }
 
  private:
-  // Most frames in the bytes that a port delivers at once.
+  // Greatest number of frames in the bytes that a port delivers at once.
   static constexpr std::size_t most_waiting = 1024;
 
   void take(const StreamFrame& found);
@@ -62,14 +62,14 @@ class Listen final : public Conversation<std::uint8_t> {
   Format format_;
   StreamDecoder decoder_;
   Buffer<StreamFrame, most_waiting> waiting_;
-  std::size_t taken_ = 0;  // number of emitted results in `waiting_`
+  std::size_t taken_ = 0;  // number of results in `waiting_` that were emitted already
   bool done_ = false;
-  bool received_anything_ = false;  // bytes or damaged characters were received since the last valid frame
-  bool restart_timeout_ = true;     // the timeout must be restarted
+  bool received_anything_ = false;  // whether bytes or damaged characters were received since the last valid frame
+  bool restart_timeout_ = true;     // whether the timeout must be restarted
   Time deadline_{};
-  Time received_at_{};             // time of the bytes that are being processed
-  Time received_before_{};         // time of the bytes before them
-  std::uint64_t valid_count_ = 0;  // number of valid frames
+  Time received_at_{};             // time at which the bytes that are being processed were received
+  Time received_before_{};         // time at which the bytes before them were received
+  std::uint64_t valid_count_ = 0;  // number of valid frames received so far
   StreamCounts counts_{};
   Reading reading_{};
   FrameBytes frame_;
@@ -80,16 +80,17 @@ class Listen final : public Conversation<std::uint8_t> {
 /// Interface by which procedures send requests and await replies.
 using Dialog = author::DialogOf<Protocol>;
 
-/// Reads the position, sets the zero, and reads until the position is zero. Errors: unsupported and invalid_argument
-/// (the options have no way to set the zero), not_still (the shaft turns), cross_check_failed (not zero after half a
-/// second).
+/// Reads the position, sets the zero, and polls until the position is zero. Errors: unsupported and invalid_argument
+/// (the options have no means to set the zero), not_still (the shaft turns), cross_check_failed (the position is not
+/// zero after half a second).
 author::Procedure set_zero(Dialog& dialog, Values& found);
 
-/// Finds the units on a bus. Listens for encoders that transmit without a request, then requests every number, in any
-/// mode. If all replies of a number are damaged, two encoders share it or the line is bad. Errors: timeout if no unit
-/// answers, unexpected_reply if an encoder transmits without a request.
+/// Result of a scan of the units on a bus; the index is the unit number. The scan listens for encoders that transmit
+/// without a request, then requests every number, whatever the option mode is. If all replies of a number are damaged,
+/// two encoders share it or the line is bad. Errors: timeout if no unit answers, unexpected_reply if an encoder
+/// transmits without a request.
 using Units = std::array<Values, unit_count>;
-/// Procedure that finds all encoders on a line.
+/// Scans the bus for units.
 author::Procedure scan(Dialog& dialog, Units& found);
 
 }  // namespace absenc::raa38::serial

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host against virtual encoder in virtual time.
+// Tests of the host's conversations with the virtual encoder in virtual time.
 #include "absenc/protocol/raa38/serial/bench_test.hpp"
 
 namespace absenc::raa38::serial {
@@ -110,7 +110,8 @@ TEST(Raa38SerialHandshake, DoesNotBlameSecondEncoderForBadChecksum) {
 TEST(Raa38SerialBus, RejectsCollisionOfTwoUnits) {
   Bench bench(bus);
   bench.add_twin(with(bus, &Format::second_byte, SecondByte::echo));
-  EXPECT_TRUE(ended(bench.run_command("position"), Error::bad_checksum));  // FF 81 01 7F 00 and FF B1 01 7E 2F collide
+  // the frames FF 81 01 7F 00 and FF B1 01 7E 2F collide
+  EXPECT_TRUE(ended(bench.run_command("position"), Error::bad_checksum));
 }
 
 // A frame may contain BC AA, but its checksum never completes a request.
@@ -151,7 +152,8 @@ TEST_P(Raa38SerialZero, ReportsZeroWithoutEffect) {
 }
 
 TEST_P(Raa38SerialZero, RefusesWhileShaftTurns) {
-  for (const int rpm : {60, 2}) {  // the slow speed is detected because some time passes between the two readings
+  // the slow speed is detected because time passes between the two readings of the procedure
+  for (const int rpm : {60, 2}) {
     Bench bench(GetParam());
     bench.shaft.spin(rpm, Time{});
     EXPECT_TRUE(ended(bench.run_command("zero"), Error::not_still, "nothing was changed")) << rpm;
@@ -240,7 +242,7 @@ TEST(Raa38SerialScan, ReportsNoUnitAndStreamingEncoder) {
 
 // ---- Rules that the virtual encoder checks
 
-/// Sends two pulses on CLK, or two requests.
+/// Sends two pulses on CLK, or two requests, with a pause between them.
 struct Twice final : Machine<std::uint8_t> {
   Twice(Time pulse_width, Time second, Wire bytes = {}) : width(pulse_width), due(second), request(std::move(bytes)) {}
   void feed(const Event<std::uint8_t>&) override {}

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The stream of a virtual encoder in virtual time, received directly and by a Session.
+// Tests of the stream of a virtual encoder in virtual time, received directly and by a Session.
 #include "absenc/host/session.hpp"
 #include "absenc/protocol/raa38/serial/bench_test.hpp"
 #include "absenc/sim/sim_port.hpp"
@@ -11,7 +11,7 @@ using namespace testing;
 
 constexpr Format fast{.mode = Mode::timing, .refresh_millihertz = 1'000'000};
 
-/// Results that a host emitted.
+/// Results that a host has emitted.
 struct Results {
   std::vector<std::uint32_t> positions;
   std::vector<Time> times;
@@ -145,7 +145,7 @@ TEST(Raa38SerialSession, ReadsEveryFrame) {
   EXPECT_EQ(bench.encoder.answer_count(), bench.session.counters().good);
 }
 
-// A pause of the caller must not return old positions.
+// After a pause of the caller, the session must not return old positions.
 TEST(Raa38SerialSession, TakesNewestFrameAfterPause) {
   SessionBench bench;
   bench.read(host::Take::newest);
@@ -153,7 +153,8 @@ TEST(Raa38SerialSession, TakesNewestFrameAfterPause) {
     bench.clock += 50ms;
     const Reading reading = *bench.read(host::Take::newest).reading();
     EXPECT_GT(reading.received, bench.clock - 2ms);
-    const auto frame = static_cast<std::uint64_t>(reading.received / 1ms);  // the frame that began at this time
+    // index of the frame that began at the time of reception
+    const auto frame = static_cast<std::uint64_t>(reading.received / 1ms);
     EXPECT_EQ(reading.singleturn, 16'384 * frame / 1000 % 16'384);
   }
 }

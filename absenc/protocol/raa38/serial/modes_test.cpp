@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks every row of README's table of orders: its options resolve, and a virtual encoder with them can be read.
+// Tests every row of README's table of order codes: its options are valid, and a virtual encoder with them can be read.
 #include <gtest/gtest.h>
 
 #include <fstream>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds frames in the bytes of a streaming encoder: directly after each other while aligned; by header, checksum, range
-// and period after bytes were lost.
+// Finds frames in the bytes of a streaming encoder: while aligned, each directly after the previous one; after bytes
+// were lost, by header, checksum, range and period.
 #pragma once
 
 #include <algorithm>
@@ -13,27 +13,29 @@
 
 namespace absenc::raa38::serial {
 
-/// A frame, or the error that ended the alignment. Each loss of alignment is reported once.
+/// A result of the stream decoder: a valid frame, or the error that ended the alignment. Each loss of alignment is
+/// reported once.
 struct StreamFrame {
-  Error error = Error::none;     ///< Error of the frame.
-  std::uint32_t singleturn = 0;  ///< Position in counts.
-  Time at{};                     ///< time at which its last byte was received
+  Error error = Error::none;     ///< Error that ended the alignment; `none` for a valid frame.
+  std::uint32_t singleturn = 0;  ///< Position in the valid frame, in counts.
+  Time at{};                     ///< Time at which the last byte of the valid frame was received.
 };
 
-/// While aligned, a frame is accepted where the one before it ended. A frame with an FF inside is accepted only when
-/// another header follows, which may take a period. Without alignment, two valid frames must follow each other; both
-/// are then handed out. A disturbance therefore costs the frames that it hits, and one valid frame if it leaves no two
-/// together.
+/// Finds frames in received bytes. While aligned, a frame is accepted where the previous one ended. A frame with an FF
+/// inside is accepted only when another header follows, which may take a period. Without alignment, two valid frames
+/// must follow each other; both are then reported. A disturbance therefore costs the frames that it hits, and one valid
+/// frame more if no two valid frames are left together.
 class StreamDecoder {
  public:
-  /// `format`: that of a streaming encoder.
+  /// Creates a decoder for a streaming encoder of this format.
   explicit constexpr StreamDecoder(const Format& format)
       : format_(format),
         frame_(format.frame_bytes()),
         second_byte_(format.own_second_byte()),
         discarded_(format.frame_bytes()) {}
 
-  /// Takes bytes that were received at `at`. Calls `on_frame(const StreamFrame&)` in the order of the line.
+  /// Processes bytes that were received at `at`. Calls `on_frame(const StreamFrame&)` for each result, in the order of
+  /// the line.
   template <class OnFrame>
   constexpr void feed(Bytes bytes, Time at, OnFrame&& on_frame) {
     for (const std::uint8_t byte : bytes) {
@@ -44,7 +46,7 @@ class StreamDecoder {
     }
   }
 
-  /// Takes a damaged character.
+  /// Processes a damaged character, which ends the alignment.
   template <class OnFrame>
   constexpr void disturbed(OnFrame&& on_frame) {
     discarded_.skip(size_ + 1);
@@ -55,13 +57,13 @@ class StreamDecoder {
     on_frame(StreamFrame{.error = Error::bad_framing});
   }
 
-  /// Returns whether the next frame must begin where the last one ended.
+  /// Returns whether the decoder is aligned: the next frame must begin where the last one ended.
   [[nodiscard]] constexpr bool in_step() const { return in_step_; }
-  /// Returns the number of bytes that belong to no frame.
+  /// Returns the number of received bytes that belong to no frame.
   [[nodiscard]] constexpr std::uint64_t skipped() const { return discarded_.skipped(); }
   /// Returns the number of frames that were damaged or could not be distinguished from damaged ones.
   [[nodiscard]] constexpr std::uint64_t discarded() const { return discarded_.count(); }
-  /// Returns whether a frame was valid except for a position with too many bits.
+  /// Returns whether a frame was valid except for a position with more bits than the format has.
   [[nodiscard]] constexpr bool saw_larger_positions() const { return saw_larger_positions_; }
   /// Returns the bytes of the last invalid frame.
   [[nodiscard]] constexpr Bytes bad() const { return bad_.view(); }
@@ -75,7 +77,7 @@ class StreamDecoder {
     return decode_position(format_, Bytes(window_).subspan(offset, frame_));
   }
 
-  // Takes the next frame while aligned. Returns false if more bytes are needed.
+  // Processes the next frame while aligned. Returns false if more bytes are needed.
   template <class OnFrame>
   constexpr bool follow(OnFrame& on_frame) {
     if (size_ < frame_) return false;
@@ -93,7 +95,8 @@ class StreamDecoder {
     return true;
   }
 
-  // Searches two valid frames in a row and drops bytes that cannot begin one.
+  // Searches two valid frames in a row and drops bytes that cannot begin a frame. Returns false if more bytes are
+  // needed.
   template <class OnFrame>
   constexpr bool search(OnFrame& on_frame) {
     if (size_ < frame_) return false;
@@ -142,12 +145,12 @@ class StreamDecoder {
   [[nodiscard]] static constexpr std::ptrdiff_t end(std::size_t count) { return static_cast<std::ptrdiff_t>(count); }
 
   Format format_;
-  std::size_t frame_;  // bytes of a frame
+  std::size_t frame_;  // number of bytes of a frame
   std::uint8_t second_byte_;
   bool in_step_ = false;
   bool saw_larger_positions_ = false;
   DiscardedFrames discarded_;
-  std::array<std::uint8_t, 2 * frame_capacity> window_{};  // bytes that may still become a frame
+  std::array<std::uint8_t, 2 * frame_capacity> window_{};  // received bytes that may still become a frame
   std::array<Time, 2 * frame_capacity> times_{};
   std::size_t size_ = 0;
   FrameBytes bad_;

@@ -196,8 +196,8 @@ struct Sent {
   bool hit = false;
 };
 
-/// Disturbs the end of the stream: adds random bytes with many headers, cuts the last frame, flips a bit, or removes a
-/// byte. Returns whether the last frame was hit.
+/// Disturbs the end of the stream in `wire`: adds random bytes with many headers, cuts the last frame, flips a bit, or
+/// removes a byte. Returns whether the last frame was hit.
 bool disturb(Wire& wire, std::size_t size, sim::Random& random) {
   switch (random.below(4)) {
     case 0:
@@ -219,10 +219,10 @@ bool disturb(Wire& wire, std::size_t size, sim::Random& random) {
   }
 }
 
-// Compares sent and received positions in order. A received position that was not sent next is wrong; a sent one that
-// was not received is lost.
+// Compares sent and received positions in order. A received position that differs from the next sent ones is wrong; a
+// sent position that was not received is lost.
 void judge_option(Tally& tally, const std::vector<Sent>& sent, const std::vector<std::uint32_t>& results) {
-  constexpr std::size_t most_missing = 12;  // most lost frames in a row
+  constexpr std::size_t most_missing = 12;  // greatest number of frames in a row that may be lost
   std::size_t next = 0;
   for (const std::uint32_t position : results) {
     const std::size_t end = std::min(sent.size(), next + most_missing);

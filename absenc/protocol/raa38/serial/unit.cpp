@@ -156,11 +156,11 @@ BitRanges bits_in(const Options& values, Frame, Frame, const FieldInfo& field) {
   if (&field != fields.of<&Values::singleturn>()) return {};
   return author::big_endian_bits(2, format.data_bytes(), format.bits);
 }
-// Document: "T1: baud rate". It states no value, so the user must give one.
+// The duration of a frame. Document: "T1: baud rate". It states no value, so the user must set one.
 constexpr LineSettings line_of(const Format&) { return {.rate = 0}; }
 constexpr Resolution resolution_of(const Format& format) { return {format.bits, 0}; }
 constexpr Result<Request> guess_request(const Format&, Bytes) { return Request{Request::Kind::trigger}; }
-// Returns whether frames come without a request. A pulse has no bytes, so its frames count as unsolicited too.
+// Returns whether frames are unsolicited. A pulse has no bytes, so the frames after a pulse count as unsolicited too.
 bool is_streaming(const Options& values) { return options.format(values).mode != Mode::bus; }
 bool is_answered(const Options&, Frame request) {
   const Result<Request> asked = decode_request(request.bytes);
@@ -175,7 +175,7 @@ constexpr author::Declaration<Protocol, VirtualEncoder> declaration{
     .id = "raa38",
     .name = "RAA38S6, RS-485, RS-232 or RS-422",
     .document = "Absolute Encoder Operation Manual, RAA38S6 series",
-    .link = LinkKind::half_duplex,  // the most restrictive of the three kinds of line
+    .link = LinkKind::half_duplex,  // RS-485, the most restrictive of the three kinds of line
     .options = options.infos,
     .format = author::format_of<options>,
     .models = models,
