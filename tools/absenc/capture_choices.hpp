@@ -10,7 +10,8 @@
 
 namespace absenc::tool {
 
-/// Returns the values of --channel, --raw-channels, --rate, --baud and --parity. Throws UsageError.
+/// Returns the values of the options --channel, --raw-channels, --rate, --baud and --parity. Throws UsageError if one
+/// is invalid.
 [[nodiscard]] CaptureChoices capture_choices(const Invocation& invocation, std::string_view path);
 
 }  // namespace absenc::tool

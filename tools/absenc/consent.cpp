@@ -38,7 +38,8 @@ bool says_yes(const std::string& question) {
   return is_yes(answer);
 }
 
-// A sim: encoder is alone on its line and disappears afterwards, so its commands disturb nothing.
+// Returns whether the command may disturb others. A sim: encoder is alone on its line and disappears afterwards, so it
+// cannot.
 bool disturbs(const EncoderAddress& uri, const Command& command) {
   return !command.disturbs.empty() && uri.port_kind != PortKind::sim;
 }
@@ -47,7 +48,7 @@ bool disturbs(const EncoderAddress& uri, const Command& command) {
 
 bool must_ask(const Invocation& invocation, const EncoderAddress& uri, std::string_view what,
               std::string_view meaning) {
-  // A sim: encoder disappears afterwards, so there is nothing to confirm.
+  // A sim: encoder disappears after the command, so no confirmation is needed.
   if (uri.port_kind == PortKind::sim || invocation.has("--yes")) return false;
   if (can_ask()) return true;
   throw UsageError(

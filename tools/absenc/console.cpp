@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::string_view spaces = " \t\r";
 
-// Returns the first word and removes it from `line`.
+// Removes the first word from `line` and returns it; "" if `line` is empty.
 std::string_view take_word(std::string_view& line) {
   line.remove_prefix(std::min(line.find_first_not_of(spaces), line.size()));
   const std::string_view word = line.substr(0, line.find_first_of(spaces));
@@ -114,7 +114,7 @@ std::string Console::condition(VirtualDevice& device, std::string_view line, Tim
 std::string Console::alarms(VirtualDevice& device, std::string_view names, bool raise) const {
   std::vector<std::string> all;
   while (!is_blank(names)) all.emplace_back(take_word(names));
-  // An alarm without a flag in the status is not raised, so lowering it succeeds.
+  // An alarm that the status does not show is not raised, so a command to lower it succeeds.
   const std::uint32_t bits = raise ? require_alarms(unit_, device.options(), all) : require_alarms(unit_, all);
   if (bits == 0) {
     throw UsageError(fmt::format("which alarm? There are {}", fmt::join(flag_names(*unit_.alarms, ~0ull), ", ")));
@@ -123,7 +123,7 @@ std::string Console::alarms(VirtualDevice& device, std::string_view names, bool 
   return fmt::format("{} {}", raise ? "raised" : "lowered", fmt::join(all, ", "));
 }
 
-// Replaces only the fault of this kind.
+// Replaces only the fault of the kind in `wanted`; faults of other kinds stay.
 std::string Console::faults(VirtualDevice& device, std::string_view wanted) {
   sim::FaultRates rates = device.fault_rates();
   for (std::string_view rest = wanted; !is_blank(rest);) {

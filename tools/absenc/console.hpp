@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Executes lines of standard input while virtual encoders run: conditions, power, alarms and faults.
+// Executes commands from lines of standard input while virtual encoders run: conditions, power, alarms and faults.
 #pragma once
 
 #include <string>
@@ -16,15 +16,15 @@ using namespace client;
 
 class Console {
  public:
-  /// All arguments must outlive the console. The encoders are of one unit and have numbers from 1.
+  /// `unit` and the encoders must outlive the console. The encoders all belong to `unit` and are numbered from 1.
   Console(const Unit& unit, std::vector<VirtualDevice*> devices) : unit_(unit), devices_(std::move(devices)) {}
 
-  /// Executes the waiting lines and prints one line to standard output for each.
+  /// Executes the lines that wait on standard input, and prints one line to standard output for each.
   void look(Time now);
-  /// Returns whether standard input has ended.
+  /// Returns whether standard input has ended or standard output was closed.
   [[nodiscard]] bool ended() const { return lines_.ended() || unheard_; }
 
-  /// Executes `line` and returns the new state in words. Throws UsageError, which lists the possible words.
+  /// Executes `line` and returns the encoder's new state in words. Throws UsageError, which lists the possible words.
   [[nodiscard]] std::string carry_out(std::string_view line, Time now);
 
  private:
@@ -37,7 +37,7 @@ class Console {
   const Unit& unit_;
   std::vector<VirtualDevice*> devices_;
   os::InputLines lines_;
-  bool unheard_ = false;  // standard output is closed
+  bool unheard_ = false;  // standard output is closed, so nobody reads the replies
 };
 
 }  // namespace absenc::tool

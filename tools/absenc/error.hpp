@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The exit statuses of the command.
+// Exit statuses of the command `absenc`, and the exception for a closed output.
 #pragma once
 
 #include "absenc/client/error.hpp"
@@ -11,9 +11,9 @@ using namespace client;  // the command uses the library's names without a prefi
 inline constexpr int exit_good = 0;
 inline constexpr int exit_failed = 1;  // the encoder, the line or the system failed
 inline constexpr int exit_usage = 2;
-inline constexpr int exit_nothing_judged = 3;  // nothing was observed that a verdict could be based on
+inline constexpr int exit_nothing_judged = 3;  // no observation was made that a verdict could be based on
 
-/// Thrown when standard output is closed, as after `| head`.
+/// Exception thrown when standard output is closed, as after `| head`.
 struct OutputClosed {};
 
 }  // namespace absenc::tool

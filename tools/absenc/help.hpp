@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Help text, made from the same data as the command line. The man page takes its parts from here.
+// Help texts of the command, made from the same data as the parser of the command line. The man page contains parts of
+// them.
 #pragma once
 
 #include <array>
@@ -43,7 +44,7 @@ inline constexpr std::array<Example, 6> environment{{
     {"NO_COLOR", "if not empty, `absenc monitor` does without colours"},
 }};
 
-/// Descriptions of the exit statuses, indexed by the status.
+/// Descriptions of the exit statuses of the command, indexed by the status.
 inline constexpr std::array<std::string_view, 4> exit_statuses{
     "good", "the encoder or the line failed", "wrong usage",
     "nothing was seen that could be judged (conform, conform-host)"};
@@ -51,7 +52,7 @@ inline constexpr std::array<std::string_view, 4> exit_statuses{
 /// Returns the help text of the whole command.
 [[nodiscard]] std::string help();
 [[nodiscard]] std::string help(const Subcommand& subcommand);
-/// Returns the help text of the verbs whose first word is `group`.
+/// Returns the help text of the verbs whose first word is `first_word_of_two`.
 [[nodiscard]] std::string help(std::string_view first_word_of_two);
 
 /// Returns the usage line of a verb: "absenc read <encoder> [options]".
@@ -59,7 +60,7 @@ inline constexpr std::array<std::string_view, 4> exit_statuses{
 
 /// Returns a parameter as help shows it: "<encoder>", "--count N".
 [[nodiscard]] std::string title(const Parameter& parameter);
-/// Returns a parameter's meaning, how often it may be given and its default.
+/// Returns a parameter's meaning, how often the parameter may be given, and its default.
 [[nodiscard]] std::string words(const Parameter& parameter);
 
 }  // namespace absenc::tool

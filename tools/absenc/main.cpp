@@ -31,7 +31,7 @@ namespace {
 
 bool asks_for_help(std::string_view word) { return word == "--help" || word == "-h"; }
 
-/// Parses the words after a verb. It reports a wrong name before a parameter that is missing because of it.
+/// A parser of the words after a verb. It reports a wrong name before a parameter that is missing because of that name.
 class ArgumentParser {
  public:
   explicit ArgumentParser(const Subcommand& subcommand) : subcommand_(&subcommand) {
@@ -140,7 +140,7 @@ class ArgumentParser {
     throw UsageError(fmt::format("{} has no option {}{}", subcommand_->name, name, suggestion(name, names)));
   }
 
-  // Throws UsageError for too many or too few arguments, and for an option that was given twice.
+  // Throws UsageError if arguments are too many or too few, or if an option was given twice.
   void refuse_numbers() const {
     if (extra_) {
       throw UsageError(fmt::format("\"{}\" is too much: usage is {}", *extra_, usage(*subcommand_)));
@@ -167,7 +167,7 @@ class ArgumentParser {
   Invocation invocation_;
 };
 
-// Reports that no verb begins with these words. `group` is the first word of a two-word verb, or "".
+// Throws UsageError: no verb begins with `words`. `group` is the first word of a two-word verb, or "".
 [[noreturn]] void refuse_verb(std::string_view group, std::span<char*> words) {
   const std::vector<std::string_view> verbs = words_after(group);
   if (words.empty()) {
@@ -193,15 +193,16 @@ class ArgumentParser {
                                suggestion(name, std::span(options).first(group.empty() ? 2 : 1))));
 }
 
-// --help and --version without a verb must be the only word.
+// Throws UsageError if a word follows --help or --version, which without a verb must be the only word.
 void require_last(std::span<char*> words) {
   if (words.size() == 1) return;
   throw UsageError(fmt::format("\"{}\" is too much behind {}", words[1], words[0]));
 }
 
 /// Returns the verb at the beginning of `words` and removes all of its words but the last; null if help or the version
-/// was requested and printed. `understood` is the recognised part of the verb, also when this throws. An unknown word
-/// is an error and is not skipped, because the next word may be a verb that changes an encoder.
+/// was requested and printed. `understood` receives the recognised part of the verb, also if an exception is thrown.
+/// Throws UsageError. An unknown word is an error and is not skipped, because the next word may be a verb that changes
+/// an encoder.
 const Subcommand* find_verb(std::span<char*>& words, std::string& understood) {
   for (;;) {
     if (words.empty()) refuse_verb(understood, words);
@@ -243,7 +244,7 @@ Json failure(std::string_view name, const std::exception& failed) {
   return json;
 }
 
-// With --json the failure is printed as JSON too.
+// Runs the verb and returns its exit status. With --json a failure is printed as JSON too.
 int run(const Subcommand& subcommand, const Invocation& invocation) {
   const bool json = invocation.has("--json");
   try {
@@ -261,14 +262,15 @@ int run(const Subcommand& subcommand, const Invocation& invocation) {
   return exit_failed;
 }
 
-// Without any word the command lists the ports: the user has probably just connected an adapter.
+// Prints the ports for a command line without any word: the user has probably just connected an adapter.
 int welcome() {
   const int status = ports_subcommand.run({});
   print_line("\n`absenc --help` shows all that absenc does, `absenc list` all encoders.");
   return status;
 }
 
-/// `understood` receives the recognised part of the verb, also when this throws.
+/// Runs a whole command line and returns the exit status. `understood` receives the recognised part of the verb, also
+/// if an exception is thrown.
 int run_command_line(std::span<char*> words, std::string& understood) {
   if (words.empty()) return welcome();
   const Subcommand* subcommand = find_verb(words, understood);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Parameters that many subcommands share, so that they read the same everywhere.
+// Parameters that many subcommands share, so that their help is the same everywhere.
 #pragma once
 
 #include "tools/absenc/subcommand.hpp"
@@ -12,20 +12,20 @@ inline constexpr Parameter encoder{"encoder", "",
                                    "", true};
 inline constexpr Parameter option{
     "--option", "NAME=VALUE", "sets an option of the protocol or of the port, as behind the encoder", "", false, true};
-/// The option --command, which sets the encoder's setting `command`, for verbs that read repeatedly.
+/// The option --command of verbs that read repeatedly; it sets the setting `command` of the encoder's address.
 inline constexpr Parameter read_command{
     "--command", "COMMAND", "what to read, instead of the position with all alarms: a command that yields positions"};
 inline constexpr Parameter yes{"--yes", "", "do not ask before the encoder is changed"};
 inline constexpr Parameter force{"--force", "", "write also what the protocol protects, as calibration"};
 inline constexpr Parameter json{"--json", "", "one JSON object"};
 
-// Without an encoder:
+// Parameters of verbs that need no encoder:
 inline constexpr Parameter protocol{"protocol", "", "see `absenc list`", "", true};
 inline constexpr Parameter model{"--model", "NAME", "which model of the protocol",
                                  "the first that agrees with the options"};
 inline constexpr Parameter protocol_option{"--option", "NAME=VALUE", "sets an option of the protocol", "", false, true};
 
-// Commands of a protocol:
+// Parameters of verbs that run a command of a protocol:
 inline constexpr Parameter command{"command", "", "a command of the protocol: see `absenc list <protocol>`", "", true};
 inline constexpr Parameter arguments{
     "arguments", "", "those of the command: decimal numbers, or hexadecimal with 0x", "", false, true};

@@ -28,7 +28,7 @@ std::size_t count_different(std::span<const std::string> names) {
   return std::set<std::string_view>(names.begin(), names.end()).size();
 }
 
-// Returns the names, each cut at one place near the middle so that all remain distinct; nothing if that is impossible.
+// Returns the names, all cut at the same place near the middle and still distinct; nothing if that is impossible.
 Names cut_in_the_middle(std::span<const std::string> names, std::size_t width) {
   const std::size_t different = count_different(names);
   const std::size_t most = width - gap.size();
@@ -40,7 +40,7 @@ Names cut_in_the_middle(std::span<const std::string> names, std::size_t width) {
   return {};
 }
 
-// Length of the common beginning of all names, and of their common end after it.
+// Length of the beginning that all names have in common, and of their common end behind it.
 struct Common {
   std::size_t front;
   std::size_t back;
@@ -61,7 +61,7 @@ Common common_parts(std::span<const std::string> names) {
   return common;
 }
 
-// Returns the differing part of each name, with ".." for the common parts.
+// Returns the part in which each name differs, with ".." for the common parts.
 Names middles(std::span<const std::string> names) {
   const auto [front, back] = common_parts(names);
   Names cuts;
@@ -72,7 +72,7 @@ Names middles(std::span<const std::string> names) {
   return cuts;
 }
 
-// Numbers the names: "3 tfo..=7" is the third.
+// Returns the names with their numbers before them: "3 tfo..=7" is the third.
 Names numbered(std::span<const std::string> names, std::size_t width) {
   Names cuts;
   for (const std::string& name : names) {

@@ -9,8 +9,8 @@
 
 namespace absenc::tool {
 
-/// Returns each name in at most `width` (8 or more) bytes, in the same order; ".." replaces the part that was cut.
-/// Different names remain different.
+/// Returns each name in at most `width` (8 or more) bytes, in the order of `names`; ".." replaces the part that was
+/// cut. Different names remain different.
 [[nodiscard]] std::vector<std::string> short_names(std::span<const std::string> names, std::size_t width);
 
 }  // namespace absenc::tool

@@ -60,7 +60,8 @@ std::string_view first_word(const Subcommand& subcommand) {
 }
 
 std::string_view last_word(const Subcommand& subcommand) {
-  return subcommand.name.substr(subcommand.name.find(' ') + 1);  // without a blank: npos + 1 is 0, the whole name
+  return subcommand.name.substr(subcommand.name.find(' ') + 1);  // also for a name without a blank: npos + 1 is 0, so
+                                                                 // the result is the whole name
 }
 
 std::vector<std::string_view> words_after(std::string_view first) {

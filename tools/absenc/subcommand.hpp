@@ -17,7 +17,7 @@ struct Parameter {
   std::string_view meaning;
   std::string_view fallback{};  // the default in words, for help; "": none
   bool required = false;
-  bool repeatable = false;  // an argument that takes all following words, or an option that may be given several times
+  bool repeatable = false;  // an argument that takes all words to the end, or an option that may be given several times
 
   [[nodiscard]] constexpr bool is_option() const { return name.starts_with("--"); }
 };
@@ -27,16 +27,17 @@ struct Example {
   std::string_view meaning;
 };
 
-/// The values that the user wrote, by parameter name.
+/// The values of parameters that the user wrote on the command line, by parameter name.
 class Invocation {
  public:
   void add(std::string_view name, std::string value) { values_[name].push_back(std::move(value)); }
 
   [[nodiscard]] bool has(std::string_view name) const { return values_.contains(name); }
-  /// Returns the last value of the parameter, or `fallback` if there is none.
+  /// Returns the last value that the user gave for a parameter, or `fallback` without a value.
   [[nodiscard]] std::string_view text(std::string_view name, std::string_view fallback = {}) const;
   [[nodiscard]] std::span<const std::string> texts(std::string_view name) const;
-  /// Returns the value as a number, decimal or with 0x. Throws UsageError if it is no number or out of range.
+  /// Returns the last value of a parameter as a number, written in decimal or with 0x, or `fallback` without a value.
+  /// Throws UsageError if the value is no number or out of range.
   [[nodiscard]] std::int64_t number(std::string_view name, std::int64_t fallback, std::int64_t minimum,
                                     std::int64_t maximum) const;
   [[nodiscard]] double real(std::string_view name, double fallback, double minimum, double maximum) const;
@@ -47,21 +48,21 @@ class Invocation {
 
 struct Subcommand {
   std::string_view name;         // one word, or two as in "memory read"
-  std::string_view summary;      // one line of help
-  std::string_view description;  // further help text, with its line ends
+  std::string_view summary;      // one line of text in the list of verbs
+  std::string_view description;  // further text in the help of the verb, with its line ends
   std::span<const Parameter> parameters;
   std::span<const Example> examples;
-  int (*run)(const Invocation& invocation);  // returns the exit status
+  int (*run)(const Invocation& invocation);  // runs the verb and returns the exit status
 };
 
 /// All subcommands in the order of help; those with the same first word are adjacent.
 [[nodiscard]] std::span<const Subcommand* const> all_subcommands();
 
-/// Returns "memory" for "memory read"; "" for a verb of one word.
+/// Returns the first word of a verb of two words, "memory" for "memory read"; "" for a verb of one word.
 [[nodiscard]] std::string_view first_word(const Subcommand& subcommand);
-/// Returns "read" for "memory read" and for "read".
+/// Returns the last word of a verb: "read" for "memory read" and for "read".
 [[nodiscard]] std::string_view last_word(const Subcommand& subcommand);
-/// Returns the words that may follow `first`; if `first` is "", the words with which a verb may begin.
+/// Returns the words that may follow `first` in a verb; for "" the words with which a verb may begin.
 [[nodiscard]] std::vector<std::string_view> words_after(std::string_view first);
 
 extern const Subcommand ports_subcommand;

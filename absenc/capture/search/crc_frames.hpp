@@ -26,7 +26,7 @@ struct Shape {
   std::size_t trailing = 0;
 };
 
-/// Frames without duplicates, grouped by length.
+/// Captured frames without duplicates, grouped by length.
 class Frames {
  public:
   explicit Frames(std::span<const CheckedFrame> frames) {
@@ -54,7 +54,8 @@ class Frames {
 
 inline bool bit_of(const CheckedFrame& frame, std::size_t i) { return (frame.bytes[i / 8] >> (7 - i % 8) & 1) != 0; }
 
-/// Returns the checksum as the encoder computes it; nothing if bits above its width are not 0.
+/// Returns the checksum in `frame` as the encoder computes it, before its byte order is changed; nothing if bits above
+/// its width are not 0.
 inline std::optional<std::uint32_t> check_of(const CheckedFrame& frame, const Shape& shape) {
   const std::size_t at = Frames::size(frame) - shape.trailing - shape.check_size;
   std::uint32_t value = 0;
@@ -89,8 +90,8 @@ inline std::uint32_t reflected_if(bool reflected, std::uint32_t value, unsigned 
   return reflected ? reflect(value, width) : value;
 }
 
-/// Returns the frame as a polynomial, which is a multiple of the CRC polynomial if the frame is good and init and
-/// xorout are right.
+/// Returns `frame` as a polynomial, which is a multiple of the CRC polynomial if the frame is good and init and xorout
+/// are right.
 inline Polynomial codeword(const CheckedFrame& frame, const Shape& shape, std::size_t first, std::uint32_t check,
                            std::uint32_t init, std::uint32_t xorout) {
   Polynomial word;
@@ -105,7 +106,7 @@ inline Polynomial codeword(const CheckedFrame& frame, const Shape& shape, std::s
   return word;
 }
 
-/// Returns the register behind the covered bits, as it would be written without xorout.
+/// Returns the CRC register behind the covered bits of `frame`, as it would be written without xorout.
 inline std::uint32_t crc_of(const CheckedFrame& frame, const Shape& shape, std::size_t first, std::uint32_t poly,
                             std::uint32_t init) {
   const auto mask = static_cast<std::uint32_t>(low_mask(shape.width));

@@ -13,7 +13,7 @@ namespace absenc::capture {
 
 namespace {
 
-constexpr double settled_log2 = -20;    // log2 of a chance of one in a million
+constexpr double settled_log2 = -20;    // log2 of one in a million: a solution below this chance is settled
 constexpr int most_common_degree = 63;  // highest degree of a common divisor that is factorised; a higher one has too
                                         // many factors
 constexpr unsigned widest = 16;
@@ -44,7 +44,7 @@ class CrcSearch {
     bool init_open;
     auto operator<=>(const Key&) const = default;
   };
-  // Possible covered beginnings, by polynomial and by init and xorout.
+  // Possible positions of the first covered byte, by polynomial and by init and xorout.
   using Firsts = std::map<std::uint32_t, std::map<Key, std::vector<std::size_t>>>;
 
   void each_order(Shape shape) {
@@ -86,14 +86,14 @@ class CrcSearch {
     });
   }
 
-  // Returns how many checksums the frames determine: one for each length, and one for each linearly independent
-  // difference of frames.
+  // Returns how many checksums the frames determine: one for each length of frames, and one for each linearly
+  // independent difference of frames of equal length.
   [[nodiscard]] double known_checks(const Shape& shape, std::size_t first) {
     Shape plain;
     plain.trailing = shape.trailing;
     const auto [known, is_new] = known_.try_emplace({plain.trailing, first});
     if (!is_new) return known->second;
-    std::vector<Polynomial> basis;  // each with a different degree
+    std::vector<Polynomial> basis;  // independent differences of frames, each with a different degree
     for (const auto& [length, frames] : frames_.lengths) {
       const Polynomial base = content(*frames.front(), plain, first);
       for (const CheckedFrame* frame : frames) {
@@ -111,7 +111,7 @@ class CrcSearch {
     return known->second = static_cast<double>(basis.size() + frames_.lengths.size());
   }
 
-  // Returns the covered bits and the checksum as they are in the frame.
+  // Returns the covered bits and the checksum of `frame`, in the order in which they are in the frame.
   static Polynomial content(const CheckedFrame& frame, const Shape& plain, std::size_t first) {
     Polynomial word;
     covered_bits(frame, plain, first, [&word](bool bit) { word.append(bit); });
@@ -149,7 +149,7 @@ class CrcSearch {
     return {{{0, 0}, {ones, 0}, {0, ones}, {ones, ones}}};
   }
 
-  // Returns the possible polynomials without the highest power. With `start` (init and xorout) whole frames are used,
+  // Returns the possible polynomials without their highest power. With `start` (init and xorout) whole frames are used,
   // otherwise only differences of frames.
   std::vector<std::uint32_t> polynomials(const Shape& shape, std::size_t first,
                                          std::optional<std::pair<std::uint32_t, std::uint32_t>> start) {
@@ -181,7 +181,8 @@ class CrcSearch {
     return found;
   }
 
-  // Finds init and xorout for a polynomial: the usual values, or the first that fit.
+  // Finds init and xorout for the polynomial `poly`: all usual values that explain the frames, or else the first that
+  // fit.
   void fit(const Shape& shape, std::size_t first, std::uint32_t poly, Firsts& solutions) {
     bool is_usual = false;
     for (const auto& [init, xorout] : usual(shape)) {
@@ -199,7 +200,7 @@ class CrcSearch {
     }
   }
 
-  // Returns the xorout that explains the first frame of every length, and so all frames.
+  // Returns the xorout that explains the first frame of every length, and so all frames; nothing if none does.
   std::optional<std::uint32_t> xorout_for(const Shape& shape, std::size_t first, std::uint32_t poly,
                                           std::uint32_t init) {
     std::optional<std::uint32_t> xorout;
@@ -212,8 +213,8 @@ class CrcSearch {
     return xorout;
   }
 
-  // Stores the solutions of a polynomial. Unusual values of init and xorout are stored only if no usual ones explain
-  // the frames, and only with the longest covered part.
+  // Stores the solutions of the polynomial `poly`. Unusual values of init and xorout are stored only if no usual values
+  // explain the frames, and only with the longest covered part.
   void keep(const Shape& shape, std::uint32_t poly, const std::map<Key, std::vector<std::size_t>>& keys) {
     const auto is_usual = [&](const Key& key) {
       const auto all = usual(shape);
@@ -230,8 +231,8 @@ class CrcSearch {
     add(shape, poly, widest_cover->first, {widest_cover->second.front()}, free_bits);
   }
 
-  // Adds a solution with its probability of chance: each frame determines `width` bits; the polynomial and `free_bits`
-  // of init and xorout were chosen to fit.
+  // Adds a solution with the probability that it is chance: each determined checksum gives `width` bits; the polynomial
+  // and `free_bits` bits of init and xorout were chosen to fit.
   void add(const Shape& shape, std::uint32_t poly, const Key& key, std::vector<std::size_t> firsts, double free_bits) {
     CheckSolution solution;
     solution.parameters = {
@@ -244,7 +245,7 @@ class CrcSearch {
     solution.check_size = shape.check_size;
     solution.trailing = shape.trailing;
     solution.chance_log2 = shape.width - 1 + free_bits - known_checks(shape, solution.first.front()) * shape.width;
-    // This CRC equals an exclusive or, unless its bits are reversed.
+    // The CRC with polynomial x^8 + 1 equals an exclusive or, unless its bits are reversed, and is reported as such.
     if (!frames_.of_bits && shape.width == 8 && poly == 1 && shape.refin == shape.refout) return;
     found_.solutions.push_back(std::move(solution));
   }
@@ -256,14 +257,16 @@ class CrcSearch {
     for (shape.trailing = 0; shape.trailing + 1 < frames_.shortest; ++shape.trailing) {
       const bool is_check = !never_changes(shape);
       for (const CheckKind kind : {CheckKind::sum, CheckKind::difference, CheckKind::exclusive_or}) {
-        std::map<std::uint8_t, std::vector<std::size_t>> firsts;  // covered beginnings by the constant
+        std::map<std::uint8_t, std::vector<std::size_t>> firsts;  // possible positions of the first covered byte, by
+                                                                  // the constant of the sum
         for (std::size_t first = 0; first < frames_.shortest - shape.trailing - 1; ++first) {
           ++shapes_;
           const std::optional<std::uint8_t> constant =
               is_check ? sum_constant(kind, shape, first) : std::optional<std::uint8_t>();
           if (constant) firsts[*constant].push_back(first);
         }
-        // 00 and FF (the complement) are usual; another constant is used only if they do not fit.
+        // The constants 00 and FF (the complement) are usual; another constant is used only if neither explains the
+        // frames.
         const bool any_usual = firsts.contains(0) || firsts.contains(0xFF);
         for (auto& [constant, first] : firsts) {
           const bool is_usual = constant == 0 || constant == 0xFF;
@@ -302,7 +305,7 @@ class CrcSearch {
 
   Frames frames_;
   std::map<const CheckedFrame*, std::uint32_t> checks_;
-  // Results of `known_checks`, by the bytes behind the checksum and the first covered byte.
+  // Results of `known_checks`, by the number of bytes behind the checksum and the position of the first covered byte.
   std::map<std::pair<std::size_t, std::size_t>, double> known_;
   std::size_t shapes_ = 0;
   CheckSearch found_;

@@ -13,7 +13,7 @@
 
 namespace absenc::capture {
 
-/// A captured frame: its bytes, or its bits packed MSB first.
+/// A captured frame: its bytes, or its bits packed MSB first, the last byte left-aligned.
 struct CheckedFrame {
   std::vector<std::uint8_t> bytes;
   std::size_t bits = 0;  // number of bits of the frame; 0: it consists of whole bytes
@@ -31,30 +31,31 @@ enum class CheckKind : std::uint8_t {
 };
 
 /// A checksum that explains all frames. Positions count bytes, or bits in frames of bits. The end of the covered part
-/// and the checksum itself are counted from the end of the frame, so that they apply to frames of all lengths.
+/// and the position of the checksum are counted from the end of the frame, so that they apply to frames of all lengths.
 struct CheckSolution {
   CheckKind kind = CheckKind::crc;
-  CrcParameters parameters{};      // for kinds other than crc: width 8, init is the constant
-  bool low_first = false;          // width above 8 in frames of bytes: the checksum's low byte comes first
-  bool padded = false;             // a byte 00 behind the covered part counts as covered
-  bool init_open = false;          // all frames have one length: every init fits with its own xorout
+  CrcParameters parameters{};      // for kinds other than crc: width is 8 and init is the constant
+  bool low_first = false;          // width above 8 in frames of bytes: the checksum's low byte comes first in the frame
+  bool padded = false;             // the checksum is computed as if a byte 00 followed the covered part
+  bool init_open = false;          // all frames have one length: every value of init fits with an xorout of its own
   std::vector<std::size_t> first;  // possible positions of the first covered byte or bit
-  std::size_t check_size = 0;      // number of bytes or bits of the checksum
-  std::size_t trailing = 0;        // number of bytes or bits behind the checksum
-  double chance_log2 = 0;          // log2 of the number of such solutions that chance alone would give
+  std::size_t check_size = 0;      // number of bytes, or bits in frames of bits, of the checksum
+  std::size_t trailing = 0;        // number of bytes, or bits in frames of bits, behind the checksum
+  double chance_log2 = 0;          // log2 of the expected number of such solutions if the frames were random
 };
 
 struct CheckSearch {
   std::vector<CheckSolution> solutions;  // sorted: the solution that is least likely to be chance comes first
-  std::size_t open = 0;  // number of layouts for which the frames determine too little to list solutions
+  std::size_t open = 0;  // number of layouts about which the frames determine too little to list solutions
 };
 
-/// Returns all checksums of 3 to 16 bits that explain every frame. The frames are all of bytes or all of bits.
+/// Returns all checksums of 3 to 16 bits that explain every frame. The frames must be all of bytes or all of bits.
 /// Duplicates add no evidence, nor do bits that never change, alone or combined: the evidence is the number of
 /// independent ways in which the covered parts differ. A checksum that never changes is not accepted.
 [[nodiscard]] CheckSearch find_checks(std::span<const CheckedFrame> frames);
 
-/// Returns how many more frames with other data would leave only solutions with a chance below one in a million.
+/// Returns how many more frames with other data would settle whether `solution` is right: its chance would fall below
+/// one in a million.
 [[nodiscard]] unsigned frames_to_settle(const CheckSolution& solution);
 
 }  // namespace absenc::capture

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The test frames use the CRC of core, which shares no code with the search.
+// Tests the search for checksums with frames whose CRC is computed by core, which shares no code with the search.
 #include "absenc/capture/search/crc_search.hpp"
 
 #include <gtest/gtest.h>
@@ -83,7 +83,7 @@ TEST(CrcSearch, FindsCheckOfBissFromFourWords) {
   constexpr CrcParameters biss{6, 0x03, 0, false, false, 0x3F};
   std::mt19937 random(2);
   std::vector<CheckedFrame> frames;
-  for (int i = 0; i < 4; ++i) {  // 32 bits of position, error and warning, and a 6-bit CRC
+  for (int i = 0; i < 4; ++i) {  // a word of 32 bits of position, error and warning, and a 6-bit CRC
     CheckedFrame frame;
     for (int k = 0; k < 4; ++k) frame.bytes.push_back(static_cast<std::uint8_t>(random()));
     frame.bytes.push_back(static_cast<std::uint8_t>(crc_bitwise(biss, frame.bytes) << 2));
@@ -99,7 +99,7 @@ TEST(CrcSearch, FindsCheckOfBissFromFourWords) {
 TEST(CrcSearch, AConstantAddressMayBeCoveredOrNot) {
   std::mt19937 random(3);
   std::vector<CheckedFrame> frames = frames_of({.parameters = esl_8, .first = 1}, 6, random);
-  for (CheckedFrame& frame : frames) frame.bytes.front() = 0;  // a zero byte does not change a CRC with init 0
+  for (CheckedFrame& frame : frames) frame.bytes.front() = 0;  // a first byte of zero does not change a CRC with init 0
   const CheckSearch search = find_checks(frames);
   ASSERT_FALSE(search.solutions.empty());
   EXPECT_EQ(search.solutions.front().parameters, esl_8);
@@ -240,7 +240,7 @@ RC_GTEST_PROP(CrcSearchProperty, FindsEveryCheckOf3To16Bits, (std::uint32_t seed
   RC_ASSERT(found(find_checks(frames_of(made, 3 + 16 / width, random)), made));
 }
 
-// Compares with a trial of every polynomial of the degree.
+// Compares the list of divisors with a trial of every polynomial of the degree.
 RC_GTEST_PROP(PolynomialProperty, ListsAllDivisorsOnce, (std::uint64_t value)) {
   const unsigned degree = *rc::gen::inRange<unsigned>(1, 11);
   value |= 1;

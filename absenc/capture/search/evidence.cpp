@@ -13,10 +13,10 @@ namespace absenc::capture {
 namespace {
 
 constexpr unsigned many_attempts = 1u << 20;  // number of random replies tried if there are only one or two frames
-constexpr unsigned enough_accepted = 256;  // number of accepted random replies that gives a rate with an error of some
-                                           // percent
+constexpr unsigned enough_accepted = 256;     // number of accepted random replies after which the rate has an error of
+                                              // some percent
 
-/// Stores the position of a good reply.
+/// Stores the position that a good reply reports.
 struct PositionSink final : FieldSink {
   void put(const FieldValue&) override {}
   void put_reading(const Reading& reading) override {
@@ -25,7 +25,7 @@ struct PositionSink final : FieldSink {
   std::optional<Reading> position;
 };
 
-// Returns how many bytes at its beginning a reply has in common with its request.
+// Returns how many bytes at the beginning of the reply repeat those of the request.
 std::size_t repeated(const ObservedExchange& exchange) {
   const auto& request = exchange.request.bytes;
   const auto& reply = exchange.reply.bytes;
@@ -37,15 +37,16 @@ std::size_t repeated(const ObservedExchange& exchange) {
 
 double position_of(const Reading& reading) { return static_cast<double>(reading.singleturn); }
 
-// Returns the shortest distance between two positions, as a fraction of the whole range.
+// Returns the shortest distance between two positions, as a fraction, 0 to 1/2, of the whole range.
 double relative_distance(const Reading& from, const Reading& to) {
   const double all = std::ldexp(1.0, static_cast<int>(from.singleturn_bits));
   const double difference = std::abs(position_of(to) - position_of(from));
   return (from.unit_um > 0 ? difference : std::min(difference, all - difference)) / all;
 }
 
-// Returns log10 of the chance that random positions move so little. A random step is no longer than the longest of
-// these steps with a probability of twice its length; one step is not counted, because it determined that length.
+// Returns log10 of the chance that random positions move as little as `positions`; nothing if they do not move. A
+// random step is no longer than the longest of the steps with a probability of twice its length; one step is not
+// counted, because it determined that length.
 std::optional<double> weigh_motion(std::span<const Reading> positions) {
   double longest = 0;
   std::size_t steps = 0;
@@ -60,7 +61,7 @@ std::optional<double> weigh_motion(std::span<const Reading> positions) {
   return static_cast<double>(steps - 1) * std::log10(std::min(1.0, 2 * longest + least));
 }
 
-/// The distinct good exchanges, and the probability that random replies would be good.
+/// The distinct good exchanges, and the probability that the unit would accept random replies to their requests.
 class Distinct {
  public:
   Distinct(const Unit& unit, const Options& options) : unit_(unit), options_(options) {}
@@ -71,7 +72,7 @@ class Distinct {
     all_.push_back(&exchange);
   }
   [[nodiscard]] std::size_t count() const { return all_.size(); }
-  /// Returns the geometric mean of the probabilities.
+  /// Returns the geometric mean of the probabilities that random replies are accepted.
   [[nodiscard]] double each() {
     if (all_.empty()) return 1;
     double sum = 0;
@@ -159,7 +160,7 @@ Evidence weigh(const Unit& unit, const Options& options, std::span<const Observe
 double tail(std::size_t good, std::size_t all, double each) {
   if (good == 0 || each >= 1) return 0;
   const auto n = static_cast<double>(all);
-  double sum = 0;  // sum of the terms in units of the first one, the largest that matters
+  double sum = 0;  // sum of the terms in units of the first term, the largest that matters
   double first = 0;
   for (std::size_t k = good; k <= all; ++k) {
     const auto at = static_cast<double>(k);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Evidence of exchanges for a protocol: how many exchanges it explains, and how likely chance would explain as many.
+// Weighs exchanges as evidence for a protocol: how many exchanges the protocol explains, and how likely chance would
+// explain as many.
 #pragma once
 
 #include <cstddef>
@@ -15,15 +16,15 @@ namespace absenc::capture {
 /// A frame that owns its bytes.
 struct ObservedFrame {
   std::vector<std::uint8_t> bytes{};
-  std::size_t bits = 0;  // number of bits on clocked links
+  std::size_t bits = 0;  // number of bits, on clocked links; otherwise 0
   std::optional<CanFrame> can{};
 
-  /// Returns a view that is valid as long as this object.
+  /// Returns a view of this frame, which is valid as long as this object.
   [[nodiscard]] Frame frame() const { return {bytes, bits, can ? &*can : nullptr}; }
   friend bool operator==(const ObservedFrame&, const ObservedFrame&) = default;
 };
 
-/// A request and its reply; without a request the reply was unsolicited or the request is unknown.
+/// A request and its reply. Without a request, the reply was unsolicited or its request is unknown.
 struct ObservedExchange {
   ObservedFrame request{};
   ObservedFrame reply{};
@@ -31,15 +32,15 @@ struct ObservedExchange {
   friend bool operator==(const ObservedExchange&, const ObservedExchange&) = default;
 };
 
-/// Evidence of exchanges for a protocol. Bytes that the reply repeats of its request are no evidence, nor is a repeated
-/// reply.
+/// The evidence that exchanges give for a protocol. Bytes of a request that the reply repeats are no evidence, nor is a
+/// repeated reply.
 struct Evidence {
   std::size_t tried = 0;      // number of exchanges examined
   std::size_t explained = 0;  // number of exchanges with a good reply
   std::size_t distinct = 0;   // number of different good replies, because a repeated frame proves no more
-  /// log10 of the probability that chance explains as many.
+  /// log10 of the probability that the unit would accept as many random frames.
   double frames = 0;
-  /// log10 of the probability that random positions change as little; empty: no position changed.
+  /// log10 of the probability that random positions would move as little; empty: no position changed.
   std::optional<double> motion{};
 
   /// Returns log10 of the total chance: that of the frames, and that of the motion if all exchanges are explained.
@@ -47,21 +48,22 @@ struct Evidence {
   [[nodiscard]] bool explains_all() const { return tried != 0 && explained == tried; }
 };
 
-/// log10 of a chance below which frames suffice as evidence without motion.
+/// log10 of the chance below which frames suffice as evidence, without the motion of the position.
 inline constexpr double frames_suffice = -2;
 
-/// Number of random replies tried where several frames multiply their chances.
+/// Number of random replies tried for each frame if several frames multiply their chances.
 inline constexpr unsigned usual_attempts = 1u << 14;
 
-/// Returns the probability that the unit accepts a random reply of this length to this request: at most 1, at least one
-/// divided by the number of attempts. Bytes at the beginning that the reply repeats of the request stay unchanged.
+/// Returns the probability that the unit accepts a random reply of the length of `good.reply` to `good.request`: at
+/// most 1, at least one divided by `attempts`. Bytes at the beginning that the reply repeats of the request stay
+/// unchanged.
 [[nodiscard]] double acceptance(const Unit& unit, const Options& options, const ObservedExchange& good,
                                 unsigned attempts = usual_attempts);
 
-/// Returns whether the unit accepts this reply as good.
+/// Returns whether the unit, with these options, accepts the reply of `exchange` as good.
 [[nodiscard]] bool explains(const Unit& unit, const Options& options, const ObservedExchange& exchange);
 
-/// Computes the evidence of exchanges, which must be in the order of time.
+/// Returns the evidence of exchanges, which must be in the order of time.
 [[nodiscard]] Evidence weigh(const Unit& unit, const Options& options, std::span<const ObservedExchange> exchanges);
 
 /// Returns log10 of the probability that at least `good` of `all` events occur when each has the probability `each`.

@@ -59,7 +59,7 @@ Options with_bits(std::int64_t bits) {
 TEST(Evidence, AcceptanceIsThatOfNoiseBehindRepeatedBytes) {
   EXPECT_NEAR(acceptance(Toy::unit(), with_bits(4), exchange_of(1)), 16.0 / 256, 0.01);
   EXPECT_DOUBLE_EQ(acceptance(Toy::unit(), with_bits(8), exchange_of(1)), 1);
-  // Without a request no byte of the reply is fixed.
+  // A reply without a request has no byte that is fixed by the request.
   const ObservedExchange unsolicited{.reply = {.bytes = {7, 1}}};
   EXPECT_NEAR(acceptance(Toy::unit(), with_bits(4), unsolicited), 16.0 / 256, 0.01);
 }
@@ -117,7 +117,7 @@ TEST(Evidence, UsesMotionWhereFramesProveNothing) {
   EXPECT_GT(motion_of({0, 130, 20, 190, 60, 180}).chance(), -0.7);
 }
 
-// A stream of random bytes of any length is attributed to no unit.
+// Tests that a stream of random bytes of any length is attributed to no unit.
 class RandomStream : public ::testing::TestWithParam<unsigned> {};
 
 TEST_P(RandomStream, MatchesNoUnit) {
@@ -135,7 +135,7 @@ TEST_P(RandomStream, MatchesNoUnit) {
   }
 }
 
-// Builds with sanitizers run only the first series.
+// A build with sanitizers runs only the first series of random streams.
 INSTANTIATE_TEST_SUITE_P(Seeds, RandomStream, ::testing::Range(0u, 40u, 4u));
 
 TEST(Hypotheses, ListsEqualMeaningsOnce) {
@@ -190,7 +190,7 @@ TEST(Hypotheses, NothingWhereNothingIsExplained) {
 
 TEST(Hypotheses, EveryVectorOfEveryUnitIsFoundByItsUnit) {
   for (const Unit* unit : all_units()) {
-    // Vectors of these units are not bytes.
+    // Vectors of clocked and CAN units are not bytes.
     if (unit->link == LinkKind::clocked || unit->link == LinkKind::can) continue;
     unsigned left = test_cases(static_cast<unsigned>(unit->vectors.size()));
     for (const Vector& vector : unit->vectors) {

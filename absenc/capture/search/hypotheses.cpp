@@ -11,7 +11,8 @@ namespace absenc::capture {
 namespace {
 
 constexpr std::int64_t most_bits = 64;
-constexpr std::size_t telling = 32;  // number of exchanges: options that explain none of these explain nothing
+constexpr std::size_t telling = 32;  // number of exchanges tried first: options that explain none of these explain
+                                     // nothing
 
 struct NoEvidence final : EvidenceSink {
   void put(const OptionEvidence&) override {}
@@ -29,7 +30,7 @@ bool contains(std::span<const Hypothesis> all, const Options& options) {
                      [&](const Hypothesis& one) { return one.options.values == options.values; });
 }
 
-/// Hash of the decoded content of frames.
+/// A hash of the decoded content of frames, to compare what options decode.
 class Meaning final : public FieldSink {
  public:
   void put(const FieldValue& value) override {
@@ -55,7 +56,7 @@ class HypothesisSearch {
   HypothesisSearch(const Unit& unit, std::span<const ObservedExchange> exchanges)
       : unit_(unit), exchanges_(exchanges) {}
 
-  /// Computes the evidence of the options if they explain as much as the best so far.
+  /// Adds a hypothesis if `options` explain at least as many exchanges as the best hypotheses so far.
   void add(const Options& options, bool at_least = false) {
     if (contains(best_, options)) return;
     ++tried_;
@@ -66,14 +67,14 @@ class HypothesisSearch {
       meanings_.clear();
     }
     most_ = count;
-    // Options that decode all frames to the same content are no other explanation.
+    // Options that decode all frames to the same content as other options are no further explanation.
     const std::uint64_t meaning = meaning_of(options);
     if (std::find(meanings_.begin(), meanings_.end(), meaning) != meanings_.end()) return;
     meanings_.push_back(meaning);
     best_.push_back({options, weigh(unit_, options, exchanges_), tried_, at_least});
   }
 
-  /// Adds the options that the unit derives from the frames where the document leaves them open.
+  /// Adds the options that the unit derives from the frames where its document leaves them open.
   void probe(Options options) {
     if (unit_.probe == nullptr) return;
     NoEvidence nowhere;
@@ -84,7 +85,8 @@ class HypothesisSearch {
     add(options);
   }
 
-  /// Adds every single choice, and with each every number of bits, for the case that the models do not explain all.
+  /// Adds `base` with every change of a single option, and with every number of bits for each, because no model
+  /// explains all exchanges.
   void vary(const Options& base) {
     vary_bits(base);
     for (std::size_t i = 0; i < unit_.options.size(); ++i) {
@@ -100,7 +102,8 @@ class HypothesisSearch {
     }
   }
 
-  /// Adds single choices with which the position moves less, for frames that prove nothing by themselves.
+  /// Adds `base` with single options changed so that the position moves less, for frames that are no evidence by
+  /// themselves.
   void vary_motion(const Options& base) {
     for (std::size_t i = 0; i < unit_.options.size(); ++i) {
       const auto count = static_cast<std::int64_t>(unit_.options[i].choices.size());
@@ -141,7 +144,7 @@ class HypothesisSearch {
     return count;
   }
 
-  // Adds the fewest bits that explain most exchanges: the frames cannot prove more bits.
+  // Adds `base` with the fewest bits that explain most exchanges, because frames cannot show more bits.
   void vary_bits(const Options& base) {
     const std::vector<std::size_t> bits = resolution_options(unit_);
     std::optional<Options> fewest;
@@ -184,7 +187,7 @@ class HypothesisSearch {
   const Unit& unit_;
   std::span<const ObservedExchange> exchanges_;
   std::vector<Hypothesis> best_;
-  std::vector<std::uint64_t> meanings_;  // decoded content of each of `best_`
+  std::vector<std::uint64_t> meanings_;  // hash of the decoded content for each hypothesis in `best_`
   std::size_t most_ = 0;
   std::size_t tried_ = 0;
 };

@@ -7,10 +7,12 @@ namespace {
 
 constexpr unsigned highest_degree = 16;
 
-// Returns the degree plus 1; 0 for the polynomial 0. (The type that std::bit_width returns differs between libraries.)
+// Returns the degree of a polynomial plus 1; 0 for the polynomial 0. (The type that std::bit_width returns differs
+// between libraries.)
 unsigned width_of(std::uint64_t value) { return static_cast<unsigned>(std::bit_width(value)); }
 
-/// Returns the irreducible polynomials of degree 1 to 16, without x, in rising order.
+/// Returns the irreducible polynomials of degree 1 to 16, without the polynomial x, in rising order of their
+/// coefficients.
 const std::vector<std::uint32_t>& irreducible_polynomials() {
   static const std::vector<std::uint32_t> all = [] {
     constexpr std::uint32_t limit = 1u << (highest_degree + 1);
@@ -36,7 +38,7 @@ std::uint64_t times(std::uint64_t a, std::uint64_t b) {
   return product;
 }
 
-/// Leaves the remainder in `value` and returns the quotient.
+/// Divides `value` by `divisor`, leaves the remainder in `value` and returns the quotient.
 std::uint64_t divide(std::uint64_t& value, std::uint64_t divisor) {
   std::uint64_t quotient = 0;
   const unsigned width = width_of(divisor);
@@ -66,7 +68,7 @@ std::vector<std::uint32_t> divisors_of_degree(std::uint64_t value, unsigned degr
   };
   for (const std::uint32_t factor : irreducible_polynomials()) {
     if (width_of(factor) > degree + 1) break;
-    if (2 * (width_of(factor) - 1) > width_of(value) - 1) break;  // the remaining polynomial is irreducible
+    if (2 * (width_of(factor) - 1) > width_of(value) - 1) break;  // the polynomial that remains is irreducible
     unsigned power = 0;
     for (std::uint64_t rest = value, quotient = divide(rest, factor); rest == 0; quotient = divide(rest, factor)) {
       ++power;

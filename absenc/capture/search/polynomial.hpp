@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Polynomials over GF(2), long enough for a frame: a frame with a good CRC is a multiple of the CRC's polynomial.
+// Polynomials over GF(2) that are long enough for a frame: a frame with a good CRC is a multiple of the CRC's
+// polynomial.
 #pragma once
 
 #include <array>
@@ -46,7 +47,7 @@ class Polynomial {
     return *this;
   }
 
-  /// Divides, leaves the remainder and returns the quotient. `divisor` must not be 0.
+  /// Divides this polynomial by `divisor`, which must not be 0; leaves the remainder and returns the quotient.
   constexpr Polynomial divide(const Polynomial& divisor) {
     Polynomial quotient;
     const int step = divisor.degree();
@@ -72,7 +73,7 @@ class Polynomial {
   std::array<std::uint64_t, capacity / 64> words_{};
 };
 
-/// Returns the greatest common divisor; for 0 and a polynomial, that polynomial.
+/// Returns the greatest common divisor of two polynomials; if one of them is 0, the other.
 [[nodiscard]] constexpr Polynomial greatest_common_divisor(Polynomial a, Polynomial b) {
   while (b.degree() >= 0) {
     static_cast<void>(a.divide(b));
@@ -81,8 +82,8 @@ class Polynomial {
   return a;
 }
 
-/// Returns each divisor of degree `degree`, 1 to 16, whose constant term is 1. `value` holds the coefficients and must
-/// not be 0.
+/// Returns each divisor of `value` of the given degree, 1 to 16, whose constant term is 1. `value` holds the
+/// coefficients of a polynomial and must not be 0.
 [[nodiscard]] std::vector<std::uint32_t> divisors_of_degree(std::uint64_t value, unsigned degree);
 
 }  // namespace absenc::capture

@@ -12,9 +12,9 @@ namespace absenc::capture {
 namespace {
 
 constexpr std::size_t noise_size = 1 << 15;
-constexpr std::size_t least_frames = 3;  // least number of good frames that suffices as evidence
+constexpr std::size_t least_frames = 3;  // number of good frames below which a stream is no evidence
 
-// Returns the size of the good reply that begins with the first byte, or 0.
+// Returns the size of the good reply that begins with the first of `bytes`, or 0 if none does.
 std::size_t reply_size(const Unit& unit, const Options& options, Bytes bytes) {
   const FrameEnd end = unit.frame_end(options, Direction::reply, bytes);
   if (end.kind != FrameEnd::Kind::complete || end.size == 0 || end.size > bytes.size()) return 0;
@@ -23,7 +23,7 @@ std::size_t reply_size(const Unit& unit, const Options& options, Bytes bytes) {
   return explains(unit, options, reply) ? end.size : 0;
 }
 
-// Returns how often random bytes contain a good reply at a given position.
+// Returns the probability that random bytes contain a good reply at a given position.
 double acceptance_of_noise(const Unit& unit, const Options& options) {
   std::mt19937_64 random(1);
   std::vector<std::uint8_t> noise(noise_size);
@@ -38,7 +38,7 @@ double acceptance_of_noise(const Unit& unit, const Options& options) {
   return static_cast<double>(std::max<std::size_t>(good, 1)) / static_cast<double>(examined);
 }
 
-// Returns whether the options themselves state the number of bits of a position, which cannot be requested from the
+// Returns whether the number of bits of a position is stated by the options, because it cannot be requested from the
 // encoder.
 bool states_bits(const Unit& unit, const Options& options, std::span<const std::size_t> of_bits) {
   const Resolution resolution = unit.resolution(options);
@@ -47,8 +47,8 @@ bool states_bits(const Unit& unit, const Options& options, std::span<const std::
   });
 }
 
-// Returns the options of all models, and for units with streams those of every number of bits if at most two options
-// determine it.
+// Returns the options of all models. If at most two options determine the number of bits, units with streams also get
+// options for every number of bits.
 std::vector<Options> stream_options(const Unit& unit) {
   std::vector<Options> all = likely_options(unit, {});
   const std::vector<std::size_t> of_bits = resolution_options(unit);
@@ -70,14 +70,14 @@ std::vector<Options> stream_options(const Unit& unit) {
   return all;
 }
 
-// Returns a sort key, smaller is better: the fewest single-turn bits, because more would look the same, and the most
-// multi-turn bits, because they do not change while the shaft is not turned that far.
+// Returns a key to sort hypotheses, smaller is better: the fewest single-turn bits, because more bits would explain the
+// frames equally well, and the most multi-turn bits, because they do not change while the shaft is not turned that far.
 std::pair<unsigned, int> bits_of(const Unit& unit, const Hypothesis& hypothesis) {
   const Resolution resolution = unit.resolution(hypothesis.options);
   return {resolution.singleturn_bits, -static_cast<int>(resolution.multiturn_bits)};
 }
 
-// Sets the option that makes a host only listen.
+// Sets the option with which a host only listens, and if possible the rate of the unsolicited frames.
 void set_streaming(const Unit& unit, Options& options, double frames_per_second) {
   if (unit.streams == nullptr || unit.streams(options)) return;
   for (std::size_t i = 0; i < unit.options.size(); ++i) {
@@ -97,9 +97,9 @@ void set_streaming(const Unit& unit, Options& options, double frames_per_second)
 
 std::vector<ObservedExchange> split_stream(const Unit& unit, const Options& options, Bytes bytes) {
   std::vector<ObservedExchange> replies;
-  std::size_t longest = 0;        // size of the longest good reply
-  std::size_t begin_of_good = 0;  // number of replies before the first good one
-  std::size_t end_of_good = 0;    // number of replies up to the last good one
+  std::size_t longest = 0;        // size of the longest good reply in the stream, in bytes
+  std::size_t begin_of_good = 0;  // index of the first good reply
+  std::size_t end_of_good = 0;    // index behind the last good reply
   for (std::size_t at = 0; at < bytes.size();) {
     const std::size_t size = reply_size(unit, options, bytes.subspan(at));
     const auto from = bytes.begin() + static_cast<std::ptrdiff_t>(at);
@@ -125,12 +125,13 @@ std::vector<Hypothesis> find_stream_hypotheses(const Unit& unit, Bytes bytes, Ti
     const std::vector<ObservedExchange> replies = split_stream(unit, options, bytes);
     Hypothesis one{.options = options, .evidence = weigh(unit, options, replies)};
     if (one.evidence.explained < least_frames) continue;
-    // Each byte from the first on was tried as the beginning of a frame.
+    // Each byte from the first on was tried as the beginning of a frame, so each is an attempt.
     for (const ObservedExchange& reply : replies) one.tried = std::max(one.tried, reply.reply.bytes.size());
     one.tried *= all.size();
     found.push_back(std::move(one));
   }
-  // Equal explanations are sorted by their bits, the fewest first: the frames cannot prove more bits.
+  // Explanations that are equally good are sorted by their number of bits, the fewest first: frames cannot show more
+  // bits.
   std::stable_sort(found.begin(), found.end(), [&](const Hypothesis& one, const Hypothesis& other) {
     const std::size_t noise = one.evidence.tried - one.evidence.explained;
     const std::size_t other_noise = other.evidence.tried - other.evidence.explained;

@@ -10,12 +10,13 @@
 
 namespace absenc::capture {
 
-/// Splits a stream into replies that the unit accepts. Each byte outside a reply is an exchange of its own, because a
-/// reply might have begun there. Only bytes that may belong to a reply cut by the beginning or the end are left out.
+/// Splits a stream into replies that the unit accepts, and returns them in order. Each byte outside a reply is an
+/// exchange of its own, because a reply might have begun there. Only bytes that may belong to a reply cut by the
+/// beginning or the end of the stream are left out.
 [[nodiscard]] std::vector<ObservedExchange> split_stream(const Unit& unit, const Options& options, Bytes bytes);
 
-/// Works like `find_hypotheses`. The options then state that the encoder sends unsolicited frames, and if possible how
-/// often, computed from `duration`, the time of the recording.
+/// Returns hypotheses for a stream, like `find_hypotheses`. Their options state that the encoder sends unsolicited
+/// frames, and if possible how often, computed from `duration`, the time of the recording.
 [[nodiscard]] std::vector<Hypothesis> find_stream_hypotheses(const Unit& unit, Bytes bytes, Time duration);
 
 }  // namespace absenc::capture

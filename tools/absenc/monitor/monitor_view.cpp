@@ -51,7 +51,7 @@ double unit_um(const MonitoredEncoder& shown) {
   return uri.unit->resolution(uri.options).unit_um;
 }
 
-// Returns the speed with fewer decimals if it would not fit into its column of the list.
+// Returns a speed as text, with fewer decimals if the text would not fit into `width` characters.
 std::string short_text(double value, int decimals, std::size_t width = 9) {
   while (decimals > 0 && fmt::formatted_size("{:.{}f}", value, decimals) > width) --decimals;
   std::string text = fmt::format("{:.{}f}", value, decimals);
@@ -80,7 +80,8 @@ std::string speed_text(const Snapshot& snapshot) {
   return text.size() <= 9 ? text : short_text(snapshot.last.speed, 1);
 }
 
-// Returns speed and uncertainty with `sign` between them: "+/-" for the screen, which only draws ASCII.
+// Returns a speed and its uncertainty with `sign` between them, "+/-" for the screen, which only draws ASCII; "-" if
+// the speed is unknown.
 std::string measured_speed_text(const Snapshot& snapshot, std::string_view sign) {
   const Sample& last = snapshot.last;
   const std::string value =
@@ -88,7 +89,8 @@ std::string measured_speed_text(const Snapshot& snapshot, std::string_view sign)
   return fmt::format("{} {}", value, speed_unit(last.reading));
 }
 
-// Returns whether an alarm is raised. If not all alarms are reported, a status flag with advice counts too.
+// Returns whether an alarm of the encoder is raised. If not all alarms are reported, a status flag that has an advice
+// counts as an alarm.
 bool has_alarm(const MonitoredEncoder& shown) {
   const Unit& unit = *shown.watch->uri().unit;
   const Reading& reading = shown.snapshot.last.reading;
@@ -111,7 +113,7 @@ std::uint64_t failures(const Snapshot& snapshot) { return snapshot.counters.bad(
 
 constexpr std::size_t turns_width = 7;
 constexpr std::size_t failures_width = 6;
-constexpr int values_width = 43;  // width of all columns after the state
+constexpr int values_width = 43;  // width of all columns behind the column of the state
 
 std::vector<std::string> names_in(const View& view, int width) {
   std::vector<std::string> names;
@@ -119,7 +121,7 @@ std::vector<std::string> names_in(const View& view, int width) {
   return short_names(names, static_cast<std::size_t>(std::max(width, 8)));
 }
 
-// Returns the width of the name column, next to the values and the mark of alarms.
+// Returns the width of the column of names, which is the room beside the values and the mark of alarms.
 int name_width(const Screen& screen) { return std::clamp(screen.columns() - values_width - 13, 8, 40); }
 
 void draw_list_line(Screen& screen, int row, const MonitoredEncoder& shown, const std::string& name, bool selected) {
@@ -138,7 +140,7 @@ void draw_list_line(Screen& screen, int row, const MonitoredEncoder& shown, cons
   }
 }
 
-// Returns the texts of the columns position and speed.
+// Returns the headings of the columns position and speed, which name the units.
 std::array<std::string_view, 2> units_of(const View& view) {
   const auto linear = std::count_if(view.encoders.begin(), view.encoders.end(),
                                     [](const MonitoredEncoder& one) { return unit_um(one) > 0; });
@@ -147,7 +149,7 @@ std::array<std::string_view, 2> units_of(const View& view) {
   return {"mm", "mm/s"};
 }
 
-// Draws the rows of the list around the selected encoder; returns the row after the last.
+// Draws the rows of the list around the selected encoder from `row` on; returns the row behind the last one.
 int draw_list(Screen& screen, int row, const View& view) {
   const std::size_t most = std::max<std::size_t>(1, static_cast<std::size_t>(screen.rows() - 14));
   const std::size_t count = std::min(view.encoders.size(), most);
@@ -169,7 +171,7 @@ int draw_list(Screen& screen, int row, const View& view) {
 
 // ---- One encoder
 
-// Returns the range of the bar: one turn, or the whole range of a linear encoder.
+// Returns the range that the bar of the position shows: one turn, or the whole range of a linear encoder.
 std::string range_text(const MonitoredEncoder& shown) {
   const EncoderAddress& uri = shown.watch->uri();
   const Resolution resolution = uri.unit->resolution(uri.options);
@@ -196,7 +198,8 @@ void draw_position(Screen& screen, int row, const MonitoredEncoder& shown) {
   const Unit& unit = *shown.watch->uri().unit;
   if (is_live(snapshot)) {
     const bool has_room =
-        unit.second_status == nullptr && unit.second_alarms == nullptr;  // the status of two channels is drawn below
+        unit.second_status == nullptr && unit.second_alarms == nullptr;  // the status of an encoder with two channels
+                                                                         // is drawn below
     const Reading& reading = snapshot.last.reading;
     const Doubt doubt = doubt_of(snapshot.last);
     const std::string text =
@@ -233,7 +236,7 @@ std::string statistics_line(const Snapshot& snapshot) {
                      to_text(snapshot.percentile_99), to_text(snapshot.longest));
 }
 
-// Draws words, wrapped, in the rows before `end`; returns the row after the last.
+// Draws `text`, wrapped at the edge of the screen, in the rows before `end`; returns the row behind the last one.
 int draw_words(Screen& screen, int row, int end, std::string_view text, Style style) {
   constexpr int indent = 2;
   const auto width = static_cast<std::size_t>(screen.columns() - indent);
@@ -263,8 +266,8 @@ int draw_alarms(Screen& screen, int row, int end, const MonitoredEncoder& shown)
   return row;
 }
 
-// Draws fields in columns; a long field takes several. Returns the row after the last. Leaves the last two rows free
-// for the section below.
+// Draws the last reply's fields in columns; a long field takes several columns. Returns the row behind the last one,
+// and leaves the last two rows before `end` free for the section below.
 int draw_fields(Screen& screen, int row, int end, const Snapshot& snapshot) {
   if (!is_live(snapshot)) return row;
   constexpr int between = 3;
@@ -297,7 +300,7 @@ void draw_trace(Screen& screen, int row, int end, const Snapshot& snapshot) {
   }
 }
 
-// Draws the last bad exchanges with sent and received bytes, repeated attempts included.
+// Draws the last bad exchanges with their sent and received bytes, repeated attempts included.
 void draw_errors(Screen& screen, int row, int end, const MonitoredEncoder& shown) {
   if (shown.snapshot.bad.empty()) return screen.put(row, 2, "no exchange has failed");
   for (const BadExchangeText& bad : shown.snapshot.bad) {
@@ -350,7 +353,7 @@ void draw_help(Screen& screen, int row, int end) {
       Style::plain);
 }
 
-// Returns the question with the encoder's name, which is never cut off.
+// Returns the question to the user with the encoder's name, which is never cut off.
 std::string question_in(const View& view, int columns) {
   const std::string name = names_in(view, columns - static_cast<int>(view.question.size()) - 5)[view.selected];
   const std::string who = fmt::format("  ({})", name);

@@ -28,11 +28,11 @@ struct View {
 inline constexpr int least_rows = 16;
 inline constexpr int least_columns = 64;
 
-/// Draws the whole screen; if the screen is smaller than the minimum, only a message that it is too small.
+/// Draws the whole screen of `view`; on a screen smaller than the minimum, only a message that it is too small.
 void draw(Screen& screen, const View& view);
 
-/// Returns "elbow: 123.456 deg ..." for output without a screen. A reading that is not live is never printed as a
-/// value.
+/// Returns one line "elbow: 123.456 deg ..." for output without a screen. A reading that is not live is never printed
+/// as a value.
 [[nodiscard]] std::string to_line(const MonitoredEncoder& shown);
 [[nodiscard]] Json to_json(const MonitoredEncoder& shown);
 

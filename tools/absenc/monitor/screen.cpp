@@ -22,10 +22,10 @@ namespace {
 
 struct TextAttributes {
   attr_t attributes;
-  short colour;  // of the colour pair, which has the same number; 0: none
+  short colour;  // colour of the text, and number of the colour pair; 0: the default colour
 };
 
-// Indexed by Style. Terminals without colours only show the attributes.
+// Attributes of text, indexed by Style. Terminals without colours show only the attributes.
 constexpr std::array<TextAttributes, 7> looks{{{A_NORMAL, 0},
                                                {A_DIM, 0},
                                                {A_BOLD, 0},

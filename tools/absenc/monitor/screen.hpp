@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A terminal as a screen. Only screen.cpp includes ncurses, because its header defines many macros.
+// Draws text on a terminal and reads its keys. Only screen.cpp includes ncurses, because its header defines many
+// macros.
 #pragma once
 
 #include <cstdint>
@@ -31,7 +32,7 @@ class Screen {
  public:
   /// Takes over the terminal of standard input and output. Returns null if it cannot be used as a screen.
   [[nodiscard]] static std::unique_ptr<Screen> open();
-  /// Restores the terminal.
+  /// Restores the terminal to its state before `open`.
   ~Screen();
   Screen(const Screen&) = delete;
   Screen& operator=(const Screen&) = delete;
@@ -42,11 +43,11 @@ class Screen {
   void clear();
   /// Draws `text`; cuts it at the edge of the screen and draws '?' for bytes that are not ASCII.
   void put(int row, int column, std::string_view text, Style style = Style::plain);
-  /// Draws `text` and gives the whole row the style.
+  /// Draws `text` and gives the whole row the style `style`.
   void fill(int row, std::string_view text, Style style);
   void show();
 
-  /// Returns the next key; waits for it at most `limit`.
+  /// Returns the next key that the user presses; waits at most `limit`.
   [[nodiscard]] KeyPress key(Time limit);
 
  private:

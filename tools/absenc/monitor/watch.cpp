@@ -26,24 +26,24 @@ using namespace std::chrono_literals;
 
 constexpr std::size_t most_lines = 200;
 constexpr Time between_summaries = 100ms;
-constexpr Time between_lines = 200ms;  // for lines of good readings; failures get a line at once
+constexpr Time between_lines = 200ms;  // shortest time between two lines of good readings; a failure is printed at once
 
 // Converts a time of os::now, which is the steady clock.
 std::chrono::steady_clock::time_point to_time_point(Time time) {
   return std::chrono::steady_clock::time_point(std::chrono::duration_cast<std::chrono::steady_clock::duration>(time));
 }
 
-/// Collects the fields of a reply that the line of the reading does not show.
+/// Collects the fields of a reply that the line of the reading does not contain.
 class OtherFields final : public FieldSink {
  public:
   explicit OtherFields(const Unit& unit) : unit_(&unit) {}
 
   void put(const FieldValue& value) override {
     const FieldInfo& info = *value.info;
-    // The line of an encoder with two channels has no room for their flags.
+    // The flags of an encoder with two channels do not fit into the line of the reading.
     const FieldInfo* in_line = unit_->alarms != nullptr ? unit_->alarms : unit_->status;
     const bool is_in_line = &info == in_line && unit_->second_status == nullptr && unit_->second_alarms == nullptr;
-    const bool is_exchange = info.role == Role::exchange;  // repeats the request
+    const bool is_exchange = info.role == Role::exchange;  // the field repeats a part of the request
     if (is_in_line || is_exchange || info.role == Role::position || info.role == Role::turns) return;
     const std::string shown = fmt::format("{}{}{}", to_text(value), info.unit.empty() ? "" : " ", info.unit);
     fields_.emplace_back(info, shown);
@@ -144,8 +144,8 @@ void Watch::work(const std::stop_token& stop) {
         next = pace.next();
       }
     }
-  } catch (const os::Interrupted&) {  // all threads end: they check os::interrupted()
-  } catch (const os::Ended&) {        // the thread was asked to end while the line was never silent
+  } catch (const os::Interrupted&) {  // os::interrupted() is set, which ends every thread
+  } catch (const os::Ended&) {        // the thread was asked to end while a line without pauses kept it waiting
   } catch (const std::exception& error) {
     end(error.what());
   }
@@ -248,7 +248,7 @@ std::string Watch::result_of(Encoder& live, const Command& command) {
       return fmt::format("{} failed: {}", command.name, connection.trouble(outcome).message);
     }
     return fmt::format("{}: {}", command.name, outcome.change.text());
-  } catch (const os::Failure& failure) {  // the next reading will report the lost port
+  } catch (const os::Failure& failure) {  // the next reading will report that the port is lost
     return fmt::format("{} was broken off, read whether it was done: {}", command.name, failure.what());
   }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads one encoder repeatedly in a thread of its own and hands out copies of its state.
+// Reads one encoder repeatedly in a thread of its own, and returns copies of its state.
 #pragma once
 
 #include <condition_variable>
@@ -17,30 +17,30 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// The state of an encoder at one moment.
+/// The state of a watched encoder at one moment.
 struct Snapshot {
   enum class State : std::uint8_t {
     opening,  // the port could not be opened yet
-    live,     // the reading is recent
+    live,     // the last reading is recent and good
     silent,   // no reading has arrived for a while
-    failing,  // the last attempt failed
+    failing,  // the last attempt to read failed
     lost,     // the port was open and was lost
     paused,   // readings are paused
     ended,    // the encoder cannot be read; `message` has the reason
   };
 
   State state = State::opening;
-  Time age{};  // age of the reading, or of the present state if there is none
+  Time age{};  // age of the last reading; without a reading, time since the state began
   bool has_reading = false;
-  Sample last{};          // the last reading, if there was one; it is the present one only while `live`
-  std::string message{};  // the reason of failing, lost, opening or ended
-  std::string notice{};   // result of the last command, or that it still runs
+  Sample last{};          // last reading; valid if `has_reading`, and the present position only in the state `live`
+  std::string message{};  // reason of the states failing, lost, opening and ended
+  std::string notice{};   // result of the last command, or that the command still runs
   host::Counters counters{};
   std::uint64_t readings = 0;
   std::uint64_t losses = 0;
-  std::uint64_t restarts = 0;  // number of restarts of the position, as Encoder::restarts
-  double rate = 0;             // readings a second
-  Time median{};               // median latency
+  std::uint64_t restarts = 0;  // number of times that the position started again; see Encoder::restarts
+  double rate = 0;             // readings per second
+  Time median{};               // median of the latencies
   Time percentile_99{};
   Time longest{};
   std::vector<std::string> trace{};    // printed readings; only with details; the newest last
@@ -51,23 +51,24 @@ struct Snapshot {
 
 [[nodiscard]] std::string_view name_of(Snapshot::State state);
 
-/// A thread of its own for each encoder: ports block, which keeps them simple, and 64 threads cost less processor time
-/// per reading than one (docs/benchmarks.md). The screen gets copies, so that it never waits for a line.
+/// Watches one encoder in a thread of its own: ports block, which keeps their code simple, and 64 threads cost less
+/// processor time per reading than one (docs/benchmarks.md). The screen gets copies, so that it never waits for a line.
 class Watch {
  public:
-  /// `name` is as the user wrote it. The first reading is `offset` after the start.
+  /// `name` is the encoder's name or address as the user wrote it. The first reading is `offset` after the start;
+  /// `rate` is in readings per second.
   Watch(std::string name, const EncoderAddress& uri, double rate, Time offset);
   Watch(const Watch&) = delete;
   Watch& operator=(const Watch&) = delete;
 
-  /// Ends the thread within the time of one reading; the destructor does the same.
+  /// Ends the thread within the time of one reading. The destructor does the same.
   void stop();
 
   [[nodiscard]] Snapshot snapshot(bool details) const;
   void pause(bool paused);
-  /// Runs a command without arguments between two readings; `notice` then has its result.
+  /// Runs a command without arguments between two readings; Snapshot::notice then contains its result.
   void run(const Command& command);
-  /// Sets `notice` to this text.
+  /// Sets Snapshot::notice to `text`.
   void notify(std::string text);
 
   [[nodiscard]] const std::string& name() const { return name_; }
@@ -89,23 +90,23 @@ class Watch {
   Time offset_;
   Time start_;
 
-  mutable std::mutex mutex_;  // guards the members down to command_
+  mutable std::mutex mutex_;  // guards the members from here down to command_
   std::condition_variable_any changed_;
   Snapshot known_;
-  Time known_at_{};  // time of the last reading, or of the last change of state
+  Time known_at_{};  // time of the last reading, or of the last change of the state
   std::deque<std::string> lines_;
   bool paused_ = false;
   std::optional<Command> command_;
 
-  // Used by the thread only:
+  // The following members are used by the thread only.
   Time next_summary_{};
   Time next_line_{};
   std::uint32_t alarms_ = 0;
   std::uint32_t alarms_reported_ = 0;
-  bool restarted_ = false;     // the previous reading restarted the position
-  bool command_runs_ = false;  // a command runs and must not be aborted
+  bool restarted_ = false;     // the position started again at the previous reading
+  bool command_runs_ = false;  // a command is running, which must not be aborted
 
-  std::jthread thread_;  // last member: it uses all others
+  std::jthread thread_;  // last member, because the thread uses all other members
 };
 
 }  // namespace absenc::tool
