@@ -114,7 +114,7 @@ std::string Console::condition(VirtualDevice& device, std::string_view line, Tim
 std::string Console::alarms(VirtualDevice& device, std::string_view names, bool raise) const {
   std::vector<std::string> all;
   while (!is_blank(names)) all.emplace_back(take_word(names));
-  // An alarm that the status does not show is not raised, so a command to lower it succeeds.
+  // An alarm that has no flag with the encoder's options cannot be raised, but a command to lower it succeeds.
   const std::uint32_t bits = raise ? require_alarms(unit_, device.options(), all) : require_alarms(unit_, all);
   if (bits == 0) {
     throw UsageError(fmt::format("which alarm? There are {}", fmt::join(flag_names(*unit_.alarms, ~0ull), ", ")));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The virtual encoders of `emulate` on one line: one from the verb's options, one for each --also.
+// The virtual encoders of `emulate` on one line: one from the verb's options, one for each option --also.
 #pragma once
 
 #include <memory>
@@ -15,12 +15,12 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// Makes the encoders from the options of the verb. Throws UsageError.
+/// Returns the settings of the virtual encoders that the verb's options state. Throws UsageError.
 [[nodiscard]] DeviceSettings device_settings(const Invocation& invocation);
-/// Returns the sim: address for one more encoder of the line. Throws UsageError.
+/// Returns the sim: address of one more encoder on the line, from the value `further` of --also. Throws UsageError.
 [[nodiscard]] EncoderAddress further_encoder(const Unit& unit, const Invocation& invocation, const std::string& further,
                                              const DeviceSettings& settings);
-/// Counts of requests, faults and broken rules of one device since `start`.
+/// Prints the numbers of requests, faults and broken rules of one device since `start`.
 void print_summary(const VirtualDevice& device, std::string_view name, Time start);
 
 template <class Item>
@@ -47,7 +47,7 @@ class VirtualLine {
     }
   }
 
-  /// The encoder whose memory --memory stores in a file.
+  /// Returns the first encoder, whose memory the option --memory stores in a file.
   [[nodiscard]] Device<Item>& first() {
     if constexpr (is_can) {
       return *devices_.front()->device().frames;

@@ -12,8 +12,9 @@ namespace absenc::tool {
 
 namespace {
 
-// Bash also splits words at : and =. The script joins `word` again as the user wrote it, and removes the part before
-// the last : or = from its replies, because bash replaces only the rest. Bash does not split inside quotes.
+// Functions of the completion script. Bash also splits words at : and =. The script joins `word` again as the user
+// wrote it, and removes the part before the last : or = from its replies, because bash replaces only the rest. Bash
+// does not split inside quotes.
 constexpr std::string_view functions = R"bash(
 _absenc_file() {
   compopt -o filenames
@@ -195,12 +196,12 @@ complete -F _absenc absenc
 
 std::string_view first_word(std::string_view name) { return name.substr(0, name.find(' ')); }
 
-// Returns the second word of a verb: "read" of "memory read".
+// Returns the second word of a verb, "read" of "memory read"; "" for a verb of one word.
 std::string_view second_word(std::string_view name) {
   return name.substr(std::min(first_word(name).size() + 1, name.size()));
 }
 
-// Returns the kind of value to complete: help's placeholder of the value, unless that is too general.
+// Returns the kind of value to complete: the placeholder of the value in help, unless the placeholder is too general.
 std::string_view kind_of(const Subcommand& subcommand, const Parameter& parameter) {
   if (parameter.name == "--model") return "model";
   if (parameter.name == "name" && first_word(subcommand.name) == "config") return "setting";
@@ -223,7 +224,8 @@ std::string description(const Subcommand& subcommand) {
                      subcommand.name, fmt::join(arguments, " "), fmt::join(options, " "), repeats);
 }
 
-// Writes "declare -gA _absenc_models=(['tformat']='TS5700N8500 23-bit' ...)". -g, because a function may source it.
+// Writes a bash table "declare -gA _absenc_models=(['tformat']='TS5700N8500 23-bit' ...)". -g, because a function may
+// source the script.
 template <class Names>
 std::string by_protocol(std::string_view name, std::span<const Unit* const> units, const Names& names) {
   std::string text = fmt::format("declare -gA _absenc_{}=(\n", name);
@@ -243,7 +245,7 @@ std::vector<std::string_view> command_names(const Unit& unit) {
   return names;
 }
 
-// Returns names of makers, families and models, each once, without names of two words, which bash would split.
+// Returns the names of makers, families and models, each once, without names of two words, which bash would split.
 std::set<std::string_view> known_names(std::span<const Unit* const> units) {
   std::set<std::string_view> names;
   for (const Unit* unit : units) {
@@ -255,7 +257,7 @@ std::set<std::string_view> known_names(std::span<const Unit* const> units) {
   return names;
 }
 
-// Returns the settings that `config get` and `config set` accept.
+// Returns the names of the settings that `config get` and `config set` accept.
 std::vector<std::string_view> setting_names(const Unit& unit) {
   std::vector<std::string_view> names;
   for (const Command& command : unit.commands) {

@@ -14,7 +14,7 @@ using namespace client;
 
 namespace {
 
-// Pages of docs/ for people who use the command.
+// Names of the pages of docs/ for people who use the command.
 constexpr std::array<std::string_view, 12> guide{"read",   "set-up",   "record",   "serve",
                                                  "mqtt",   "tap",      "decode",   "test-a-drive",
                                                  "doctor", "encoders", "firmware", "add-an-encoder"};
@@ -74,7 +74,7 @@ std::string to_roff(std::string_view text) {
   for (const char c : text) {
     if (line_begins && (c == '.' || c == '\''))
       roff += "\\&";  // otherwise roff takes . or ' at the beginning of a line for a request
-    if (line_begins && c == '\n') roff += ".PP";  // roff would print an empty line as more space than a paragraph
+    if (line_begins && c == '\n') roff += ".PP";  // roff would print an empty line with more space than a paragraph has
     line_begins = c == '\n';
     switch (c) {
       case '\\':

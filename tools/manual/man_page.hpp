@@ -11,7 +11,7 @@
 
 namespace absenc::tool {
 
-/// Returns the page as roff for the man macros.
+/// Returns the man page of the command as roff source for the man macros.
 [[nodiscard]] std::string man_page(std::string_view version, std::span<const Subcommand* const> subcommands,
                                    std::span<const Unit* const> units);
 

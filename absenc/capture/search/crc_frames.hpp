@@ -54,8 +54,8 @@ class Frames {
 
 inline bool bit_of(const CheckedFrame& frame, std::size_t i) { return (frame.bytes[i / 8] >> (7 - i % 8) & 1) != 0; }
 
-/// Returns the checksum in `frame` as the encoder computes it, before its byte order is changed; nothing if bits above
-/// its width are not 0.
+/// Returns the checksum in `frame` as a number, read in the byte order of `shape`; nothing if bits above its width are
+/// not 0.
 inline std::optional<std::uint32_t> check_of(const CheckedFrame& frame, const Shape& shape) {
   const std::size_t at = Frames::size(frame) - shape.trailing - shape.check_size;
   std::uint32_t value = 0;

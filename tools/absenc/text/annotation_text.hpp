@@ -18,19 +18,19 @@ using namespace client;
 enum class AnnotationFormat : std::uint8_t { text, json, csv };
 enum class ShowBits : std::uint8_t { no, yes };  // whether to print the bits of each field in the reply
 
-enum class MarkAlarms : std::uint8_t { no, yes };  // whether to mark an error or a raised alarm by ! before the time
+enum class MarkAlarms : std::uint8_t { no, yes };  // whether to print ! before the time of an error or a raised alarm
 
 /// Returns whether the annotated reply reports a raised alarm.
 [[nodiscard]] bool raises_alarm(const capture::Annotation& annotation);
 
-/// Prints annotations, each at once or many at a time if standard output is no terminal.
+/// Prints annotations to standard output: each at once on a terminal, otherwise many at a time.
 class AnnotationPrinter final : public capture::AnnotationSink {
  public:
   AnnotationPrinter(const Unit& unit, const Options& options, const TickClock& clock, AnnotationFormat format,
                     ShowBits bits = ShowBits::no, MarkAlarms marks = MarkAlarms::no);
 
   void put(const capture::Annotation& annotation) override;
-  /// Prints the annotations that are still buffered. Throws OutputClosed, Failure.
+  /// Prints the annotations that are still buffered. Throws OutputClosed, os::Failure.
   void flush();
 
  private:
@@ -44,7 +44,7 @@ class AnnotationPrinter final : public capture::AnnotationSink {
   AnnotationFormat format_;
   ShowBits bits_;
   MarkAlarms marks_;
-  // Only used for CSV.
+  // The following members are used only for CSV.
   std::string time_format_;
   ReadingColumns reading_;
   std::vector<Column> columns_;

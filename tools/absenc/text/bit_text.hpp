@@ -13,20 +13,22 @@
 
 namespace absenc::tool {
 
-/// Returns the bits as text, the most significant first: "16-32", "7", "24-31 16-23".
+/// Returns bit ranges as text, the most significant range first: "16-32", "7", "24-31 16-23".
 [[nodiscard]] std::string ranges_text(const BitRanges& ranges);
 
-/// Returns the fields of a good reply whose bits the unit declares, in order.
+/// The bits of a good reply that each of its fields occupies, as far as the unit declares them, in the order of the
+/// fields.
 class FieldPlaces {
  public:
   FieldPlaces(const Unit& unit, const Options& options, const Frame& request, const Frame& reply,
               const capture::Contents& contents);
 
-  /// Returns "singleturn 16-32, multiturn 48-63"; "" if the unit declares no bits.
+  /// Returns the fields with their bits as "singleturn 16-32, multiturn 48-63"; "" if the unit declares no bits.
   [[nodiscard]] std::string text() const;
-  /// Returns {"singleturn":[{"first":16,"count":17}]}, the least significant part first.
+  /// Returns the fields with their bits as {"singleturn":[{"first":16,"count":17}]}, the least significant range of a
+  /// field first.
   [[nodiscard]] Json json() const;
-  /// Adds a column with the bits after the value of each field.
+  /// Adds a column with the bits of each field to `rows`, after the column of the values.
   void add_to(std::vector<std::vector<std::string>>& rows) const;
 
  private:

@@ -71,7 +71,8 @@ void CaptureStatistics::put(const Annotation& annotation) {
   }
   if (annotation.error != Error::none) return put_error(annotation);
   error_run_.count = 0;
-  // The position of a composed frame was known from the first exchange that carried a byte of it.
+  // The position of a composed frame was known from the first exchange that carried a byte of it, so it is not added
+  // again.
   if (annotation.contents.reading != nullptr && !annotation.composed)
     trace_.add(annotation.begin, *annotation.contents.reading);
 }
@@ -114,7 +115,7 @@ double CaptureStatistics::per_second() const {
   return span().count() > 0 ? static_cast<double>(count_ - composed_) * 1e9 / static_cast<double>(span().count()) : 0;
 }
 
-// ---- For people
+// ---- Statistics as text, for people
 
 std::string CaptureStatistics::text(const CaptureOutcome& outcome) const {
   std::string text = counts_text(outcome) + turnaround_text();
@@ -202,7 +203,7 @@ std::string CaptureStatistics::errors_text() const {
   return text;
 }
 
-// ---- For programs
+// ---- Statistics as JSON, for programs
 
 Json CaptureStatistics::json(const CaptureOutcome& outcome) const {
   Json errors = Json::object();

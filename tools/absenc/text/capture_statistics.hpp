@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Statistics of a capture: counts, errors, response times, movement of the position. The memory use is constant.
+// Statistics of a capture: counts, errors, response times, movement of the position. The memory use does not grow with
+// the capture.
 #pragma once
 
 #include <array>
@@ -22,7 +23,7 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// A histogram of times with four bins for each power of two.
+/// A histogram of durations with four bins for each power of two.
 class TimeHistogram {
  public:
   struct Bar {
@@ -37,7 +38,7 @@ class TimeHistogram {
     const auto quarter = static_cast<unsigned>(top >= 2 ? value >> (top - 2) & 3 : value << (2 - top) & 3);
     ++counts_[4 * top + quarter];
   }
-  /// Returns the bins from the first to the last that is not empty, joined to at most `most` bins.
+  /// Returns the bins from the first one to the last one that is not empty, joined to at most `most` bins.
   [[nodiscard]] std::vector<Bar> bars(std::size_t most) const;
 
  private:
@@ -52,7 +53,7 @@ class CaptureStatistics final : public capture::AnnotationSink {
 
   [[nodiscard]] std::uint64_t count() const { return count_; }
   [[nodiscard]] std::uint64_t errors() const { return errors_; }
-  /// Returns the number of good frames.
+  /// Returns the number of annotations that are neither bad nor cut.
   [[nodiscard]] std::uint64_t good() const { return count_ - errors_ - cut_; }
 
   [[nodiscard]] std::string text(const CaptureOutcome& outcome) const;
@@ -62,7 +63,7 @@ class CaptureStatistics final : public capture::AnnotationSink {
   static constexpr std::size_t most_kept = 8;
   static constexpr std::size_t error_kinds = error_texts.size();
 
-  // Beginning of the frame with an error, cut to a fixed length.
+  // The beginning of a frame with an error, cut to a fixed length.
   struct StoredError {
     capture::Annotation annotation{};
     ByteBuffer<32> request{};
@@ -93,8 +94,8 @@ class CaptureStatistics final : public capture::AnnotationSink {
   std::uint64_t count_ = 0;
   std::uint64_t errors_ = 0;
   std::uint64_t cut_ = 0;
-  std::uint64_t composed_ = 0;            // number of composed frames, whose parts exchanges carried
-  std::array<std::uint64_t, 4> kinds_{};  // number of other annotations, by kind
+  std::uint64_t composed_ = 0;            // number of composed frames, of which several exchanges carried the bytes
+  std::array<std::uint64_t, 4> kinds_{};  // number of annotations that are not composed, by kind
   std::array<std::uint64_t, error_kinds> by_error_{};
   std::uint64_t echoes_ = 0;
   std::uint64_t repeated_ = 0;

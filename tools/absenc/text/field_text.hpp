@@ -15,11 +15,12 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// Returns the options as {"singleturn_bits":17,...}.
+/// Returns the options of a unit as {"singleturn_bits":17,...}.
 [[nodiscard]] Json options_to_json(const Unit& unit, const Options& options);
 
-/// Puts fields into a JSON object. After a value of a reading that is invalid or of unknown validity follows
-/// `singleturn_valid` or the like: false, or null if no reply reports validity. A value without such a key is valid.
+/// Puts decoded fields into a JSON object. A value of a reading that is invalid or of unknown validity has a further
+/// key such as `singleturn_valid` behind it: false, or null if no reply reports the validity. A value without such a
+/// key is valid.
 struct JsonFields final : FieldSink {
   void put(const FieldValue& value) override;
   void put_reading(const Reading& reading) override;
@@ -33,10 +34,11 @@ struct JsonFields final : FieldSink {
   std::vector<ValidatedField> judged_;
 };
 
-/// Returns rows for `table`: name, value, unit or meaning; one row for each flag that is set.
+/// Returns rows for the function `table`: name, value, and unit or meaning of each column; one row for each flag that
+/// is set.
 [[nodiscard]] std::vector<std::vector<std::string>> to_table(const Row& row);
 
-/// Makes a row of each field: name, value, unit or meaning; one row for each flag that is set.
+/// Makes rows of decoded fields: name, value, and unit or meaning; one row for each flag that is set.
 struct FieldTable final : FieldSink {
   void put(const FieldValue& value) override;
   void put_reading(const Reading& reading) override;
@@ -51,7 +53,7 @@ struct FieldTable final : FieldSink {
 
   std::vector<ValidatedRow> judged_;
   std::vector<std::pair<std::size_t, const FlagInfo*>>
-      sends_to_alarms_;  // rows of the flags whose advice is to look at the alarms
+      sends_to_alarms_;  // rows of flags whose advice refers to the alarms
   bool shows_alarms_ = false;
 };
 

@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::size_t most_shown = 8;
 
-// Returns a probability as "1 in 16384" or "1 in 10^9".
+// Returns the probability 10^`log10` as "1 in 16384" or "1 in 10^9".
 std::string chance_text(double log10) {
   if (log10 > -0.05) return "as likely";
   if (log10 > -6) return fmt::format("1 in {:.0f}", std::pow(10, -log10));
@@ -58,7 +58,7 @@ void show_table(std::span<const Candidate> candidates) {
   print_line(table(rows));
 }
 
-// Returns the identity of candidate 1 as "  1 says: serial_number 12, device_id 41 62".
+// Prints the identity that each candidate reported, as "  1 says: serial_number 12, device_id 41 62" for candidate 1.
 void show_identities(std::span<const Candidate> candidates) {
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     const Answer& identity = candidates[i].identity;
@@ -75,7 +75,7 @@ bool same_encoder(const Candidate& one, const Candidate& other) {
   return one.unit != other.unit || one.encoder == other.encoder || one.encoder.empty() || other.encoder.empty();
 }
 
-// Returns the likeliest candidate of each encoder found; encoders of one protocol differ by their address.
+// Returns the likeliest candidate of each encoder that was found; encoders of one protocol differ by their address.
 std::vector<const Candidate*> encoders(std::span<const Candidate> candidates) {
   std::vector<const Candidate*> all;
   for (const Candidate& one : candidates) {
@@ -86,7 +86,7 @@ std::vector<const Candidate*> encoders(std::span<const Candidate> candidates) {
   return all;
 }
 
-// Explains that the frames fit several candidates of one encoder equally well.
+// Returns sentences that explain that the frames fit several candidates of one encoder equally well.
 std::vector<std::string> ties(std::span<const Candidate> candidates, std::span<const Candidate* const> found) {
   std::vector<std::string> notes;
   for (const Candidate* best : found) {

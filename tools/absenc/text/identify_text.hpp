@@ -14,15 +14,16 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// Returns why a search found nothing, judged by the received bytes, and what to try.
+/// Returns the reason why a search found nothing, judged by the received bytes, and what to try.
 [[nodiscard]] std::string advice_for(const LineFindings& findings, const LineSearch& search);
 
-/// Returns the command to read a candidate: absenc read "tformat:/dev/ttyUSB0?model=23-bit".
+/// Returns the command line that reads a candidate: absenc read "tformat:/dev/ttyUSB0?model=23-bit".
 [[nodiscard]] std::string read_command(const Candidate& candidate, std::string_view place);
-/// Returns the command to decode frames of a candidate: absenc decode tformat --option model=23-bit.
+/// Returns the command line that decodes frames of a candidate: absenc decode tformat --option model=23-bit.
 [[nodiscard]] std::string decode_command(const Candidate& candidate);
 
-/// Prints all candidates, each with the next command that `command` returns. Returns the exit status.
+/// Prints all candidates of a search, each with the next command that `command` returns. Returns the exit status of the
+/// verb.
 int show_candidates(std::span<const Candidate> candidates, const std::function<std::string(const Candidate&)>& command,
                     bool json);
 

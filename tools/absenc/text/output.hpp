@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes data to standard output and messages to standard error; notices at once when writing fails.
+// Writes data to standard output and messages to standard error, and detects at once if standard output cannot be
+// written.
 #pragma once
 
 #include <span>
@@ -11,7 +12,7 @@
 
 namespace absenc::tool {
 
-/// Writes `text` and one line end to standard output, unbuffered. Throws OutputClosed, Failure.
+/// Writes `text` and one line end to standard output, unbuffered. Throws OutputClosed, os::Failure.
 void print_line(std::string_view text);
 
 /// Writes "absenc: <text>" to standard error.
@@ -21,10 +22,10 @@ void print_note(std::string_view text);
 /// Writes `text` without a line end to standard error.
 void print_prompt(std::string_view text);
 
-/// Returns whether standard input and standard error are a terminal, so that a user can be asked.
+/// Returns whether standard input and standard error are terminals, so that the user can be asked.
 [[nodiscard]] bool can_ask();
 
-/// Returns rows as lines with aligned columns, without trailing spaces.
+/// Returns rows of cells as lines of text with aligned columns, without trailing spaces.
 [[nodiscard]] std::string table(std::span<const std::vector<std::string>> rows);
 
 }  // namespace absenc::tool

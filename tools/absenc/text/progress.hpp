@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shows the progress of long work on the last line of the terminal; does nothing without a terminal.
+// Shows the progress of long work on the last line of the terminal; shows nothing if standard error is no terminal.
 #pragma once
 
 #include <string_view>
@@ -17,7 +17,7 @@ class Progress {
   Progress& operator=(const Progress&) = delete;
 
   [[nodiscard]] bool visible() const { return visible_; }
-  /// Replaces the shown text. Nothing else may be printed until `clear`.
+  /// Replaces the shown text by `text`. Nothing else may be printed until `clear`.
   void show(std::string_view text) {
     if (!visible_) return;
     print_prompt("\r\033[K");

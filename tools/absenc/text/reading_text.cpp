@@ -20,12 +20,13 @@ using namespace client;
 
 namespace {
 
-// Returns the decimals of degrees at which neighbouring counts differ.
+// Returns the number of decimals of degrees with which neighbouring counts of `bits` bits look different.
 int decimals(unsigned bits) {
   return std::max(0, static_cast<int>(std::ceil(std::log10(std::ldexp(1.0, static_cast<int>(bits)) / 360))));
 }
 
-// Returns the decimals of one count; options allow up to six decimals of a micrometre.
+// Returns the number of decimals of millimetres that one count of `unit_um` needs; options allow six decimals of a
+// micrometre.
 int linear_decimals(double unit_um) {
   int decimals = 9;
   for (auto nanometres_e3 = std::llround(unit_um * 1e6); decimals > 0 && nanometres_e3 % 10 == 0; --decimals) {
@@ -71,7 +72,8 @@ std::string turns_text(const Reading& reading, Doubt doubt) {
   return fmt::format("{:>{}} turns", reading.turns(), digits(reading.multiturn_bits));
 }
 
-// Returns the alarms, and the status if the alarms do not cover it; of both channels if there are two.
+// Returns the alarms for the line of a reading, and the status if the alarms are not complete; of both channels of an
+// encoder with two.
 std::vector<Flags> flags_in_line(const Unit& unit, const Reading& reading) {
   if (unit.second_status != nullptr || unit.second_alarms != nullptr) return flags_of(unit, reading);
   const std::vector<Flags> alarms = alarms_of(unit, reading);
@@ -79,7 +81,8 @@ std::vector<Flags> flags_in_line(const Unit& unit, const Reading& reading) {
   return flags_of(unit, reading);
 }
 
-// If both channels report all alarms and none is raised, one text serves both; otherwise each channel is named.
+// Returns whether both channels report all alarms and raise none: one text then serves both, otherwise each channel is
+// named.
 bool both_channels_are_well(const Unit& unit, const Reading& reading) {
   if (unit.second_status == nullptr || unit.second_alarms == nullptr || !reading.ready) return false;
   const std::vector<Flags> all = flags_of(unit, reading);

@@ -19,10 +19,10 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// Why the validity of a position is unknown.
+/// Reason why the validity of a position is unknown.
 enum class Doubt : std::uint8_t {
   none,
-  unconfirmed,  // no second reading agreed with it; other reasons: no reply reports validity
+  unconfirmed,  // no second reading confirmed the position; none: no reply reports the validity
 };
 [[nodiscard]] inline Doubt doubt_of(const Sample& sample) { return sample.doubtful ? Doubt::unconfirmed : Doubt::none; }
 
@@ -31,23 +31,24 @@ enum class Doubt : std::uint8_t {
 /// "position unknown (43981)   status: alarm   alarms not reported".
 [[nodiscard]] std::string reading_text(const Unit& unit, const Reading& reading, Doubt doubt = Doubt::none);
 
-/// Returns the first part of that line: position and turns.
+/// Returns position and turns, the first part of the line that `reading_text` returns.
 [[nodiscard]] std::string place_text(const Reading& reading, Doubt doubt = Doubt::none);
 
-/// Returns "no alarms", "alarms: over_heat", "alarms not reported" or "alarms: counting_error (not reported:
-/// over_speed)"; for a status "status clear" or "status: alarm".
+/// Returns flags as text: "no alarms", "alarms: over_heat", "alarms not reported" or "alarms: counting_error (not
+/// reported: over_speed)"; for flags of a status "status clear" or "status: alarm".
 [[nodiscard]] std::string flags_text(const Unit& unit, const Flags& flags);
 
-/// Returns one line for each set flag, with its meaning and what to do; "" if none is set.
+/// Returns one line for each set flag, with its meaning and what the user should do; "" if no flag is set.
 [[nodiscard]] std::string flags_in_words(const Flags& flags, bool beside_alarms = false);
-/// For two channels, each under its name; a flag that both raise is listed once.
+/// Returns the raised alarms in words. With two channels each has its name before its alarms; a flag that both raise is
+/// listed once.
 [[nodiscard]] std::string alarms_in_words(const Unit& unit, const Reading& reading);
 
-/// Sets singleturn_valid and multiturn_valid if the reading has these parts, and the alarms of all channels if the unit
-/// has alarms. null means that no reply reports it.
+/// Sets the keys singleturn_valid and multiturn_valid if the reading has these parts, and the alarms of all channels if
+/// the unit has alarms. null means that no reply reports the value.
 void set_state(Json& json, const Unit& unit, const Reading& reading);
 
-/// Returns "0.125" with no more decimals than one count has.
+/// Returns millimetres as text "0.125", with no more decimals than one count of `unit_um` micrometres has.
 [[nodiscard]] std::string millimetres_text(double millimetres, double unit_um);
 
 }  // namespace absenc::tool

@@ -20,7 +20,7 @@ namespace absenc::tool {
 namespace {
 
 struct Measurement {
-  std::vector<Time> latencies;  // of all good readings, sorted
+  std::vector<Time> latencies;  // latencies of all good readings, the shortest first
   std::uint64_t failed = 0;
   Time duration{};
   Time processor{};
@@ -29,7 +29,7 @@ struct Measurement {
 
 Measurement measure(Connection& encoder, double seconds) {
   Measurement measurement;
-  encoder.read();  // not measured: the first position is read twice, and echo is detected
+  encoder.read();  // not measured: the first reading reads the position twice and detects echo
   const Time start = os::now();
   const Time end = start + Time(static_cast<std::int64_t>(seconds * 1e9));
   const Time processor_before = os::processor_time();
@@ -46,7 +46,7 @@ Measurement measure(Connection& encoder, double seconds) {
       }
       before = after;
     }
-  } catch (const os::Interrupted&) {  // Ctrl-C ends the measurement; its readings so far count
+  } catch (const os::Interrupted&) {  // Ctrl-C ends the measurement; the readings made so far count
   }
   measurement.duration = before - start;
   measurement.processor = os::processor_time() - processor_before;
@@ -55,7 +55,7 @@ Measurement measure(Connection& encoder, double seconds) {
   return measurement;
 }
 
-// Returns the latency that a fraction `share` of the readings does not exceed.
+// Returns the latency that the fraction `share` of the sorted latencies does not exceed.
 Time percentile(const std::vector<Time>& sorted, double share) {
   const auto rank = static_cast<std::size_t>(share * static_cast<double>(sorted.size()));
   return sorted[std::min(rank, sorted.size() - 1)];

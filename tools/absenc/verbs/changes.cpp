@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The verb `changes`: prints the journal of changes of encoders.
+// The verb `changes`: prints the journal of changes that commands made to encoders.
 #include <fmt/format.h>
 
 #include <array>
@@ -15,7 +15,7 @@ namespace absenc::tool {
 
 namespace {
 
-// Returns whether the entry is of `encoder`, given with or without its settings.
+// Returns whether the journal's entry belongs to `encoder`, an address with or without its settings.
 bool is_of(const JournalEntry& entry, std::string_view encoder) {
   const std::string_view written = entry.encoder;
   return written == encoder || written.substr(0, written.find('?')) == encoder;

@@ -13,7 +13,8 @@ namespace absenc::tool {
 
 namespace {
 
-// Names commands that are related to the verb but do something else: "set-zero" for "zero".
+// Returns a sentence that names the unit's commands whose names contain the verb but which do something else:
+// "set-zero" for "zero"; "" without such commands.
 std::string related(const Unit& unit, std::string_view word) {
   std::string names;
   for (const Command& command : unit.commands) {

@@ -37,10 +37,11 @@ std::vector<CheckedFrame> frames_of(const Invocation& invocation) {
 
 std::string hex(std::uint32_t value, unsigned width) { return fmt::format("0x{:0{}X}", value, (width + 3) / 4); }
 
-// Returns the polynomial without its last power (Koopman's notation), which some documents print.
+// Returns the polynomial in Koopman's notation, without its last power, which some documents print.
 std::string koopman(const CrcParameters& crc) { return hex((1u << crc.width | crc.poly) >> 1, crc.width); }
 
-/// Returns the covered bytes as "bytes 0 to 7". If the frames differ in length, the end is given relative to the check.
+/// Returns the covered bytes as "bytes 0 to 7". If the frames differ in length, the end of the covered part is given
+/// relative to the checksum.
 std::string covered_text(const FoundCheck& check, const CheckFindings& findings, std::string_view unit) {
   const std::string end = findings.shortest == findings.longest
                               ? fmt::format("{}", findings.shortest - check.trailing - check.check_size - 1)
@@ -93,7 +94,7 @@ void show_checks(const CheckFindings& findings, std::size_t most, std::string_vi
   if (left != 0) print_note(fmt::format("{} more, each likelier to be chance: --all shows them", left));
 }
 
-// Prints the options by which units that decode words use the best check.
+// Prints the options with which units that decode words use the likeliest checksum.
 void show_options(const CheckFindings& findings, LinkKind link) {
   for (const CheckOptions& one : options_for(findings.checks.front(), findings.shortest, link)) {
     const std::string options =

@@ -80,12 +80,12 @@ int decode_one(const Invocation& invocation, const Unit& unit, const Options& op
   return exit_failed;
 }
 
-// ---- A whole capture
+// ---- Decoding of a whole capture
 
 constexpr std::array<std::string_view, 7> capture_options{"--channel", "--baud", "--parity", "--raw-channels",
                                                           "--rate",    "--csv",  "--stats"};
 
-// Counts annotations and forwards them to the printer, if there is one.
+// Counts the annotations of a capture and forwards them to the printer, if they are printed.
 struct Counted final : capture::AnnotationSink {
   Counted(CaptureStatistics& all, AnnotationPrinter* some) : statistics(all), printer(some) {}
   void put(const capture::Annotation& annotation) override {
@@ -96,7 +96,7 @@ struct Counted final : capture::AnnotationSink {
   AnnotationPrinter* printer;
 };
 
-// Prints the damages of the capture. Returns whether data is missing because of them.
+// Prints the damages of the capture file. Returns whether data is missing because of them.
 bool tell_damages(const CaptureOutcome& outcome, const TickClock& clock) {
   bool damaged = false;
   for (const capture::Damage& damage : outcome.damages) {
@@ -148,7 +148,8 @@ int decode_capture(const Invocation& invocation, const Unit& unit, const Options
   return damaged || statistics.errors() != 0 ? exit_failed : exit_good;
 }
 
-// The user gave a capture without its protocol: identify it, and say which protocol to give.
+// Identifies the protocol of a capture that the user gave without a protocol, and prints how to decode it. Returns the
+// exit status.
 int identify_instead(std::string_view file) {
   print_message(fmt::format("the protocol is missing before {}: it is looked for", file));
   Invocation search;

@@ -25,7 +25,8 @@ std::string finding_text(const Finding& one) {
                      one.action);
 }
 
-// Identifies the encoder behind a bare port and returns the likeliest.
+// Identifies the encoder on a port that the user gave without a protocol, and returns the address of the likeliest
+// encoder.
 std::string identified(const std::string& port, Progress& progress) {
   LineSearch search = parse_search(port);
   search.limit = std::chrono::seconds(60);

@@ -58,7 +58,7 @@ void print_rules(const Device<Item>& encoder, const VirtualDevice& device, std::
   if (encoder.violation_count() > encoder.violations().size()) print_note("    ...");
 }
 
-// Runs `machine` on `port` until a signal or the end of the time.
+// Runs `machine` on `port` until a signal arrives or the time of --for ends.
 template <class Item>
 void serve(Machine<Item>& machine, Port<Item>& port) {
   try {
@@ -73,13 +73,13 @@ std::optional<std::uint16_t> tcp_port(const Invocation& invocation) {
   return static_cast<std::uint16_t>(invocation.number("--tcp", 0, 0, 65535));
 }
 
-// Returns the unit to emulate; with --spidev its variant for SPI.
+// Returns the unit to emulate; with --spidev the unit's variant for SPI.
 const Unit& emulated_unit(const Invocation& invocation) {
   const Unit& unit = require_unit(invocation.text("protocol"));
   return invocation.has("--spidev") && unit.over_spi != nullptr ? *unit.over_spi : unit;
 }
 
-/// An option that puts the encoder on a kind of line, and whether the unit fits it.
+/// An option that puts the encoder on a kind of line, and whether the unit can use such a line.
 struct Where {
   std::string_view option;
   std::string_view line;
@@ -136,7 +136,7 @@ void check_line(const Unit& unit, const Options& options, const Invocation& invo
   if (invocation.has("--memory")) throw UsageError("--memory keeps the memory of one encoder: not with --also");
 }
 
-/// The virtual line, its memory file and the end of its time.
+/// The virtual line of the verb, its memory file and the time at which it ends.
 template <class Item>
 struct EmulationRun {
   EmulationRun(const Unit& unit, const Options& options, const Invocation& invocation)
@@ -148,7 +148,8 @@ struct EmulationRun {
     if (keeps_memory) file.load(line.first().memory());
   }
 
-  /// Calls `serve(machine)`, which runs the encoders until a signal or the end and returns notes about the line.
+  /// Calls `serve(machine)`, which runs the encoders until a signal or the end and returns notes about the line; prints
+  /// counts and notes. Returns the exit status.
   template <class Serve>
   int run(const Serve& serve) {
     const Time start = os::now();
@@ -173,7 +174,7 @@ struct EmulationRun {
     return status;
   }
 
-  // Returns the time of the end; `never` if only a signal ends it.
+  // Returns the time at which the verb ends; `never` if only a signal ends it.
   [[nodiscard]] Time end() const {
     return seconds > 0 ? os::now() + Time(static_cast<std::int64_t>(seconds * 1e9)) : never;
   }
@@ -238,7 +239,7 @@ int emulate_bytes(const Unit& unit, const Options& options, const Invocation& in
   });
 }
 
-// Emulates the encoder behind a slcan adapter on a pseudo-terminal.
+// Emulates the encoder behind a slcan adapter, which is a pseudo-terminal; returns notes about the line.
 Notes serve_adapter(Machine<CanFrame>& machine, const LineSettings& line, const Invocation& invocation, Time end) {
   const auto bytes = std::make_shared<os::EmulatorPort>(std::string(invocation.text("--pty")), tcp_port(invocation));
   bytes->set_end(end);
@@ -345,7 +346,7 @@ DeviceSettings device_settings(const Invocation& invocation) {
 
 EncoderAddress further_encoder(const Unit& unit, const Invocation& invocation, const std::string& further,
                                const DeviceSettings& settings) {
-  // Settings of --also override those of the first encoder.
+  // Settings of the option --also override those of the first encoder.
   std::string base = fmt::format("sim:{}?", unit.id);
   const auto add = [&](const std::string& setting) {
     const std::string assigned = setting.substr(0, setting.find('=')) + '=';

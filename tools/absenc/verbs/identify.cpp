@@ -28,7 +28,7 @@ namespace {
 using capture::ObservedExchange;
 using capture::ObservedFrame;
 
-// ---- Frames from the command line
+// ---- Identification from frames on the command line
 
 ObservedFrame heard(LinkKind link, std::string_view what, std::string_view text) {
   if (text.empty()) return {};
@@ -69,7 +69,7 @@ int identify_frames(const Invocation& invocation) {
       for (capture::Hypothesis& one : capture::find_hypotheses(*unit, {}, exchanges)) {
         candidates.push_back({unit, std::move(one), {}, false, line_of(*unit)});
       }
-    } catch (const UsageError& error) {  // the request may be of another kind of link
+    } catch (const UsageError& error) {  // the request may be written for another kind of link
       if (!unreadable) unreadable = error;
     }
   }
@@ -89,7 +89,7 @@ int identify_frames(const Invocation& invocation) {
   return status;
 }
 
-// ---- A line
+// ---- Identification of the encoder on a line
 
 LineSearch search_of(const Invocation& invocation) {
   LineSearch search = parse_search(invocation.text("where"));
@@ -113,7 +113,7 @@ int identify_line(const Invocation& invocation) {
   return findings.interrupted ? exit_failed : status;
 }
 
-// ---- A capture
+// ---- Identification from a capture
 
 int identify_capture(const Invocation& invocation) {
   const CaptureChoices choices = capture_choices(invocation, invocation.text("where"));
@@ -139,14 +139,14 @@ int identify_capture(const Invocation& invocation) {
   return status;
 }
 
-// A folder may be the export of a logic analyser.
+// Returns whether `where` names a capture: a file, or a folder, which may be the export of a logic analyser.
 bool is_capture(std::string_view where) {
   std::error_code error;
   return std::filesystem::is_regular_file(where, error) || std::filesystem::is_directory(where, error);
 }
 
-// Reports a missing file: otherwise its name would be taken for a port. Interfaces of CAN have names like can0, ports
-// of this computer are below /dev.
+// Throws UsageError for the name of a missing file, which would otherwise be taken for a port. CAN interfaces have
+// names like can0, ports of this computer are below /dev.
 void refuse_missing_file(std::string_view where) {
   const std::filesystem::path path(where);
   std::error_code error;

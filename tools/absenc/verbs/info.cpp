@@ -28,7 +28,8 @@ namespace {
 
 using Rows = std::vector<std::vector<std::string>>;
 
-// Describes the range of turns as the encoder counts them; backwards from 0 most continue at their greatest number.
+// Describes the range of turns as the encoder counts them; turning backwards from 0, most encoders continue at their
+// greatest number.
 std::string turns_text(const Resolution& resolution) {
   const std::int64_t count = std::int64_t{1} << resolution.multiturn_bits;
   const std::int64_t least = resolution.multiturn_signed ? -count / 2 : 0;
@@ -43,7 +44,7 @@ std::string resolution_text(const Resolution& resolution) {
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 
-// Names the options that differ from their defaults.
+// Returns the options of the address that differ from their defaults.
 std::string options_in_short(const EncoderAddress& uri) {
   const std::vector<std::string> settings = settings_for(*uri.unit, uri.options);
   return settings.empty() ? "all at their defaults" : fmt::format("{}", fmt::join(settings, " "));
@@ -84,7 +85,7 @@ Json identity_json(const EncoderAddress& uri, const Resolution& resolution) {
       .set("options", options_to_json(unit, uri.options));
 }
 
-/// Returns whether the card shows a field: identity, connection and temperature.
+/// Collects the fields that the card shows: identity, connection and temperature.
 class CardRows final : public FieldSink {
  public:
   explicit CardRows(const Command& command) : command_(command) {}
@@ -106,10 +107,10 @@ class CardRows final : public FieldSink {
   const Command& command_;
 };
 
-/// Reads identity, settings and state of the encoder and collects them as rows and as JSON.
+/// Reads identity, settings and state of the encoder, and collects them as rows of text and as JSON.
 class Survey {
  public:
-  /// `all`: collect every field and setting; otherwise a card.
+  /// `all`: collect every field and setting; otherwise only those of the card.
   Survey(const EncoderAddress& uri, bool all)
       : encoder_(open_connection(uri)), resolution_(uri.unit->resolution(uri.options)), all_(all) {}
 
@@ -128,7 +129,7 @@ class Survey {
     FieldTable table;
     encoder_->report(table);
     for (std::vector<std::string>& row : table.rows) row.front().insert(0, "  ");
-    // Skips a setting that the identity has already shown.
+    // Returns whether the table already has this row, because the identity shows the setting too.
     const auto is_shown = [&](const auto& row) { return std::find(rows.begin(), rows.end(), row) != rows.end(); };
     if (command.verb == Verb::config_get && std::all_of(table.rows.begin(), table.rows.end(), is_shown)) return;
     add_heading(command);
@@ -163,16 +164,16 @@ class Survey {
     if (is_doubtful) add_line("  no two readings in a row agree as well as the fastest shaft allows");
   }
 
-  /// Returns the resolution in the encoder's replies; before the first reply, that of the options.
+  /// Returns the resolution in the encoder's replies; before the first reply, the resolution according to the options.
   [[nodiscard]] const Resolution& resolution() const { return resolution_; }
 
   Json answers = Json::object();
   Rows rows;
-  std::string below;              // printed below the rows: alarms in words, and why a position is doubtful
-  std::vector<Trouble> troubles;  // the first failure with each error
+  std::string below;              // text printed below the rows: alarms in words, and why a position is doubtful
+  std::vector<Trouble> troubles;  // first failure with each kind of error
 
  private:
-  // Adds rows that are not there yet: several commands may report the same value.
+  // Adds rows whose names are not in the table yet: several commands may report the same value.
   void add_new(Rows more) {
     for (std::vector<std::string>& row : more) {
       if (std::find(rows.begin(), rows.end(), row) == rows.end()) rows.push_back(std::move(row));
@@ -193,7 +194,7 @@ class Survey {
     return a.singleturn_bits == b.singleturn_bits && a.multiturn_bits == b.multiturn_bits && a.unit_um == b.unit_um;
   }
 
-  // Keeps the resolution of the first reply, which is the one to the identity command.
+  // Stores the resolution of the first reply, which answers the identity command.
   void hear(const Resolution& resolution) {
     if (!heard_) resolution_ = resolution;
     heard_ = true;
@@ -209,7 +210,7 @@ class Survey {
   void fail(const Command& command, const Trouble& trouble) {
     answers.set(command.name, to_json(trouble));
     const std::string why = fmt::format("{}: {}", text_of(trouble.error).name, trouble.message);
-    // Reports only the first of several settings that fail for the same reason.
+    // If several settings fail for the same reason, only the first is reported.
     if (command.verb == Verb::config_get && why == std::exchange(failed_setting_, why)) return;
     rows.push_back({std::string(command.name), "FAILED", why});
     const bool is_known = std::any_of(troubles.begin(), troubles.end(),
@@ -220,8 +221,8 @@ class Survey {
   std::unique_ptr<Connection> encoder_;
   Resolution resolution_;
   bool all_;
-  bool heard_ = false;          // whether a reply has reported the resolution
-  std::string failed_setting_;  // reason of the last setting that failed
+  bool heard_ = false;          // a reply has reported the resolution
+  std::string failed_setting_;  // reason why the last failed setting failed
 };
 
 int run_info(const Invocation& invocation) {

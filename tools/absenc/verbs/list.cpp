@@ -37,18 +37,19 @@ std::string argument_names(const Command& command) {
   return text;
 }
 
-// Returns rows indented below their heading; "" without rows.
+// Returns rows as text, indented below their heading; "" without rows.
 std::string section(std::string_view heading, Rows rows) {
   if (rows.empty()) return {};
   for (auto& row : rows) row.front().insert(0, "  ");
   return fmt::format("\n{}\n{}", heading, table(rows));
 }
 
-// Returns the line of the unit with the options of this model.
+// Returns the description of the unit's line with the options of `model`.
 std::string line_of_model(const Unit& unit, const Model& model) {
   Options options;
   static_cast<void>(resolve_options(unit, model.name, {},
-                                    options));  // cannot fail: the name is the unit's own, without further options
+                                    options));  // cannot fail: the unit itself has this model, and no further options
+                                                // are given
   return line_of(unit.link, line_settings(unit, options));
 }
 
@@ -80,7 +81,7 @@ Rows option_rows(const Unit& unit) {
   return rows;
 }
 
-// Spelling of position words as in protocol/word_format.hpp.
+// Returns rows that explain how position words are written, as in protocol/word_format.hpp.
 Rows word_rows(const Unit& unit) {
   if (!takes_word(unit)) return {};
   return {
@@ -202,7 +203,7 @@ Json models_json(const Unit& unit) {
   });
 }
 
-// Sets "role" if the field, option or argument has a role.
+// Returns `json` with the key "role" if the field, option or argument has a role.
 Json with_role(Json json, Role role) {
   const std::string_view name = name_of(role);
   return name.empty() ? json : json.set("role", name);
@@ -326,7 +327,8 @@ Json name_json(std::string_view name, const EncoderAddress& uri) {
       .set("options", options_to_json(*uri.unit, uri.options));
 }
 
-// Checks all names first, so that nothing is printed if one is wrong.
+// Prints the named encoders of absenc.toml. Parses all their addresses first, so that nothing is printed if one is
+// wrong.
 int list_names(bool json) {
   const NamedEncoders names = require_names("the names are those of absenc.toml");
   Rows rows{{"NAME", "ENCODER", "MODEL"}};

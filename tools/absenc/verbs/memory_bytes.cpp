@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The verbs `memory read` and `memory write`, for single bytes.
+// The verbs `memory read` and `memory write`, for bytes at single addresses.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -28,7 +28,7 @@ MemoryAddress first_address(const Invocation& invocation) {
           static_cast<std::uint32_t>(invocation.number("address", 0, 0, INT32_MAX))};
 }
 
-// Returns a line as "0x10  00 5A ...  .Z...".
+// Returns bytes of memory as lines "0x10  00 5A ...  .Z...".
 std::string hex_dump(const MemoryImage& image) {
   std::vector<std::vector<std::string>> rows;
   for (const MemoryRun& run : runs(image, 16)) {
@@ -41,7 +41,8 @@ std::string hex_dump(const MemoryImage& image) {
   return table(rows);
 }
 
-// Returns a register by name or address. An address that is not in the table is sent to the encoder all the same.
+// Returns the address of a register that is given by name or address. An address that the unit's table does not contain
+// is sent to the encoder all the same.
 std::int64_t register_address(const Invocation& invocation, const Unit& unit, bool for_writing) {
   const std::string_view written = invocation.text("address");
   const Result<std::int64_t> number = parse_number(written);

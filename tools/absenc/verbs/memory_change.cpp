@@ -31,7 +31,7 @@ Json addresses_json(const MemoryImage& image) {
   });
 }
 
-// Returns the smallest number of writes that one of these bytes endures, in words; "" if unknown.
+// Returns the smallest number of writes that one of the bytes endures, in words; "" if the number is unknown.
 std::string write_life(const Unit& unit, const MemoryImage& image) {
   const MemoryArea* least = nullptr;
   for (const auto& [at, value] : image) {
@@ -43,7 +43,7 @@ std::string write_life(const Unit& unit, const MemoryImage& image) {
   return least == nullptr ? "" : life_of(*least);
 }
 
-// Runs `work` and shows its progress. Nothing else may be printed meanwhile.
+// Runs `work` and shows its progress as "DOING n of m bytes". Nothing else may be printed meanwhile.
 template <class Work>
 void with_progress(std::string_view doing, const Work& work) {
   Progress progress;
@@ -95,7 +95,7 @@ class MemoryWrite {
       return;
     }
     print_line(difference_table(unit_, "NEW", change_->differing(), change_->found()));
-    if (!asks_) print_note(cost());  // otherwise the question contains it
+    if (!asks_) print_note(cost());  // if the user is asked, the question contains the cost
   }
 
   int finish() const {
@@ -124,7 +124,7 @@ class MemoryWrite {
     } catch (const os::Interrupted&) {
       words = "interrupted";
       answer.set("message", words);
-    } catch (const OutputClosed&) {  // the user has not seen the bytes to be written
+    } catch (const OutputClosed&) {  // standard output is closed, so the user has not seen the bytes to be written
       words = "nobody reads standard output";
     } catch (const EncoderFailure& failure) {
       words = failure.what();

@@ -35,14 +35,14 @@ std::vector<MonitoredEncoder> look_at(const Watches& watches, std::size_t select
   return shown;
 }
 
-// ---- On a terminal
+// ---- Output on a terminal
 
-/// The interactive screen. Keys that change an encoder ask first.
+/// Handles the keys of the interactive screen. Keys that change an encoder ask first.
 class Controls {
  public:
   explicit Controls(Watches& watches) : watches_(&watches) {}
 
-  /// Handles a key; returns false to quit.
+  /// Handles a key; returns false if the key ends the program.
   bool take(KeyPress key) {
     const bool answers = !view_.question.empty() && key != KeyPress::none && key != KeyPress::resized;
     if (answers) {
@@ -103,7 +103,7 @@ class Controls {
 
   Watches* watches_;
   View view_;
-  const Command* asked_ = nullptr;  // the command that the question is about
+  const Command* asked_ = nullptr;  // command that the shown question is about; null: no question
 };
 
 void run_on_screen(Screen& screen, Watches& watches, Time end) {
@@ -114,9 +114,9 @@ void run_on_screen(Screen& screen, Watches& watches, Time end) {
   }
 }
 
-// ---- Without a terminal
+// ---- Output without a terminal
 
-/// Prints to standard error when an encoder's state changes.
+/// Prints a line to standard error when the state of an encoder changes.
 class StateChanges {
  public:
   void tell(const std::vector<MonitoredEncoder>& encoders) {
@@ -137,7 +137,7 @@ class StateChanges {
 
 void print_lines(const Watches& watches, bool json, Time interval, Time end) {
   StateChanges changes;
-  Time next = os::now() + std::min<Time>(interval, 500ms);  // the first lines once encoders had time to reply
+  Time next = os::now() + std::min<Time>(interval, 500ms);  // time of the first lines: encoders need some time to reply
   try {
     while (os::now() < end) {
       os::sleep_until(std::min({next, end, os::now() + refresh}));
@@ -152,7 +152,7 @@ void print_lines(const Watches& watches, bool json, Time interval, Time end) {
   }
 }
 
-// Returns whether each encoder was read and none has ended.
+// Prints a summary of each encoder. Returns whether each encoder was read and none has ended.
 bool summarize(const Watches& watches, Time start, Time processor) {
   std::uint64_t readings = 0;
   bool all_read = true;
@@ -178,7 +178,7 @@ Watches make_watches(const Invocation& invocation, double rate) {
   require_different(uris, names);
   Watches watches;
   for (std::size_t i = 0; i < uris.size(); ++i) {
-    // Spreads the readings over the period, so that they do not coincide.
+    // The first readings are spread over the period, so that the encoders are not read at the same time.
     const double share = rate > 0 ? static_cast<double>(i) / (rate * static_cast<double>(uris.size())) : 0;
     const Time offset(static_cast<std::int64_t>(1e9 * share));
     watches.push_back(std::make_unique<Watch>(names[i], uris[i], rate, offset));

@@ -28,7 +28,7 @@ std::string adapter_text(const ListedPort& port) {
   return usb.serial_number.empty() ? text : fmt::format("{}, serial number {}", text, usb.serial_number);
 }
 
-// Returns the known ones of chip, rate, driver and latency.
+// Returns chip, highest rate, driver and latency of a port, as far as they are known.
 std::string way_text(const ListedPort& port) {
   const os::AdapterChip* chip = port.usb ? os::chip_of(*port.usb) : nullptr;
   std::string text = chip != nullptr ? fmt::format("chip {}, ", chip->name) : "";

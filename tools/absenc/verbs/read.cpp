@@ -26,16 +26,16 @@ namespace {
 
 enum class Format : std::uint8_t { human, json, csv };
 
-// Returns "   12.0 ± 0.3 rpm" if the uncertainty excludes a shaft at rest; otherwise "".
+// Returns the speed as "   12.0 ± 0.3 rpm" if its uncertainty excludes a shaft at rest; otherwise "".
 std::string speed_text(const Sample& sample) {
   if (!sample.speed_valid || std::abs(sample.speed) <= sample.speed_uncertainty) return {};
   return fmt::format("   {} {}", to_text(*sample.measured_speed()), speed_unit(sample.reading));
 }
 
-/// Prints readings and failures, and does not repeat messages.
+/// Prints readings and failures; a message is not repeated while it stays the same.
 class Display {
  public:
-  /// With `speeds`, a line has the speed of a shaft that turns.
+  /// With `speeds`, the line of a reading contains the speed of a shaft that turns.
   Display(const Encoder& live, Format format, bool speeds)
       : live_(&live),
         format_(format),
@@ -81,7 +81,7 @@ class Display {
     if (format_ != Format::human) return show_row(sample);
     print_line(reading_text(unit, reading, doubt_of(sample)) + (speeds_ ? speed_text(sample) : "") +
                angles_text(live_->joint(), sample));
-    // An alarm counts as raised until the encoder reports it clear.
+    // An alarm that was raised counts as raised until the encoder reports it clear.
     const std::uint32_t alarms = reading.alarms | (alarms_ & ~reading.alarms_reported);
     if (alarms == alarms_) return;
     alarms_ = alarms;
@@ -117,7 +117,7 @@ struct Tally {
   bool last_good = false;
 };
 
-// Endless reading continues after the port was lost.
+// Reads `count` times and prints each reading; without a count it continues after the port was lost.
 void read_all(Encoder& live, Display& display, std::uint64_t count, Pace& pace, Tally& tally) {
   for (std::uint64_t i = 0; count == 0 || i < count; ++i) {
     if (i > 0) os::sleep_until(pace.next());
@@ -152,7 +152,7 @@ int run_read(const Invocation& invocation) {
   const Time start = os::now();
   if (count != 0) {
     read_all(live, display, count, pace, tally);
-    // Reports damaged replies that retries have hidden.
+    // Prints the counts if retries have hidden damaged replies.
     if (live.counters().discarded != 0) print_tally(live, tally, os::now() - start);
     return tally.bad == 0 ? exit_good : exit_failed;
   }

@@ -21,7 +21,7 @@ namespace absenc::tool {
 
 namespace {
 
-/// Shows the progress of a recording once a second.
+/// Shows the progress of a recording once per second.
 class RecordingProgress {
  public:
   void show(const Recording& recording, const Encoder& live) {
@@ -41,9 +41,9 @@ class RecordingProgress {
   Time next_{};
 };
 
-// Prints losses, returns and failures between readings; the file has them too.
+// Prints losses of the port, its returns, and failures, which are also in the file.
 void tell(const Sample& sample, const Encoder& live, RecordingProgress& report) {
-  if (sample.restarted && live.restarts() == 1) {  // only the first time; the summary has the count
+  if (sample.restarted && live.restarts() == 1) {  // printed only for the first restart; the summary has the number
     report.clear();
     print_message(sample.message);
   }
@@ -72,7 +72,7 @@ RecordingSettings settings_of(const Invocation& invocation) {
   return settings;
 }
 
-// `whole`: the files were completed without an error.
+// Prints a summary of the recording. `whole`: the files were completed without an error.
 void summarize_recording(const Recording& recording, const Encoder& live, bool whole) {
   std::string text = fmt::format("{} readings and {} failures in {} {}", recording.counts().readings,
                                  recording.counts().failures, to_text(os::now() - recording.start()),

@@ -29,7 +29,7 @@ int run_run(const Invocation& invocation) {
   return run_command(invocation, uri, command, arguments);
 }
 
-// Prints the newest intermediate result.
+// Shows the newest intermediate result of the command as progress.
 void show_progress(Progress& progress, const Connection& encoder, const Command& command) {
   if (!progress.visible()) return;
   FieldTable so_far;
@@ -39,7 +39,7 @@ void show_progress(Progress& progress, const Connection& encoder, const Command&
   progress.show(fmt::format("{}: {}: {}", command.name, newest[0], newest[1]));
 }
 
-// Shows the position before the question, so that the user recognises the encoder.
+// Prints the position before the user is asked, so that the user recognises the encoder.
 void show_before(Connection& encoder) {
   if (find_command(encoder.unit(), Verb::read) == nullptr) return;
   const Outcome outcome = encoder.read();

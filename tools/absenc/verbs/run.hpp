@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a command of a protocol for any verb: asks, runs, prints the result or the failure.
+// Runs a command of a protocol for any verb: asks the user, runs the command, and prints its result or failure.
 #pragma once
 
 #include "absenc/client/encoder/connection.hpp"
@@ -9,11 +9,11 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// Asks, runs one command and prints its result, with --yes and --json; returns the exit status. Throws UsageError
-/// without a terminal, EncoderFailure.
+/// Asks the user, runs one command and prints its result, as the options --yes and --json state; returns the exit
+/// status. Throws UsageError if it must ask without a terminal, EncoderFailure.
 int run_command(const Invocation& invocation, const EncoderAddress& uri, const Command& command, Arguments arguments);
 
-/// Runs a command of Verb::scan, whose result is a list.
+/// Runs a command of Verb::scan and prints its list of encoders; returns the exit status.
 int run_scan_command(const Invocation& invocation, const EncoderAddress& uri, const Command& command,
                      Arguments arguments);
 

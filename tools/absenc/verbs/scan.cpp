@@ -20,7 +20,7 @@ namespace absenc::tool {
 
 namespace {
 
-/// The encoders found: each record begins with the address field of one encoder.
+/// Collects the encoders that a scan finds: each record begins with the address field of one encoder.
 struct Records final : FieldSink {
   struct Record {
     bool clash = false;
@@ -59,7 +59,7 @@ struct Records final : FieldSink {
     return table(rows);
   }
 
-  std::vector<const FieldInfo*> fields;  // in the order of their first appearance
+  std::vector<const FieldInfo*> fields;  // columns of the table, in the order in which fields first appeared
   std::vector<Record> all;
 };
 

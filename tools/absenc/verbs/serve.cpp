@@ -19,9 +19,10 @@ namespace {
 constexpr std::string_view usual_host = "127.0.0.1";
 constexpr std::uint16_t usual_port = 8420;
 constexpr std::string_view no_history = "none";
-constexpr Time between_looks = std::chrono::milliseconds(100);  // polled, because another thread may receive the signal
+constexpr Time between_looks = std::chrono::milliseconds(100);  // period in which signals are checked: polled, because
+                                                                // another thread may receive the signal
 
-// Parses "HOST:PORT", "HOST" or ":PORT".
+// Sets host and port of the server from "HOST:PORT", "HOST" or ":PORT". Throws UsageError.
 void set_place(serve::Choices& choices, std::string_view written) {
   const std::size_t bracket = written.rfind(']');
   const std::size_t colon = written.find(':', bracket == std::string_view::npos ? 0 : bracket);
@@ -36,9 +37,9 @@ void set_place(serve::Choices& choices, std::string_view written) {
   choices.port = static_cast<std::uint16_t>(*port);
 }
 
-constexpr std::string_view home_assistant = "--home-assistant";  // the only one of these options without a value
+constexpr std::string_view home_assistant = "--home-assistant";  // the only option for outlets that has no value
 
-// Options that set the same as settings of absenc.toml.
+// An option that sets the same value as a setting of absenc.toml.
 struct OutletParameter {
   std::string_view option;
   std::string_view section;

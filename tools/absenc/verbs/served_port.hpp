@@ -15,14 +15,14 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// Parses "/dev/ttyUSB1" with settings of the port behind `?`, as in an address. Throws UsageError.
+/// Parses the name of a port, "/dev/ttyUSB1", with settings of the port behind `?` as in an address. Throws UsageError.
 [[nodiscard]] EncoderAddress parse_served_port(const Unit& unit, std::string_view text);
 
-/// Prints that it is ready, and runs until a signal or `end`. It waits for a port that was lost; the encoder then
-/// continues unchanged. A transfer due within `send_slack` is sent at once.
-/// Throws os::Failure if the port cannot be opened at the start.
+/// Prints that the encoder is ready, and runs it on a serial port until a signal or the time `end`. If the port is
+/// lost, it waits for the port; the encoder then continues unchanged. A transfer due within `send_slack` is sent at
+/// once. Throws os::Failure if the port cannot be opened at the start.
 void serve_port(Machine<std::uint8_t>& device, const EncoderAddress& uri, Time end);
-/// Does the same on a CAN interface such as "vcan0".
+/// Runs a virtual encoder like `serve_port`, on a CAN interface such as "vcan0".
 void serve_interface(Machine<CanFrame>& device, const std::string& interface, const LineSettings& line, Time end);
 
 }  // namespace absenc::tool

@@ -44,7 +44,7 @@ int run_get(const Invocation& invocation) {
   return exit_good;
 }
 
-// Returns the value as text; "-" if the encoder did not report it.
+// Returns the value of a field as text; "-" if the encoder did not report the field.
 std::string text_of_field(const Answer& answer, std::string_view field) {
   for (std::size_t i = 0; i < answer.columns.size(); ++i) {
     if (answer.columns[i].name == field) return to_text(answer.columns[i], answer.values[i]);
@@ -66,7 +66,7 @@ void show_change(std::string_view name, const Answer& old, const Answer& now) {
   print_line(table(rows));
 }
 
-// With --force, sets the setter's argument of role `force` to 1.
+// Returns the arguments of the command that writes a setting. With --force, its argument of the role `force` is 1.
 std::vector<std::int64_t> setter_arguments(const Invocation& invocation, const Unit& unit, const Command& setter) {
   std::vector<std::int64_t> values = require_arguments(setter, invocation.texts("values"));
   if (!invocation.has("--force")) return values;

@@ -17,7 +17,7 @@ namespace absenc::tool {
 
 namespace {
 
-// Returns the fields as "name=value name=value".
+// Returns the options of a vector, which are stored as a text "name=value name=value".
 std::vector<OptionText> vector_settings(const Vector& vector) {
   std::vector<OptionText> settings;
   std::string_view rest = vector.options;
@@ -29,7 +29,8 @@ std::vector<OptionText> vector_settings(const Vector& vector) {
   return settings;
 }
 
-// A vector stores its frames as bytes: either the frame itself, or the text of a CAN frame or clocked word.
+// Returns a frame of a vector. A vector stores its frames as bytes: either the frame itself, or the text of a CAN frame
+// or clocked word.
 WireFrame vector_frame(const Unit& unit, Bytes bytes) {
   if (bytes.empty()) return {};
   if (unit.link != LinkKind::can && unit.link != LinkKind::clocked) return {{bytes.begin(), bytes.end()}, 0, {}};
