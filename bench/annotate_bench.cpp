@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Time per character of a fully loaded T-format line, from the line decoder to the decoded exchange.
+// Measures the time per character of a fully loaded T-format line, from the line decoder to the decoded exchange.
 #include <benchmark/benchmark.h>
 
 #include <memory>
@@ -12,7 +12,7 @@
 namespace absenc::capture {
 namespace {
 
-constexpr Tick character = 80;  // ticks per character, at 20 MS/s
+constexpr Tick character = 80;  // duration of a character in ticks, at 20 MS/s
 constexpr Tick turnaround = 60;
 constexpr Tick pause = 64;
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decodes an asynchronous line of 2.5 Mbit/s, sampled at 20 MS/s, from a raw file to characters. Compares this with a
-// plain read of the file, with two threads, with larger files, and with sigrok-cli's decoder.
+// Decodes an asynchronous line of 2.5 Mbit/s, sampled at 20 MS/s, from a raw file to characters. Compares the time with
+// that of a plain read of the file, of two threads, of larger files, and of sigrok-cli's decoder.
 #include <fcntl.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -35,7 +35,7 @@ constexpr std::uint64_t megabyte = 1'000'000;
 }
 
 struct Cost {
-  double time;       // elapsed, seconds
+  double time;       // elapsed time in seconds
   double processor;  // seconds of processor time of all threads and children, independent of other load
 };
 
@@ -98,7 +98,7 @@ class File {
   }
 
  private:
-  // Channel 0 has characters without pauses; the other channels have arbitrary levels.
+  // Writes the samples: channel 0 has characters without pauses, the other channels have arbitrary levels.
   void write() const {
     const int out = open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
     if (out < 0) fail("open");
@@ -151,7 +151,7 @@ class RawReader final : public Reader {
   std::vector<Damage> damages_;
 };
 
-// Decodes the whole file and checks each character.
+// Decodes the whole file, checks each character and returns the cost.
 Cost decode(const File& file, unsigned threads) {
   RawReader reader(file);
   std::uint64_t count = 0;
@@ -166,7 +166,7 @@ Cost decode(const File& file, unsigned threads) {
       return true;
     });
   });
-  // The first character has no falling edge, and the decoder may mistake its inner edges for the next start bits.
+  // The first character of the capture has no falling edge, and the decoder may mistake edges within it for start bits.
   if (!outcome.problem.empty() || wrong > 20 || count + 20 < file.characters()) {
     std::fprintf(stderr, "%llu of %llu characters, %llu wrong: %s\n", static_cast<unsigned long long>(count),
                  static_cast<unsigned long long>(file.characters()), static_cast<unsigned long long>(wrong),
@@ -176,7 +176,7 @@ Cost decode(const File& file, unsigned threads) {
   return cost;
 }
 
-// Reads and sums up the same blocks: the highest possible rate of this machine.
+// Reads and sums up the blocks that the decoder reads: the highest possible rate of this machine.
 Cost plain_read(const File& file) {
   RawReader reader(file);
   std::uint64_t sum = 0;
@@ -194,7 +194,8 @@ Cost plain_read(const File& file) {
   return cost;
 }
 
-// Decodes two files at once with one thread each: the greatest possible gain of a second core under the current load.
+// Decodes two files at once with one thread each, and returns half the elapsed time: the least time per file that a
+// second core can give under the current load.
 double two_independent(const File& file) {
   return cost_of([&] {
            std::jthread other([&] { decode(file, 1); });
@@ -217,7 +218,7 @@ void throughput(bool quick) {
       median(one), median(plain));
 }
 
-// Compares the shortest of many runs, because only some runs find both cores free.
+// Measures the gain of a second thread from the shortest of many runs, because only some runs find both cores free.
 void two_threads(bool quick) {
   const File file(50 * megabyte);
   std::vector<double> alone;
@@ -258,7 +259,8 @@ void against_sigrok(bool quick) {
               median(ours) / theirs);
 }
 
-// The small file is decoded many times, so that both measurements take about the same time.
+// Compares the cost per character of a small and a large file. The small file is decoded many times, so that both
+// measurements take about the same time.
 void compare_file_sizes(bool quick) {
   const std::uint64_t most = (quick ? 100 : 4000) * megabyte;
   const File small(10 * megabyte);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Compares reading of captures with the minimum of work: raw samples with std::fread, a sigrok session with a libzip
-// loop as in its manual. Text, value change dump and CSV are measured alone. Files have 64 MiB of samples.
+// loop as in its manual. Text, value change dump and CSV are measured without a comparison. Files have 64 MiB of
+// samples.
 #include <zip.h>
 
 #include <array>
@@ -32,7 +33,8 @@ struct Files {
   Files()
       : folder(std::filesystem::temp_directory_path() / ("absenc-bench-" + std::to_string(std::random_device()()))) {
     std::filesystem::create_directory(folder);
-    // Eight lines that change about every 32 samples, like a line that is sampled at 10 or more times its bit rate.
+    // Samples of eight lines that change about every 32 samples, like a line that is sampled at 10 or more times its
+    // bit rate.
     std::mt19937 random(1);
     std::vector<char> samples(samples_size);
     unsigned levels = 0xFF;
@@ -86,7 +88,7 @@ struct Files {
     }
   }
 
-  // The CSV format of Saleae's Logic 2.
+  // Writes samples in the CSV format of Saleae's Logic 2.
   void write_csv(const std::vector<char>& samples) const {
     std::ofstream file(csv());
     file << "Time [s],0,1,2,3,4,5,6,7\n";
@@ -130,7 +132,7 @@ void raw_samples(benchmark::State& state) {
 }
 BENCHMARK(raw_samples)->Unit(benchmark::kMillisecond);
 
-// Reads into one buffer of `samples_size`, in as large pieces as possible, without the library's own buffer.
+// Reads the file into one buffer of `samples_size`, in pieces as large as possible, without the C library's own buffer.
 void raw_samples_reference(benchmark::State& state) {
   std::vector<char> buffer(1 << 20);
   const std::string path = files().raw();
@@ -155,7 +157,7 @@ void sigrok_session_reference(benchmark::State& state) {
     for (zip_uint64_t i = 2; i < samples_size / piece_size + 2; ++i) {
       zip_file_t* entry = zip_fopen_index(archive, i, 0);
       require_that(zip_fread(entry, buffer.data(), buffer.size()) == static_cast<zip_int64_t>(buffer.size()));
-      require_that(zip_fread(entry, buffer.data(), 1) == 0);  // checks the checksum
+      require_that(zip_fread(entry, buffer.data(), 1) == 0);  // at the end of the data libzip checks the checksum
       zip_fclose(entry);
       benchmark::DoNotOptimize(buffer.data());
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decoding and checking of frames: T-format compared with the same work and a bitwise CRC, BiSS compared with the
-// method of a motor controller.
+// Measures decoding and checking of frames: T-format compared with the same work and a bitwise CRC, BiSS compared with
+// the method of a motor controller.
 #include <algorithm>
 #include <array>
 
@@ -14,7 +14,7 @@ namespace {
 using namespace absenc;
 using namespace absenc::tformat;
 
-// Replies differ, so that the compiler cannot treat any as a constant.
+// Returns different replies, so that the compiler cannot treat one as a constant.
 std::array<ReplyBytes, 64> replies() {
   std::array<ReplyBytes, 64> made;
   for (std::uint32_t i = 0; i < made.size(); ++i) {
@@ -50,8 +50,9 @@ void tformat_everything_reference(benchmark::State& state) {
 }
 BENCHMARK(tformat_everything_reference);
 
-// 64 samples of SLO with a frame of 32 bits: packed bits, as from an SPI controller or an E201-9S, and one byte per
-// sample, as from a port that a timer samples. ACK times and positions differ.
+// Inputs of the BiSS benchmarks: 64 samples of SLO with a frame of 32 bits. They are packed bits, as from an SPI
+// controller or an E201-9S, or one byte per sample, as from a port that a timer samples. Times of ACK and positions
+// differ.
 constexpr biss::Format known{.word = "position:32 error:1! warning:1!"_word};
 
 struct Samples {
@@ -73,7 +74,7 @@ std::array<Samples, 64> biss_samples() {
   return made;
 }
 
-// Checks each decoded position; a wrong one ends the benchmark.
+// Decodes frames and checks each decoded position; a wrong position ends the benchmark.
 template <class Decode>
 void run_biss(benchmark::State& state, Decode&& decode) {
   const auto frames = biss_samples();
@@ -107,7 +108,7 @@ void biss_any_format(benchmark::State& state) {
 }
 BENCHMARK(biss_any_format);
 
-// Reference of both BiSS benchmarks.
+// The motor controller's decoder, the reference of both BiSS benchmarks.
 void biss_peer(benchmark::State& state) {
   bench::SampledPeer peer{pin, 32};
   benchmark::DoNotOptimize(peer);

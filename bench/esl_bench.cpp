@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decoding and checking of the 18 bytes of an ESL safety reply by the function for hosts, compared with the two CRCs of
-// such a reply alone, computed bit by bit.
+// Measures decoding and checking of the 18 bytes of an ESL safety reply by the function for hosts, compared with the
+// two CRCs of such a reply alone, computed bit by bit.
 #include <array>
 
 #include "absenc/protocol/esl/reply.hpp"
@@ -11,7 +11,7 @@ namespace {
 using namespace absenc;
 using namespace absenc::esl;
 
-// Replies differ, so that the compiler cannot treat any as a constant.
+// Returns different replies, so that the compiler cannot treat one as a constant.
 std::array<ReplyBytes, 64> replies() {
   std::array<ReplyBytes, 64> made;
   for (std::uint32_t i = 0; i < made.size(); ++i) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Processor time per reading when `absenc monitor` watches 1, 8 and 64 virtual encoders at 100 readings per second
-// each: medians of three interleaved rounds. Each virtual encoder is a separate process.
+// Measures the processor time per reading when `absenc monitor` watches 1, 8 and 64 virtual encoders at 100 readings
+// per second each: medians of three interleaved rounds. Each virtual encoder is a separate process.
 #include <stdlib.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -27,7 +27,7 @@ constexpr std::array<int, 3> counts{1, 8, most_encoders};
   std::exit(1);
 }
 
-/// A process whose standard output or standard error is read here.
+/// A child process whose standard output or standard error this program reads.
 struct Child {
   pid_t pid;
   FILE* output;
@@ -60,7 +60,7 @@ std::string line_of(FILE* file) {
   return line;
 }
 
-/// Returns user and system time of the monitor per reading, in microseconds.
+/// Returns the monitor's user and system time per reading, in microseconds.
 double measure(const std::string& absenc, const fs::path& folder, int count, const char* seconds) {
   std::vector<std::string> arguments{absenc, "monitor", "--json", "--rate", "100", "--for", seconds};
   for (int i = 0; i < count; ++i) arguments.push_back("tformat:" + (folder / std::to_string(i)).string());

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Readings per second through a pseudo-terminal with the whole stack on both sides, compared with a bare loop of ppoll,
-// read and write on both sides: 40 interleaved blocks of each, and a second bare block each time to measure the noise.
+// Measures readings per second through a pseudo-terminal with the whole stack on both sides, compared with a bare loop
+// of ppoll, read and write on both sides: 40 interleaved blocks of each, and a second bare block each time to measure
+// the noise.
 #include <fcntl.h>
 #include <poll.h>
 #include <stdlib.h>
@@ -54,7 +55,8 @@ int open_raw(const char* path) {
   return descriptor;
 }
 
-/// A child process, ended by SIGKILL to its id. `end` returns its user CPU time in seconds.
+/// A child process, which the destructor or `end` ends by SIGKILL to its id. `end` returns its user CPU time in
+/// seconds.
 class Child {
  public:
   explicit Child(const std::function<void()>& body) : pid_(fork()) {
@@ -77,7 +79,7 @@ class Child {
   pid_t pid_;
 };
 
-/// Bare system calls on both sides: the encoder's side in a child, the host's side in this process.
+/// Exchanges by bare system calls: the encoder's side in a child process, the host's side in this process.
 class BareLoop {
  public:
   BareLoop() : master_(open_raw(nullptr)), child_([this] { answer(); }) {
@@ -104,7 +106,7 @@ class BareLoop {
       wait_readable(master_);
       std::array<std::uint8_t, 64> buffer{};
       const ssize_t count = read(master_, buffer.data(), buffer.size());
-      // Until the slave is open, read fails: try again.
+      // Until the host's end of the pseudo-terminal is open, read fails: try again.
       if (count > 0 && write(master_, reply.data(), reply.size()) < 0) _exit(1);
     }
   }
@@ -113,7 +115,8 @@ class BareLoop {
   Child child_;
 };
 
-/// The whole stack: virtual encoder and EmulatorPort in a child, SerialPort and Session in this process.
+/// Exchanges through the whole stack: virtual encoder and EmulatorPort in a child process, SerialPort and Session in
+/// this process.
 class Stack {
  public:
   explicit Stack(std::string link)
@@ -199,7 +202,7 @@ int main(int argc, char** argv) {
   double bare_user = 0;
   double stack_user = 0;
   for (int i = 0; i < blocks; ++i) {
-    // Every second block swaps the order of the bare runs, so that neither always comes first.
+    // Every second block swaps the order of the two bare runs, so that neither always comes first.
     const Block first = run(bare, exchanges);
     const Block measured = run(stack, exchanges);
     const Block second = run(bare, exchanges);

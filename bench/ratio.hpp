@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Google Benchmark with an additional line for each pair NAME and NAME/reference: how many times faster NAME is.
+// Extends Google Benchmark by an additional line for each pair NAME and NAME/reference: how many times faster NAME is.
 #pragma once
 
 #include <benchmark/benchmark.h>
@@ -12,7 +12,7 @@
 
 namespace absenc::bench {
 
-/// Prints the usual table, then the ratios of the medians over all repetitions.
+/// Prints the usual table of results, then the ratios of the medians over all repetitions.
 class RatioReporter : public benchmark::ConsoleReporter {
  public:
   RatioReporter() : ConsoleReporter(isatty(STDOUT_FILENO) != 0 ? OO_ColorTabular : OO_Tabular) {}
@@ -37,7 +37,8 @@ class RatioReporter : public benchmark::ConsoleReporter {
   std::map<std::string, double> medians_;
 };
 
-/// Runs the benchmarks with repetitions interleaved at random, so that changes of the machine's speed affect all alike.
+/// Runs all benchmarks with repetitions interleaved at random, so that changes of the machine's speed affect all alike.
+/// Returns the exit status.
 inline int run_with_ratios(int argc, char** argv) {
   std::vector<std::string> arguments(argv, argv + argc);
   arguments.insert(arguments.begin() + 1, {"--benchmark_enable_random_interleaving=true", "--benchmark_repetitions=9",

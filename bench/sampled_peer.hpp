@@ -11,10 +11,10 @@
 
 namespace absenc::bench {
 
-/// Configuration of the controller.
+/// Configuration of the motor controller's decoder.
 struct SampledPeer {
   unsigned pin;
-  unsigned bits;  // bits of the position, up to 58
+  unsigned bits;  // number of bits of the position, up to 58
 };
 
 struct SampledPosition {
@@ -26,7 +26,7 @@ struct SampledPosition {
 
 namespace detail {
 
-// Remainders of six bits followed by six zeros, for the polynomial x^6 + x + 1.
+// CRC remainders of six bits followed by six zeros, for the polynomial x^6 + x + 1.
 inline constexpr auto six_bits = [] {
   std::array<std::uint8_t, 64> table{};
   for (unsigned value = 0; value < 64; ++value) {
@@ -41,14 +41,15 @@ constexpr std::uint32_t every_byte = 0x0101'0101;
 
 inline std::uint32_t four_samples(const std::uint8_t* samples, unsigned pin) {
   std::uint32_t four = 0;
-  __builtin_memcpy(&four, samples, sizeof four);  // one load instruction, also in a freestanding program
+  __builtin_memcpy(&four, samples, sizeof four);  // a single load instruction, also in a freestanding program
   return four >> pin & every_byte;
 }
 
-// Gathers one bit of each of four bytes by a multiplication; the first byte gives the highest bit.
+// Returns one bit of each of the four bytes in `four`, gathered by a multiplication; the first byte gives the highest
+// bit.
 inline std::uint32_t gathered(std::uint32_t four) { return four * 0x0804'0201 >> 24; }
 
-// Processes six bits per step, in as many steps as 30 or 60 bits need.
+// Returns the CRC of `data`, computed with six bits per step, in as many steps as 30 or 60 bits need.
 inline unsigned checksum(std::uint64_t data, unsigned bits) {
   unsigned rest = 0;
   const auto step = [&](unsigned shift) { rest = six_bits[(data >> shift & 0x3F) ^ rest]; };

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Streams of 10 000 frames per second each, on 1, 4 and 16 pseudo-terminals at once, read in one process with a thread,
-// a serial port and a session for each. No frame may be lost, and the cost per frame must not rise with the number of
-// ports. The sender is a process that writes ten frames to each port every millisecond, in bursts like those of a USB
-// adapter.
+// Measures streams of 10 000 frames per second each, on 1, 4 and 16 pseudo-terminals at once, read in one process with
+// a thread, a serial port and a session for each. No frame may be lost, and the cost per frame must not rise with the
+// number of ports. The sender is a process that writes ten frames to each port every millisecond, in bursts like those
+// of a USB adapter.
 #include <fcntl.h>
 #include <stdlib.h>
 #include <termios.h>
@@ -34,8 +34,8 @@ using namespace absenc::raa38;
 using namespace std::chrono_literals;
 
 constexpr std::array<std::size_t, 3> counts{1, 4, 16};
-constexpr std::uint32_t frames_each = 20'000;  // two seconds of frames per port
-constexpr std::uint32_t together = 10;         // frames per burst, one burst per millisecond
+constexpr std::uint32_t frames_each = 20'000;  // number of frames per port, two seconds of a stream
+constexpr std::uint32_t together = 10;         // number of frames per burst; a burst is sent every millisecond
 constexpr int rounds = 3;
 
 [[noreturn]] void fail(const char* what) {
@@ -55,7 +55,8 @@ struct Terminal {
   std::string path;
 };
 
-// The position counts the frames, so that a missing one is detected. Bytes that a full port refuses are sent later.
+// Sends the streams. The position counts the frames, so that a missing frame is detected. Bytes that a full port
+// refuses are sent later.
 void transmit(const std::vector<Terminal>& terminals) {
   const serial::Format format{.bits = 16};
   std::vector<std::vector<std::uint8_t>> unsent(terminals.size());
@@ -105,7 +106,7 @@ Reader read_stream(const std::string& path, std::atomic<std::size_t>& ready, std
   return reader;
 }
 
-/// Returns the processor time of this process per frame, in microseconds.
+/// Returns the processor time of this process per received frame, in microseconds.
 double measure(std::size_t ports) {
   const std::vector<Terminal> terminals(ports);
   const pid_t child = ::fork();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Unit::decode of every unit, as captures, `decode` and `identify` call it: options, checks, and output of every field.
-// The frames are the unit's valid vectors. Their cost is compared with one CRC over their bytes, computed bit by bit.
+// Measures Unit::decode of every unit, as captures, `decode` and `identify` call it: options, checks, and output of
+// every field. The frames are the unit's valid vectors. The time per frame is compared with that of one CRC over the
+// frame's bytes, computed bit by bit.
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -34,7 +35,7 @@ Options options_of(const Unit& unit, const Vector& vector) {
   return options;
 }
 
-/// A frame in the form of its link, with the data that `frame()` refers to.
+/// A frame of a vector in the form of its link, with the data that `frame()` refers to.
 struct OwnedFrame {
   OwnedFrame(const Unit& unit, Bytes text) : bytes(text.begin(), text.end()) {
     if (unit.link == LinkKind::clocked) {

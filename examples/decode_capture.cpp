@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Prints a capture of a logic analyser as rows: exchanges, fields and errors.
+// Prints a capture of a logic analyser as rows of exchanges, each with its fields or its error.
 #include <cstdio>
 #include <exception>
 

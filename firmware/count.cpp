@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A plugin for QEMU. For each pair of calls of count_begin and count_end it prints the nesting depth and the number of
-// instructions between them. The arguments begin=ADDRESS and end=ADDRESS are the addresses of these functions. Debian's
-// QEMU supports plugins but lacks their header, so the functions in use (interface version 1) are declared here.
+// A plugin for QEMU that counts instructions. For each pair of calls of count_begin and count_end it prints the nesting
+// depth and the number of instructions between the two calls. The arguments begin=ADDRESS and end=ADDRESS are the
+// addresses of these functions. Debian's QEMU supports plugins but lacks their header, so the functions in use
+// (interface version 1) are declared here.
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>

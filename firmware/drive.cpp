@@ -30,7 +30,8 @@ struct Result {
   Reading reading;
 };
 
-// Used by the interrupts: runs one conversation at a time, either a position or a command of the main program.
+// The axis of the drive, used by the interrupts: runs one conversation at a time, either a position or a command of the
+// main program.
 class Axis {
  public:
   explicit Axis(Time latency) : carrier_(*this, latency) {}
@@ -84,7 +85,7 @@ class Axis {
     --count_;
     return true;
   }
-  // Runs a conversation to its end; it then has an error or a result.
+  // Runs a conversation to its end; the conversation then has an error or a result.
   void run(Conversation<std::uint8_t>& conversation) {
     {
       const machine::InterruptLock lock;
@@ -117,7 +118,7 @@ class Axis {
 alignas(Axis) std::byte axis_memory[sizeof(Axis)];
 Axis* axis = nullptr;
 
-// Checks and counts the readings.
+// Checks each reading against the expected position, and counts the readings.
 class ReadingCheck {
  public:
   ReadingCheck(std::uint32_t singleturn, std::uint32_t multiturn) : singleturn_(singleturn), multiturn_(multiturn) {}
@@ -163,7 +164,7 @@ class ReadingCheck {
   std::uint32_t singleturn_;
   std::uint32_t multiturn_;
   std::uint32_t alarms_ = 0;
-  bool known_ = false;  // the last reading was good
+  bool known_ = false;  // the last reading was good, so the next one is compared with it
   std::uint32_t good_ = 0;
   std::uint32_t failed_ = 0;
   std::uint32_t implausible_ = 0;
@@ -184,8 +185,9 @@ void read(ReadingCheck& check, std::uint32_t until) {
   while (axis->take(result)) check.take(result);
 }
 
-// Runs a command of the unit. A command that changes the encoder is never repeated automatically. This program may
-// repeat these commands, because clearing alarms or writing the same byte twice does no harm.
+// Runs a command of the unit and returns whether it succeeded. A command that changes the encoder is never repeated
+// automatically. This program may repeat its commands, because clearing alarms or writing the same byte twice does no
+// harm.
 bool command(std::string_view name, Arguments arguments) {
   alignas(std::max_align_t) static std::array<std::byte, 4096> storage;
   const Unit& unit = tformat::unit;
@@ -210,7 +212,7 @@ bool run() {
   check.alarms_are(tformat::alarms::over_heat);
   read(check, positions / 2);
   const bool cleared = command("clear-alarms", {});
-  constexpr std::array<std::int64_t, 3> written{5, 0x42, 2};  // arguments: address, value, page
+  constexpr std::array<std::int64_t, 3> written{5, 0x42, 2};  // arguments of the command: address, value, page
   const bool stored = command("memory-write", written);
   check.alarms_are(0);
   read(check, positions);

@@ -16,8 +16,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// A long period, because a tick that the emulator delivers too late is lost, with its time. The main program reads the
-// clock instead.
+// The period of the tick is long, because a tick that the emulator delivers too late is lost, with its time. The main
+// program reads the clock instead.
 constexpr Time tick_period = 500ms;
 constexpr tformat::Format format{.singleturn_bits = 17, .multiturn_bits = 16, .encoder_id = 0x11};
 
@@ -46,17 +46,17 @@ class Encoder {
     device_.raise_alarms(tformat::alarms::over_heat);
   }
 
-  // ---- Called by interrupts
+  // ---- Functions called by interrupts
 
   void start(Time now) { carrier_.start(device_, now); }
   void tick(Time now) { carrier_.tick(now); }
   void received(std::uint8_t byte, Time now) { carrier_.received({&byte, 1}, now); }
   void sent(Time now) { carrier_.sent(now); }
 
-  // ---- Called by the carrier
+  // ---- Functions called by the carrier
 
-  // Copies the reply, because the device overwrites its own when a host sends during the reply, in violation of the
-  // document.
+  // Starts to send a reply. It copies the reply, because the device overwrites its own buffer when a host sends during
+  // the reply, in violation of the document.
   void begin(const ByteStep& step) {
     reply_.clear();
     reply_.append(step.out);
@@ -64,7 +64,7 @@ class Encoder {
   }
   void result(bool) {}
 
-  // ---- Called by the main program
+  // ---- Functions called by the main program
 
   [[nodiscard]] bool is_at_rest() const { return carrier_.due() == never; }
   [[nodiscard]] std::uint32_t broken_rules() const { return device_.violation_count(); }
@@ -106,7 +106,8 @@ int main() {
   for (std::uint32_t reported = 0;;) {
     const machine::InterruptLock lock;
     encoder->tick(machine::now());
-    // An interrupt that is pending ends `wfi` at once. A busy loop would keep the emulator from its socket.
+    // Waits for an interrupt; a pending interrupt ends `wfi` at once. A busy loop would keep the emulator from its
+    // socket.
     if (encoder->is_at_rest()) asm volatile("wfi");
     if (encoder->broken_rules() == reported) continue;
     reported = encoder->broken_rules();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decodes every vector of every unit on the machine, both the units' own and those of tests/*.json, and compares fields
-// and errors.
+// Decodes every vector of every unit on the machine, both the units' own vectors and those of tests/*.json, and
+// compares fields and errors.
 #include <algorithm>
 #include <array>
 
@@ -14,7 +14,8 @@ namespace {
 
 using machine::print;
 
-// Returns the part of `text` before `end`, and removes both from `text`. Does not use substr(), which may throw.
+// Returns the part of `text` before `end`, and removes that part and `end` from `text`. Does not use substr(), which
+// may throw.
 std::string_view cut(std::string_view& text, char end) {
   const std::size_t size = std::min(text.find(end), text.size());
   const std::string_view front(text.data(), size);
@@ -22,7 +23,7 @@ std::string_view cut(std::string_view& text, char end) {
   return front;
 }
 
-// Resolves options from a text "name=value name=value".
+// Resolves options from a text "name=value name=value"; returns false if one is invalid.
 bool resolve(const Unit& unit, std::string_view text, Options& options) {
   Buffer<OptionText, maximum_options> settings;
   while (!text.empty()) {
@@ -45,7 +46,8 @@ class ReferenceCheck final : public FieldSink {
       if (!matches(one, value)) wrong_ = true;
     }
   }
-  // Returns whether all expected fields matched. An empty text may be missing.
+  // Returns whether all expected fields had their expected value. A field that is expected as an empty text may be
+  // missing.
   [[nodiscard]] bool all() const {
     const auto needed = std::count_if(expected_.begin(), expected_.end(), [](const ExpectedField& one) {
       return one.kind != ExpectedField::Kind::text || !one.text.empty();

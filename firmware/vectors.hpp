@@ -15,15 +15,15 @@ struct ExpectedField {
   enum class Kind : std::uint8_t { number, real, text, names } kind;
   std::string_view field;
   std::int64_t number;
-  double real;            // expected number, also for a whole one
-  std::string_view text;  // flag names separated by blanks; bytes in hexadecimal
+  double real;            // expected number, also if it is whole
+  std::string_view text;  // expected flag names separated by blanks, or bytes in hexadecimal
 };
 
 struct ReferenceVector {
   std::string_view unit;
   std::string_view id;
   std::string_view options;  // options: "name=value name=value"
-  Bytes request;             // request; clocked and CAN links: its text
+  Bytes request;             // bytes of the request; on clocked and CAN links the bytes of its text
   Bytes reply;
   std::span<const ExpectedField> fields;
   Error error;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Hookup for a CAN controller with a receive FIFO and a transmit mailbox.
+// A hookup of the library to a CAN controller with a receive FIFO and a transmit mailbox.
 #pragma once
 
 #include <optional>
@@ -23,7 +23,7 @@ class CanFifo {
   void start(Machine<CanFrame>& machine, Time now) { carrier_.start(machine, now); }
   [[nodiscard]] bool is_busy() const { return carrier_.is_busy(); }
 
-  // ---- Interrupts; a common handler of both calls `transmitted` first
+  // ---- Functions that interrupts call; if one handler serves both, it calls `transmitted` before `pending`
 
   void tick(Time now) { carrier_.tick(now); }
   void transmitted(Time now) {
@@ -36,7 +36,7 @@ class CanFifo {
     while (const std::optional<CanFrame> frame = hardware_->take()) carrier_.received({&*frame, 1}, now);
   }
 
-  // ---- Called by the carrier
+  // ---- Functions that the carrier calls
 
   void begin(const Step<CanFrame>& step) {
     if (step.kind == Step<CanFrame>::Kind::configure) return hardware_->set_rate(step.rate);

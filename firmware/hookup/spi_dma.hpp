@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Hookup for an SPI controller with DMA that reads BiSS or SSI. It clocks whole bytes; the frame is a part of their
-// bits.
+// A hookup of the library to an SPI controller with DMA that reads BiSS or SSI. The controller clocks whole bytes; the
+// frame is a part of their bits.
 #pragma once
 
 #include <algorithm>
@@ -28,9 +28,9 @@ class SpiDma {
   void start(Machine<std::uint8_t>& machine, Time now) { carrier_.start(machine, now); }
   [[nodiscard]] bool is_busy() const { return carrier_.is_busy(); }
 
-  // ---- Interrupts
+  // ---- Functions that interrupts call
 
-  // The encoder's timeout must expire before the next clock; the carrier delays the transfer until then.
+  // Lets the carrier start a transfer that it delays: the encoder's timeout must expire before the next clock.
   void tick(Time now) { carrier_.tick(now); }
   void done(Time now) {
     align();
@@ -38,7 +38,7 @@ class SpiDma {
     carrier_.received(Bytes(buffer_).first((bits_ + 7) / 8), now);
   }
 
-  // ---- Called by the carrier
+  // ---- Functions that the carrier calls
 
   void begin(const ByteStep& step) {
     if (step.kind == ByteStep::Kind::configure) return hardware_->set_rate(step.rate);

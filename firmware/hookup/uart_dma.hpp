@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Hookup for a UART with DMA and an idle-line interrupt, behind an RS-485 transceiver.
+// A hookup of the library to a UART with DMA and an idle-line interrupt, behind an RS-485 transceiver.
 #pragma once
 
 #include <algorithm>
@@ -24,23 +24,24 @@ namespace absenc::firmware {
 template <class Hardware>
 class UartDma {
  public:
-  /// `latency`: the idle time of one character, plus the period of the timer's tick.
+  /// `latency`: the idle time of one character, plus the period of the timer's tick. `hardware` must outlive this
+  /// object.
   UartDma(Hardware& hardware, Time latency) : hardware_(&hardware), carrier_(*this, latency) {}
 
   /// Starts a conversation. Call it in the context of the interrupts, for example from a timer of the same priority.
   void start(Machine<std::uint8_t>& machine, Time now) { carrier_.start(machine, now); }
   [[nodiscard]] bool is_busy() const { return carrier_.is_busy(); }
 
-  // ---- Interrupts
+  // ---- Functions that interrupts call
 
   void tick(Time now) { carrier_.tick(now); }
-  // Receiving starts before the line is released, because the first character may follow after 3 us.
+  // Receiving starts before the driver releases the line, because the first character may follow after 3 us.
   void transmission_complete(Time now) {
     arm(expected_);
     hardware_->drive(false);
     carrier_.sent(now);
   }
-  // More bytes may follow at once, so the other buffer is ready before this one is evaluated.
+  // More bytes may follow at once, so the other buffer is made ready before the received bytes are evaluated.
   void arrived(Time now) {
     const MutableBytes buffer = buffers_[current_];
     const std::size_t count = hardware_->stop_receiving();
@@ -50,7 +51,7 @@ class UartDma {
   }
   void line_error(Time now) { carrier_.line_error(now); }
 
-  // ---- Called by the carrier
+  // ---- Functions that the carrier calls
 
   void begin(const ByteStep& step) {
     if (step.kind == ByteStep::Kind::configure) return hardware_->set_rate(step.rate);
@@ -62,7 +63,8 @@ class UartDma {
   void result(bool) {}
 
  private:
-  // Starts receiving `count` bytes, so that the last byte of the reply calls `arrived`; 0: until the line is idle.
+  // Starts receiving `count` bytes, so that the last byte of the reply calls `arrived`; for 0, receiving lasts until
+  // the line is idle.
   void arm(std::size_t count) {
     const MutableBytes buffer = buffers_[current_];
     hardware_->receive(count == 0 ? buffer : buffer.first(std::min(count, buffer.size())));

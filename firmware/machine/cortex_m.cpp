@@ -27,7 +27,7 @@ constexpr auto filled = []<std::size_t count>(std::array<void (*)(), count> all,
   return all;
 };
 
-// Only the UART has its device interrupts enabled.
+// Interrupt vectors. Of the devices, only the UART has its interrupts enabled.
 [[gnu::section(".vectors"), gnu::used]] const Vectors vectors{
     &stack_top, start, filled(std::array<void (*)(), 13>{}, fault), tick, filled(std::array<void (*)(), 32>{}, uart)};
 
@@ -50,7 +50,7 @@ constexpr std::uint32_t tick_is_pending = 1u << 26;
 
 std::uint32_t counts_of_period = 0;
 Time period_of_ticks{};
-Time begin_of_tick{};  // start of the current period; written by the tick only
+Time begin_of_tick{};  // start of the current period; written by the tick's interrupt only
 }  // namespace
 
 void start_clock(Time period) {
@@ -58,7 +58,7 @@ void start_clock(Time period) {
   counts_of_period = static_cast<std::uint32_t>(period.count()) / frequency.nanoseconds * frequency.counts;
   register_at(reload) = counts_of_period - 1;
   register_at(value) = 0;
-  register_at(control) = 7;  // clock of the processor, interrupts enabled
+  register_at(control) = 7;  // clock of the processor, counter and its interrupt enabled
 }
 
 Time now() {

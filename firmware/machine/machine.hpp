@@ -12,10 +12,10 @@
 
 namespace absenc::machine {
 
-/// Prints on the emulator's terminal; numbers are decimal.
+/// Prints a text or a decimal number on the emulator's terminal.
 void print(std::string_view text);
 void print(std::uint64_t number);
-/// Ends the emulator with status 0 or 1.
+/// Ends the emulator with status 0 if `good`, otherwise 1.
 [[noreturn]] void end(bool good);
 /// Returns the number in the emulator's argument `index`, where 0 is the first after the program's name; `otherwise` if
 /// it is missing.
@@ -26,9 +26,9 @@ void start_clock(Time period);
 /// Returns the time since `start_clock`, with a resolution below one microsecond. Interrupts may call it, too.
 [[nodiscard]] Time now();
 
-/// Starts the UART: `on_received` and `on_sent` are called from now on.
+/// Starts the UART: from now on it calls `on_received` and `on_sent`.
 void start_uart();
-/// Sends by interrupts; `bytes` must stay valid until `on_sent`.
+/// Sends `bytes` by interrupts; they must stay valid until `on_sent` is called.
 void send(Bytes bytes);
 
 /// Returns the largest size of the stack since `paint_stack`, in bytes.
@@ -36,7 +36,7 @@ void send(Bytes bytes);
 /// Restarts the measurement of `stack_used`.
 void paint_stack();
 
-/// Disables interrupts while an object exists.
+/// Disables interrupts while an object of this class exists.
 class InterruptLock {
  public:
   InterruptLock() { asm volatile("cpsid i" : : : "memory"); }
@@ -45,19 +45,19 @@ class InterruptLock {
   InterruptLock& operator=(const InterruptLock&) = delete;
 };
 
-// ---- Provided by the program; all interrupts have one priority, so none interrupts another
+// ---- Functions that the program provides; all interrupts have one priority, so none interrupts another
 
 void on_tick();
 void on_received(std::uint8_t byte);
-/// Called when the last bit of `send` is on the line.
+/// Called when the last bit of the bytes given to `send` is on the line.
 void on_sent();
 
-// ---- Provided by the machine: cortex_m.cpp with microbit.cpp or mps2.cpp; virt.cpp provides only the first function
+// ---- Functions that the machine provides: cortex_m.cpp with microbit.cpp or mps2.cpp; virt.cpp has only the first one
 
-/// Calls the emulator's semihosting service `number`.
+/// Calls the emulator's semihosting service `number` and returns its result.
 std::uint32_t call_emulator(std::uint32_t number, const void* parameter);
 
-/// Frequency of SysTick's clock.
+/// Frequency of the clock that SysTick counts, in hertz and as a number of counts per time.
 struct Frequency {
   std::uint32_t hertz;
   std::uint32_t nanoseconds;  // time that `counts` counts take
@@ -66,7 +66,7 @@ struct Frequency {
 extern const Frequency frequency;
 void handle_uart();
 
-/// Returns a register of the machine.
+/// Returns a reference to the machine's register at `address`.
 inline volatile std::uint32_t& register_at(std::uint32_t address) {
   return *reinterpret_cast<volatile std::uint32_t*>(address);
 }

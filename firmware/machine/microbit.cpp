@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The micro:bit: Cortex-M0, nRF51822 (UART: nRF51 Series Reference Manual, 29). The real part has no SysTick; the
-// emulated one has, at 16 MHz.
+// The machine micro:bit: Cortex-M0, nRF51822 (UART: nRF51 Series Reference Manual, 29). The real part has no SysTick;
+// the emulated one has, at 16 MHz.
 #include "firmware/machine/machine.hpp"
 
 namespace absenc::machine {
@@ -12,7 +12,7 @@ constexpr std::uint32_t start_receiver = uart + 0x000, start_transmitter = uart 
                         data_in = uart + 0x518, data_out = uart + 0x51C, set_enable = 0xE000'E100;
 constexpr std::uint32_t received_bit = 1u << 2, sent_bit = 1u << 7, uart_number = 2;
 
-Bytes unsent{};  // unsent bytes; the first one is in the transmitter
+Bytes unsent{};  // bytes whose transmission has not ended; the first one is in the transmitter
 }  // namespace
 
 const Frequency frequency{16'000'000, 125, 2};
@@ -31,8 +31,8 @@ void send(Bytes bytes) {
 }
 
 void handle_uart() {
-  // A late handler finds both events and must handle the end of transmission first. The receiver's state is read before
-  // that, because a byte that is received later may be the reply to the next byte that is sent.
+  // A late interrupt handler finds both events and must handle the end of transmission first. The receiver's state is
+  // read before that, because a byte that is received later may be the reply to the next byte that is sent.
   const bool has_received = register_at(received) != 0;
   while (register_at(sent) != 0) {
     register_at(sent) = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// ARM's MPS2 boards with the images AN385 (Cortex-M3) and AN386 (Cortex-M4F), and their CMSDK UART.
+// The machines MPS2 of ARM with the images AN385 (Cortex-M3) and AN386 (Cortex-M4F), and their CMSDK UART.
 #include "firmware/machine/machine.hpp"
 
 namespace absenc::machine {
@@ -11,7 +11,7 @@ constexpr std::uint32_t data = uart, state = uart + 0x04, control = uart + 0x08,
 constexpr std::uint32_t receiver_is_full = 2, sent_bit = 1, received_bit = 2;
 constexpr std::uint32_t receiver_number = 0, transmitter_number = 1;
 
-Bytes unsent{};  // unsent bytes; the first one is in the transmitter
+Bytes unsent{};  // bytes whose transmission has not ended; the first one is in the transmitter
 }  // namespace
 
 const Frequency frequency{25'000'000, 40, 1};
@@ -28,8 +28,8 @@ void send(Bytes bytes) {
 }
 
 void handle_uart() {
-  // A late handler finds both events and must handle the end of transmission first. The receiver's state is read before
-  // that, because a byte that is received later may be the reply to the next byte that is sent.
+  // A late interrupt handler finds both events and must handle the end of transmission first. The receiver's state is
+  // read before that, because a byte that is received later may be the reply to the next byte that is sent.
   for (;;) {
     const bool has_received = (register_at(state) & receiver_is_full) != 0;
     while ((register_at(pending) & sent_bit) != 0) {

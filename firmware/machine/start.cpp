@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Start-up from reset to main. On a real part, its own start-up code replaces this file.
+// Start-up of a program from reset to main. On a real part, the part's own start-up code replaces this file.
 #include "firmware/machine/machine.hpp"
 
 int main();
@@ -39,7 +39,7 @@ void* __dso_handle = nullptr;
 [[noreturn]] void __cxa_pure_virtual() { fault(); }
 }
 
-// Defaults for programs without interrupts.
+// Default functions for programs without interrupts.
 namespace absenc::machine {
 [[gnu::weak]] void on_tick() {}
 [[gnu::weak]] void on_received(std::uint8_t) {}

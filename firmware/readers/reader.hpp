@@ -12,7 +12,7 @@
 #include "absenc/link/step.hpp"
 #include "firmware/machine/machine.hpp"
 
-// Marks: the instructions between these calls are counted. They must not be inlined.
+// Functions that mark code: the instructions between their calls are counted. They must not be inlined.
 extern "C" {
 [[gnu::noinline]] inline void count_begin() { asm volatile(""); }
 [[gnu::noinline]] inline void count_end() { asm volatile(""); }
@@ -55,8 +55,8 @@ bool converse(Reader& reader, std::span<const Item> reply, Delivery delivery) {
   return false;
 }
 
-/// Measures, then ends the emulator, with status 0 if a position was read. `by_character`: also measures a line whose
-/// interrupts deliver single characters.
+/// Measures a reader, then ends the emulator, with status 0 if a position was read. `by_character`: also measures a
+/// line whose interrupts deliver single characters.
 template <class Item, class Reader, class... Parameters>
 [[noreturn]] void run(std::span<const Item> reply, bool by_character, const Parameters&... parameters) {
   alignas(Reader) static std::byte memory[sizeof(Reader)];

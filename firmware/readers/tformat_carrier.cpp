@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// T-format as in tformat.cpp, but through the carrier that firmware calls from its interrupts.
+// Reads T-format like tformat.cpp, but through the carrier that firmware calls from its interrupts.
 #include <array>
 
 #include "absenc/host/carrier.hpp"
@@ -17,7 +17,7 @@ using Carrier = host::Carrier<std::uint8_t, Line>;
 
 constexpr auto reply = std::to_array<std::uint8_t>({0x1A, 0x00, 0x45, 0x23, 0x01, 0x11, 0x34, 0x12, 0x00, 0x00, 0x4A});
 
-// Represents an interrupt handler, whose character is in a register.
+// Stands in for an interrupt handler, which gets the received character in a register.
 [[gnu::noinline]] void interrupt(Carrier& carrier, std::uint8_t character, Time now) {
   carrier.received({&character, 1}, now);
 }

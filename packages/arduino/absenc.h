@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Header that a sketch includes first, followed by the headers of its encoder, such as
+// Header that an Arduino sketch includes first, followed by the headers of its encoder, such as
 // "absenc/protocol/tformat/host.hpp".
 #pragma once
 

@@ -18,13 +18,14 @@ namespace absenc::python {
 
 namespace py = pybind11;
 
-/// Checks whether a Python signal handler has raised an exception, during waits without the GIL. Python runs handlers
-/// in its main thread only, so `wants_end` is always false in other threads.
+/// An object that checks whether a Python signal handler has raised an exception, during waits without the GIL. Python
+/// runs handlers in its main thread only, so `wants_end` is always false in other threads.
 class SignalWatch {
  public:
-  /// Returns whether the wait must end. Checks at most every 20 ms. Call it without the GIL.
+  /// Returns whether a signal handler has raised an exception, so that the wait must end. Checks at most every 20 ms.
+  /// Call it without the GIL.
   [[nodiscard]] bool wants_end();
-  /// Throws the exception that the handler raised, if any. Call it with the GIL.
+  /// Throws the exception that the signal handler raised, if any. Call it with the GIL.
   void rethrow();
 
  private:
@@ -35,16 +36,16 @@ class SignalWatch {
 /// Registers the conversion of the library's exceptions to classes of absenc.errors.
 void register_exceptions();
 
-/// Returns the exception object of absenc.errors for a failed command.
+/// Returns an exception object of absenc.errors that describes a failed command.
 [[nodiscard]] py::object error_object(const client::Trouble& trouble);
 
-/// Converts numbers, texts and bytes; flags become a tuple of names; missing, invalid and unreported values become
-/// None.
+/// Converts a value to Python: numbers, texts and bytes; flags become a tuple of names; missing, invalid and unreported
+/// values become None.
 [[nodiscard]] py::object to_python(const client::Value& value);
-/// Returns the values as a dict by column name.
+/// Returns the values of an answer as a dict by column name.
 [[nodiscard]] py::dict to_python(const client::Answer& answer);
 [[nodiscard]] py::dict to_python(const std::vector<client::Column>& columns, const std::vector<client::Value>& values);
-/// Returns the names of the raised flags of all channels.
+/// Returns the names of the flags that are set, of all channels.
 [[nodiscard]] py::list names_of(const std::vector<client::Flags>& flags);
 
 [[nodiscard]] inline py::bytes to_bytes(Bytes bytes) {

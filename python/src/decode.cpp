@@ -21,7 +21,7 @@ using client::Column;
 using client::ColumnType;
 using client::Value;
 
-/// The values of one column. They are stored without the GIL and converted with it.
+/// The values of one column. They are collected without the GIL, and converted to NumPy with it.
 struct Values {
   explicit Values(ColumnType of_type) : type(of_type) {}
 
@@ -78,7 +78,7 @@ struct Values {
     return objects();
   }
 
-  // Creates one Python object for repeated values, such as most requests and texts.
+  // Returns the values as Python objects, with one object for repeated values, such as most requests and texts.
   [[nodiscard]] py::object objects() const {
     py::list list(ends.size());
     std::unordered_map<std::string_view, py::object> known;
@@ -130,7 +130,7 @@ class Rows {
   Rows(const std::string& path, const std::string& unit, const client::DecodeChoices& choices)
       : decoded_(path, unit, choices) {}
 
-  /// Returns (name, unit, dtype, meaning) of each column.
+  /// Returns a tuple (name, unit, dtype, meaning) for each column.
   [[nodiscard]] py::list columns() const {
     py::list list;
     for (const Column& column : decoded_.columns()) {
@@ -140,7 +140,7 @@ class Rows {
     return list;
   }
 
-  /// Returns (values, missing) of each column; None at the end.
+  /// Returns a tuple (values, missing) for each column, with at most `most` rows; None at the end of the capture.
   py::object take(std::size_t most) {
     std::vector<Values> columns;
     for (const Column& column : decoded_.columns()) columns.emplace_back(column.type);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Binds virtual encoders.
+// Binds virtual encoders to Python.
 #include "absenc/client/emulate.hpp"
 
 #include "python/src/bind.hpp"

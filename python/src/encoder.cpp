@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Binds an open encoder.
+// Binds an open encoder to Python.
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
@@ -18,7 +18,7 @@ namespace absenc::python {
 
 namespace {
 
-/// Replies to a scan: each record starts with the field that identifies the encoder.
+/// Collects the replies to a scan: each record starts with the field that identifies the encoder.
 struct ScanReplies final : FieldSink {
   void put(const FieldValue& value) override {
     if (value.info->role == Role::encoder || all.empty()) all.emplace_back();
@@ -38,10 +38,10 @@ struct Closed : client::UsageError {
   Closed() : UsageError("this encoder is closed: open it again") {}
 };
 
-/// An encoder for any Python thread. Threads take turns and wait without the GIL.
+/// An encoder that any Python thread may use. Threads take turns and wait without the GIL.
 class PyEncoder {
  public:
-  /// Calls `work` with the encoder, without the GIL; the result of `work` must not contain Python objects.
+  /// Calls `work` with the encoder, without the GIL, and returns its result, which must not contain Python objects.
   template <class Work>
   auto use(const Work& work) {
     try {
@@ -67,7 +67,7 @@ class PyEncoder {
   void check() { watch_.rethrow(); }
 
   void close() {
-    encoder_.cancel();  // allowed from any thread: ends the waits
+    encoder_.cancel();  // ends the waits of the encoder; allowed from any thread
     const py::gil_scoped_release released;
     const std::lock_guard lock(mutex_);
     if (!std::exchange(closed_, true)) encoder_.disconnect();
@@ -120,13 +120,13 @@ class PySamples {
 std::int64_t whole_number(const Argument& argument, const py::handle& value) {
   try {
     return py::cast<std::int64_t>(value);
-  } catch (const py::cast_error&) {  // not a number, or more than 64 bits
+  } catch (const py::cast_error&) {  // the value is not a number, or has more than 64 bits
     throw client::UsageError(std::string(argument.name) + " is " + std::string(py::repr(value)) +
                              ", but must be a whole number of up to 64 bits");
   }
 }
 
-/// Returns the arguments in the order of the command; missing ones have their defaults.
+/// Returns the arguments in the order of the command; missing arguments have their defaults. Throws UsageError.
 std::vector<std::int64_t> arguments_of(const Command& command, const py::args& args, const py::kwargs& named) {
   std::vector<std::int64_t> values;
   if (args.size() > command.arguments.size()) {
@@ -218,8 +218,8 @@ py::bytes memory_read(PyEncoder& encoder, std::uint32_t address, std::uint32_t c
   client::MemoryImage wanted;
   for (std::uint32_t i = 0; i < count; ++i) {
     const client::MemoryAddress at{page, address + i};
-    client::require_open(unit, {{at, 0}}, client::MemoryAccess::read);  // each address separately, because `count` may
-                                                                        // be very large
+    client::require_open(unit, {{at, 0}}, client::MemoryAccess::read);  // each address is checked separately, because
+                                                                        // `count` may be very large
     wanted[at] = 0;
   }
   const client::MemoryImage image = encoder.use([&](client::Encoder& one) { return one.memory().read(wanted); });

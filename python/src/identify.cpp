@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Binds the identification of an encoder on a line.
+// Binds the identification of an encoder on a line to Python.
 #include "absenc/client/identify.hpp"
 
 #include "absenc/os/signals.hpp"
@@ -30,7 +30,8 @@ py::tuple to_tuple(const client::Identified& identified) {
   return py::make_tuple(found, identified.notes, identified.is_complete);
 }
 
-/// A Python signal handler may end the search between two attempts.
+/// Searches the line and returns the result as a tuple. A Python signal handler may end the search between two
+/// attempts.
 py::tuple identify(const std::string& place, double limit_s) {
   SignalWatch watch;
   try {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Binds the descriptions of protocols, their codecs, and CRCs.
+// Binds the descriptions of protocols, their codecs, and CRCs to Python.
 #include <pybind11/numpy.h>
 
 #include <algorithm>
@@ -17,7 +17,7 @@ namespace absenc::python {
 
 namespace {
 
-/// Converts a frame from bytes or text; an empty object is no frame.
+/// Returns a frame converted from bytes or text; an empty frame for an empty object. Throws UsageError.
 client::WireFrame frame_of(LinkKind link, const char* what, const py::object& object) {
   if (py::len(object) == 0) return {};
   if (py::isinstance<py::str>(object)) return client::parse_wire_text(link, what, py::cast<std::string>(object));
@@ -138,7 +138,7 @@ std::vector<std::string> error_names() {
   return names;
 }
 
-/// Returns one CRC for each row.
+/// Returns an array with the CRC of each row.
 py::array_t<std::uint16_t> crc(const py::array_t<std::uint8_t, py::array::c_style | py::array::forcecast>& rows,
                                unsigned width, std::uint16_t poly, std::uint16_t init, bool refin, bool refout,
                                std::uint16_t xorout) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Python views of a reading and of a sample.
+// Classes that present a reading and a sample to Python.
 #pragma once
 
 #include <algorithm>
@@ -40,7 +40,7 @@ struct PyReading {
   }
   [[nodiscard]] py::object alarms() const { return names_or_none(client::alarms_of(*unit, reading)); }
   [[nodiscard]] py::object status() const { return names_or_none(client::status_of(*unit, reading)); }
-  // Returns None if no flag is raised but not all flags are reported.
+  // Returns the names of the raised flags; None if no flag is raised but not all flags are reported.
   [[nodiscard]] static py::object names_or_none(const std::vector<client::Flags>& channels) {
     const py::list names = names_of(channels);
     const bool is_complete = !channels.empty() && std::all_of(channels.begin(), channels.end(),

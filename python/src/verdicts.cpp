@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Binds doctor, conform and probe, and the ports of this computer, with results as JSON, so that their texts are those
-// of the command; and waveforms.
+// Binds doctor, conform and probe, the ports of this computer, and waveforms to Python. Results are JSON, so that their
+// texts are those of the command.
 #include "absenc/client/captures/probe.hpp"
 #include "absenc/client/conform/conform_text.hpp"
 #include "absenc/client/doctor/examine.hpp"
@@ -17,7 +17,8 @@ using SettingTexts = std::vector<std::string>;
 
 Time duration_of(double seconds) { return std::chrono::duration_cast<Time>(std::chrono::duration<double>(seconds)); }
 
-/// Runs `work` without the GIL. `work` gets a function that returns whether a Python signal handler wants to end it.
+/// Runs `work` without the GIL and returns its result. `work` gets a function that returns whether a Python signal
+/// handler wants to end it.
 template <class Work>
 std::string watched(const Work& work) {
   SignalWatch watch;

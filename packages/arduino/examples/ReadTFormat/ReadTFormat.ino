@@ -7,10 +7,11 @@
 
 using namespace absenc;
 
-constexpr int direction_pin = 2;              // DE and /RE of the transceiver; high: transmit
-constexpr std::uint32_t period_us = 10'000;   // time between two readings
-constexpr std::uint32_t fastest_rpm = 6'000;  // highest speed of the axis
-constexpr Time latency = std::chrono::milliseconds(2);  // greatest delay by loop() and the port's buffers
+constexpr int direction_pin = 2;                        // DE and /RE of the transceiver; high: transmit
+constexpr std::uint32_t period_us = 10'000;             // time between two readings
+constexpr std::uint32_t fastest_rpm = 6'000;            // highest speed of the axis
+constexpr Time latency = std::chrono::milliseconds(2);  // greatest delay between line and program, by loop() and the
+                                                        // port's buffers
 
 constexpr tformat::Format format{.singleturn_bits = 17, .multiturn_bits = 16, .encoder_id = 0x11};
 
@@ -22,7 +23,7 @@ struct SerialLine {
   void begin(const ByteStep& step) {
     digitalWrite(direction_pin, HIGH);
     Serial1.write(step.out.data(), step.out.size());
-    Serial1.flush();  // waits until the last bit is sent
+    Serial1.flush();  // waits until the last bit of the request is sent
     digitalWrite(direction_pin, LOW);
     was_sent = true;
   }
