@@ -67,7 +67,7 @@ class NamedCommands(unittest.TestCase):
             for text in literals(source):
                 rest = re.sub(r"`[^`]*(`|$)", "", text)
                 if text.startswith("sudo "):
-                    continue  # the text is only an example command
+                    continue  # a text that is only an example command
                 with self.subTest(f"{source.relative_to(ROOT)}: {text}"):
                     self.assertNotRegex(rest, r"\bsudo \w")
 

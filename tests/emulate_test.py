@@ -242,7 +242,7 @@ class DataIds(EmulateCase):
         client.write_memory(5, 0x5A)
         reply = client.write_memory(6, 0x77)
         client.wait_until_written(5)
-        if reply[1] & 0x80:  # the encoder is still busy, unless this machine took more than 18 ms
+        if reply[1] & 0x80:  # the EEPROM is still busy, unless this machine took more than 18 ms
             self.assertEqual(reply[2], 0)
             self.assertEqual(client.read_memory(6), (False, 0))
 
@@ -277,7 +277,7 @@ class DataIds(EmulateCase):
         client.send([0xEA, 5, 0])  # a request with a wrong CRC
         self.assertEqual(client.receive(11), everything)
         self.assertEqual(client.exchange(0x6, 127, 6, length=11), everything)  # a write to a closed page
-        client.send([0xEA])  # a truncated request
+        client.send([0xEA])  # a request that ends after its first byte
         self.assertEqual(client.receive(11), everything)
         client.send([0x19, 0x1A])  # a byte that is no sync code precedes a request
         self.assertEqual(client.receive(12, patience=0.05), everything)
@@ -611,7 +611,7 @@ class SerialPort(EmulateCase):
         for _ in range(4):
             reply = client.exchange(0)
             self.assert_reply(reply, 0, 0, [0xE8, 0x03, 0])
-            client.send(reply)  # this reply begins with a byte that also begins a request
+            client.send(reply)  # a reply that begins with the first byte of a request
         _, _, err = emulator.end()
         self.assertIn("4 requests answered", err)
         self.assertNotIn("rules", err)
@@ -844,7 +844,8 @@ class MemoryFile(EmulateCase):
     def test_lock_survives_save_and_ends_with_emulator(self):
         with Emulator(self.directory, "--memory", self.file("memory")) as emulator:
             with Client.open(emulator.path) as client:
-                client.write_memory(0, 0xAB)  # the emulator saves its memory by replacing the file
+                # The emulator saves its memory in a new file, which replaces the memory file.
+                client.write_memory(0, 0xAB)
                 client.wait_until_written(0)
             result = absenc("emulate", "tformat", "--memory", self.file("memory"), "--for", "60")
             self.assert_failed(result, "another emulator keeps its memory")

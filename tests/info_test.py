@@ -144,7 +144,7 @@ class Alarms(EncoderCase):
             "  battery_alarm: the battery is below 3.1 V. What to do: replace the battery with the encoder switched on; "
             "without a battery set battery=false\n"
             "status:\n"
-            # the text omits the advice of the status to read the alarms
+            # The output of `alarms` omits the status's advice to read the alarms.
             "  alarm: over-heat, multi-turn error, battery error or battery alarm\n")
 
     def test_status_refers_to_alarms_only_if_not_shown(self):

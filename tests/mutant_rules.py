@@ -37,7 +37,7 @@ ASSIGNMENT = {"=", "+=", "-=", "*=", "/=", "%=", "&=", "|=", "^=", "<<=", ">>="}
 # Tokens that end an operand of `&&` or `||`.
 ENDS_OPERAND = {";", ",", "?", ":", "return", "co_return", "case", "else"} | ASSIGNMENT
 COARSE = {"never", "skip", "half", "twice", "zero", "ten"}
-ARITHMETIC = {"bit", "shift", "sign"}  # rules of which only one mutant is made for a line, which represents the others
+ARITHMETIC = {"bit", "shift", "sign"}  # rules on arithmetic, of which at most one mutant is made for a line
 EDGE = {"<": "<=", "<=": "<", ">": ">=", ">=": ">"}
 REFUSES = re.compile(r"fail|failed|refuse\w*|reject\w*|settle\w*")
 NOTHING = {"returnfalse;", "returnstd::nullopt;", "returnnullptr;", "return{};", "std::nullopt", "nullptr"}

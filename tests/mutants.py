@@ -119,7 +119,8 @@ class Tree:
 
     def prepare(self):
         self.source.mkdir(parents=True, exist_ok=True)
-        self.lock = open(self.source.parent / "lock", "w", encoding="utf-8")  # the lock is held until this process ends
+        # File lock on this copy of the sources, held until this process ends.
+        self.lock = open(self.source.parent / "lock", "w", encoding="utf-8")
         try:
             fcntl.flock(self.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:

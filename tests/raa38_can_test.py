@@ -99,7 +99,7 @@ class CanBus(Case):
         self.assertEqual(self.singleturn(address), 0)
         # Nothing is written, because the position is zero already.
         self.assertFalse(self.fields("zero", address, "--yes")["written"])
-        # The node sends cyclic frames again, as before the command.
+        # After the zero command the node sends cyclic frames again.
         self.assertEqual(self.singleturn(address + "&listen=true"), 0)
         self.assert_no_rule_broken()
         again = self.emulator("--singleturn", "5010", "--memory", memory, name="again")
@@ -118,7 +118,7 @@ class CanBus(Case):
         again = absenc("config", "set", address + "&node=0x42", "node", "0x42", "--yes")
         self.assert_good(again)
         self.assertIn("nothing was sent, because it is so already", again.stderr)
-        self.assert_no_rule_broken()  # the node reports a rule violation if a setting is written twice
+        self.assert_no_rule_broken()  # the summary shows a rule violation if the host wrote a setting twice
 
     def test_force_writes_node_again(self):
         address = self.bus()
@@ -221,7 +221,7 @@ class CanBus(Case):
         """Garbage, and commands of another program, arrive at the adapter while absenc uses it."""
         address = self.bus("--singleturn", "9799")
         with open(self.node.path, "wb", buffering=0) as other:
-            other.write(b"garbage\rt22")  # the other program sends garbage and an incomplete command
+            other.write(b"garbage\rt22")  # another program sends garbage and an incomplete adapter command
         self.assertEqual(self.singleturn(address), 9799)
 
     def test_bench(self):

@@ -288,7 +288,7 @@ class Frames(ModbusCase):
     def test_silence_and_noise(self):
         with FakeEncoder({0x01: b""}) as encoder:
             self.assert_failed(absenc("read", f"raa38-modbus:{encoder.path}"), "timeout", "nobody answers", "scan")
-        with FakeEncoder({0x01: REQUEST_1}) as encoder:  # this fake encoder only returns the echo of the request
+        with FakeEncoder({0x01: REQUEST_1}) as encoder:  # a fake encoder that only returns the echo of the request
             self.assert_failed(absenc("read", f"raa38-modbus:{encoder.path}"), "request itself came back")
 
     def test_decode_without_request(self):

@@ -154,7 +154,8 @@ class Simulator(EncoderCase):
         self.assertEqual(len(readings), 6)
         for one in readings:
             away = min(one["singleturn"], 4096 - one["singleturn"])
-            # Damaged words may be equal by chance within 4 counts.
+            # A confirmed SSI position may differ from the true one by 4 counts, because damaged words may match by
+            # chance.
             self.assertTrue(not one["confirmed"] or away <= 4, one)
         doubtful = [one for one in readings if not one["confirmed"]]
         self.assertTrue(doubtful)
@@ -271,7 +272,7 @@ class ErrorMessages(EncoderCase):
 
     def test_nothing_listens_on_tcp_port(self):
         with socket.socket() as listener:
-            listener.bind(("127.0.0.1", 0))  # the port is reserved, but not listening
+            listener.bind(("127.0.0.1", 0))  # reserves a TCP port on which no program listens
             result = absenc("read", f"tformat:tcp:127.0.0.1:{listener.getsockname()[1]}")
         self.assert_failed(result, "nothing listens on 127.0.0.1")
 
@@ -338,7 +339,7 @@ class OrdinaryUser(EncoderCase):
             self.first_line(first)
             second = self.as_user("read", address)
             self.assert_failed(second, emulator.path, "in use", f"process {first.pid}")
-            # The refused second reader does not disturb the first one.
+            # The first `read` continues although a second one tried to open the same port.
             self.assertIsNotNone(read_line(first.stdout, time.monotonic() + PATIENCE))
         finally:
             end(first)
@@ -421,7 +422,7 @@ class Termination(EncoderCase):
         result = subprocess.run(["sh", "-c", '"$0" read "tformat:$1?latency=300" >&-', ABSENC, emulator.path],
                                 capture_output=True, text=True, timeout=PATIENCE, check=False)
         self.assert_failed(result, "standard output cannot be written")
-        # The emulator received the two request bytes of the other process, and not the text of a reading.
+        # The emulator received two position requests of one byte each, and not the text of a reading.
         self.assertIn("absenc: 2 requests answered", emulator.end()[2])
 
 

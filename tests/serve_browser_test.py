@@ -28,7 +28,7 @@ class Page(ServeCase):
         super().setUp()
         self.emulator = Emulator(self.directory, "--singleturn", "1000")
         self.addCleanup(lambda: self.emulator.end())
-        self.name = f"tformat:{self.emulator.path}?latency=300"  # the latency allows for a busy machine
+        self.name = f"tformat:{self.emulator.path}?latency=300"  # encoder with a latency that allows for a busy machine
         self.served = self.server(self.name, "sim:esl?motion=rpm=60", "sim:tformat?alarm=over_heat&fault=corrupt=0.2",
                                   "--token-file", self.tokens(), "--history", self.file("history"))
         self.window.window(1200, 900)
@@ -305,7 +305,7 @@ class Page(ServeCase):
         yes = self.browser.find_element(By.ID, "dialog-yes")
         token = self.browser.find_element(By.ID, "dialog-token")
         token.send_keys("another-secret-than-that")
-        yes.click()  # the confirmation dialog refused, because its checkbox about the machine's safety was not set
+        yes.click()  # the dialog refuses, because its checkbox about the machine's safety is not set
         self.assertEqual(self.text("#dialog-wrong"), "")
         self.browser.find_element(By.ID, "dialog-safe").click()
         yes.click()

@@ -301,7 +301,7 @@ class WrongSystemClock(ServeCase):
         self.wrong_by(-600)
         self.wait_for_event(server, "the clock jumped back by 10 minutes")
         self.wait_for_readings(server)
-        self.wrong_by(-602)  # the server does not report so small a step; some seconds occur twice
+        self.wrong_by(-602)  # a step of the clock that is too small to be reported: some seconds occur twice
         readings = self.wait_for_readings(server)
         self.wait_for_readings(server)  # waits until the second that is being recorded is over
         end(server.process)

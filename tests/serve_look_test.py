@@ -230,7 +230,7 @@ class Look(ServeCase):
               done([same, drawings]);
             })();""")
         self.assertEqual(same, 0)
-        self.assertIn(often, range(1, 6))  # a state arrives twice a second, 60 times in all
+        self.assertIn(often, range(1, 6))  # in 2 s `show` is called 60 times, and the view redraws twice a second
 
     def test_one_encoder_and_none(self):
         path = self.file("absenc.toml", config({"elbow": ("tformat", "motion=rpm=60")}))

@@ -102,7 +102,7 @@ class Messages(MqttCase):
         good = {"Authorization": f"Bearer {TOKEN}"}
         self.assertEqual(server.ask(of(name, "acknowledge"), "POST", good, alarm="over_heat")[0], 200)
         server.command(name, "position", good)
-        # The command's event follows the acknowledgement, so that of the acknowledgement would have arrived.
+        # The server would publish an event of the acknowledgement before this event of the command.
         receiver.until("event", lambda one: one["kind"] == "command")
         self.assertNotIn("acknowledged", [one["kind"] for one in receiver.all("event")])
         self.assertNotIn("acknowledged", [one for state in receiver.all("state") for alarm in state.get("alarms") or [] for one in alarm])
@@ -117,7 +117,7 @@ class State(MqttCase):
         server.process.kill()
         self.assertEqual(receiver.until("state", lambda one: one["state"] == "offline")["why"],
                          "the connection was lost")
-        # This subscriber comes after the message, so it receives the retained one.
+        # A receiver that subscribes after the message was sent receives it as a retained message.
         late = self.receiver(broker, "plant/hall/state")
         self.assertEqual(late.until("state")["state"], "offline")
         self.assertTrue(late.messages[0][2])
@@ -344,7 +344,7 @@ class Access(MqttCase):
         broker = self.broker("allow_anonymous true", f"acl_file {closed}")
         server = self.sender(broker.url, ONE)
         wait_until(lambda: "refuses a message" in self.mqtt(server)["trouble"], "it says so")
-        self.assertIn("(plant/hall/", self.mqtt(server)["trouble"])  # the message about the trouble names the topic
+        self.assertIn("(plant/hall/", self.mqtt(server)["trouble"])  # the reported trouble names the topic
         self.assertGreater(self.mqtt(server)["waiting"], 0)
         self.assertEqual(self.mqtt(server)["sent"], 0)
         pathlib.Path(closed).write_text(pathlib.Path(rules).read_text(encoding="utf-8"), encoding="utf-8")

@@ -142,7 +142,7 @@ class Proxy(ServeCase):
         self.assert_page_and_commands_work("caddy", False)
 
     def test_page_in_browser(self):
-        port = free_port()  # the port is a part of the browser's Origin header
+        port = free_port()  # port of the public URL, which is a part of the browser's Origin header
         served = self.server(NAME, "--history", "none", "--token-file", self.tokens(), "--public-url", f"https://{SITE}:{port}")
         with unittest.mock.patch(f"{__name__}.free_port", return_value=port):
             self.start("nginx", False, served)

@@ -529,7 +529,7 @@ class AccessRights(ServeCase):
         good = {"Authorization": f"Bearer {TOKEN}"}
         status, body = server.command(self.name, "memory-read", good, argument=["5"])
         self.assertEqual(status, 200, body)
-        self.assertNotIn("change", body)  # a reply has no key "change" if the command changes nothing
+        self.assertNotIn("change", body)  # the reply has no key "change", because memory-read changes nothing
         status, body = server.command(self.name, "memory-write", good, argument=["5", "66"])
         self.assertEqual((status, body["change"]), (200, "confirmed"))
         for command, argument in (("zerro", []), ("memory-read", ["x"]), ("memory-read", ["5", "6", "7", "8", "9"])):
@@ -771,7 +771,7 @@ class EncoderAccess(ServeCase):
         answers = []
 
         def ask():
-            with contextlib.suppress(OSError, ValueError):  # the server may end before it replies
+            with contextlib.suppress(OSError, ValueError):  # the connection fails if the server ends before it replies
                 answers.append(self.post(server, name))
         client = threading.Thread(target=ask)
         client.start()

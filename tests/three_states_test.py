@@ -56,7 +56,7 @@ class EveryUnit(Case):
                     file = self.file("wave.vcd")
                     wave = absenc("wave", f"{about['protocol']}?alarm={alarm}", file, "--force", "--command", command["name"])
                     if wave.returncode == 2:
-                        continue  # the command has no waveform
+                        continue  # `wave` has no waveform of this command
                     rows = json_lines(absenc("decode", about["protocol"], file, "--json").stdout)
                     for row in rows:
                         if "alarms" in row:

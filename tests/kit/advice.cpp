@@ -181,7 +181,7 @@ bool follow_advice(const Unit& unit, const Configuration& configuration, std::si
     reported_more =
         reported_more || (ended.good() && !one.command->changes_encoder && reports_more(ended.seen, before));
   }
-  alarmed.world().pass(std::chrono::seconds(1));  // the encoder may be writing its memory
+  alarmed.world().pass(std::chrono::seconds(1));  // time for the encoder to write its memory
   const bool gone = !alarmed.shows_alarms();
   findings.require(named.empty() || gone || explained || reported_more, [&] {
     return configuration.text + ", alarm " + std::string(flag.name) + ": following \"" + std::string(flag.action) +

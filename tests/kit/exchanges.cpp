@@ -181,7 +181,8 @@ class Campaign {
     if (!query.truth[place_]) {
       world_.set_rates({});
       world_.pass(std::chrono::seconds(1));
-      (void)world_.run(*query.command, query.arguments);  // receives late replies to previous requests
+      // The encoder's late replies to previous requests arrive during this conversation.
+      (void)world_.run(*query.command, query.arguments);
       if (!record_truth_at(query, place_)) return;
     }
     world_.move(places_[place_]);

@@ -31,7 +31,7 @@ enum class Mistake : std::uint8_t {
   never_ends,           // the host waits for ever if no byte arrives
   accepts_all_arguments,    // `encode` accepts any arguments
   late_capture_timeout,     // captures wait longer for a reply than any host does
-  zeroes_invalid_position,  // the position is never valid, and the zero command ignores that
+  zeroes_invalid_position,  // every position is invalid, and the zero command sets the zero nevertheless
 };
 
 inline constexpr std::uint8_t ask = 0x5A;

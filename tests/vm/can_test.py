@@ -85,7 +85,7 @@ class VirtualBus(EncoderCase):
 
     def add(self, interface):
         run("ip", "link", "add", interface, "type", "vcan")
-        # the interface may not exist, because the test may have deleted it
+        # The interface may not exist, because a test may delete it.
         self.addCleanup(subprocess.run, ["ip", "link", "del", interface], capture_output=True)
         self.up(interface)
 

@@ -42,7 +42,7 @@ def boot(kernel, initramfs, folder):
             output, _ = machine.communicate()
             trouble = f"the machine did not end within {PATIENCE} s"
         finally:
-            machine.kill()  # no effect if the machine has ended
+            machine.kill()  # has no effect if the virtual machine has ended
     return output.decode(errors="replace").replace("\r", ""), trouble
 
 
@@ -81,5 +81,6 @@ def main(patterns):
 
 
 if __name__ == "__main__":
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # the exit also ends the machine
+    # On SIGTERM the program exits by an exception, which also ends the virtual machine.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     sys.exit(main(sys.argv[1:]))

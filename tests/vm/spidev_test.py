@@ -82,7 +82,7 @@ class Spi:
 
     def message(self, *transfers):
         packed = bytearray(b"".join(transfer.packed for transfer in transfers))
-        # The message is longer than the 1024 bytes that fcntl copies by itself.
+        # fcntl copies at most 1024 bytes by itself, and a longer SPI message needs a mutable buffer.
         return fcntl.ioctl(self.descriptor, request(False, 0, len(packed)), packed, True)
 
     def exchange(self, out, **settings):
@@ -240,7 +240,7 @@ class Command(SpidevCase):
                 while now == before and time.monotonic() < deadline:
                     with open("/tmp/spidev-memory", encoding="utf-8") as file:
                         now = file.read()
-                self.assertNotEqual(now, before)  # the emulator saves its memory while it runs
+                self.assertNotEqual(now, before)  # the emulator saves a changed memory to the file while it runs
             reading = self.reading("encolink:spi:/dev/spidev9.0")
             self.assertEqual((reading["singleturn"], reading["multiturn"]), (0, 9))
             self.summary(process, signal.SIGTERM)
