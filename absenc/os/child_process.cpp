@@ -46,7 +46,8 @@ struct SpawnSteps {
     }
     ::posix_spawn_file_actions_adddup2(&files, channel, channel_of_child);
     ::posix_spawn_file_actions_addclosefrom_np(&files, channel_of_child + 1);
-    // Ctrl-C and systemd signal all processes at once, but the parent needs the child to close its connections.
+    // The child blocks signals: Ctrl-C and systemd signal all processes at once, but the parent needs the child to
+    // close its connections.
     sigset_t blocked;
     ::sigemptyset(&blocked);
     for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE}) ::sigaddset(&blocked, signal);
@@ -98,7 +99,7 @@ bool Channel::send(std::string& bytes) const {
 }
 
 bool Channel::receive(std::string& bytes) const {
-  std::array<char, 65536> piece;  // not initialised: only received bytes are read
+  std::array<char, 65536> piece;  // not initialised, because only received bytes are read from it
   for (;;) {
     const ssize_t size = ::recv(end_.get(), piece.data(), piece.size(), MSG_DONTWAIT);
     if (size < 0 && errno == EINTR) continue;
@@ -142,7 +143,7 @@ std::string ChildProcess::end(Time longest) {
 }
 
 Channel become_child(const char* name, std::size_t bytes) {
-  // If the parent has ended before this call, its end of the channel is closed already.
+  // If the parent has ended before this call, its end of the channel is closed already, so the child notices it.
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   ::prctl(PR_SET_NAME, name);
   ::fcntl(channel_of_child, F_SETFD, FD_CLOEXEC);

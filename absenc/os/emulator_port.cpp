@@ -51,8 +51,8 @@ Descriptor bind_name_of(const fs::path& link) {
   const std::string file = link.filename();
   const std::size_t room = sizeof address.sun_path - 1 - name.size();
   name += file.substr(file.size() - std::min(file.size(), room));
-  std::copy(name.begin(), name.end(), address.sun_path + 1);  // begins with a zero byte: an abstract name without a
-                                                              // file
+  // The name begins with a zero byte: it is an abstract socket name without a file.
+  std::copy(name.begin(), name.end(), address.sun_path + 1);
   const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
   if (::bind(socket.get(), reinterpret_cast<sockaddr*>(&address), size) < 0) return {};
   return socket;
@@ -139,7 +139,8 @@ void EmulatorPort::make_link() {
 }
 
 std::size_t EmulatorPort::read_some(MutableBytes into, std::span<const int> ready) {
-  // Handled first: bytes that arrive from now on must not be discarded as leftovers.
+  // A program's open or close of the slave is handled first: bytes that arrive from now on must not be discarded as
+  // leftovers.
   if (std::find(ready.begin(), ready.end(), watch_.get()) != ready.end()) users_changed();
   std::size_t filled = 0;
   for (const int descriptor : ready) {
@@ -159,11 +160,11 @@ std::size_t EmulatorPort::read_some(MutableBytes into, std::span<const int> read
   return filled;
 }
 
-// Returns how long received bytes may have waited, because this thread could not run. On a busy machine a ready thread
-// may wait for milliseconds. A host that times out and repeats its request meanwhile has broken no rule, although both
-// requests arrive at once. Kernel threads that carry the bytes of pseudo-terminals wait as well, at other times, so the
-// longest delay of the last second is used. The delay is read at most every 0.5 ms, because shorter delays do not
-// matter.
+// Returns how long received bytes may have waited before this thread read them, because this thread could not run. On a
+// busy machine a ready thread may wait for milliseconds. A host that times out and repeats its request meanwhile has
+// broken no rule, although both requests arrive at once. Kernel threads that carry the bytes of pseudo-terminals wait
+// as well, at other times, so the longest delay of the last second is used. The delay is read at most every 0.5 ms,
+// because shorter delays do not matter.
 Time EmulatorPort::lateness() {
   const Time now = os::now();
   if (now < delay_read_at_ + 500us) return lateness_;
@@ -188,7 +189,8 @@ void EmulatorPort::drop_client(int descriptor) {
 
 void EmulatorPort::accept_client() {
   Descriptor client(::accept4(listener_.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
-  if (!client || clients_.size() == most_clients) return;  // too many clients: the connection is closed at once
+  // At the limit of TCP clients the connection is closed at once.
+  if (!client || clients_.size() == most_clients) return;
   const int on = 1;
   ::setsockopt(client.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
   poller().add(client.get());

@@ -103,8 +103,8 @@ TEST(EmulatorPort, IsOneLineForAllItsEnds) {
     EXPECT_EQ(receive(first), reply);
     EXPECT_EQ(receive(second), reply);
   }
-  expect_quiet(device);          // handles the end of `second`
-  for (int i = 0; i < 2; ++i) {  // the first write to a closed connection succeeds
+  expect_quiet(device);          // also handles the close of `second`
+  for (int i = 0; i < 2; ++i) {  // twice, because the first write to a closed connection succeeds
     device.begin(transfer(request));
     EXPECT_EQ(receive(first), request);
   }
@@ -169,7 +169,7 @@ TEST(EmulatorPort, DiscardsBytesForTheNextUser) {
   while (device.dropped() == 0) device.begin(transfer(frame));  // no program reads, so bytes are dropped at last
   const Time written = now();
   sleep_until(written + 200ms);  // later than any reply that may still be in transit
-  // A SerialPort would discard the bytes itself.
+  // Opens the terminal directly: a SerialPort would discard leftover bytes itself.
   const Descriptor host(::open(device.path().c_str(), O_RDWR | O_NOCTTY));
   put(host.get(), request);
   EXPECT_EQ(receive(device), request);
@@ -194,14 +194,14 @@ TEST(EmulatorPort, IsNotLockedByAUserWhoLeft) {
     ASSERT_EQ(::ioctl(greedy.get(), TIOCEXCL), 0);
   }
   expect_quiet(device);
-  // root can open the terminal in any case, so the test reads the flag.
+  // The test reads the exclusive flag, because root can open the terminal in any case.
   const Descriptor next(::open(device.path().c_str(), O_RDWR | O_NOCTTY));
   int exclusive = 1;
   ASSERT_EQ(::ioctl(next.get(), TIOCGEXCL, &exclusive), 0);
   EXPECT_EQ(exclusive, 0);
 }
 
-// After a byte the port waits long for the rest of a request, but only briefly where no more bytes are expected.
+// After a byte the port waits long for the rest of a request, but only briefly where the device expects no more bytes.
 TEST(EmulatorPort, PauseIsShorterWhereNoMoreBytesAreExpected) {
   EmulatorPort device;
   device.set_latency(std::chrono::hours(1));
@@ -228,7 +228,7 @@ TEST(EmulatorPort, IgnoresRatesAndWires) {
 TEST(EmulatorPort, LinksToItself) {
   const TemporaryDirectory directory;
   const fs::path link = directory.path() / "encoder";
-  fs::create_symlink("/dev/pts/999999", link);  // left by an emulator that was killed
+  fs::create_symlink("/dev/pts/999999", link);  // link left by an emulator that was killed
   {
     EmulatorPort device(link);
     EXPECT_EQ(device.path(), link);

@@ -20,7 +20,7 @@
 
 namespace absenc::os::testing {
 
-/// One controller with one chip select, /dev/spidev0.0. A Spidev answers its messages.
+/// An SPI controller with one chip select, /dev/spidev0.0. A Spidev answers its messages.
 class FakeSpi final : public SpiKernel {
  public:
   static constexpr const char* path = "/dev/spidev0.0";
@@ -30,7 +30,7 @@ class FakeSpi final : public SpiKernel {
     connect(LinkKind::spi, {.rate = 500'000, .spi_mode = 1}, nobody_);
   }
 
-  /// Connects `device` to the controller; without this call nothing is connected.
+  /// Connects `device` to the controller; before this call no device is connected.
   void connect(LinkKind kind, const LineSettings& settings, Machine<std::uint8_t>& device) {
     const SpidevSettings before = spidev_ ? spidev_->settings() : SpidevSettings{0, 16, 500'000, ~0u};
     device_ = std::make_unique<SpiDevice>(kind, settings, device);
@@ -64,11 +64,11 @@ class FakeSpi final : public SpiKernel {
   [[nodiscard]] SpidevSettings& settings() { return spidev_->settings(); }
   [[nodiscard]] SpiDevice& device() { return *device_; }
 
-  std::map<unsigned long, int> refusals;  // errno with which a request fails, by request
+  std::map<unsigned long, int> refusals;  // errno with which a request fails, by number of the request
   int open_error = 0;
-  std::uint32_t mode_mask = ~0u;  // bits outside the mask are accepted without effect
+  std::uint32_t mode_mask = ~0u;  // SPI mode bits outside the mask are accepted without effect
   std::uint32_t highest_speed = ~0u;
-  int missing = 0;       // number of bytes by which a message is too short
+  int missing = 0;       // number of bytes by which the result of a message is too short
   bool shorted = false;  // the data line is shorted to low
   std::string log;
 

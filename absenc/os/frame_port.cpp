@@ -68,7 +68,8 @@ Event<CanFrame> FramePort::wait(const Step<CanFrame>& step) {
     collect(std::min(waiting_.due(), end_));
     const Time time = os::now();
     if (time >= end_) throw Ended{};
-    // Frames go before limits: a late look by this program is not the fault of the other side.
+    // Received frames are reported before a silence or timer: if this program looks late, the other side is not at
+    // fault.
     if (!pending_events_.empty()) continue;
     if (const std::optional<Event<CanFrame>> event = waiting_.take_due(time)) return *event;
   }

@@ -33,13 +33,13 @@ FileIdentity identity_of(const std::string& path) {
 OwnedFile::OwnedFile(const std::string& path) : path_(path) {
   constexpr int most_tries = 100;
   for (int tries = 0; tries < most_tries; ++tries) {
-    // The type is checked before opening, because opening a device may already have an effect.
+    // The type of the file is checked before opening, because opening a device may already have an effect.
     struct stat named {};
     const bool there = ::stat(path.c_str(), &named) == 0;
     if (there) require_regular(is_regular(named), path);
     const int make = there ? 0 : O_CREAT | O_EXCL;
     file_ = Descriptor(::open(path.c_str(), O_RDWR | O_NONBLOCK | O_NOCTTY | O_CLOEXEC | make, 0666));
-    // Another process created or removed the file meanwhile.
+    // Another process created or removed the file between the two calls.
     if (!file_ && (errno == EEXIST || (there && errno == ENOENT))) continue;
     if (!file_) throw system_failure("opening " + path, errno);
     made_ = made_ || !there;
@@ -53,8 +53,8 @@ OwnedFile::OwnedFile(const std::string& path) : path_(path) {
     // The file may have been replaced before it was locked.
     if (identity_of(path) == identity_of(opened)) return;
   }
-  throw system_failure("opening " + path, ELOOP);  // a link to itself, or another process replaces the file again and
-                                                   // again
+  // The path is a link to itself, or another process replaces the file again and again.
+  throw system_failure("opening " + path, ELOOP);
 }
 
 void OwnedFile::replace(std::string_view content, Durable durable) {

@@ -23,7 +23,7 @@ void protect_standard_streams() {
   std::signal(SIGXFSZ, SIG_IGN);
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     if (::fcntl(stream, F_GETFD) >= 0 || errno != EBADF) continue;
-    // open() returns the lowest free number, which is this stream.
+    // open() returns the lowest free number, which is that of the closed stream.
     if (::open("/dev/null", stream == STDOUT_FILENO ? O_RDONLY : O_RDWR) < 0) throw system_failure("/dev/null", errno);
   }
 }
@@ -37,7 +37,7 @@ int write_standard_output(std::string_view bytes) {
       const int error = errno;
       struct stat file {};
       const bool is_file = ::fstat(STDOUT_FILENO, &file) == 0 && S_ISREG(file.st_mode);
-      // The part that was written is removed, unless another program has written behind it.
+      // The part of `bytes` that was written is removed, unless another program has written behind it.
       if (done > 0 && is_file && file.st_size == ::lseek(STDOUT_FILENO, 0, SEEK_CUR)) {
         [[maybe_unused]] const int ignored = ::ftruncate(STDOUT_FILENO, file.st_size - done);
         ::lseek(STDOUT_FILENO, -done, SEEK_CUR);
@@ -64,8 +64,8 @@ Time processor_time() {
 RunDelay::RunDelay() : file_(::open("/proc/thread-self/schedstat", O_RDONLY | O_CLOEXEC)) { (void)take(); }
 
 Time RunDelay::take() {
-  std::array<char, 64> text{};  // in nanoseconds: time on a processor, time ready to run but waiting; then the number
-                                // of time slices
+  std::array<char, 64> text{};  // /proc/thread-self/schedstat, in nanoseconds: time on a processor, time ready to run
+                                // but waiting; then the number of time slices
   if (!file_ || ::pread(file_.get(), text.data(), text.size() - 1, 0) <= 0) return {};
   char* end = text.data();
   std::strtoull(end, &end, 10);

@@ -25,7 +25,7 @@ Descriptor open_terminal(const std::string& path, SerialUse use) {
   const int access = use == SerialUse::receive ? O_RDONLY : O_RDWR;
   Descriptor descriptor(::open(path.c_str(), access | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
   if (!descriptor) throw open_failure(path, errno);
-  // Checked before any wait: epoll refuses regular files with a less clear error.
+  // The type of the file is checked before any wait: epoll refuses regular files with a less clear error.
   if (!terminal_state(descriptor.get())) throw open_failure(path, errno);
   return descriptor;
 }
@@ -76,7 +76,7 @@ SerialPort::SerialPort(const std::string& path, const LineSettings& settings, Rs
   if (!before) throw open_failure(path, errno);
   before_ = *before;
   lock();
-  ::tcflush(descriptor(), TCOFLUSH);  // unsent bytes of another program must not delay the first request
+  ::tcflush(descriptor(), TCOFLUSH);  // bytes that another program has not sent yet must not delay the first request
   try {
     apply(settings);
     if (uses_rts(wires) && rs485 == Rs485::on) {
@@ -103,7 +103,8 @@ SerialPort::~SerialPort() {
   if (!pseudo_) ::ioctl(descriptor(), TIOCNXCL);
 }
 
-// flock keeps out every program that uses it, also those of root; TIOCEXCL keeps out all programs except those of root.
+// Locks the port twice: flock keeps out every program that uses flock, also those of root; TIOCEXCL keeps out all
+// programs except those of root.
 void SerialPort::lock() const {
   if (::flock(descriptor(), LOCK_EX | LOCK_NB) < 0) throw open_failure(path_, errno);
   // TIOCEXCL lasts until the last descriptor is closed. A virtual encoder keeps its side of the slave open, so the flag
@@ -111,7 +112,7 @@ void SerialPort::lock() const {
   if (!pseudo_) ::ioctl(descriptor(), TIOCEXCL);
 }
 
-// Parity and stop bits belong to the wiring, so a change of the rate leaves them.
+// Parity and stop bits belong to the wiring, so a change of the rate leaves both unchanged.
 void SerialPort::change_rate(std::uint32_t rate) {
   LineSettings settings = line_;
   settings.rate = rate;
@@ -121,7 +122,7 @@ void SerialPort::change_rate(std::uint32_t rate) {
 void SerialPort::apply(const LineSettings& settings) {
   if (settings.rate == 0) throw Failure(Failure::Kind::bad_rate, "a serial port needs a baud rate above 0");
   const std::optional<LineSettings> set = set_terminal(descriptor(), settings);
-  if (!set) fail(errno);  // the port may disappear at this time
+  if (!set) fail(errno);  // the port may disappear between two calls
   const LineSettings given = *set;
   line_ = settings;
   if (is_gadget(path_)) return;
@@ -131,7 +132,7 @@ void SerialPort::apply(const LineSettings& settings) {
                       std::to_string(nearest_rate(settings.rate, given.rate, clock_of_rates())) +
                       ": use that, or another adapter");
   }
-  if (pseudo_) return;  // without a line parity is ignored and characters take no time
+  if (pseudo_) return;  // a pseudo-terminal has no line: parity is ignored and characters take no time
   if (given.parity != settings.parity || given.stop_bits != settings.stop_bits) {
     throw Failure(Failure::Kind::unsupported,
                   "the port " + path_ + " cannot do " + std::string(name_of(settings.parity)) + " parity with " +
@@ -168,9 +169,9 @@ void SerialPort::set_direction(Rs485 rs485) {
 }
 
 void SerialPort::shorten_latency() {
-  // The latency covers USB frames, the receive FIFO's own timeout (4 characters) and scheduling. On a pseudo-terminal
-  // it covers only the scheduling of two processes, which a busy machine may delay by a time slice or two: 2 ms gave
-  // false timeouts. The limit only matters when a reply is missing.
+  // The latency of the port covers USB frames, the receive FIFO's own timeout (4 characters) and scheduling. On a
+  // pseudo-terminal it covers only the scheduling of two processes, which a busy machine may delay by a time slice or
+  // two: 2 ms gave false timeouts. The limit only matters when a reply is missing.
   set_latency(pseudo_ ? 20ms : 10ms);
   if (pseudo_) return;
   serial_struct serial{};

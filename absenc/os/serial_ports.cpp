@@ -88,7 +88,7 @@ Failure in_use(const std::string& path) {
                                                              : Holder::program;
     return {what + holder + ": end it, or use another port", who};
   }
-  // The advice is not to end the server: it may read this encoder for several clients.
+  // The advice does not ask to end the server: the server may read this encoder for several clients.
   const std::string process = holder.substr(server.size(), holder.size() - server.size() - 1);
   const std::string page = page_of_server(path, process);
   const std::string where =
@@ -156,7 +156,7 @@ std::string holder_of(const std::string& path) {
   struct stat status {};
   std::string holder;
   if (::stat(path.c_str(), &status) == 0) holder = lock_holder(status);
-  // The program that made a pseudo-terminal always has it open; it is not the one that blocks the port.
+  // The program that made a pseudo-terminal always has it open; that program does not block the port.
   if (holder.empty() && !file.native().starts_with("/dev/pts/")) holder = opener(file);
   return holder;
 }
@@ -182,7 +182,8 @@ Failure open_failure(const std::string& path, int error) {
     case ENXIO:
     case ENODEV:
       return no_port(path);
-    // From the terminal's ioctl: a 16550 that is listed but does not exist, or a line that was hung up after opening.
+    // EIO comes from the ioctl of the terminal: a 16550 that is listed but does not exist, or a line that was hung up
+    // after opening.
     case EIO:
       return {Failure::Kind::not_found, "the port " + path +
                                             " is there, but no hardware is behind it, or not any more: check the name, "

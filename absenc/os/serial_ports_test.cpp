@@ -22,8 +22,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// A folder with the layout of /sys: the terminal's device is below an interface of the USB device, and only the USB
-/// device has its identification numbers.
+/// Test folders with the layout of /sys: the terminal's device is below an interface of the USB device, and only the
+/// USB device has its identification numbers.
 class ListedPorts : public ::testing::Test {
  protected:
   void write(const fs::path& file, std::string_view text) const {
@@ -74,11 +74,12 @@ TEST_F(ListedPorts, ReadsIdentityOfAdapter) {
 
 TEST_F(ListedPorts, UnknownChipHasNoRate) {
   plug_in("0403", "6010", "0700");
-  EXPECT_EQ(look().highest_rate, 12'000'000u);  // the release number identifies the chip
+  EXPECT_EQ(look().highest_rate, 12'000'000u);  // the release number bcdDevice identifies the chip
   write("devices/usb1/1-2/bcdDevice", "9999");
   EXPECT_FALSE(look().highest_rate);
   write("devices/usb1/1-2/idVendor", "10c4");
-  write("devices/usb1/1-2/idProduct", "ea60");  // CP2102, or CP2102N, which is three times as fast
+  // This number is that of CP2102 and of CP2102N, which is three times as fast.
+  write("devices/usb1/1-2/idProduct", "ea60");
   EXPECT_FALSE(look().highest_rate);
   EXPECT_EQ(look().lasting_path, "");
 }

@@ -28,7 +28,7 @@ bool contains(const Failure& failure, std::string_view part) {
   return std::string_view(failure.what()).find(part) != std::string_view::npos;
 }
 
-// Returns the rate: the last field of struct termios2.
+// Returns the bit rate in `state`: the last field of struct termios2.
 std::uint32_t rate_of(const TerminalState& state) {
   std::uint32_t rate = 0;
   std::memcpy(&rate, state.data() + state.size() - sizeof rate, sizeof rate);
@@ -48,7 +48,8 @@ static_assert(nearest_rate(2'500'000, 9600, 5'000'000) == 9600, "the driver has 
 
 TEST(SerialPort, SetsAnyRateAndRestoresSettings) {
   const PseudoTerminal terminal;
-  const auto before = terminal_state(terminal.master.get());  // settings of the slave: a master has none of its own
+  // Settings of the slave: a master has no settings of its own.
+  const auto before = terminal_state(terminal.master.get());
   ASSERT_TRUE(before);
   {
     const SerialPort port(terminal.path, fast);
@@ -90,7 +91,7 @@ TEST(SerialPort, CarriesEveryByteUnchanged) {
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<std::uint8_t>(i);
   const Descriptor slave(::open(terminal.path.c_str(), O_RDWR | O_NOCTTY));
   set_terminal(slave.get(), fast);
-  put(terminal.master.get(), {0x55});  // must be discarded when the port is opened
+  put(terminal.master.get(), {0x55});  // this byte must be discarded when the port is opened
   pollfd readable{slave.get(), POLLIN, 0};
   ASSERT_EQ(::poll(&readable, 1, 5000), 1);
   SerialPort port(terminal.path, fast);

@@ -40,7 +40,7 @@ void install() {
   if (wake < 0) throw system_failure("eventfd", errno);
   struct sigaction action {};
   action.sa_handler = on_signal;
-  // Without SA_RESTART a prompt that reads the terminal returns as well.
+  // Without SA_RESTART the signal also ends a prompt that reads the terminal.
   for (const int signal : {SIGINT, SIGTERM}) {
     if (::sigaction(signal, &action, nullptr) < 0) throw system_failure("sigaction", errno);
   }
@@ -94,7 +94,7 @@ bool wait_for(std::span<pollfd> watched, Time deadline) {
   std::array<pollfd, most_watched + 1> all;
   std::copy(watched.begin(), watched.end(), all.begin());
   pollfd& signal = all[watched.size()];
-  signal = {interrupt_descriptor(), POLLIN, 0};  // -1 is ignored by poll
+  signal = {interrupt_descriptor(), POLLIN, 0};  // before `catch_interrupts` the number is -1, which poll ignores
   for (;;) {
     const Time patience = CancelCheck::interval();
     const Time poll_deadline = patience == never ? deadline : std::min(deadline, now() + patience);

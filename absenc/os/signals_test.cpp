@@ -20,7 +20,7 @@ class Signals : public ::testing::Test {
  protected:
   Signals() { catch_interrupts(); }
 
-  // SIGALRM interrupts the system call too, but must not end the wait.
+  // SIGALRM also interrupts the system call, but must not end the wait.
   static void signal_in(int milliseconds, int signal) {
     static pthread_t target;
     target = ::pthread_self();

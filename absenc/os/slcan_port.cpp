@@ -15,10 +15,11 @@ using Kind = Failure::Kind;
 
 namespace {
 
-constexpr Time reply_timeout = 300ms;  // timeout for an adapter's reply; on USB it takes 1 or 2 ms
+constexpr Time reply_timeout = 300ms;  // timeout for the reply of an adapter, which takes 1 or 2 ms on USB
 constexpr Time settling_time = 20ms;
-constexpr std::size_t most_queued = 64;  // number of frames, as many as common adapters queue
-constexpr unsigned most_reads = 1024;  // limit per call, so that a line that is never silent does not block the caller
+constexpr std::size_t most_queued = 64;  // greatest number of queued frames, as many as common adapters queue
+// Limit of reads per call, so that a line that is never silent does not block the caller.
+constexpr unsigned most_reads = 1024;
 
 Bytes bytes_of(std::string_view text) { return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}; }
 
@@ -31,7 +32,8 @@ void SlcanLine::write(Bytes text) { bytes_->begin({.kind = ByteStep::Kind::trans
 void SlcanLine::collect(Time deadline) {
   received_any_ = false;
   deadline = reach(bytes_->now()) ? Time{} : std::min(deadline, due());
-  // Without a wait all available bytes are read, in any number of reads; with a wait only until one event was received.
+  // If the deadline is past, all available bytes are read, in any number of reads; otherwise the reads end after the
+  // first event.
   const bool everything = deadline <= bytes_->now();
   for (unsigned reads = 0; reads < most_reads && (everything || !received_any_); ++reads) {
     const Time now = bytes_->now();
@@ -80,7 +82,7 @@ void SlcanPort::apply(const LineSettings& settings) {
     throw Failure(Kind::bad_rate, name_ + ": the adapter has no bit rate of " + std::to_string(settings.rate) +
                                       " bit/s: 10, 20, 50, 100, 125, 250, 500, 800 kbit/s and 1 Mbit/s are there");
   }
-  static_cast<void>(request("C\r"));  // many adapters refuse this if they are closed already
+  static_cast<void>(request("C\r"));  // many adapters refuse to close if they are closed already
   settle();
   const std::string set{'S', static_cast<char>(*code), '\r'};
   const Reply rate = request(set);
@@ -100,8 +102,8 @@ void SlcanPort::apply(const LineSettings& settings) {
   }
 }
 
-// Waits until late replies have been received. Replies carry no number, so replies to earlier commands must not arrive
-// after the next command.
+// Waits until late replies of the adapter have been received. Replies carry no number, so replies to earlier commands
+// must not arrive after the next command.
 void SlcanPort::settle() {
   constexpr unsigned most_replies = 64;
   bool any = true;
@@ -180,8 +182,8 @@ void SlcanAdapter::queue_frame(Bytes line, Time at) {
   waiting_.push_back(*frame);
 }
 
-// Reports at most one frame whose transmission has ended, and begins the next one. One per call even if this is late:
-// between two frames a node must be able to send its own.
+// Reports at most one frame whose transmission has ended, and begins the next one. It reports only one frame per call,
+// even if it is called late: between two frames a node must be able to send its own.
 bool SlcanAdapter::reach(Time now) {
   if (waiting_.empty() || bus_free_ > now) return false;
   push(waiting_.front(), bus_free_);
@@ -196,7 +198,7 @@ Time SlcanAdapter::duration(const CanFrame& frame) const {
   return Time(std::chrono::seconds(1)) * bits / std::max<std::int64_t>(1, rate_);
 }
 
-// Executes a command. Returns false if it is unknown or not allowed now.
+// Executes a command of the host. Returns false if the command is unknown or not allowed now.
 bool SlcanAdapter::execute(Bytes line) {
   const auto letter = static_cast<char>(line[0]);
   switch (letter) {

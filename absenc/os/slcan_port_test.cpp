@@ -189,7 +189,7 @@ TEST_F(Adapter, NothingPassesAtAnotherBitRate) {
   EXPECT_EQ(port.lost(), 2u);
 }
 
-constexpr Time frame_time = 111 * 4us;  // (47 + 8 * 8) bits at 250 kbit/s
+constexpr Time frame_time = 111 * 4us;  // time of a frame on the bus: (47 + 8 * 8) bits at 250 kbit/s
 
 TEST_F(Adapter, FramesSentAtOnceComeOneAfterTheOther) {
   send_text("S5\rO\r");

@@ -30,7 +30,8 @@ using Kind = Failure::Kind;
 
 namespace {
 
-constexpr Time queue_patience = 500ms;  // a working bus empties the queue of a controller within 10 ms
+// Time to wait for room in the queue: a working bus empties the queue of a controller within 10 ms.
+constexpr Time queue_patience = 500ms;
 constexpr Time queue_pause = 500us;
 constexpr std::size_t most_at_once = 256;
 
@@ -39,8 +40,8 @@ constexpr std::string_view check_bus =
 
 Time time_of(const timespec& time) { return std::chrono::seconds(time.tv_sec) + Time(time.tv_nsec); }
 
-// Converts a kernel time stamp, which is calendar time, to os::now. Both clocks are read together, and again if another
-// thread ran between the two reads.
+// Converts a kernel time stamp, which is calendar time, to a time of os::now. Both clocks are read together, and again
+// if another thread ran between the two reads.
 Time since_boot(const timespec& stamp) {
   constexpr Time together = std::chrono::microseconds(20);
   timespec day{};
@@ -187,7 +188,7 @@ void SocketCan::set_options() {
 }
 
 void SocketCan::collect(Time deadline) {
-  // Without a wait it only reads available frames: the socket does not block.
+  // If the deadline is past, only available frames are read: the socket does not block.
   if (deadline > os::now() && poller_.wait(deadline).empty()) return;
   for (std::size_t i = 0; i < most_at_once; ++i) {
     can_frame frame{};
@@ -195,7 +196,7 @@ void SocketCan::collect(Time deadline) {
     const ssize_t size = kernel_->read(socket_.get(), frame, at);
     if (size < 0 && (errno == EAGAIN || errno == EINTR)) return;
     if (size < 0) fail("reading from " + interface_, errno);
-    if (size != static_cast<ssize_t>(sizeof frame)) continue;  // CAN FD, which is not enabled
+    if (size != static_cast<ssize_t>(sizeof frame)) continue;  // a CAN FD frame, which is not enabled
     if ((frame.can_id & CAN_ERR_FLAG) != 0) {
       take_error(frame, at);
     } else {
@@ -235,7 +236,7 @@ void SocketCan::send(const CanFrame& from) {
   const Time limit = os::now() + queue_patience;
   for (;;) {
     if (kernel_->write(socket_.get(), frame) == static_cast<ssize_t>(sizeof frame)) return;
-    // poll(2) does not report the end of either condition, so the call is repeated.
+    // poll(2) does not report the end of either error condition, so the write is repeated.
     const bool full = errno == ENOBUFS || errno == EAGAIN;
     if (!full && errno != EINTR) fail("sending on " + interface_, errno);
     if (os::now() >= limit) {

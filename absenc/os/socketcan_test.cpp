@@ -82,7 +82,7 @@ TEST(SocketCan, SendsAndReceives) {
   kernel.put(raw(0x120, {0x47, 0x26}));
   const FrameEvent sent = port.wait({.at = never});
   EXPECT_EQ(sent.kind, EventKind::sent);
-  EXPECT_LE(sent.at, kernel.written_at);  // a reply can be received before the call returns
+  EXPECT_LE(sent.at, kernel.written_at);  // the time before the write: a reply can be received before the call returns
   const FrameEvent received = port.wait({.at = never});
   ASSERT_EQ(received.kind, EventKind::received);
   EXPECT_GE(received.at, sent.at);
@@ -180,15 +180,15 @@ TEST(SocketCan, AnInterfaceThatGoesAway) {
 TEST(SocketCan, DoesNotSetBitRate) {
   FakeCan kernel;
   SocketCan port("can0", line, kernel);
-  port.begin({.kind = FrameStep::Kind::configure, .rate = line.rate});  // equal to the interface's rate, so it is
-                                                                        // accepted
+  // This rate equals the bit rate of the interface, so it is accepted.
+  port.begin({.kind = FrameStep::Kind::configure, .rate = line.rate});
   const Failure other = failure_of([&] { port.begin({.kind = FrameStep::Kind::configure, .rate = 500'000}); });
   EXPECT_EQ(other.kind(), Failure::Kind::unsupported);
   EXPECT_NE(std::string(other.what()).find("bitrate 500000"), std::string::npos);
   EXPECT_EQ(failure_of([&] { port.begin({.kind = FrameStep::Kind::pulse}); }).kind(), Failure::Kind::unsupported);
 }
 
-// Tests the same system call on a UDP socket, which every kernel has.
+// Tests the system call that reads a frame and its time on a UDP socket, which every kernel has.
 TEST(SocketCan, KernelStampIsTimeOfReception) {
   const Descriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
   sockaddr_in address{};
@@ -226,7 +226,7 @@ TEST(SocketCan, ListsInterfaces) {
   EXPECT_TRUE(can_interfaces(sys.path() / "none").empty());
 }
 
-// The test machine may have no CAN, so the kernel may give either of two errors.
+// The test machine may have no CAN, so the kernel may report one of two errors.
 TEST(SocketCan, RealKernelReportsMissingInterface) {
   const std::string what = failure_of([] { const SocketCan port("absenc-none", line); }).what();
   EXPECT_TRUE(what.find("there is no CAN interface absenc-none") != std::string::npos ||

@@ -49,7 +49,7 @@ TEST_F(SpiEncoder, SsiOfEveryLength) {
   }
 }
 
-// Clocks 1000 bits, of which the frame needs 41, on each kind of port that carries a clocked line.
+// Clocks 1000 bits, although the frame needs only 41, on each kind of port that carries a clocked line.
 TEST_F(SpiEncoder, SloIsLowBehindTheCrcOnEveryPort) {
   constexpr std::size_t clocks = 1000;
   const auto samples = [&](Port<std::uint8_t>& port) {
@@ -134,7 +134,7 @@ TEST_F(SpiEncoder, ReadsRegistersWithClockLevel) {
   EXPECT_EQ(info.error(), Error::none);
 }
 
-// With this controller the two pulses of the start sequence are one byte.
+// On this controller the two pulses of the start sequence are sent as one byte.
 TEST_F(SpiEncoder, BissIsStartedByAByteOfPulses) {
   biss::Format format;
   format.start_sequence = true;

@@ -101,7 +101,7 @@ Time SpiPort::now() { return waiting_.now(); }
 void SpiPort::begin(const ByteStep& step) {
   switch (step.kind) {
     case ByteStep::Kind::transfer:
-      // A caller that reads without pauses never waits, so interrupts are checked here.
+      // A caller that reads without pauses never waits, so SIGINT and SIGTERM are checked here.
       if (interrupted() && take_interrupt()) throw Interrupted{};
       if (step.hold_low) {
         hold_low(step.at);
@@ -155,7 +155,8 @@ void SpiPort::transfer(const ByteStep& step) {
 void SpiPort::send_message(bool with_output) {
   std::array<spi_ioc_transfer, 2> transfers{};
   const auto lead = std::chrono::ceil<std::chrono::microseconds>(settings_.select_lead).count();
-  transfers[0].delay_usecs = static_cast<std::uint16_t>(lead);  // a transfer without bytes that only waits
+  // A transfer without bytes that only waits between chip select and the first clock.
+  transfers[0].delay_usecs = static_cast<std::uint16_t>(lead);
   spi_ioc_transfer& bytes = transfers[1];
   if (with_output) bytes.tx_buf = reinterpret_cast<std::uintptr_t>(out_.data());
   bytes.rx_buf = reinterpret_cast<std::uintptr_t>(in_.data());
@@ -163,7 +164,7 @@ void SpiPort::send_message(bool with_output) {
   const int result = lead > 0 ? control(SPI_IOC_MESSAGE(2), transfers.data()) : control(SPI_IOC_MESSAGE(1), &bytes);
   if (result == static_cast<int>(in_.size())) return;
   const int error = result < 0 ? errno : EIO;
-  // The last two errors mean that the device was served by a program (CUSE) that has ended.
+  // The last two errors mean that a program (CUSE) served the device and has ended.
   if (error == ENODEV || error == ESHUTDOWN || error == ENOTCONN || error == ECONNABORTED) {
     throw Failure(Kind::lost, path_ + " went away: was its driver unloaded?");
   }
@@ -176,8 +177,8 @@ void SpiPort::send_message(bool with_output) {
   throw Failure(Kind::system, what + ": try another speed=HZ, and see what the kernel says in dmesg");
 }
 
-// Reduces the sampled bytes to `bits` bits: removes the idle clocks, whose level is stored, and clocks behind the last
-// bit.
+// Reduces the sampled bytes to `bits` bits: removes the bits of the idle clocks, whose level is stored, and those of
+// clocks behind the last bit.
 void SpiPort::extract_bits(std::size_t bits) {
   const BitView clocked{in_, in_.size() * 8};
   idle_low_ = settings_.idle_clocks > 0 && clocked.load(0, settings_.idle_clocks) == 0;
@@ -189,7 +190,7 @@ void SpiPort::extract_bits(std::size_t bits) {
   in_ = std::move(extracted);
 }
 
-// Applies only changed settings: a conversation may configure the line before each reading.
+// Applies only the settings that have changed: a conversation may configure the line before each reading.
 void SpiPort::apply(LineSettings settings) {
   settings.rate = choice_.speed.value_or(settings.rate);
   settings.spi_mode = choice_.mode.value_or(settings.spi_mode);
@@ -221,8 +222,8 @@ void SpiPort::set_mode(std::uint8_t mode) {
                                        reason(error) + ": " + advice);
 }
 
-// Holds the clock line low by changing the idle level of the controller. Most drivers apply the level at once, some
-// only with the next message.
+// Holds the clock line low by changing the idle level of the controller. Most drivers apply the idle level at once,
+// some only with the next message.
 void SpiPort::hold_low(Time until) {
   const std::uint8_t mode = settings_.spi_mode;
   try {
@@ -241,7 +242,7 @@ void SpiPort::set_word() {
   std::uint8_t given = 0;
   const bool set = control(SPI_IOC_WR_BITS_PER_WORD, &wanted) >= 0;
   const int error = set ? EINVAL : errno;
-  // The kernel reports 8 as 0.
+  // The kernel reports a word length of 8 as 0.
   if (set && control(SPI_IOC_RD_BITS_PER_WORD, &given) >= 0 && (given == word_bits || given == 0)) return;
   throw Failure(Kind::unsupported, "the controller of " + path_ + " refused words of " + std::to_string(word_bits) +
                                        " bits" + reason(error) + ": use another controller");

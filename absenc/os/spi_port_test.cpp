@@ -98,7 +98,7 @@ TEST_F(SpiPortTest, ExchangesAsManyBytesAsAreSentOrExpected) {
 
 TEST_F(SpiPortTest, WaitsBetweenChipSelectAndClock) {
   LineSettings slow = encoder_settings;
-  slow.select_lead = 4'500ns;  // rounded up to whole microseconds
+  slow.select_lead = 4'500ns;  // this lead is rounded up to whole microseconds
   SpiPort port = open(LinkKind::spi, slow);
   kernel.log.clear();
   port.begin({.kind = ByteStep::Kind::transfer, .expect = 3});
@@ -136,7 +136,7 @@ TEST_F(SpiPortTest, ReportsLowIdleLine) {
   EXPECT_FALSE(idle_low(ssi_settings));
   kernel.shorted = true;
   EXPECT_TRUE(idle_low(ssi_settings));
-  EXPECT_FALSE(idle_low(biss_settings));  // BiSS has no clock that shows the idle line
+  EXPECT_FALSE(idle_low(biss_settings));  // without idle clocks in BiSS no clock shows the level of the idle line
 }
 
 TEST_F(SpiPortTest, BeginsNotBeforeItsTimeAndStampsTheEnd) {
@@ -192,7 +192,7 @@ TEST_F(SpiPortTest, ReportsRefusedMode) {
             "the controller of /dev/spidev0.0 refused SPI mode 3 (Invalid argument): swap the two wires of the clock "
             "pair and set spi_mode=1, or use another controller");
   kernel.refusals.clear();
-  kernel.mode_mask = SPI_CPHA;  // other bits are accepted without effect
+  kernel.mode_mask = SPI_CPHA;  // mode bits outside this mask are accepted without effect
   EXPECT_THAT(refusal(Kind::unsupported, LinkKind::clocked, biss_settings), HasSubstr("refused SPI mode 3"));
 }
 

@@ -11,8 +11,10 @@ namespace absenc::os {
 
 namespace {
 
-constexpr std::size_t most_bytes = 4096;   // default of the kernel module's parameter bufsiz
-constexpr std::size_t most_buffers = 255;  // a FUSE request has 256 buffers, one of which holds the list of transfers
+// Greatest number of bytes of a message: the default of the kernel module's parameter bufsiz.
+constexpr std::size_t most_bytes = 4096;
+// Greatest number of buffers of a message: a FUSE request has 256, one of which holds the list of transfers.
+constexpr std::size_t most_buffers = 255;
 constexpr std::uint8_t most_wires = 1;
 constexpr std::uint32_t lsb_first = SPI_LSB_FIRST;
 
@@ -63,7 +65,7 @@ Buffers buffers_of(UserMemory list, std::span<const spi_ioc_transfer> transfers)
 int refused(std::span<const spi_ioc_transfer> transfers, const Buffers& buffers) {
   if (buffers.in > most_bytes || buffers.out > most_bytes) return EMSGSIZE;
   if (buffers.reply.in.size() - 1 + buffers.reply.out.size() > most_buffers) return EMSGSIZE;
-  std::uint64_t all = 0;  // includes transfers without a buffer
+  std::uint64_t all = 0;  // number of bytes, including transfers without a buffer
   for (const spi_ioc_transfer& transfer : transfers) {
     all += transfer.len;
     if (all > INT32_MAX) return EMSGSIZE;
@@ -122,7 +124,7 @@ SpidevReply Spidev::get(unsigned long request) const {
   }
 }
 
-// Changes a setting. Returns 0 or a value of errno.
+// Changes a setting of the controller. Returns 0 or a value of errno.
 int Spidev::set(unsigned long request, Bytes value) {
   switch (request) {
     case SPI_IOC_WR_MODE:
@@ -150,7 +152,7 @@ int Spidev::set_mode(std::uint32_t wanted) {
 }
 
 // Processes a message in two passes: the first requests the list of transfers, the second their buffers. Another thread
-// of the program may change the list between the two passes; the list that came with the buffers counts.
+// of the program may change the list between the two passes; then the list that came with the buffers is used.
 SpidevReply Spidev::message(std::uint64_t address, std::size_t size, Bytes in, std::size_t room, Time now) {
   if (size % sizeof(spi_ioc_transfer) != 0) return error_reply(EINVAL);
   if (size == 0) return {};

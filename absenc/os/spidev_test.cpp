@@ -30,7 +30,7 @@ Data bytes_of(const Value& value) {
   return bytes;
 }
 
-// The fields of spi_ioc_transfer, 0 by default.
+// The fields of spi_ioc_transfer; each is 0 by default.
 struct TransferFields {
   std::uint64_t tx_buf = 0;
   std::uint64_t rx_buf = 0;
@@ -65,7 +65,7 @@ struct SpidevTest : ::testing::Test {
     return spidev.control(_IOC(_IOC_WRITE, SPI_IOC_MAGIC, 0, count * sizeof(spi_ioc_transfer)), 0x1000, list_and_bytes,
                           room, 1ms);
   }
-  // Returns the errno of a message of one transfer.
+  // Returns the errno with which a message of one transfer is refused.
   int refused(const TransferFields& transfer) {
     const SpidevReply reply = message(bytes_of(transfer), 1, 0);
     return -reply.result;

@@ -29,7 +29,7 @@ void StreamPort::begin(const ByteStep& step) {
       pulse(step);
       break;
     case ByteStep::Kind::configure:
-      reach(sent_at_);  // bytes in transit leave with the old settings
+      reach(sent_at_);  // bytes that are not sent yet leave with the old settings
       change_rate(step.rate);
       break;
     case ByteStep::Kind::wait:
@@ -40,7 +40,7 @@ void StreamPort::begin(const ByteStep& step) {
 }
 
 void StreamPort::transfer(const ByteStep& step) {
-  // The first comparison saves most transfers a read of the clock.
+  // The first comparison avoids reading the clock for most transfers.
   if (step.at > waiting_.known_time() + send_slack_ && step.at > os::now() + send_slack_) reach(step.at);
   const Time before = os::now();
   if (!step.out.empty()) write_all(step.out);
@@ -60,7 +60,8 @@ ByteEvent StreamPort::wait(const ByteStep& step) {
     const Time time = os::now();
     if (time >= end_) throw Ended{};
     if (!ready.empty()) {
-      // Bytes go before limits: a late look by this program is not the fault of the other side.
+      // Received bytes are reported before a silence or timer: if this program looks late, the other side is not at
+      // fault.
       if (const std::size_t size = read_some(buffer_, ready); size > 0) {
         const Time at = std::max(time, sent_at_);  // an echo is received before the computed end of sending
         waiting_.silence.received(at);
@@ -128,7 +129,8 @@ std::size_t DescriptorPort::read_some(MutableBytes into, std::span<const int>) {
 }
 
 void DescriptorPort::write_all(Bytes bytes) {
-  constexpr Time patience = 3s;  // longer than the slowest line needs to send a full buffer
+  // Patience for a peer that reads nothing: longer than the slowest line needs to send a full buffer.
+  constexpr Time patience = 3s;
   for (;;) {
     const ssize_t size = write_some(bytes);
     if (size < 0 && errno != EAGAIN && errno != EINTR) fail(errno);
@@ -144,7 +146,7 @@ void DescriptorPort::write_all(Bytes bytes) {
 
 void DescriptorPort::fail(int error) const {
   switch (error) {
-    case 0:  // the end of the stream
+    case 0:  // end of the stream: the other side has closed it
     case EIO:
     case ENXIO:
     case ENODEV:

@@ -75,7 +75,7 @@ TEST_F(StreamPortTest, ComputesTheEndOfSending) {
   EXPECT_GE(first, before + 2s);
   EXPECT_LE(first, now() + 2s);
   port_.begin(transfer(request_));
-  EXPECT_EQ(port_.wait({}).at, first + 2s);  // sent after the first transfer
+  EXPECT_EQ(port_.wait({}).at, first + 2s);  // the second transfer was sent after the first one
 }
 
 TEST_F(StreamPortTest, AnEchoDoesNotComeBeforeTheEndOfSending) {
@@ -161,7 +161,7 @@ TEST_F(StreamPortTest, ReportsTimerThatPassesWhileSending) {
 }
 
 TEST_F(StreamPortTest, ReportsEarlierOfTimerAndSilenceFirst) {
-  // Also if both have passed before the port checks.
+  // The result must be the same if both times have passed before the port checks.
   const auto first_of = [this](Time timer, Time answer) {
     port_.begin(transfer(request_));
     const Time sent = port_.wait({}).at;
@@ -182,7 +182,7 @@ TEST_F(StreamPortTest, WaitsForAnAnswerAfterEachTransfer) {
   port_.begin(transfer(request_));
   EXPECT_EQ(port_.wait({.at = never}).kind, Kind::sent);
   port_.set_end(now() + 5s);
-  // The answer limit applies; only the gap limit would be none.
+  // The answer limit applies and ends the wait; a gap limit of 0 would mean no limit.
   EXPECT_EQ(port_.wait({.at = never, .answer = 1ms}).kind, Kind::silence);
 }
 
@@ -223,7 +223,8 @@ TEST_F(StreamPortTest, EndsWhileWaiting) {
 TEST_F(StreamPortTest, IsLostWhenTheOtherSideCloses) {
   put(peer_.get(), {1});
   peer_.close();
-  EXPECT_EQ(port_.wait({.at = never}).kind, Kind::received);  // bytes received before the close are not lost
+  // Bytes received before the other side closed are not lost.
+  EXPECT_EQ(port_.wait({.at = never}).kind, Kind::received);
   errno = EAGAIN;  // left by an earlier call: the end of a stream does not set errno
   const Failure failure = failure_of([&] { static_cast<void>(port_.wait({.at = never})); });
   EXPECT_EQ(failure.kind(), Failure::Kind::lost);

@@ -69,7 +69,7 @@ TEST(TcpPort, KnowsIpv6) {
 }
 
 TEST(TcpPort, ReportsRefusedConnection) {
-  const TestListener listener;  // bound, so that no other program takes the port
+  const TestListener listener;  // the socket is bound, so that no other program takes the port
   const Failure failure = failure_of([&] { const TcpPort port("127.0.0.1", listener.port); });
   EXPECT_EQ(failure.kind(), Kind::not_found);
   EXPECT_EQ(std::string(failure.what()), "nothing listens on 127.0.0.1 port " + std::to_string(listener.port) +
@@ -97,12 +97,13 @@ TEST(TcpPort, IsLostWhenTheServerCloses) {
   listener.listen(1);
   TcpPort port("127.0.0.1", listener.port);
   Descriptor server = listener.accept();
-  const linger reset{1, 0};  // the next write of the other side fails at once
+  const linger reset{1, 0};  // with this setting the next write of the other side fails at once
   ASSERT_EQ(::setsockopt(server.get(), SOL_SOCKET, SO_LINGER, &reset, sizeof reset), 0);
   server.close();
   EXPECT_EQ(failure_of([&] { static_cast<void>(port.wait({.at = never})); }).kind(), Kind::lost);
   const Data bytes{1};
-  EXPECT_EQ(failure_of([&] { port.begin(transfer(bytes)); }).kind(), Kind::lost);  // the write fails without SIGPIPE
+  // The write fails without raising SIGPIPE.
+  EXPECT_EQ(failure_of([&] { port.begin(transfer(bytes)); }).kind(), Kind::lost);
 }
 
 }  // namespace

@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Returns a number of four hexadecimal digits.
+// Returns the number in a file of four hexadecimal digits; 0 if it has none.
 std::uint16_t number_of(const fs::path& path) { return static_cast<std::uint16_t>(first_number(path, 16).value_or(0)); }
 
 struct KnownChip {
@@ -28,7 +28,8 @@ constexpr std::uint16_t wch = 0x1A86;
 
 // Rates from the data sheets: FTDI DS_FT232R, DS_FT232BM, DS_FT2232D, DS_FT2232H, DS_FT4232H, DS_FT232H, DS_FT231X;
 // Silicon Labs CP2105; WCH CH340DS1, CH343DS1, CH9102DS1. FTDI's bcdDevice as in the kernel's ftdi_sio.c. CP2102 (1
-// Mbit/s) and CP2102N (3 Mbit/s) have the same numbers, and so have the PL2303 variants: none of them is listed.
+// Mbit/s) and CP2102N (3 Mbit/s) have the same USB numbers, and so have the PL2303 variants: none of these chips is
+// listed.
 constexpr std::array<KnownChip, 11> chips{{
     {ftdi, 0x6001, 0x0600, {"FT232R", 3'000'000}},
     {ftdi, 0x6001, 0x0400, {"FT232B", 3'000'000}},

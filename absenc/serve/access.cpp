@@ -22,14 +22,15 @@ constexpr Time time_of_guesses = std::chrono::seconds(60);
 constexpr std::size_t most_addresses = 1000;
 constexpr std::string_view wrong_token = "the token is wrong: the server's token file has no such token";
 
-// Compares host names and URL schemes as HTTP does: ASCII, ignoring case.
+// Returns whether host names or URL schemes are equal as HTTP defines it: ASCII, ignoring case.
 bool equals_ignoring_case(std::string_view one, std::string_view other) {
   const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; };
   return std::equal(one.begin(), one.end(), other.begin(), other.end(),
                     [&](char a, char b) { return lower(a) == lower(b); });
 }
 
-// Takes the same time wherever the texts differ, so that the time does not reveal how much of a guess is right.
+// Returns whether two secrets are equal. The comparison takes the same time wherever they differ, so that the time does
+// not reveal how much of a guess is right.
 bool same_secret(std::string_view one, std::string_view other) {
   if (one.size() != other.size()) return false;
   unsigned difference = 0;
@@ -102,7 +103,7 @@ std::uint64_t Access::wrong_tokens() const {
 }
 
 // Counts a wrong token and returns whether the address may try again. However many guesses arrive, only two of them add
-// an event: the first of a minute, and the one that exceeds the limit.
+// an event to the history: the first of a minute, and the one that exceeds the limit.
 bool Access::may_try_again(const std::string& peer) const {
   const Time now = os::now();
   const std::lock_guard lock(mutex_);
@@ -135,8 +136,8 @@ std::string Access::token_name(const Request& request) const {
   return name;
 }
 
-// Checks that the request names this server. Otherwise a page of another site could make a browser send a request under
-// that site's own name and let the page read the response (DNS rebinding).
+// Returns whether the header Host names this server. Otherwise a page of another site could make a browser send a
+// request under that site's own name and let the page read the response (DNS rebinding).
 bool Access::names_this_server(std::string_view host) const {
   return names_loopback(host) || (!public_origin_.empty() &&
                                   equals_ignoring_case(host_name_in(host), host_name_in(authority_of(public_origin_))));
@@ -150,15 +151,15 @@ bool Access::is_from_own_page(const Request& request) const {
          (!public_origin_.empty() && equals_ignoring_case(request.origin, public_origin_));
 }
 
-// A proxy does not always add its header. With a configured proxy, even a read request from this computer therefore
-// needs a token.
+// Returns whether the request needs a token. A proxy does not always add its header. With a configured proxy, even a
+// read request from this computer therefore needs a token.
 bool Access::needs_token(const Request& request, Right right) const {
   if (right == Right::open || right == Right::change || !on_loopback_) return right != Right::open;
   return has_tokens() && (request.is_forwarded || !public_origin_.empty());
 }
 
-// The last entry of X-Forwarded-For is the address that the proxy itself saw. It is used only with a configured proxy
-// and a request from this computer, because any client can send this header.
+// Returns the address of the client. The last entry of X-Forwarded-For is the address that the proxy itself saw. That
+// entry is used only with a configured proxy and a request from this computer, because any client can send this header.
 std::string Access::client_of(const Request& request) const {
   if (public_origin_.empty() || !is_loopback_address(request.peer)) return request.peer;
   const std::string& list = request.forwarded_for;

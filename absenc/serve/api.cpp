@@ -21,7 +21,7 @@ using namespace client;
 
 namespace {
 
-constexpr std::int64_t most_rows = 5000;         // rows in one JSON response
+constexpr std::int64_t most_rows = 5000;         // greatest number of rows in one JSON response
 constexpr std::int64_t rows_of_a_page = 10'000;  // rows of CSV that are read from the history at a time
 
 /// An error that is answered with status 400.
@@ -216,7 +216,8 @@ void Api::post(const Request& request, const Reply& reply) {
   reply.send(response);
 }
 
-// The server is healthy while it can answer and can store what it reads. Faults of encoders are in /metrics.
+// Returns the response to a health check. The server is healthy while it can answer and can store readings. Faults of
+// encoders are in /metrics.
 Response Api::health() const {
   std::size_t live = 0;
   const Fleet::Watches watches = fleet_->all();
@@ -236,7 +237,7 @@ Response Api::health() const {
                            .set("mqtt_dropped", mqtt.dropped));
 }
 
-// Reports whether the server has tokens, and the name of the token in the request.
+// Returns a response that states whether the server has tokens, and the name of the token in the request.
 Response Api::token(const Request& request) const {
   const std::string who = access_->token_name(request);
   if (who.empty() && !request.authorization.empty()) return access_->refuse_token(request);
@@ -264,7 +265,7 @@ void Api::command(Watch& watch, const Request& request, const Reply& reply) {
   give(watch, std::move(order), request, reply);
 }
 
-// The alarm stays raised, because only the encoder can clear it.
+// Acknowledges an alarm. The alarm stays raised, because only the encoder can clear it.
 void Api::acknowledge(Watch& watch, const Request& request, const Reply& reply) {
   const std::string alarm = request.value("alarm");
   if (alarm.empty()) throw BadRequest("alarm must name the alarm that is acknowledged");
@@ -278,7 +279,8 @@ void Api::acknowledge(Watch& watch, const Request& request, const Reply& reply) 
   chronicler_->when_written(server_events_->added(), answer);
 }
 
-// The doctor opens the port again with other settings, so other encoders on the same line would lose their port.
+// Starts an examination, unless other encoders are on the same line. It opens the port again with other settings, so
+// other encoders on the same line would lose their port.
 void Api::doctor(Watch& watch, const Request& request, const Reply& reply) {
   const std::vector<std::string> others = fleet_->others_on_line(watch);
   if (others.empty()) return give(watch, examination_order(), request, reply);
@@ -288,7 +290,7 @@ void Api::doctor(Watch& watch, const Request& request, const Reply& reply) {
                        watch.name(), fmt::join(others, ", "), watch.name())));
 }
 
-// Queues the order. Unless the order has its own `done`, the response is the JSON result or {"error":"..."}.
+// Queues `order` for its encoder. Unless it has its own `done`, the response is the JSON result or {"error":"..."}.
 void Api::give(Watch& watch, Order order, const Request& request, const Reply& reply) {
   const std::string who = access_->token_name(request);
   order.who = who.empty() ? request.peer : fmt::format("{} from {}", who, request.peer);

@@ -69,7 +69,8 @@ void Chronicler::when_written(std::uint64_t added, std::function<void()> then) {
   changed_.notify_all();
 }
 
-// Returns whether a caller of `when_written` waits for events that can be written now. The mutex must be held.
+// Returns whether a caller of `when_written` waits for events that can be written now. The caller of this function must
+// hold the mutex.
 bool Chronicler::has_ready_caller() const {
   return std::any_of(waiting_.begin(), waiting_.end(), [this](const auto& one) { return one.first <= added_; });
 }

@@ -22,7 +22,8 @@ namespace {
 
 bool is_named(std::string_view name) { return name.find_first_of(":?") == std::string_view::npos; }
 
-// Returns a text of all settings of an encoder: equal texts mean that nothing has changed.
+// Returns a text of all settings of an encoder: if the texts before and after a reload are equal, no setting has
+// changed.
 std::string description_of(const NamedEncoder& named) {
   std::string text = fmt::format("{} {} {}", named.address, named.rate_hz, named.has_company);
   for (const auto* settings : {&named.settings, &named.defaults}) {
@@ -50,7 +51,8 @@ Fleet::~Fleet() { end(); }
 
 void Fleet::end() {
   const Watches watches = all();
-  for (const auto& watch : watches) watch->request_stop();  // requests all threads to stop first, then waits for each
+  // All threads are requested to stop first; then each one is waited for.
+  for (const auto& watch : watches) watch->request_stop();
   for (const auto& watch : watches) watch->wait();
 }
 
@@ -99,7 +101,7 @@ std::string Fleet::reload() {
       if (stays) unchanged.push_back(one);
     }
   }
-  // A new encoder may need the port of an ended one.
+  // The old encoders are stopped first, because a new encoder may need the port of one of them.
   for (const auto& watch : ending) watch->request_stop();
   for (const auto& watch : ending) watch->wait();
   std::vector<std::string> added;

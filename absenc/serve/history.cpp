@@ -16,8 +16,8 @@ using namespace client;
 
 namespace {
 
-// The same second occurs twice if the clock was set back or the server was restarted within it. The row then combines
-// the readings of both.
+// Adds the row of a second. The same second occurs twice if the clock was set back or the server was restarted within
+// it. The row then combines the readings of both.
 constexpr const char* add_second = R"(
 INSERT INTO second SELECT id, ?, ?, ?, ?, ?, ?, ?, ?, ? FROM encoder WHERE name = ?
 ON CONFLICT (encoder, at) DO UPDATE SET
@@ -72,7 +72,8 @@ HistoryWriter::HistoryWriter(std::string path, const HistoryLimits& limits)
 }
 HistoryWriter::~HistoryWriter() = default;
 
-// A damaged file at the path that this server did not write is not replaced: it may belong to another program.
+// Opens the history file. A damaged file that this server did not write is not replaced: it may belong to another
+// program.
 void HistoryWriter::open() {
   try {
     file_.emplace(path_);
@@ -88,7 +89,7 @@ void HistoryWriter::open() {
   reader_.accept();
 }
 
-// Ensures that the open file is intact and still at the path; opens or creates another file if needed.
+// Ensures that the open history file is intact and still at the path; opens or creates another file if needed.
 void HistoryWriter::require_file() {
   if (file_) {
     const HistoryFile::State state = file_->check();
@@ -179,7 +180,7 @@ void HistoryWriter::note_loss(std::size_t rows, const std::string& why) {
 void HistoryWriter::roll_back() {
   try {
     if (file_ && file_->sqlite().in_transaction()) file_->sqlite().run("ROLLBACK");
-  } catch (const Failure&) {  // then SQLite has already rolled back
+  } catch (const Failure&) {  // the transaction has ended: SQLite has already rolled it back
   }
 }
 
@@ -217,7 +218,8 @@ bool HistoryWriter::has_day_of_rows_since(std::int64_t at_s) {
   return false;
 }
 
-// Counts rows instead of comparing times, because a wrong clock may have given some rows any time.
+// Returns the time in seconds before which the oldest tenth of all rows lies. Counts rows instead of comparing times,
+// because a wrong clock may have given some rows any time.
 std::int64_t HistoryWriter::end_of_oldest_tenth() {
   Sqlite& sqlite = file_->sqlite();
   const std::int64_t most = sqlite.number(
@@ -255,7 +257,7 @@ void HistoryReader::accept() {
   refused_.clear();
 }
 
-// Returns the open database, or opens it. The mutex must be held.
+// Returns the open history database, or opens it. The caller must hold the mutex.
 Sqlite& HistoryReader::database() {
   if (!refused_.empty()) throw Failure(refused_);
   if (!database_) database_.emplace("the history", path_, Sqlite::For::reading);

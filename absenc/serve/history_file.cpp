@@ -77,14 +77,14 @@ HistoryFile::HistoryFile(const std::string& path) : path_(path), owned_file_(loc
   sqlite_->run(fmt::format("PRAGMA user_version = {}", version));
   log_ = os::identity_of(log_of(path));
   index_ = os::identity_of(index_of(path));
-  // After kill -9 the file has its full length only once the log is written into it.
+  // After kill -9 the database file has its full length only once the log was written into it.
   const bool is_in_file = sqlite_->number("PRAGMA wal_checkpoint(FULL)") == 0;
   if (is_in_file && is_truncated()) throw DamagedFile(fmt::format("the history {} was cut off", path));
   note_written();
 }
 
-// The header has the page size at byte 16 and the number of pages at byte 28: https://www.sqlite.org/fileformat.html,
-// 1.3.
+// Returns whether the database file is shorter than its header states. The header has the page size at byte 16 and the
+// number of pages at byte 28: https://www.sqlite.org/fileformat.html, 1.3.
 bool HistoryFile::is_truncated() const {
   constexpr std::string_view magic{"SQLite format 3\0", 16};
   const std::string header = owned_file_->beginning(32);
@@ -94,9 +94,10 @@ bool HistoryFile::is_truncated() const {
   return owned_file_->state().size < page * std::int64_t{big_endian(header.substr(28, 4))};
 }
 
-// Checks through a separate connection, which has no pages of the file in memory.
+// Returns whether SQLite finds the database intact. Checks through a separate connection, which has no pages of the
+// file in memory.
 bool HistoryFile::passes_quick_check() const {
-  if (owned_file_->state().size == 0) return false;  // SQLite would delete the log of an empty file
+  if (owned_file_->state().size == 0) return false;  // an empty database file is damaged; SQLite would delete its log
   try {
     Sqlite other("the history", path_, Sqlite::For::reading);
     Statement quick_check(other, "PRAGMA quick_check(1)");
@@ -110,8 +111,8 @@ HistoryFile::State HistoryFile::check() const {
   if (!owned_file_->has_its_name()) {
     return os::identity_of(path_).number == 0 ? State::gone : State::replaced;
   }
-  // SQLite in another program has changed the file, and may have written our log to it; or `cp` has overwritten it,
-  // which mixes our log into the new content.
+  // SQLite in another program has changed the file, and may have written the log of this server into it; or `cp` has
+  // overwritten it, which mixes our log into the new content.
   const bool is_changed = owned_file_->state().modified_ns != modified_ns_;
   if (!is_changed && !is_truncated()) return State::whole;
   if (!passes_quick_check()) return State::damaged;
@@ -130,7 +131,7 @@ void HistoryFile::close_moved() {
   bool is_in_file = false;
   try {
     is_in_file = sqlite_->number("PRAGMA wal_checkpoint(FULL)") == 0;
-  } catch (const Failure&) {  // the log is not in the file: it is renamed below
+  } catch (const Failure&) {  // the log was not written into the file, so the log is renamed below
   }
   close();
   // SQLite would apply a log that stays beside the path to the next file there.
@@ -149,7 +150,7 @@ std::string HistoryFile::set_aside() {
   return name;
 }
 
-// The log is renamed too: under its old name SQLite would write it into the damaged file.
+// Renames the history file and its log: under its old name SQLite would write it into the damaged file.
 std::string HistoryFile::set_aside(const std::string& path) {
   std::string name = new_name_beside(path);
   rename_to(path, name);

@@ -15,7 +15,7 @@ using namespace client;
 
 namespace {
 
-/// Returns the text with only letters, digits, - and _.
+/// Returns `text` reduced to the characters that an object id may have: letters, digits, - and _.
 std::string object_id(std::string_view text) {
   std::string id = topic_level(text);
   for (char& c : id) {

@@ -20,7 +20,8 @@ namespace absenc::serve {
 
 namespace {
 
-// Higher than the limits of Connections: at this limit the library would leave new connections unaccepted.
+// Greatest number of connections of libmicrohttpd, above the limits of Connections: at its own limit the library would
+// leave new connections unaccepted.
 constexpr unsigned most_connections = Connections::most + Connections::reserve + 64;
 constexpr std::size_t memory_for_each = 64 * 1024;  // bytes for headers and unsent output; larger headers are refused
                                                     // with status 431
@@ -90,13 +91,14 @@ struct Stream::Sending {
   std::deque<Text> queue;
   std::size_t sent_of_first = 0;
   MHD_Connection* suspended = nullptr;
-  int socket = -1;  // socket of the connection that sends this stream; -1 without one
+  int socket = -1;  // socket of the connection that sends this stream; -1 before there is one
   Time taken_at = os::now();
-  bool ended = false;  // no more texts will be added
-  bool over = false;   // the connection has ended
+  bool ended = false;  // no more texts will be added to the queue
+  bool over = false;   // the connection of the stream has ended
   std::uint64_t dropped = 0;
 
-  // The mutex must be held, so that a connection is never resumed before it is suspended.
+  // Resumes the suspended connection of the stream. The mutex must be held, so that the connection is never resumed
+  // before it is suspended.
   void resume() {
     if (suspended != nullptr) ::MHD_resume_connection(std::exchange(suspended, nullptr));
   }
@@ -143,7 +145,7 @@ void Stream::push(Text text) {
   if (sending_->over || sending_->ended || text->empty()) return;
   std::deque<Text>& queue = sending_->queue;
   queue.push_back(std::move(text));
-  // The first text may be partly sent, so the second one is dropped.
+  // The first text of the queue may be partly sent, so the second one is dropped.
   if (queue.size() > std::max<std::size_t>(sending_->most, 2)) {
     queue.erase(queue.begin() + 1);
     ++sending_->dropped;
@@ -300,7 +302,8 @@ struct HttpServer::Daemon {
       exchanges.emplace(exchange.get(), exchange);
       if (ending) return exchange->answer(Response{503, "text/plain", "the server is shutting down\n"}, nullptr);
     }
-    // The last copy of `reply` calls this deleter. If no copy has answered by then, the client gets this response.
+    // The last copy of `reply` calls this deleter. If no copy has answered by then, the client gets the response with
+    // status 500.
     const Reply reply(std::shared_ptr<Exchange>(exchange.get(), [exchange](Exchange*) {
       exchange->answer(Response{500, "text/plain", "the request got no answer\n"}, nullptr);
     }));
@@ -376,7 +379,8 @@ struct HttpServer::Daemon {
     static_cast<void>(listener.socket.release());  // the daemon closes the listening socket
   }
 
-  // Resumes all suspended connections first, because libmicrohttpd must not be stopped with suspended ones.
+  // Stops the HTTP server. Resumes all suspended connections first, because libmicrohttpd must not be stopped with
+  // suspended ones.
   void stop() {
     ::MHD_quiesce_daemon(daemon);
     std::vector<std::shared_ptr<Exchange>> waiting;

@@ -13,7 +13,7 @@ using namespace client;
 
 namespace {
 
-/// Escapes a label value as the Prometheus format requires: backslash, quote and line feed.
+/// Returns a label value with the escapes that the Prometheus format requires: for backslash, quote and line feed.
 std::string label(std::string_view text) {
   std::string written;
   for (const char c : text) {

@@ -19,10 +19,13 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr std::size_t most_in_frame = 4096;  // bytes; the process sends only numbers and short texts
+// Greatest size in bytes of a frame from the MQTT client process, which sends only numbers and short texts.
+constexpr std::size_t most_in_frame = 4096;
 constexpr Time time_to_start = 10s;
-constexpr Time longest_silence = 10s;  // longest silence of a connected process, which sends a sign of life each second
-constexpr Time time_to_end = 500ms;    // to disconnect from the broker, or to write a core dump
+// Longest silence of the MQTT client process, which sends a sign of life each second.
+constexpr Time longest_silence = 10s;
+// Time for the MQTT client process to disconnect from the broker, or to write a core dump.
+constexpr Time time_to_end = 500ms;
 
 // Replaces characters that are not printable ASCII: the text may come from the broker.
 std::string printable(std::string text) {
@@ -60,7 +63,7 @@ MqttClient::State MqttClient::work(Time longest) {
   if (state_ == State::lost) return state_;
   const os::Ready ready = os::wait_for_socket(process_.channel().get(), !outgoing_.empty(), longest);
   if (ready.to_read) receive();
-  // The process may have ended: its last frames are received first, because they give the reason.
+  // The MQTT client process may have ended: its last frames are received first, because they give the reason.
   if (state_ != State::lost && !process_.channel().send(outgoing_)) note_end();
   if (state_ == State::connected && os::now() - last_frame_at_ > longest_silence) {
     process_.end({});
@@ -120,7 +123,8 @@ void MqttClient::lose(const std::string& why) {
   trouble_ = why;
 }
 
-// Only a packet of the broker can make the library end its process: nothing else reaches it from outside.
+// Records that the MQTT client process has ended unexpectedly. Only a packet of the broker can make the library end its
+// process: nothing else reaches it from outside.
 void MqttClient::note_end() {
   const std::string how = process_.end(time_to_end);
   if (state_ == State::lost) return;

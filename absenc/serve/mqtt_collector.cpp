@@ -17,9 +17,10 @@ using namespace client;
 
 namespace {
 
-constexpr std::size_t most_in_a_message = 250;                   // readings per message; about 15 kB
-constexpr Time drop_report_interval = std::chrono::seconds(10);  // between events about drops, which are messages too
-constexpr Time drop_display_time = std::chrono::seconds(30);     // the health shows drops for this time
+constexpr std::size_t most_in_a_message = 250;  // greatest number of readings in a message, about 15 kB
+// Time between two events about dropped readings; these events are messages too.
+constexpr Time drop_report_interval = std::chrono::seconds(10);
+constexpr Time drop_display_time = std::chrono::seconds(30);  // the health of MQTT shows dropped readings for this time
 
 }  // namespace
 
@@ -62,8 +63,8 @@ void MqttCollector::work(const std::stop_token& stop) {
   }
 }
 
-// The text contains a random part that changes with each start. A power failure may undo the last writes to the spool;
-// the same id would then be used again for a different message.
+// Returns the id of a message in its payload. The id contains a random part that changes with each start. A power
+// failure may undo the last writes to the spool; the same id would then be used again for a different message.
 std::string MqttCollector::id_text(std::int64_t id) const { return fmt::format("{}-{}", spool_->run(), id); }
 
 void MqttCollector::collect() {

@@ -31,12 +31,14 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr int keepalive_s = 15;
-constexpr int most_in_flight = 1000;  // messages without acknowledgement; the broker may set a lower limit
+// Greatest number of messages without acknowledgement; the broker may set a lower limit.
+constexpr int most_in_flight = 1000;
 constexpr const char* system_certificates = "/etc/ssl/certs";
-constexpr std::size_t most_memory = 128'000'000;  // bytes; an MQTT packet may have 256 MB, but none is expected
-constexpr std::size_t most_frame = 256'000'000;   // bytes of a frame from the parent
-constexpr std::size_t outgoing_limit = 100'000;   // bytes; above it nothing is read from the broker until the parent
-                                                  // has received them
+constexpr std::size_t most_memory = 128'000'000;  // greatest memory of the process in bytes; an MQTT packet may have
+                                                  // 256 MB, but none so large is expected
+constexpr std::size_t most_frame = 256'000'000;   // greatest size in bytes of a frame from the parent
+constexpr std::size_t outgoing_limit = 100'000;   // bytes for the parent; above this number nothing is read from the
+                                                  // broker until the parent has received them
 constexpr Time sign_of_life_interval = 1s;
 
 void require(int error, const std::string& what) {
@@ -174,8 +176,8 @@ class MqttProcess {
   void run_library() {
     if (client_ == nullptr || !connects_) return;
     if (::mosquitto_socket(client_) < 0) return lose("the connection was lost");
-    const bool is_over =
-        (broker_events_ & (POLLERR | POLLHUP | POLLNVAL)) != 0;  // mosquitto_loop_read reports the reason
+    // Error or end of the connection: mosquitto_loop_read reports the reason.
+    const bool is_over = (broker_events_ & (POLLERR | POLLHUP | POLLNVAL)) != 0;
     const bool reads = is_over || (broker_events_ & POLLIN) != 0;
     const bool writes = (broker_events_ & POLLOUT) != 0;
     errno = 0;  // the library reads errno after calls that do not set it
@@ -189,7 +191,8 @@ class MqttProcess {
     note(error);
   }
 
-  // Reason codes of MQTT 3.1.1 are below 128 and have their own texts.
+  // Handles the broker's answer to the connection request. Reason codes of MQTT 3.1.1 are below 128 and have their own
+  // texts.
   void connect_answered(int reason) {
     if (reason == 0) {
       connected_ = true;
@@ -241,7 +244,8 @@ class MqttProcess {
   Broker broker_{};
   MqttVersion version_ = MqttVersion::v5;
   mosquitto* client_ = nullptr;
-  std::unordered_map<int, std::uint32_t> numbers_{};  // number of a message at the parent, by its number in the library
+  // Number that the parent has given a message, by the number that the library has given it.
+  std::unordered_map<int, std::uint32_t> numbers_{};
   short broker_events_ = 0;
   Time next_sign_of_life_{};
   bool connects_ = false;

@@ -24,14 +24,14 @@ using namespace std::chrono_literals;
 constexpr std::size_t most_messages_out = 500;  // greatest number of messages without acknowledgement
 constexpr Time one_wait = 20ms;
 constexpr Time state_interval = 200ms;
-constexpr Time many_state_interval = 1s;  // between states, with more than `many` encoders
+constexpr Time many_state_interval = 1s;  // time between two publications of the states, with more than `many` encoders
 constexpr std::size_t many = 50;
-constexpr Time value_interval = 1s;  // between values for Home Assistant
-constexpr Time first_pause = 500ms;  // before the second attempt to connect; each further pause is twice as long
+constexpr Time value_interval = 1s;  // time between two publications of values for Home Assistant
+constexpr Time first_pause = 500ms;  // pause before the second attempt to connect; each further pause is twice as long
 constexpr Time longest_pause = 5s;
 constexpr Time time_to_connect = 10s;
 constexpr Time time_to_finish = 1s;
-constexpr Time stable_time = 10s;  // after a connection of this length, the next pause is `first_pause` again
+constexpr Time stable_time = 10s;  // after a connection that lasted this long, the next pause is `first_pause` again
 constexpr Time connection_report_interval = 60s;  // minimum time between two events about a connection that is often
                                                   // lost; a lasting connection is reported at once
 
@@ -40,7 +40,7 @@ constexpr Time connection_report_interval = 60s;  // minimum time between two ev
 MqttSender::MqttSender(const MqttSettings& settings, Spool& spool, const Fleet& fleet, ServerEvents& server_events)
     : settings_(&settings), spool_(&spool), fleet_(&fleet), server_events_(&server_events) {
   for (const auto& [name, next] : spool.next_numbers()) served_.insert(name);
-  static_cast<void>(MqttClient(settings.broker, identity(), version_));  // checks the files of the settings
+  static_cast<void>(MqttClient(settings.broker, identity(), version_));  // checks the files that the settings name
   thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
 }
 
@@ -67,11 +67,11 @@ void MqttSender::work(const std::stop_token& stop) {
       run_connection(stop);
     } catch (const Failure& failure) {
       set_lost(failure.what());
-    } catch (const os::Failure& failure) {  // the broker's name cannot be resolved
+    } catch (const os::Failure& failure) {  // the name of the broker cannot be resolved
       set_lost(failure.what());
     }
     if (version_ != tried) continue;
-    version_ = MqttVersion::v5;  // the broker may have been updated, or its answer was a mistake
+    version_ = MqttVersion::v5;  // MQTT 5 is tried again: the broker may have been updated, or its answer was a mistake
     const bool was_stable = connected_at_ != Time{} && os::now() - connected_at_ >= stable_time;
     if (has_acknowledged_ && was_stable) pause = first_pause;
     std::unique_lock lock(mutex_);
@@ -92,7 +92,8 @@ void MqttSender::run_connection(const std::stop_token& stop) {
   retained_.clear();
   next_states_ = {};
   std::vector<std::string> hosts = os::addresses_of(settings_->broker.host);
-  const bool by_name = settings_->broker.tls;  // TLS: the certificate is issued for the name
+  // With TLS the host name is used, because the certificate is issued for it.
+  const bool by_name = settings_->broker.tls;
   const bool try_all = by_name && hosts.size() > 1;
   if (by_name) hosts = {settings_->broker.host};
   std::string why;
@@ -133,8 +134,8 @@ void MqttSender::begin() {
   figures_.trouble = refusals_.text();
 }
 
-// Reports the connection by an event. After an event, the next one needs a lasting connection or a minute, so that an
-// unstable connection does not fill the history.
+// Reports the connection by an event. After one event, a further event needs a lasting connection or a minute, so that
+// an unstable connection does not fill the history.
 void MqttSender::report_connected() {
   if (connection_reported_) return;
   if (os::now() < next_connection_report_ && os::now() - connected_at_ < stable_time) return;
@@ -166,14 +167,14 @@ void MqttSender::step(MqttClient& client) {
   report_connected();
   send_messages(client);
   const bool lost = client.work(one_wait) == MqttClient::State::lost;
-  settle(client);  // handles also acknowledgements from before the loss
+  settle(client);  // also handles acknowledgements that arrived before the connection was lost
   if (!lost) return;
   note_death(client);
-  if (!client.died()) note_lost_connection();  // otherwise a packet ended the process, and no topic is the cause
+  if (!client.died()) note_lost_connection();  // if a packet ended the client process, no topic is the cause
   throw Failure(client.trouble());
 }
 
-// A broker may close the connection instead of refusing a message.
+// Records a lost connection as a possible refusal: a broker may close the connection instead of refusing a message.
 void MqttSender::note_lost_connection() {
   std::set<std::string> topics;
   for (const auto& [number, sent] : outstanding_) topics.insert(sent.topic);
@@ -212,7 +213,8 @@ void MqttSender::send_states(MqttClient& client) {
   }
 }
 
-// Otherwise the broker would keep the retained messages of an encoder that is no longer served.
+// Clears the retained messages of encoders that are no longer served. Otherwise the broker would keep the retained
+// messages of an encoder that is no longer served.
 void MqttSender::clear_unserved(MqttClient& client, const Fleet::Watches& watches) {
   std::set<std::string> now;
   for (const auto& watch : watches) now.insert(watch->name());
@@ -299,7 +301,7 @@ void MqttSender::settle_refused(const Outstanding& sent, const std::string& why)
 
 void MqttSender::settle_taken(const Outstanding& sent) {
   if (!refusals_.take(sent.topic)) return;
-  last_checked_id_ = 0;  // other messages of this topic were skipped
+  last_checked_id_ = 0;  // the search starts again from the first id, because other messages of this topic were skipped
   {
     const std::lock_guard lock(mutex_);
     figures_.trouble = refusals_.text();

@@ -28,7 +28,7 @@ OrderResult success(const Command& command, const Answer& answer, const std::str
           change};
 }
 
-// Runs a command. A setting is read back and compared after it was written.
+// Runs a command. A command that writes a setting is followed by reading the setting back and comparing it.
 OrderResult run_command(Encoder& encoder, const Order& order) {
   const Command& command = *order.command;
   if (command.verb != Verb::config_set) {
@@ -64,7 +64,7 @@ class OptionalReads {
     return std::nullopt;
   }
 
-  /// Returns why the last request failed.
+  /// Returns why the last request of this object failed.
   [[nodiscard]] const std::string& reason() const { return last_; }
   /// Returns false if the options of the encoder exclude the last request.
   [[nodiscard]] bool was_sent() const { return was_sent_; }
@@ -76,7 +76,7 @@ class OptionalReads {
  private:
   Encoder* encoder_;
   const Between* between_;
-  bool has_sent_ = false;  // a read request was sent before
+  bool has_sent_ = false;  // whether a read request was sent before
   bool was_sent_ = false;
   bool answered_ = false;
   std::string first_;
@@ -97,7 +97,7 @@ std::string range_of(const Unit& unit, const Command& getter) {
   return fmt::format("{}", fmt::join(texts, ", "));
 }
 
-// Returns null for an invalid value.
+// Returns a value as JSON for people; null for an invalid value.
 Json value_for_people(const Column& column, const Value& value) {
   if (std::holds_alternative<Invalid>(value)) return {};
   if (std::holds_alternative<Unknown>(value)) return "unknown";
@@ -114,7 +114,7 @@ Json row_for_people(const Column& column, const Value& value) {
       .set("meaning", column.meaning);
 }
 
-// `wanted` is the command that reads one setting; null: all settings.
+// Reads settings. `wanted` is the command that reads one setting; null: all settings.
 OrderResult read_settings(Encoder& encoder, const Command* wanted, const Between& between) {
   Json identity = Json::object();
   Json settings = Json::object();

@@ -25,7 +25,8 @@ using namespace std::chrono_literals;
 
 constexpr Time between_points = 33ms;
 constexpr Time between_states = 200ms;
-constexpr Time between_large_states = 1s;  // between states of more than `large` encoders
+// Time between two states in the event stream, with more than `large` encoders.
+constexpr Time between_large_states = 1s;
 constexpr std::size_t large = 50;
 
 std::string url_of(const std::string& host, std::uint16_t port) {
@@ -35,7 +36,7 @@ std::string url_of(const std::string& host, std::uint16_t port) {
 
 }  // namespace
 
-// In order of dependency: each member uses those above it.
+// Parts of the server in order of dependency: each member uses those above it.
 struct Server::Parts {
   explicit Parts(const Choices& choices)
       : listener(os::listen_at(choices.host, choices.port)),
@@ -58,8 +59,8 @@ struct Server::Parts {
   ~Parts() {
     publisher.request_stop();
     publisher.join();
-    http.reset();  // stops requests before the parts that they use
-    fleet.end();   // before write_events, for the events of its last commands
+    http.reset();  // HTTP ends first: requests use the other parts
+    fleet.end();   // before write_events, so that events of the last commands are written
     distribute_events();
     sending.change_to({});
   }
@@ -147,7 +148,7 @@ std::string Server::history_trouble() const {
 std::size_t Server::encoders() const { return parts_->fleet.all().size(); }
 
 std::string Server::reload() {
-  const Outlets outlets = read_outlets(outlets_);  // read before any change, because this may throw
+  const Outlets outlets = read_outlets(outlets_);  // the settings are read before any change, because reading may throw
   try {
     parts_->access.reload();
   } catch (const client::Failure& failure) {

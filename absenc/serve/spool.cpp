@@ -17,7 +17,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::size_t write_size = 65536;  // small writes, because a nearly full disk may still accept one
+// Size of one write in bytes; it is small, because a nearly full disk may still accept a small one.
+constexpr std::size_t write_size = 65536;
 
 std::int64_t memory_bytes(std::int64_t most) { return std::clamp<std::int64_t>(most / 16, 64'000, 4'000'000); }
 
@@ -96,7 +97,7 @@ void Spool::write_waiting() {
   notes_.push_back(fmt::format("the spool {} can be written again", path_));
 }
 
-// Writes the waiting messages that fit into one write. Returns false when none waits.
+// Writes the waiting messages that fit into one write. Returns false when no message waits.
 bool Spool::write_some() {
   if (memory_.empty() && unwritten_numbers_.empty()) return false;
   std::string bytes;
@@ -159,7 +160,8 @@ std::vector<Message> Spool::after(std::int64_t id, std::size_t most) {
       collect_from(part, id, most, found);
     } catch (const os::Failure&) {
       std::error_code error;
-      if (fs::exists(path_of(part.number), error)) break;  // a temporary error: the next call tries again
+      // The error is temporary: the next call of this function tries again.
+      if (fs::exists(path_of(part.number), error)) break;
       drop_part(i--, fmt::format("{} was removed", path_of(part.number)));
     }
   }
@@ -193,7 +195,7 @@ void Spool::remove(const std::vector<std::int64_t>& ids) {
   const std::lock_guard lock(mutex_);
   for (const std::int64_t id : ids) {
     const auto place = places_.find(id);
-    if (place == places_.end()) continue;  // the message was dropped meanwhile
+    if (place == places_.end()) continue;  // the message was dropped after `after` returned it
     remove_one(id, place->second);
     places_.erase(id);
   }
@@ -216,7 +218,7 @@ void Spool::remove_one(std::int64_t id, const Place& place) {
   part->waiting_bytes -= place.bytes;
   try {
     if (file_of(*part).mark_arrived(place.offset) == 0) return;
-  } catch (const os::Failure&) {  // the file is gone, so the mark is not needed
+  } catch (const os::Failure&) {  // the file is gone, so the mark of acknowledgement is not needed
   }
   unmarked_.insert(id);
 }
@@ -226,7 +228,7 @@ void Spool::forget(const std::string& encoder) {
   facts_.next_numbers.erase(encoder);
   unwritten_numbers_.erase(encoder);
   if (newest_ == nullptr) return;
-  // Without free space the reading number stays in the file until the next file is started, which does no harm.
+  // Without free space the reading number stays in the newest file until the next file is started, which does no harm.
   [[maybe_unused]] const int ignored = newest_->log().append(spool_record_without(encoder));
   parts_.back().bytes = newest_->log().size();
 }

@@ -16,7 +16,8 @@ namespace {
 
 constexpr std::string_view part_suffix = ".part";
 
-// Returns the size limit of one file. It is smaller on a small disk, because only deleting a whole file frees space.
+// Returns the size limit of one file of the spool. The limit is smaller on a small disk, because only deleting a whole
+// file frees space.
 std::size_t part_bytes(std::int64_t most, const std::string& folder) {
   std::error_code error;
   const std::uintmax_t free = fs::space(folder, error).available;
@@ -26,7 +27,8 @@ std::size_t part_bytes(std::int64_t most, const std::string& folder) {
 
 }  // namespace
 
-// Renames a plain file at the path of the folder: it may be a spool of an older absenc, or no spool.
+// Opens the folder of the spool. A plain file at its path is renamed: it may be a spool of an older absenc, or no
+// spool.
 void Spool::open_folder() {
   std::error_code error;
   if (fs::exists(path_, error) && !fs::is_directory(path_, error)) set_aside(path_);
@@ -76,8 +78,8 @@ void Spool::load_part(std::int64_t number) {
   }
 }
 
-// Handles files that were removed or moved while open. The newest file is still open and can be read; the messages of
-// the others are lost.
+// Handles spool files that were removed or moved while open. The newest file is still open and can be read; the
+// messages of the others are lost.
 void Spool::check_folder() {
   if (folder_ && folder_->is_there() && (newest_ == nullptr || newest_->log().is_there())) return;
   if (folder_) {
@@ -107,7 +109,7 @@ void Spool::rescue_newest() {
     while (std::optional<SpoolFile::StoredMessage> one = newest_->next(offset, nullptr)) {
       if (!one->arrived && !unmarked_.contains(one->message.id)) rescued.push_back(std::move(one->message));
     }
-  } catch (const os::Failure&) {  // a disk error: the remaining messages are lost
+  } catch (const os::Failure&) {  // disk error: the remaining messages of this file are lost
   }
   Counts lost = parts_.back().waiting;
   for (const Message& one : rescued) lost -= {1, one.readings};
@@ -148,7 +150,7 @@ void Spool::drop_part(std::size_t index, const std::string& why) {
   fs::remove(path_of(part.number), ignored);
 }
 
-// Counts the messages that are still readable; the others are reported as dropped.
+// Counts the messages of `part` that are still readable; the others are reported as dropped.
 void Spool::recount(Part& part) {
   Counts readable;
   std::int64_t bytes = 0;
@@ -204,7 +206,7 @@ Spool::Part* Spool::find_part(std::int64_t number) {
 
 std::string Spool::path_of(std::int64_t number) const { return fmt::format("{}/{:010}{}", path_, number, part_suffix); }
 
-// Renames the file in its folder, because this needs no free space.
+// Renames the file at `path` within its folder, because this needs no free space.
 void Spool::set_aside(const std::string& path) {
   std::error_code error;
   std::string to = path + ".bad";

@@ -64,7 +64,7 @@ Statement& Statement::bind(int parameter, double value) {
 
 Statement& Statement::bind(int parameter, const std::string& value) {
   const auto size = static_cast<int>(value.size());
-  // This value is SQLITE_TRANSIENT, written without its C cast: SQLite copies the text.
+  // The value -1 is SQLITE_TRANSIENT, written without its C cast: SQLite copies the text.
   if (::sqlite3_bind_text(handle_, parameter, value.data(), size, reinterpret_cast<sqlite3_destructor_type>(-1)) !=
       SQLITE_OK) {
     database_->fail();

@@ -20,7 +20,7 @@ Stream::Text event_text(std::string_view event, const client::Json& data) {
 
 std::shared_ptr<Stream> Streams::open(const std::string& trace, const std::string& peer) {
   auto stream = std::make_shared<Stream>("text/event-stream");
-  // A browser reconnects one second after it lost the stream.
+  // This text makes a browser reconnect one second after it lost the stream.
   stream->push(std::make_shared<const std::string>("retry: 1000\n\n"));
   const std::lock_guard lock(mutex_);
   if (!make_room(peer)) return nullptr;
@@ -39,8 +39,8 @@ bool Streams::make_room(const std::string& peer) {
   return abort_slowest(peer, os::now() - stall_time);
 }
 
-// Closes the slowest of the streams whose client received nothing since `taken_before`. Returns false without such a
-// stream.
+// Closes the slowest of the streams whose client received nothing since `taken_before`. Returns false if every client
+// received something.
 bool Streams::abort_slowest(const std::string& peer, Time taken_before) {
   auto slowest = open_.end();
   for (auto one = open_.begin(); one != open_.end(); ++one) {

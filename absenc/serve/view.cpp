@@ -17,7 +17,7 @@ namespace {
 
 double microseconds_of(Time time) { return static_cast<double>(time.count()) / 1e3; }
 
-// Adds the time since which the alarm is raised, and the user who has acknowledged it.
+// Adds to an alarm the time since which it is raised, and the user who has acknowledged it.
 void set_acknowledged(Json& json, const std::vector<RaisedAlarm>& raised, const FieldInfo& field,
                       const FlagInfo& flag) {
   const auto known = std::find_if(raised.begin(), raised.end(), [&](const RaisedAlarm& one) {
@@ -32,7 +32,8 @@ void set_acknowledged(Json& json, const std::vector<RaisedAlarm>& raised, const 
   json.set("acknowledged", acknowledged);
 }
 
-// Returns null if no alarm is raised but not all alarms are reported. `known`: null omits acknowledgements.
+// Returns the raised alarms; null if none is raised but the replies do not report all alarms. `known`: raised alarms
+// with their acknowledgements; null omits these.
 Json alarms_json(const Unit& unit, const Reading& reading, const std::vector<RaisedAlarm>* known = nullptr) {
   Json all = Json::array();
   const std::vector<Flags> channels = alarms_of(unit, reading);
@@ -49,8 +50,8 @@ Json alarms_json(const Unit& unit, const Reading& reading, const std::vector<Rai
   return all;
 }
 
-// Returns the status flags. They are no alarms, but for encoders without alarms they are the only report of the
-// encoder.
+// Returns the status flags. Status flags are no alarms, but encoders without alarms report their condition only by
+// them.
 Json status_json(const Unit& unit, const Reading& reading) {
   Json all = Json::array();
   const std::vector<Flags> channels = status_of(unit, reading);
@@ -129,7 +130,7 @@ Json errors_json(const host::Counters& counters) {
   return json;
 }
 
-// Returns the count of each bucket, not cumulative; the last bucket has no limit.
+// Returns the latency histogram with the count of each bucket, not cumulative; the last bucket has no upper limit.
 Json latency_json(const LatencyFigures& latency) {
   Json buckets = Json::array();
   std::uint64_t below = 0;
@@ -159,7 +160,8 @@ Json bad_json(const Details& details) {
   });
 }
 
-// Sets the number of positions per turn or along the scale; null if only a reply reports it and none was received.
+// Sets the number of positions per turn or along the scale; null if only a reply reports that number and no reply was
+// received.
 void set_scale(Json& json, const Watch& watch, const Snapshot& snapshot) {
   Resolution known = watch.address().unit->resolution(watch.address().options);
   const Reading& reading = snapshot.last.reading;
@@ -200,7 +202,7 @@ Json condition_json(const Watch& watch, const Snapshot& snapshot) {
 
 namespace {
 
-// Values that are not configured, invalid or unknown are null.
+// Sets the angles of a joint and of the motor. Values that are not configured, invalid or unknown are null.
 void set_angles(Json& json, const Watch& watch, const JointAngles& angles) {
   const auto value = [](const std::optional<double>& one) { return one ? Json(*one) : Json(); };
   const std::optional<Estimate>& speed = angles.joint_speed_mm_s ? angles.joint_speed_mm_s : angles.joint_speed_rpm;

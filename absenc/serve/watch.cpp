@@ -26,7 +26,7 @@ using namespace std::chrono_literals;
 
 constexpr Time summary_interval = 1s;
 constexpr Time failure_report_interval = 1s;  // between two events about failures, which may occur with each reading
-constexpr Time retry_pause = 5s;              // before the next attempt to read an encoder in state `ended`
+constexpr Time retry_pause = 5s;              // pause before the next attempt to read an encoder in state `ended`
 
 // Converts a time of os::now, which is the steady clock.
 std::chrono::steady_clock::time_point to_time_point(Time time) {
@@ -184,7 +184,7 @@ void Watch::work(const std::stop_token& stop) {
       read_on(stop);
     } catch (const os::Interrupted&) {  // the program ends: os::interrupted() stops the other threads
       return;
-    } catch (const os::Ended&) {  // the end was requested while the line was busy
+    } catch (const os::Ended&) {  // the end of the reading thread was requested while the line was busy
       return;
     } catch (const std::exception& error) {
       set_state(State::ended, error.what());
@@ -282,8 +282,8 @@ void Watch::summarize(const Encoder& live, const Sample& sample) {
   const Time now = os::now();
   const std::lock_guard lock(mutex_);
   const std::uint64_t before = current_.counters.bad();
-  const std::uint64_t errors = bad < before ? bad : bad - before;  // the counters start at 0 when the encoder was
-                                                                   // opened again
+  // The error counters start at 0 when the encoder was opened again.
+  const std::uint64_t errors = bad < before ? bad : bad - before;
   const std::int64_t at_ms = calendar_ms();
   series_.count_errors(at_ms, errors);
   if (sample.kind == Sample::Kind::reading) {
@@ -328,7 +328,8 @@ void Watch::queue_outgoing(const Sample& sample) {
   }
 }
 
-// Adds events for alarms that changed. An alarm stays raised until the encoder reports it as cleared.
+// Adds an event for each alarm that was raised or cleared. An alarm stays raised until the encoder reports it as
+// cleared.
 void Watch::report_alarms(const Reading& reading) {
   const std::uint32_t alarms = reading.alarms | (alarms_ & ~reading.alarms_reported);
   if (alarms == alarms_) return;
@@ -360,7 +361,7 @@ void Watch::report_alarms(const Reading& reading) {
   }
 }
 
-// Carries out an order. Commands are reported by an event, and so are examinations, because they interrupt the
+// Carries out an order. Commands and examinations are reported by an event; an examination, because it interrupts the
 // readings.
 void Watch::carry_out(Encoder& live, const Order& order, const std::function<void()>& between,
                       const std::stop_token& stop) {
@@ -393,7 +394,7 @@ void Watch::carry_out(Encoder& live, const Order& order, const std::function<voi
     if (!is_examination && !live.connected()) live.connect();
     has_begun = true;
     done = is_examination ? examine(live, stop) : serve::carry_out(live, order, between);
-  } catch (const os::Failure& failure) {  // the next reading will find the port lost
+  } catch (const os::Failure& failure) {  // the port has failed; the next reading will find it lost
     note(failure);
     done.text = fmt::format("{} {}: {}", name, has_begun ? "was interrupted" : "was not done", failure.what());
   } catch (const os::Interrupted& interrupted) {
@@ -413,8 +414,8 @@ void Watch::carry_out(Encoder& live, const Order& order, const std::function<voi
   finish();
 }
 
-// The examination opens the port itself, and tries other settings if no encoder replies. A virtual encoder would be a
-// new one if it were opened again, so it is examined as it is.
+// Examines the encoder of this object. The examination opens the port itself, and tries other settings if no encoder
+// replies. Opening a virtual encoder again would create a new one, so its open port is used.
 OrderResult Watch::examine(Encoder& live, const std::stop_token& stop) {
   const std::string words = "the encoder is being examined, readings continue afterwards";
   set_state(State::examined, words);

@@ -57,7 +57,7 @@ std::string checked(const std::string& name) {
 std::vector<iovec> ranges(const std::vector<UserMemory>& memory) {
   std::vector<iovec> found;
   for (const UserMemory& one : memory) {
-    // an address of another process, which only the kernel uses
+    // an address in the memory of another process, which only the kernel uses
     found.push_back({reinterpret_cast<void*>(static_cast<std::uintptr_t>(one.address)), one.size});
   }
   return found;
@@ -134,7 +134,7 @@ SpidevNode::SpidevNode(const std::string& name, Spidev& spidev) : spidev_(&spide
   fuse_opt_free_args(&arguments);
   const std::string what = "making " + path_;
   if (!session_) throw Failure(Kind::system, what + " failed: libfuse made no session");
-  // The session takes ownership of the descriptor.
+  // The FUSE session takes ownership of the CUSE descriptor.
   const std::string descriptor_name = "/dev/fd/" + std::to_string(control.get());
   if (fuse_session_mount(session_.get(), descriptor_name.c_str()) != 0) {
     throw Failure(Kind::system, what + " failed: libfuse did not take " + control_path);
@@ -146,7 +146,7 @@ SpidevNode::SpidevNode(const std::string& name, Spidev& spidev) : spidev_(&spide
     wait_for({&readable, 1}, never);
     process_one();
   }
-  // The kernel reports no error if it refuses the name.
+  // The kernel reports no error if it refuses the name of the device.
   if (!std::filesystem::exists(path_, ignored)) {
     throw Failure(Kind::system,
                   "the kernel did not make " + path_ + ": see what it says in dmesg, or choose another name");
