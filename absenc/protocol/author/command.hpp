@@ -68,7 +68,7 @@ struct Report {
   /// Items that the line carries.
   using Items = std::span<const ItemOf<P>>;
 
-  /// Puts the fields of a request into the sink. `put_values<fields, values>` makes such a function.
+  /// Puts the fields of a request into the sink. The template `put_values` makes such a function.
   void (*put_request)(FieldSink&, const Format&, const Request&) = nullptr;
   /// Puts the fields of a valid reply to the request into the sink.
   void (*put_reply)(FieldSink&, const Format&, const Request&, const Reply&) = nullptr;

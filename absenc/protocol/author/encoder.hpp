@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Base of every virtual encoder, on any line: power, alarms raised by tests and users, broken rules, number of answers.
+// Base of every virtual encoder, on any kind of line: power, alarms raised by tests and users, breaches of rules, and
+// the number of answers.
 #pragma once
 
 #include <cstdint>
@@ -10,51 +11,53 @@
 
 namespace absenc::author {
 
-/// Power, alarms and watched rules, which all virtual encoders share.
+/// A virtual encoder with the parts that all share: power, alarms, rule checks and counters. Subclasses add the line.
 template <class Item>
 class EncoderOn : public Device<Item> {
  public:
-  /// Switches the encoder on.
+  /// Switches the encoder on at `now`; it is ready after the start-up time, or at once with `PowerOn::skip`.
   void power_on(Time now, typename Device<Item>::PowerOn kind) override {
     power_ = Power::starting;
     ready_at_ = kind == Device<Item>::PowerOn::skip ? now : now + start_time_;
     static_cast<void>(is_on(now));
   }
-  /// Switches the encoder off.
+  /// Switches the encoder off at `now`.
   void power_off(Time now) override {
     if (is_on(now)) stopped(now);
     power_ = Power::off;
   }
-  /// Raises alarms.
+  /// Raises the alarms `bits`, bits of the unit's alarm field.
   void raise_alarms(std::uint32_t bits) override { raised_ |= bits; }
-  /// Ends the cause of alarms; latched alarms stay until a host clears them.
+  /// Ends the cause of the alarms `bits`. An encoder with latched alarms overrides this function.
   void lower_alarms(std::uint32_t bits) override { raised_ &= ~bits; }
-  /// Returns a number that changes with the memory.
+  /// Returns a number that every change of the memory increments.
   [[nodiscard]] std::uint32_t memory_version() const final { return memory_version_; }
-  /// Returns the first rules that the host broke.
+  /// Returns the first rule breaches of the host, in order of time.
   [[nodiscard]] std::span<const Violation> violations() const final { return rules_.violations(); }
   /// Returns how often the host broke a rule.
   [[nodiscard]] std::uint32_t violation_count() const final { return rules_.violation_count(); }
-  /// Sets the watch of rule checks; null: none.
+  /// Sets the observer of rule checks; null: none.
   void watch_rules(RuleWatch* watch) final { rules_.watch(watch); }
-  /// Returns the number of replies sent.
+  /// Returns how many requests the encoder has answered.
   [[nodiscard]] std::uint64_t answer_count() const final { return answer_count_; }
 
  protected:
-  /// `start_time`: from power on to the first request that is answered.
+  /// Constructs an encoder that is off. `start_time`: time from power on until requests are answered.
   explicit EncoderOn(Time start_time) : start_time_(start_time) {}
   ~EncoderOn() = default;
 
   /// Records whether the host kept a rule of the document, and returns `kept`. A broken rule is a violation.
   bool expect(bool kept, std::string_view rule, Time at) { return rules_.expect(kept, rule, at); }
-  /// Records the same for a rule whose breach is no violation: a host may break it, or may have given up.
+  /// Notifies only the observer that the host kept or broke a rule. Breaking this rule is no violation, because the
+  /// document permits a host to do so, or the host may have given up after an error.
   void note(bool kept, std::string_view rule) { rules_.note(kept, rule); }
-  /// Ignores everything until `until`, as after a reset.
+  /// Restarts the encoder, as a reset does: it ignores everything until the time `until`.
   void restart(Time until) {
     power_ = Power::starting;
     ready_at_ = until;
   }
-  /// Returns whether the encoder is switched on and ready.
+  /// Returns whether the encoder is switched on and its start-up is over at `now`. Calls `started` if the start-up has
+  /// ended since the last call.
   [[nodiscard]] bool is_on(Time now) {
     if (power_ == Power::starting && now >= ready_at_) {
       power_ = Power::on;
@@ -62,16 +65,16 @@ class EncoderOn : public Device<Item> {
     }
     return power_ == Power::on;
   }
-  /// Returns the raised alarms.
+  /// Returns the alarms that `raise_alarms` has raised.
   [[nodiscard]] std::uint32_t raised() const { return raised_; }
   /// Notes that the memory changed.
   void change_memory() { ++memory_version_; }
-  /// Counts a reply.
+  /// Counts an answered request.
   void count_answer() { ++answer_count_; }
 
-  /// Called when power is on and the start-up over; the time is the end of the start-up.
+  /// Is called after the start-up of the encoder has ended, with the time of that end.
   virtual void started(Time) {}
-  /// Is called when the encoder is switched off.
+  /// Is called when an encoder that was ready is switched off, with the time of switching off.
   virtual void stopped(Time) {}
 
  private:

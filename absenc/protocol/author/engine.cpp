@@ -43,13 +43,13 @@ void Engine::finish(Error error, Time hold) {
 // ---- Steps
 
 ByteStep Engine::next(Time now) {
-  // A function makes the step, because a variable would first be zeroed by a call.
+  // A function makes the step, because the compiler would first zero a variable by a call.
   ByteStep step = [this]() -> ByteStep {
     return {.expect = due_, .at = never, .answer = manner_.answer_limit, .gap = times_.gap_limit};
   }();
-  if (state_ == State::receiving) return step;  // at once: between two characters there is little time
+  if (state_ == State::receiving) return step;  // the rest is left out: between two characters there is little time
   step.expect = 0;
-  // Traffic before this conversation is unknown, so pauses count from now.
+  // The traffic before this conversation is unknown, so pauses are measured from now.
   if (!started_) received_at_ = now;
   started_ = true;
   wake(now);
@@ -67,7 +67,8 @@ ByteStep Engine::next(Time now) {
   return step;
 }
 
-// The subclass may sleep again. Its emits and rate changes come first.
+// Calls `woken` when a sleep or the time of listening is over. The subclass may sleep again in it. Steps that it has
+// requested (`emit`, `configure`) come first.
 void Engine::wake(Time now) {
   while ((state_ == State::sleeping || state_ == State::listening) && rate_ == 0 && !emitting_) {
     if (state_ == State::listening && earliest_ == never) earliest_ = now + listening_;
@@ -78,7 +79,7 @@ void Engine::wake(Time now) {
   }
 }
 
-// Returns the time before which nothing is sent or ended.
+// Returns the time before which the engine neither sends the next request nor ends.
 Time Engine::rest_end() const {
   if (state_ == State::ready && times_.silence != Time{}) return std::max(received_at_ + times_.silence, earliest_);
   return state_ >= State::sleeping && state_ != State::over ? earliest_ : Time::min();
@@ -130,14 +131,15 @@ void Engine::feed(const ByteEvent& event) {
   if (noisy_) end_noise(before);
 }
 
-// Handles items that arrive while no reply is awaited. Returns whether they need no further handling.
+// Handles bytes or a damaged character received while no reply is awaited. Returns true if the event needs no further
+// handling.
 bool Engine::handle_unawaited(const ByteEvent& event) {
   const bool damaged = event.kind == ByteEvent::Kind::line_error;
   if (state_ == State::listening) {
     heard(damaged ? Bytes{} : event.items);
     return true;
   }
-  // The reply may already follow the pulse's edge.
+  // While a pulse is still active, the reply may already follow the pulse's first edge.
   const bool pulsing = state_ == State::sending && manner_.pulse != Time{};
   if (!pulsing) disturbed_ = true;
   return false;
@@ -147,7 +149,7 @@ void Engine::end_noise(State before) {
   if (is_awaited() || (before == State::ready && state_ == State::ready)) {
     conclude();
   } else if (state_ != State::sending) {
-    item_received_ = noisy_ = false;  // the reply was accepted
+    item_received_ = noisy_ = false;  // the valid reply has ended the exchange
   }
 }
 
@@ -157,10 +159,10 @@ void Engine::sent(Time at) {
   if (state_ != State::sending) return;
   if (!manner_.expects_reply) return conclude_with(Error::none);
   state_ = disturbed_ ? State::settling : State::receiving;
-  check_reply();  // checks items received during a pulse
+  check_reply();  // bytes may have been received during a pulse
 }
 
-// Ends the exchange if the reply is complete.
+// Checks the reply if it is complete, and ends the exchange unless silence must follow.
 void Engine::check_reply() {
   if (state_ != State::receiving) return;
   const std::size_t whole = expected();
@@ -176,7 +178,7 @@ void Engine::conclude() {
     if (disturbed_) return conclude_with(Error::bad_framing);
     return conclude_with(manner_.any_reply ? Error::none : Error::timeout);
   }
-  // Some of the bytes do not belong to this reply.
+  // Some of the received bytes do not belong to this reply.
   if (disturbed_ || noisy_) return conclude_with(Error::wrong_length);
   conclude_with(manner_.any_reply ? Error::none : check());
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of a line of characters on which one reply answers one request at a time: sends, receives, settles,
-// repeats, gives up. It knows no protocol, and is compiled once.
+// Host side of a line of characters (UART) on which each request has one reply: sends a request, receives the reply,
+// waits for silence after an error, repeats the request, and ends with an error after the last repetition. It knows no
+// protocol, and is compiled once.
 #pragma once
 
 #include <algorithm>
@@ -13,35 +14,36 @@
 
 namespace absenc::author {
 
-/// Times of a host on its line, as the document has them.
+/// Time limits and pauses of a host, as the protocol's document states them.
 struct HostTimes {
   Time answer_limit{};          ///< longest time from the end of a request to the first character of its reply
   Time gap_limit{};             ///< longest time between two characters of a reply
-  Time silence{};               ///< silence of the line required before each request; received items restart it
-  Time patience = noise_limit;  ///< a line that is busy for this long counts as never silent
-  Time pause{};                 ///< shortest time from a reply to the next request, too short to listen in
+  Time silence{};               ///< shortest silence of the line before each request; received bytes restart it
+  Time patience = noise_limit;  ///< a line without silence for this long is treated as never silent
+  Time pause{};  ///< shortest time from a reply to the next request; it is too short to listen in between
 };
 
-/// How one request is sent, and how its reply ends.
+/// How a request is sent, repeated and timed, and how its reply ends.
 struct Manner {
-  unsigned repeats = 0;       ///< how often the request is repeated before its error counts
-  Time pause{};               ///< time before a repetition, from the last sent or received character
-  bool expects_reply = true;  ///< false: no reply is awaited
-  /// A reply is accepted only when silence follows, because its checksum is too weak alone.
+  unsigned repeats = 0;       ///< how often the request is sent again after an invalid or missing reply
+  Time pause{};               ///< pause before a repetition, from the last sent or received character
+  bool expects_reply = true;  ///< false: the encoder does not reply, so the exchange ends with the request
+  /// Whether a reply is accepted only when silence follows it, because its checksum alone is too weak.
   bool ends_by_silence = false;
-  /// The document does not define the reply, or whether there is one: its bytes are not checked, and silence ends it.
+  /// Whether any reply, or none, is accepted, because the document does not define it: the received bytes are not
+  /// checked, and silence ends the exchange.
   bool any_reply = false;
-  Time answer_limit{};  ///< instead of the answer limit of the line; 0: that of the line
-  Time hold{};          ///< after an error: how long the encoder may still be busy with the request
-  Time pulse{};         ///< the request is a pulse of this length on `wire` instead of bytes
-  ExtraWire wire{};     ///< Wire that is pulsed instead of a request.
+  Time answer_limit{};  ///< longest time until the reply begins; 0: HostTimes::answer_limit
+  Time hold{};          ///< how long the encoder may still be busy with the request after an error
+  Time pulse{};         ///< if not 0, the request is a pulse of this duration on `wire` instead of bytes
+  ExtraWire wire{};     ///< Wire that is pulsed, if `pulse` is not 0.
 };
 
-/// An exchange of characters whose subclass recognizes a complete reply and handles it. DialogOf makes one from a
-/// protocol. CAN and clocked lines have engines of their own, because replies end differently there.
+/// Conversation on a line of characters; a subclass recognizes a complete reply and handles it. DialogOf makes such a
+/// class from a protocol. CAN and clocked lines have engines of their own, because replies end differently there.
 ///
-/// After an invalid reply it waits for silence before it ends or sends again: sending while an encoder sends can
-/// destroy its driver. A valid reply ends the exchange at once.
+/// After an invalid reply the engine waits for silence before it ends or sends again: sending while an encoder sends
+/// can destroy the encoder's driver. A valid reply ends the exchange at once.
 class Engine : public Conversation<std::uint8_t> {
  public:
   /// Takes an event of the port.
@@ -50,79 +52,85 @@ class Engine : public Conversation<std::uint8_t> {
   Step<std::uint8_t> next(Time now) final;
   [[nodiscard]] Error error() const final { return error_; }
   /// Puts nothing, so that names and texts of fields are only linked where they are used. Reported (command.hpp) puts
-  /// them, and explains a line that is never silent.
+  /// them, and explains the error that the line is never silent.
   void report(FieldSink&) const override {}
-  /// Returns the items of the last exchange.
+  /// Returns the last request and the bytes received after it.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const final { return {out_, reply(), sent_at_, received_at_}; }
 
-  /// Returns the begin of the last request; an SPI device answers with its state at that time.
+  /// Returns the time at which the last request began; an SPI device answers with its state at that time.
   [[nodiscard]] Time begun_at() const { return begun_at_; }
-  /// Returns the end of the last request.
+  /// Returns the time at which the last bit of the last request was sent.
   [[nodiscard]] Time sent_at() const { return sent_at_; }
-  /// Returns when the last item was received.
+  /// Returns the time at which the last byte was received, or the last request ended, whichever is later.
   [[nodiscard]] Time received_at() const { return received_at_; }
-  /// Returns the bytes received since the last request, valid or not.
+  /// Returns the bytes received after the last request, valid or not.
   [[nodiscard]] Bytes reply() const { return Bytes(storage_).first(size_); }
-  /// Returns whether the last exchange was abandoned because the line is never silent; repeating it is no use.
+  /// Returns whether the last exchange was abandoned because the line is never silent. Repeating the request does not
+  /// help then.
   [[nodiscard]] bool is_noisy() const { return noisy_; }
-  /// Returns whether characters of the last exchange were damaged, or arrived before its request was sent.
+  /// Returns whether, in the last exchange, characters were damaged or received before the request was sent.
   [[nodiscard]] bool is_disturbed() const { return disturbed_; }
 
  protected:
-  /// `storage`: for a reply, longer than the longest one, so that a reply that is too long is detected.
+  /// Constructs an engine. `storage`: room for a reply, and more than the longest reply, so that a reply that is too
+  /// long is detected. It must outlive the engine.
   Engine(const HostTimes& times, MutableBytes storage) : storage_(storage), times_(times) {}
   ~Engine() = default;
 
-  /// Sends `request`, which must stay valid until it is answered, not before `earliest`.
+  /// Sends `request` as `manner` states, not before `earliest`. The bytes must stay valid until the exchange has ended.
   void send(Bytes request, const Manner& manner, Time earliest);
-  /// Emits an intermediate result before anything else.
+  /// Delivers the present result to the caller (step `emit`) before any other step.
   void emit() { emitting_ = true; }
-  /// Switches this end of the line to `rate` before the next transfer, and before the end.
+  /// Switches this end of the line to `rate` bits per second, before the next transfer or the end of the conversation.
   void set_rate(std::uint32_t rate) { rate_ = rate; }
-  /// Sets other times from now on, as for another rate.
+  /// Replaces the time limits, for example after a change of the rate.
   void set_times(const HostTimes& times) { times_ = times; }
   /// Sends nothing until `time`, then calls `woken`.
   void sleep(Time time);
-  /// Listens for `duration` from the next step on: calls `heard` for all received bytes and `woken` at the end. The
-  /// limit is also checked when bytes arrive, because a port delivers bytes before timers.
+  /// Listens without sending for `duration`, from the next step on: calls `heard` for all received bytes and `woken` at
+  /// the end. The end is also checked when bytes arrive, because a port delivers bytes before timers.
   void listen(Time duration);
-  /// Continues to listen. Call it from `heard`.
+  /// Continues to listen until the end of the time. To be called after `heard`.
   void listen_on() { state_ = State::listening; }
-  /// Ends the conversation. The encoder must not be disturbed for `hold` after the last sent or received character.
+  /// Ends the conversation with `error`, but not before `hold` has passed since the last sent or received character:
+  /// until then the encoder must not be disturbed.
   void finish(Error error, Time hold = {});
-  /// Returns the manner of the request.
+  /// Returns the manner of the present request, with the repetitions that are left.
   [[nodiscard]] const Manner& manner() const { return manner_; }
 
-  /// Returns the length of the reply that begins with `reply()`; 0: unknown yet, or only silence ends it.
+  /// Returns the length of the reply that begins with the bytes `reply()`; 0: it is not known yet, or only silence ends
+  /// the reply.
   [[nodiscard]] virtual std::size_t expected() const = 0;
-  /// Checks the complete `reply()` and stores its content.
+  /// Checks the complete reply in `reply()`, and stores its content if it is valid. Returns the first error, or none.
   [[nodiscard]] virtual Error check() = 0;
   /// Returns whether a reply with this error is complete, as a refusal is, so that nothing follows it. After any other
   /// error more bytes may follow, which must not meet the next request.
   [[nodiscard]] virtual bool is_whole(Error error) const = 0;
-  /// Handles the end of an exchange: `none`, or the error of the last attempt. Calls `send`, `sleep` or `finish`.
+  /// Handles the end of an exchange. `error`: none, or the error of the last repetition. Calls `send`, `sleep`,
+  /// `listen` or `finish`.
   virtual void concluded(Error error) = 0;
-  /// Is called when a wait has ended.
+  /// Is called when the time of `sleep` or `listen` has passed.
   virtual void woken() {}
-  /// Handles bytes received while listening; none: a damaged character.
+  /// Handles bytes received while listening; an empty range stands for a damaged character.
   virtual void heard(Bytes) {}
 
  private:
   enum class State : std::uint8_t {
     receiving,  ///< the reply is awaited
-    settling,   ///< an error was found: waits until the line is silent
-    ready,      ///< the next request is to be sent
-    sending,    ///< until the last bit is sent
+    settling,   ///< the reply has an error: waits until the line is silent
+    ready,      ///< the next request is to be sent, as soon as pauses permit
+    sending,    ///< the request is being sent
     sleeping,
     listening,
-    ending,  ///< the result is known, but reported only after a time that the encoder needs
+    ending,  ///< the result is known; the conversation ends after a time that the encoder needs
     over,
   };
 
   void wake(Time now);
   [[nodiscard]] Time rest_end() const;
   void begin_or_end(Step<std::uint8_t>& step, Time now);
-  // Bytes that do not fit are dropped: the reply is too long already.
+  // Stores received bytes as part of the reply. Bytes for which there is no room are dropped: the reply is too long
+  // already.
   void keep(Bytes bytes) {
     const MutableBytes room = storage_.subspan(size_);
     const std::size_t fitting = std::min(bytes.size(), room.size());
@@ -142,8 +150,8 @@ class Engine : public Conversation<std::uint8_t> {
   // instruction.
   State state_ = State::over;
   bool disturbed_ = false;
-  bool item_received_ = false;  // an item was received in this exchange
-  bool noisy_ = false;          // items still arrive long after the first one
+  bool item_received_ = false;  // a byte, or a damaged character, was received in this exchange
+  bool noisy_ = false;          // bytes are still received after `noise_end_`
   bool started_ = false;
   bool emitting_ = false;
   Error error_ = Error::none;
@@ -151,7 +159,8 @@ class Engine : public Conversation<std::uint8_t> {
   std::size_t due_ = 0;  // bytes of the reply still to be received
   MutableBytes storage_;
   HostTimes times_;
-  Time noise_end_{};  // items received after this time make the line noisy. No timer: silence is reported otherwise
+  // A byte received after this time shows that the line is never silent; without such a byte silence is reported.
+  Time noise_end_{};
   Time received_at_{};
   Manner manner_{};
   Time earliest_{};

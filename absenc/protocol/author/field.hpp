@@ -17,15 +17,16 @@
 
 namespace absenc::author {
 
-/// A field and its source: a member, or a function of all values, `T (*)(const Values&)`.
+/// Description of a field together with the source of its value: a member of a struct `Values`, or a function that
+/// computes the value from the struct.
 template <auto member>
 struct FieldOf {
   FieldInfo info;  ///< Description of the field.
 };
 
-/// A text as ASCII bytes, which must outlive the call of `put`.
+/// Value of a text field: ASCII characters as bytes, which must outlive the call of `put`.
 struct AsciiText {
-  Bytes bytes;  ///< The characters.
+  Bytes bytes;  ///< The characters of the text.
 };
 
 namespace detail {
@@ -53,47 +54,48 @@ constexpr FieldInfo::Kind kind_of() {
 }
 }  // namespace detail
 
-/// Declares a field. The type of the member, which may be an optional, gives its kind. An optional without a value is
-/// not put.
+/// Returns the declaration of a field whose value is `member`. The type of the member gives the kind of the field. A
+/// member that is an optional without a value is not put.
 template <auto member>
 [[nodiscard]] constexpr FieldOf<member> field(std::string_view name, std::string_view unit, std::string_view meaning,
                                               Role role = Role::other) {
   return {
       {.name = name, .kind = detail::kind_of<detail::Held<member>>(), .unit = unit, .meaning = meaning, .role = role}};
 }
-/// Declares a field of flags; bit n is flags[n].
+/// Returns the declaration of a field of flags whose value is `member`; `flags[n]` describes bit n.
 template <auto member>
 [[nodiscard]] constexpr FieldOf<member> field(std::string_view name, std::string_view meaning,
                                               std::span<const FlagInfo> flags) {
   return {{name, FieldInfo::Kind::flags, {}, meaning, flags}};
 }
 
-/// Returns the field, which texts show in hexadecimal.
+/// Returns the field `one`, marked so that texts show its value in hexadecimal.
 template <auto member>
 [[nodiscard]] constexpr FieldOf<member> in_hex(FieldOf<member> one) {
   one.info.in_hex = true;
   return one;
 }
 
-/// The fields of `Values`, a struct with their members.
+/// Table of the fields of a struct `Values`, which has their values as members.
 template <class Values, auto... members>
 struct FieldsOf {
-  /// Takes the fields in their order.
+  /// Constructs the table from the fields, in the order in which they are put.
   constexpr explicit FieldsOf(const FieldOf<members>&... all) : infos{all.info...} {}
 
-  /// Puts the values that are there.
+  /// Puts each field of `values` into `sink`, in the order of the table; members that are optionals without a value are
+  /// left out.
   constexpr void put(FieldSink& sink, const Values& values) const {
     std::size_t index = 0;
     (put_one(sink, infos[index++], shown<members>(values)), ...);
   }
 
-  /// Puts one field with this value.
+  /// Puts the field of `member` with this value into `sink`.
   template <auto member>
   constexpr void put(FieldSink& sink, const detail::Held<member>& value) const {
     put_one(sink, *of<member>(), value);
   }
 
-  /// Returns the field of this member.
+  /// Returns the description of the field of `member`.
   template <auto member>
   [[nodiscard]] constexpr const FieldInfo* of() const {
     std::size_t index = 0;
@@ -101,7 +103,7 @@ struct FieldsOf {
     return &infos[index];
   }
 
-  /// Descriptions of the fields.
+  /// Descriptions of the fields, in the order of the table.
   std::array<FieldInfo, sizeof...(members)> infos;
 
  private:
@@ -135,13 +137,13 @@ struct FieldsOf {
   }
 };
 
-/// Returns the fields as one table.
+/// Returns a table of the fields `all`.
 template <class Values, auto... members>
 [[nodiscard]] constexpr FieldsOf<Values, members...> fields_of(const FieldOf<members>&... all) {
   return FieldsOf<Values, members...>(all...);
 }
 
-/// Joins the fields of several arrays, for Declaration::fields.
+/// Returns an array with the fields of all given arrays, for Declaration::fields.
 template <std::size_t... sizes>
 [[nodiscard]] constexpr auto joined(const std::array<FieldInfo, sizes>&... infos) {
   std::array<FieldInfo, (sizes + ...)> all{};

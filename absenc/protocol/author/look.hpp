@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Parts that procedures share: reading the position, and checking whether a zero may be set.
+// Parts that the procedures of several units share: reading the position, and checking whether a zero may be set.
 #pragma once
 
 #include <cstdint>
@@ -9,14 +9,14 @@
 
 namespace absenc::author {
 
-/// Returns a reading whose position, or turns, are valid completely.
+/// Returns a reading of a position of `bits` bits, all valid, without turns.
 [[nodiscard]] constexpr Reading position_reading(std::uint64_t counts, unsigned bits) {
   Reading reading;
   reading.singleturn = counts & low_mask(bits);
   reading.singleturn_bits = reading.singleturn_valid_bits = bits;
   return reading;
 }
-/// Returns a reading that has turns and no position.
+/// Returns a reading of valid turns, without a position.
 [[nodiscard]] constexpr Reading turns_reading(std::int64_t turns, Resolution resolution) {
   Reading reading;
   reading.multiturn = static_cast<std::uint64_t>(turns) & low_mask(resolution.multiturn_bits);
@@ -26,15 +26,17 @@ namespace absenc::author {
   return reading;
 }
 
-/// Result of `look`: `Found` of procedures that report a position derives from it, or is it.
+/// Result of `look`: the exchange that read a position. The `Found` of a procedure that reports a position is this
+/// struct, or derives from it.
 template <class P>
 struct Looked {
-  typename P::Request request{};  ///< The request.
-  typename P::Reply reply{};      ///< The reply.
-  Reading reading{};              ///< The position.
+  typename P::Request request{};  ///< The request that was sent.
+  typename P::Reply reply{};      ///< The valid reply to the request.
+  Reading reading{};              ///< The reading of the reply, with the times of the exchange.
 };
 
-/// Requests the position once. `found` gets the reply with its times; the result is the position in counts.
+/// Requests the position once, and stores the exchange in `found`. The result is the position in counts. Without a
+/// valid reply the procedure ends.
 template <class P>
 Part<std::uint64_t> look(DialogOf<P>& dialog, Looked<P>& found, typename P::Request request) {
   found.reply = co_await dialog.ask(request);
@@ -43,7 +45,8 @@ Part<std::uint64_t> look(DialogOf<P>& dialog, Looked<P>& found, typename P::Requ
   co_return found.reading.singleturn;
 }
 
-/// Reads the position twice. Ends the procedure if the zero must not be set, before anything is changed.
+/// Reads the position twice. Ends the procedure with the reason if a zero must not be set now; nothing is changed then.
+/// Otherwise the result is true.
 template <class P>
 Part<bool> may_set_zero(DialogOf<P>& dialog, Looked<P>& found, typename P::Request request) {
   co_await look(dialog, found, request);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds the area of an encoder's memory that has a byte, and the offset of the byte in the stored areas.
+// Functions on the areas of an encoder's memory: find the area of a byte, and compute the offset of the byte if some
+// areas are stored one after the other.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +11,7 @@
 
 namespace absenc::author {
 
-/// Returns the area that has this byte, or null.
+/// Returns the area that includes the byte at `address` of `page`, or null if no area does.
 [[nodiscard]] constexpr const MemoryArea* find_area(std::span<const MemoryArea> areas, unsigned page,
                                                     unsigned address) {
   const auto area =
@@ -18,12 +19,12 @@ namespace absenc::author {
   return area == areas.end() ? nullptr : &*area;
 }
 
-/// Returns whether an area is on this page.
+/// Returns whether any of the areas is on this page.
 [[nodiscard]] constexpr bool has_page(std::span<const MemoryArea> areas, unsigned page) {
   return std::any_of(areas.begin(), areas.end(), [&](const MemoryArea& each) { return page - each.page < each.pages; });
 }
 
-/// Returns the number of bytes in the areas for which `counts` is true.
+/// Returns the number of bytes in those areas for which `counts(area)` is true.
 template <class Counts>
 [[nodiscard]] constexpr std::size_t size_of(std::span<const MemoryArea> areas, Counts counts) {
   std::size_t bytes = 0;
@@ -31,8 +32,8 @@ template <class Counts>
   return bytes;
 }
 
-/// Returns the offset of a byte if the areas for which `counts` is true are stored one after the other. Each has one
-/// page, and one of them must have the byte.
+/// Returns the offset of the byte at `address` of `page` in a buffer that stores the areas for which `counts(area)` is
+/// true, one after the other. Each area has one page, and one of them must include the byte.
 template <class Counts>
 [[nodiscard]] constexpr std::size_t offset_of(std::span<const MemoryArea> areas, unsigned page, unsigned address,
                                               Counts counts) {

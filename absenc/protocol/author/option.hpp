@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Declares an option by the member of the format that it sets. The unit's table, the format, and the values of models
-// and vectors follow from it.
+// Declares the options of a unit: each by the member of the format that it sets. The unit's table of options, the
+// format, and the option values of models and vectors follow from the declarations.
 #pragma once
 
 #include <array>
@@ -19,7 +19,7 @@ template <class Format, class Member>
 Format format_of(Member Format::*);
 template <class Format, class Member>
 Member member_of(Member Format::*);
-// Value of an option for a member; times are in nanoseconds.
+// Returns the value of an option for a member of the format; a time gives nanoseconds.
 template <class Value>
 constexpr std::int64_t number_of(const Value& value) {
   if constexpr (requires { value.count(); }) {
@@ -28,7 +28,7 @@ constexpr std::int64_t number_of(const Value& value) {
     return static_cast<std::int64_t>(value);
   }
 }
-// The type that derives from all others.
+// Finds the type among `One` and `Others` that derives from all others.
 template <class One, class... Others>
 struct MostDerived {
   using Type = One;
@@ -38,7 +38,7 @@ struct MostDerived<One, Next, Others...>
     : MostDerived<std::conditional_t<std::is_base_of_v<One, Next>, Next, One>, Others...> {};
 }  // namespace detail
 
-/// An option with the member of the format that it sets.
+/// Description of an option, together with the member of the format that the option sets.
 template <auto member>
 struct OptionOf {
   /// Format of the encoder: the values of its options.
@@ -47,15 +47,16 @@ struct OptionOf {
   using Member = decltype(detail::member_of(member));
   Option info;  ///< Description of the option.
 
-  /// Sets the member.
+  /// Sets the member of `format` to `value`.
   static constexpr void put(Format& format, std::int64_t value) { format.*member = static_cast<Member>(value); }
-  /// Returns the value of the member.
+  /// Returns the value of the member of `format`.
   [[nodiscard]] static constexpr std::int64_t get(const Format& format) {
     return static_cast<std::int64_t>(format.*member);
   }
 };
 
-/// Declares a number from `minimum` to `maximum` in steps; the member has the default.
+/// Returns the declaration of an option that is a number from `minimum` to `maximum`, in steps of `step`. The default
+/// is the initial value of the member.
 template <auto member>
 [[nodiscard]] constexpr OptionOf<member> option(std::string_view name, std::string_view meaning, std::int64_t minimum,
                                                 std::int64_t maximum, std::uint32_t step = 1) {
@@ -68,7 +69,8 @@ template <auto member>
            .step = step}};
 }
 
-/// Declares a choice; the choices of an enumeration are in its order.
+/// Returns the declaration of an option that is one of `choices`, in the order of the member's enumeration. The default
+/// is the initial value of the member.
 template <auto member>
 [[nodiscard]] constexpr OptionOf<member> option(std::string_view name, std::string_view meaning,
                                                 std::span<const std::string_view> choices) {
@@ -76,99 +78,101 @@ template <auto member>
   return {{.name = name, .meaning = meaning, .default_value = static_cast<std::int64_t>(value), .choices = choices}};
 }
 
-/// Declares a choice of yes and no.
+/// Returns the declaration of an option that is true or false. The default is the initial value of the member.
 template <auto member>
 [[nodiscard]] constexpr OptionOf<member> option(std::string_view name, std::string_view meaning) {
   return option<member>(name, meaning, std::span<const std::string_view>(boolean_choices));
 }
 
-/// Returns the option, marked as one whose value captured frames can show.
+/// Returns the option `one`, marked as one whose value captured frames can show.
 template <auto member>
 [[nodiscard]] constexpr OptionOf<member> probeable(OptionOf<member> one) {
   one.info.probeable = true;
   return one;
 }
 
-/// Returns the option, marked as one that a word format replaces.
+/// Returns the option `one`, marked as one that a word format replaces.
 template <auto member>
 [[nodiscard]] constexpr OptionOf<member> describing_word(OptionOf<member> one) {
   one.info.describes_word = true;
   return one;
 }
 
-/// Returns the option with this many decimal digits: its values are in units of the last digit.
+/// Returns the option `one`, marked so that users may write `decimals` decimal digits; its values are in units of the
+/// last digit.
 template <unsigned decimals, auto member>
 [[nodiscard]] constexpr OptionOf<member> decimal(OptionOf<member> one) {
   one.info.decimals = decimals;
   return one;
 }
 
-/// Returns the option, which may also be 0, below its range.
+/// Returns the option `one`, marked so that 0 is permitted too, although it is below the minimum.
 template <auto member>
 [[nodiscard]] constexpr OptionOf<member> or_zero(OptionOf<member> one) {
   one.info.or_zero = true;
   return one;
 }
 
-/// Returns the option with this role, by which code that does not know the unit finds it.
+/// Returns the option `one` with the role `role`, by which programs that do not know the unit find it.
 template <Role role, auto member>
 [[nodiscard]] constexpr OptionOf<member> with_role(OptionOf<member> one) {
   one.info.role = role;
   return one;
 }
 
-/// Returns the option, which texts show in hexadecimal; users may write it so or in decimal.
+/// Returns the option `one`, marked so that texts show its value in hexadecimal; users may write it in hexadecimal or
+/// decimal.
 template <auto member>
 [[nodiscard]] constexpr OptionOf<member> in_hex(OptionOf<member> one) {
   one.info.in_hex = true;
   return one;
 }
 
-/// Options of a unit: members of one struct and of its bases.
+/// Table of a unit's options, each with its member of the format struct or of a base of that struct.
 template <auto... members>
 struct OptionsOf {
   /// Format of the encoder: the values of its options.
   using Format = typename detail::MostDerived<typename OptionOf<members>::Format...>::Type;
 
-  /// Takes the options in their order.
+  /// Constructs the table from the options, in their order.
   constexpr explicit OptionsOf(const OptionOf<members>&... all) : infos{all.info...} {}
 
-  /// Returns the format with these values.
+  /// Returns the format whose members have the option values `values`.
   [[nodiscard]] constexpr Format format(const Options& values) const {
     Format made{};
     std::size_t index = 0;
     (OptionOf<members>::put(made, values[index++]), ...);
     return made;
   }
-  /// Sets the option of this index in `format`.
+  /// Sets the member of `format` that belongs to the option number `option`.
   static constexpr void put(Format& format, std::size_t option, std::int64_t value) {
     std::size_t index = 0;
     ((index++ == option ? OptionOf<members>::put(format, value) : void()), ...);
   }
-  /// Returns the value of an option, by its index.
+  /// Returns the value in `format` of the option number `option`.
   [[nodiscard]] static constexpr std::int64_t get(const Format& format, std::size_t option) {
     std::size_t index = 0;
     std::int64_t value = 0;
     ((index++ == option ? void(value = OptionOf<members>::get(format)) : void()), ...);
     return value;
   }
-  /// Returns the index of the option with this name; the number of options if there is none.
+  /// Returns the index of the option with this name; the number of options if no option has it.
   [[nodiscard]] constexpr std::size_t find(std::string_view name) const {
     std::size_t i = 0;
     while (i < infos.size() && infos[i].name != name) ++i;
     return i;
   }
 
-  /// Descriptions of the options.
+  /// Descriptions of the options, in their order.
   std::array<Option, sizeof...(members)> infos;
 };
 
-/// A model, whose values are text: "bits=12 turns=false".
+/// A model of encoder, with its option values as text: "bits=12 turns=false".
 struct ModelText {
   std::string_view name;      ///< Name of the model.
-  std::string_view meaning;   ///< The model, as a phrase.
-  std::uint32_t maximum_rpm;  ///< highest speed in rpm; 0: the document states none
-  std::string_view values;    ///< Options that it sets, as `name=value` separated by blanks.
+  std::string_view meaning;   ///< Description of the model, as a phrase.
+  std::uint32_t maximum_rpm;  ///< highest permitted speed in rpm; 0: the document states none
+  std::string_view values;    ///< Options that the model sets, as `name=value` separated by blanks.
 };
 
 }  // namespace absenc::author

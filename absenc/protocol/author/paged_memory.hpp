@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Device side of a memory with pages that is busy for a while after each change: an EEPROM whose bytes have addresses
-// of 7 or 8 bits. It knows no protocol, and is compiled once.
+// Device side of a paged memory that is busy for a while after each change: an EEPROM whose bytes have addresses of 7
+// or 8 bits. It knows no protocol, and is compiled once.
 #pragma once
 
 #include <cstdint>
@@ -13,18 +13,19 @@
 
 namespace absenc::author {
 
-/// The properties of such a memory, as its document states them.
+/// Properties of a paged memory, as the encoder's document states them.
 struct PagedMemory {
   std::span<const MemoryArea> areas;  ///< Areas of the memory, in the order of its pages.
-  std::uint8_t select_address;        ///< Writing this address selects the page, reading it returns the selected page.
-  std::uint8_t start_page;            ///< Page after power on.
-  Time page_time;                     ///< How long the memory is busy after a page change.
-  Time write_time;                    ///< How long the memory is busy after a write.
+  /// Address that selects pages: writing it selects a page, reading it returns the selected page.
+  std::uint8_t select_address;
+  std::uint8_t start_page;  ///< Page that is selected after power on.
+  Time page_time;           ///< How long the memory is busy after a page change.
+  Time write_time;          ///< How long the memory is busy after a write.
   /// Time between the request that fetches a byte and the one that returns it; 0: the first request returns it.
   Time fetch_time{};
-  /// Whether no page can be selected while a write lasts, and a page change makes all bytes busy.
+  /// Whether page changes and writes exclude each other: only one of the two busy times runs, that of the last change.
   bool exclusive = true;
-  /// Returns whether a byte is never busy or fetched. Null: no byte is so.
+  /// Returns whether the byte is read and written at once, without busy time or fetching. Null: no byte is.
   bool (*is_immediate)(unsigned page, unsigned address) = nullptr;
   std::string_view page_rule;          ///< Rule for the host: access waits for `page_time`.
   std::string_view write_rule;         ///< Rule for the host: a write waits for `write_time`.
@@ -33,40 +34,41 @@ struct PagedMemory {
   std::string_view fetch_time_rule{};  ///< Rule: a fetched byte is read only after `fetch_time`; "": no such rule.
 };
 
-/// A virtual encoder with such a memory. The subclass stores the bytes.
+/// A virtual encoder with a paged memory; a subclass stores the bytes.
 class PagedMemoryDevice : public Responder {
  protected:
   /// A request to read or write a byte of the selected page.
   struct Access {
-    bool writes;           ///< Whether the byte is written.
-    std::uint8_t address;  ///< Address on the selected page, or the one that selects the page.
-    std::uint8_t value;    ///< Value to be written.
+    bool writes;           ///< Whether the byte is written; false: it is read.
+    std::uint8_t address;  ///< Address of the byte on the selected page, or the address that selects pages.
+    std::uint8_t value;    ///< Value to be written; unused when reading.
   };
-  /// The answer to such a request.
+  /// Content of the reply to a memory request.
   struct MemoryAnswer {
-    bool busy;           ///< Whether the memory is busy; the request was not executed.
-    std::uint8_t value;  ///< The byte; 0 while busy.
+    bool busy;           ///< Whether the memory is busy, so that the request was not executed.
+    std::uint8_t value;  ///< The byte that was read or written; 0 if busy.
   };
 
-  /// Constructs the device; `memory` must outlive it.
+  /// Constructs an encoder with these times and this memory; `memory` must outlive it.
   PagedMemoryDevice(const DeviceTimes& times, const PagedMemory& memory) : Responder(times), memory_(&memory) {}
   ~PagedMemoryDevice() = default;
 
-  /// Returns a byte of an area, which need not be stored: it may be a temperature.
+  /// Returns the value of a byte of the memory. It need not be stored: it may be a measured temperature.
   [[nodiscard]] virtual std::uint8_t load(std::uint8_t page, std::uint8_t address) = 0;
-  /// Stores a byte of a writable area.
+  /// Stores a byte in a writable area of the memory.
   virtual void store(std::uint8_t page, std::uint8_t address, std::uint8_t value) = 0;
 
-  /// Executes a request that arrived at `at`. Busy times count from `since`, which may be earlier. Returns nothing if
-  /// no area has this byte, or if it is not writable.
+  /// Executes a request that was received at `at`, and returns the content of the reply; nothing if no area has the
+  /// byte, or if it is not writable. Busy times are measured from `since`, which may be earlier than `at`.
   std::optional<MemoryAnswer> access(const Access& request, Time at, Time since);
-  /// Returns whether the areas have this byte, or the page that the request selects.
+  /// Returns whether the request can be executed: an area has the byte, writable if it is written, or has the page to
+  /// be selected.
   [[nodiscard]] bool exists(const Access& request) const;
-  /// Makes the memory busy until this time, as a write does.
+  /// Makes the memory busy until the time `until`, as a write does.
   void write_lasts(Time until);
-  /// Returns the end of the last write; 0: none.
+  /// Returns the time at which the busy time of the last write ends; 0: nothing was written.
   [[nodiscard]] Time written_at() const { return written_at_; }
-  /// Resets the selected page and all busy times, at power on.
+  /// Selects the start page and ends all busy times; to be called at power on.
   void restart_memory();
 
  private:
@@ -76,9 +78,9 @@ class PagedMemoryDevice : public Responder {
 
   const PagedMemory* memory_;
   std::uint8_t page_ = 0;
-  bool page_changed_ = false;  // no access has waited for the page change yet
+  bool page_changed_ = false;  // since the last page change no access was received after its busy time
   Time page_ready_at_{};
-  Time written_at_{};                              // end of the last write; 0: none
+  Time written_at_{};                              // end of the busy time of the last write; 0: none
   std::optional<std::uint8_t> refused_address_{};  // address of the last request, if it was a read during a write
   bool fetching_ = false;
   std::uint8_t fetch_address_ = 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Procedures as coroutines without a heap: each reads like its paragraph of the document. Coroutine frames are in
-// storage of the caller, one after the other.
+// Runs procedures (commands of several requests) as coroutines without a heap, so that each reads like its paragraph of
+// the document. The coroutine frames are in storage of the caller, one after the other.
 #pragma once
 
 #include <coroutine>
@@ -21,31 +21,32 @@
 
 namespace absenc::author {
 
-/// Result of a procedure.
+/// How a procedure ended: its error, with texts for people.
 struct Outcome {
-  Error error = Error::none;  ///< Why it ended; `Error::none`: well.
-  std::string_view detail{};  ///< which step failed, and the evidence
+  Error error = Error::none;  ///< Why the procedure failed; `Error::none`: it succeeded.
+  std::string_view detail{};  ///< the step that failed, and the evidence
   std::string_view advice{};  ///< what to try, instead of the error's own advice
   Time hold{};                ///< how long the encoder must not be disturbed after the last sent or received character
-  bool alone = false;         ///< these texts replace all others: the explanation of the last reply is not added
+  /// True: `detail` and `advice` replace all other texts, so the explanation of the last reply is not added.
+  bool alone = false;
 };
 
-/// `co_return done;` ends a procedure without an error.
+/// Outcome of a procedure that succeeded: `co_return done;`.
 inline constexpr Outcome done{};
 
-/// `co_return only(Error::timeout, "...")` ends a procedure with these texts and no others.
+/// Returns an outcome whose texts replace all others: `co_return only(Error::timeout, "...")`.
 [[nodiscard]] constexpr Outcome only(Error error, std::string_view detail, std::string_view advice = {}) {
   return {.error = error, .detail = detail, .advice = advice, .alone = true};
 }
 
-/// Runs one procedure and its parts; the subclass resumes it when an awaited result is there. Not copyable, because
-/// coroutine frames point to it.
+/// Runs one procedure and its parts (coroutines that it awaits); a subclass resumes it when an awaited result is
+/// available. Not copyable, because coroutine frames point to it.
 class Routine {
  public:
   Routine(const Routine&) = delete;
   Routine& operator=(const Routine&) = delete;
 
-  /// For coroutines: returns storage of a frame, null if it does not fit.
+  /// Returns storage for a coroutine frame of `size` bytes; null if there is no room. Only coroutines call it.
   [[nodiscard]] void* take(std::size_t size) {
     const std::size_t needed = (size + alignment - 1) / alignment * alignment;
     if (needed > arena_.size() - used_) return nullptr;
@@ -54,27 +55,29 @@ class Routine {
     if (used_ > most_used_) most_used_ = used_;
     return frame;
   }
-  /// Releases the frame of the coroutine that ended last.
+  /// Releases the storage of `frame`, the frame of the coroutine that was begun last.
   void give_back(void* frame) { used_ = static_cast<std::size_t>(static_cast<std::byte*>(frame) - arena_.data()); }
-  /// For coroutines: resumes `next` when the present one suspends.
+  /// Sets the coroutine that runs when the present one suspends. Only coroutines call it.
   void go_on_with(std::coroutine_handle<> next) { next_ = next; }
-  /// Ends the procedure with this outcome.
+  /// Ends the procedure with this outcome: its coroutines are not resumed again.
   void end_with(const Outcome& outcome) {
     next_ = nullptr;
     current_ = nullptr;
     ended(outcome);
   }
-  /// Returns the most bytes of storage that coroutine frames have taken.
+  /// Returns the greatest number of bytes that coroutine frames have occupied at once.
   [[nodiscard]] std::size_t frames_size() const { return most_used_; }
 
-  /// Marks that requests from now on may change the encoder.
+  /// Notes that requests from now on may change the encoder.
   void changes() { change_ = ChangeSent::yes; }
-  /// Marks that the encoder is as it was before `changes`: it refused the request, or reading back shows it.
+  /// Notes that the encoder has not changed since `changes` was called: it refused the request, or reading back shows
+  /// it.
   void refused() { change_ = ChangeSent::refused; }
-  /// Returns whether a request that changes the encoder was sent.
+  /// Returns whether a request that changes the encoder was sent, as `changes` and `refused` have noted it.
   [[nodiscard]] ChangeSent change() const { return change_; }
 
-  /// Ends the procedure from any depth: `co_await dialog.stop({Error::busy, "..."})`.
+  /// Returns an awaitable that ends the procedure, also from within a part: `co_await dialog.stop({Error::busy,
+  /// "..."})`.
   [[nodiscard]] auto stop(const Outcome& outcome) {
     struct Stop {
       Routine& routine;
@@ -87,15 +90,16 @@ class Routine {
   }
 
  protected:
-  /// `arena`: aligned for any type, must outlive this.
+  /// Constructs a routine without a procedure. `arena`: storage for coroutine frames, aligned for any type; it must
+  /// outlive the routine.
   explicit Routine(std::span<std::byte> arena) : arena_(arena) {}
   ~Routine() = default;
 
-  /// Handles the end of the whole procedure, also if a part of it ended it.
+  /// Handles the end of the whole procedure, also if a part ended it.
   virtual void ended(const Outcome& outcome) = 0;
 
-  /// Resumes the coroutine whose awaited result is there. Parts are resumed one after the other, not from within each
-  /// other.
+  /// Resumes the coroutine whose awaited result is available. Coroutines are resumed one after the other from here, not
+  /// from within each other.
   void resume() {
     next_ = current_;
     while (next_) {
@@ -103,7 +107,8 @@ class Routine {
       current_.resume();
     }
   }
-  /// Begins with the first coroutine.
+  /// Begins the procedure whose coroutine is `first`. Null: there was no storage, and the procedure ends with
+  /// buffer_too_small.
   void begin(std::coroutine_handle<> first) {
     current_ = first;
     if (!first) return ended({.error = Error::buffer_too_small, .detail = "the storage is too small for this command"});
@@ -123,56 +128,57 @@ class Routine {
 
 /// Base of the coroutine frames of procedures and parts. The first parameter of the coroutine is the Routine.
 struct FrameInRoutine {
-  /// Allocates the frame in the arena of the routine; null: the arena is full.
+  /// Allocates a coroutine frame in the arena of `routine`; returns null if the arena is full.
   template <class... Parameters>
   static void* operator new(std::size_t size, Routine& routine, const Parameters&...) noexcept {
     return routine.take(size);
   }
-  /// The caller owns the storage: a part returns its own, and that of the procedure ends with its owner.
+  /// Does nothing: a part returns its storage to the routine itself, and the storage of the procedure belongs to the
+  /// caller.
   static void operator delete(void*, std::size_t) {}
 
-  /// Belongs to this routine.
+  /// Constructs the frame of a coroutine that the routine `carrier` runs.
   template <class... Parameters>
   explicit FrameInRoutine(Routine& carrier, const Parameters&...) : routine(carrier) {}
 
-  /// Waits until the routine resumes it.
+  /// Suspends a new coroutine until the routine resumes it.
   [[nodiscard]] std::suspend_always initial_suspend() const noexcept { return {}; }
-  /// Is never called: the layer has no exceptions.
+  /// Is never called, because procedures throw no exceptions.
   void unhandled_exception() const noexcept {}
 
   Routine& routine;  ///< The routine that runs this coroutine.
 };
 
-/// Return type of a coroutine that is a whole command: `Procedure name(Dialog& dialog, Found& found, ...)`. It ends by
-/// `co_return done;` or `co_return {Error::..., "..."};`.
+/// Return type of a coroutine that executes a whole command: `Procedure name(Dialog& dialog, Found& found, ...)`. Such
+/// a coroutine ends with `co_return done;` or `co_return {Error::..., "..."};`.
 struct Procedure {
-  /// The interface that the compiler requires of a coroutine.
+  /// Functions that the compiler calls for a coroutine of this return type.
   struct promise_type : FrameInRoutine {
     using FrameInRoutine::FrameInRoutine;
-    /// Returns the procedure to its caller.
+    /// Returns the procedure object of the new coroutine.
     [[nodiscard]] Procedure get_return_object() { return {std::coroutine_handle<promise_type>::from_promise(*this)}; }
-    /// Returns a procedure without a coroutine: there was no room.
+    /// Returns a procedure without a coroutine, if there was no room for its frame.
     [[nodiscard]] static Procedure get_return_object_on_allocation_failure() { return {}; }
-    /// Stays suspended at its end.
+    /// Keeps the coroutine suspended at its end.
     [[nodiscard]] std::suspend_always final_suspend() const noexcept { return {}; }
-    /// Ends the procedure.
+    /// Ends the procedure with `outcome`.
     void return_value(const Outcome& outcome) { routine.end_with(outcome); }
   };
-  std::coroutine_handle<> handle{};  ///< The coroutine; null: there was no room.
+  std::coroutine_handle<> handle{};  ///< The coroutine; null: there was no room for its frame.
 };
 
-/// Return type of a part of a procedure, with a result: `const Reply reply = co_await look(dialog);`. At most one part
-/// of a procedure runs.
+/// Return type of a coroutine that is a part of a procedure and has a result: `const Reply reply = co_await
+/// look(dialog);`. Only one part runs at a time.
 template <class T>
 struct [[nodiscard]] Part {
-  /// The interface that the compiler requires of a coroutine.
+  /// Functions that the compiler calls for a coroutine of this return type.
   struct promise_type : FrameInRoutine {
     using FrameInRoutine::FrameInRoutine;
-    /// Returns the part to its caller.
+    /// Returns the part object of the new coroutine.
     [[nodiscard]] Part get_return_object() { return {std::coroutine_handle<promise_type>::from_promise(*this)}; }
-    /// Returns a part without a coroutine: there was no room.
+    /// Returns a part without a coroutine, if there was no room for its frame.
     [[nodiscard]] static Part get_return_object_on_allocation_failure() { return {}; }
-    /// Continues with the caller.
+    /// Returns an awaitable that continues with the coroutine that awaits the part.
     [[nodiscard]] auto final_suspend() const noexcept {
       struct Back {
         [[nodiscard]] bool await_ready() const noexcept { return false; }
@@ -183,16 +189,17 @@ struct [[nodiscard]] Part {
       };
       return Back{};
     }
-    /// Keeps the result.
+    /// Stores the result of the part.
     void return_value(const T& value) { result.emplace(value); }
 
     std::coroutine_handle<> caller{};  ///< The coroutine that awaits the part.
-    std::optional<T> result{};         ///< The result, when the part has ended.
+    std::optional<T> result{};         ///< Result of the part; nothing until the part has ended.
   };
 
-  /// Returns false: the part always runs.
+  /// Returns false: awaiting a part always runs it first.
   [[nodiscard]] bool await_ready() const { return false; }
-  /// Begins the part; its caller continues when the part has ended.
+  /// Begins the part; the coroutine `caller` continues when the part has ended. Without a frame the procedure ends with
+  /// buffer_too_small.
   template <class Caller>
   void await_suspend(std::coroutine_handle<Caller> caller) {
     Routine& routine = caller.promise().routine;
@@ -203,7 +210,8 @@ struct [[nodiscard]] Part {
     handle.promise().caller = caller;
     routine.go_on_with(handle);
   }
-  /// Returned by value: a reference would point into the frame, which is released here.
+  /// Returns the result of the part, by value: a reference would point into the coroutine frame, which is released
+  /// here.
   T await_resume() {
     const T result = *handle.promise().result;
     Routine& routine = handle.promise().routine;
@@ -213,7 +221,7 @@ struct [[nodiscard]] Part {
     return result;
   }
 
-  std::coroutine_handle<promise_type> handle{};  ///< The coroutine; null: there was no room.
+  std::coroutine_handle<promise_type> handle{};  ///< The coroutine; null: there was no room for its frame.
 };
 
 }  // namespace absenc::author

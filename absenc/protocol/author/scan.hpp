@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds the encoders on a line by a request to every address.
+// Procedure that finds the encoders on a line by a request to every address.
 #pragma once
 
 #include <array>
@@ -9,16 +9,18 @@
 
 namespace absenc::author {
 
-/// Addresses at which an encoder answered.
+/// Result of `scan`: the addresses at which an encoder answered.
 template <std::size_t addresses>
 struct Nodes {
   std::array<bool, addresses> there{};  ///< Whether an encoder answered, for each address.
-  /// Every answer was damaged: two encoders share the address, or the line is bad.
+  /// Whether every answer was damaged, for each address: two encoders share the address, or the line is bad.
   std::array<bool, addresses> clash{};
 };
 
-/// Requests every address; `request_to(i)` makes the request to address i. An address that is not silent is requested
-/// twice, because one answer may be noise. A device that answers at every address is no encoder.
+/// Sends the request `request_to(i)` to each address i, and stores in `nodes` which addresses answered. An address that
+/// is not silent is requested twice, because one answer may be noise. Errors: timeout (no answer at any address),
+/// wrong_length (eight addresses in a row answered, so the device is no encoder), or that of a line that is never
+/// silent.
 template <class P, std::size_t addresses, auto request_to>
 Procedure scan(DialogOf<P>& dialog, Nodes<addresses>& nodes) {
   constexpr unsigned most_in_a_row = 8;
@@ -34,7 +36,7 @@ Procedure scan(DialogOf<P>& dialog, Nodes<addresses>& nodes) {
     const Result<typename P::Reply> second = co_await dialog.attempt(request_to(i)).once();
     if (!first && !second && second.error() == Error::timeout) continue;
     nodes.there[i] = any = true;
-    // Two complete but invalid answers come from one encoder.
+    // Two complete but invalid answers come from one encoder, so they are no clash.
     nodes.clash[i] = !first && !second && (is_damage(first.error()) || is_damage(second.error()));
     if (++noise == most_in_a_row) {
       co_return {Error::wrong_length, "something comes back whatever address is asked: noise, or another device"};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Limits for standing still, as angles, and for setting a zero: each is stated once, here.
+// Decides whether the shaft stands still, and whether a zero may be set. All limits for this, as angles, are here.
 #pragma once
 
 #include <algorithm>
@@ -11,14 +11,14 @@
 
 namespace absenc::author {
 
-/// Time between two positions that show whether the shaft turns: at 0.33 rpm and more.
+/// Time between two readings of the position, which show whether the shaft turns at 0.33 rpm or more.
 inline constexpr Time between_looks = std::chrono::milliseconds(10);
-/// Angle that noise may add to a standing position, in 1/1000 degree.
+/// Greatest difference of two positions of a standing shaft, caused by noise, in 1/1000 degree.
 inline constexpr std::uint32_t standstill_millidegrees = 20;
 /// Largest distance from 0 after a zero was set, in 1/1000 degree, if the document states none.
 inline constexpr std::uint32_t zero_millidegrees = 350;
 
-/// Returns this angle in counts of a circle with 2^bits counts (1 to 64), at least one count.
+/// Returns the angle `millidegrees` in counts of a circle with 2^bits counts (1 to 64 bits); at least one count.
 [[nodiscard]] constexpr std::int64_t counts_of_angle(unsigned bits,
                                                      std::uint32_t millidegrees = standstill_millidegrees) {
   const unsigned more = bits > 40 ? bits - 40 : 0;
@@ -26,7 +26,8 @@ inline constexpr std::uint32_t zero_millidegrees = 350;
   return std::max<std::int64_t>(static_cast<std::int64_t>(counts), 1);
 }
 
-/// Returns whether two positions on a circle of 2^bits counts (1 to 63) differ by at most this angle, or one count.
+/// Returns whether two positions on a circle of 2^bits counts (1 to 63 bits) differ by at most the angle
+/// `millidegrees`, or by one count.
 [[nodiscard]] constexpr bool is_near(std::uint64_t counts, std::uint64_t other, unsigned bits,
                                      std::uint32_t millidegrees = standstill_millidegrees) {
   const std::int64_t apart = wrapped_difference(counts, other, bits);
@@ -41,7 +42,9 @@ inline constexpr std::uint32_t zero_millidegrees = 350;
   return {Error::not_still, "nothing was changed"};
 }
 
-/// Returns the same for setting a zero. If the position is invalid the zero would be wrong for ever: invalid_argument.
+/// Returns why a zero must not be set after these two readings, taken `between_looks` apart: invalid_argument (a
+/// position is invalid, so the zero would be wrong for ever), not_still (the shaft turns); no error: the zero may be
+/// set.
 [[nodiscard]] constexpr Outcome objection_to_zero(const Reading& first, const Reading& second) {
   for (const Reading& look : {first, second}) {
     if (!look.ready) {

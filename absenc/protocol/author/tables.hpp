@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Turns the declaration of a unit into the tables that its descriptor points to. Texts are parsed when the unit is
-// compiled.
+// Makes the tables to which the descriptor of a unit points from the unit's Declaration. Texts of models and vectors
+// are parsed at compile time.
 #pragma once
 
 #include <algorithm>
@@ -17,13 +17,13 @@
 
 namespace absenc::author {
 
-/// The tables of a Declaration.
+/// Tables of commands, models and vectors of the Declaration `declared`.
 template <const auto& declared>
 struct Tables {
   /// The protocol.
   using P = typename std::remove_cvref_t<decltype(declared)>::Protocol;
 
-  /// Descriptions of the commands.
+  /// Descriptions of the commands, numbered in their order.
   static constexpr auto commands = [] {
     std::array<Command, declared.commands.size()> made{};
     for (std::size_t i = 0; i < made.size(); ++i) {
@@ -33,21 +33,21 @@ struct Tables {
     return made;
   }();
 
-  /// Bytes that the largest conversation needs.
+  /// Bytes of storage that the largest conversation needs, with the frames of its coroutines.
   static constexpr std::size_t host_storage = [] {
     std::size_t most = sizeof(Refusal<ItemOf<P>>);
     for (const CommandOf<P>& one : declared.commands) most = std::max(most, one.size);
     return most + declared.frames_size;
   }();
 
-  /// Returns the index of the option with this name; the number of options if there is none.
+  /// Returns the index of the option with this name; the number of options if no option has it.
   static constexpr std::size_t find_option(std::string_view name) {
     std::size_t i = 0;
     while (i < declared.options.size() && declared.options[i].name != name) ++i;
     return i;
   }
 
-  /// The parsed values are stored one after the other, in no more space than values written by hand.
+  /// Returns the option values of a model, parsed from its text. A text that cannot be parsed does not compile.
   static constexpr Buffer<OptionValue, maximum_options> values_of(const ModelText& model) {
     Buffer<OptionValue, maximum_options> made;
     const bool good = for_each_value(model.values, [&](std::string_view name, std::string_view text) {
@@ -59,7 +59,7 @@ struct Tables {
     if (!good) this_model_has_an_option_or_a_value_that_the_unit_does_not_have();
     return made;
   }
-  /// Values of the models' options.
+  /// Option values of all models, one after the other, so that they need no more space than values written by hand.
   static constexpr auto model_values = [] {
     constexpr std::size_t size = [] {
       std::size_t sum = 0;
@@ -78,18 +78,18 @@ struct Tables {
       const ModelText& text = declared.models[i];
       const std::size_t size = values_of(text).size();
       made[i] = {text.name, text.meaning, text.maximum_rpm, {}};
-      // G++ 12 cannot make a view of an empty one.
+      // G++ 12 cannot make a view of an empty buffer.
       if (size != 0) made[i].values = model_values.view().subspan(first, size);
       first += size;
     }
     return made;
   }();
 
-  /// Returns the parts of a vector.
+  /// Returns the parsed content of a vector's text.
   static constexpr VectorParts parts_of(const VectorText& text) {
     return VectorParts(text, Clocked<P> || declared.frames_are_texts);
   }
-  /// Bytes and fields of all vectors.
+  /// Bytes and expected fields of all vectors, one after the other.
   static constexpr auto vector_parts = [] {
     constexpr auto sizes = [] {
       std::array<std::size_t, 2> sums{};
@@ -109,7 +109,7 @@ struct Tables {
     }
     return all;
   }();
-  /// Descriptions of the vectors.
+  /// The test vectors, whose members point into `vector_parts`.
   static constexpr auto vectors = [] {
     std::array<Vector, declared.vectors.size()> made{};
     Bytes bytes = vector_parts.bytes;

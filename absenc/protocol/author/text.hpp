@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vectors and models as text, which is parsed when the unit is compiled.
+// Parses the texts of test vectors and models at compile time.
 #pragma once
 
 #include <cstddef>
@@ -13,31 +13,33 @@
 
 namespace absenc::author {
 
-/// A frame and its decoded fields: `fields` is "name=value name=value", or the name of an error. A value is an integer,
-/// a real number if it has a point, or a text. Frames are hexadecimal, or plain text if the unit's frames are texts.
+/// A test vector as text: a frame with the fields, or the error, that decoding must give. A value in `fields` is an
+/// integer, a real number if it has a point, or a text. Frames are hexadecimal, or plain text if
+/// Declaration::frames_are_texts.
 struct VectorText {
   std::string_view id;       ///< Identifier of the vector, unique within the unit.
   std::string_view meaning;  ///< The case that the vector shows, as a phrase.
   std::string_view source;   ///< Document and paragraph of the frame.
   std::string_view options;  ///< Options of the encoder, as `name=value` separated by blanks.
-  std::string_view request;  ///< Bytes of the request in hexadecimal.
-  std::string_view reply;    ///< Bytes of the reply in hexadecimal.
-  std::string_view fields;   ///< Wanted values as `name=value` separated by blanks, or the wanted error.
+  std::string_view request;  ///< Bytes of the request in hexadecimal, or plain text; empty: none.
+  std::string_view reply;    ///< Bytes of the reply in hexadecimal, or plain text; empty: none.
+  std::string_view fields;  ///< Expected fields as `name=value` separated by blanks, or the name of the expected error.
 };
 
-/// Neither constexpr nor defined: a call while compiling is an error whose message contains the function's name.
+/// Reports a wrong text of fields: it is neither constexpr nor defined, so a call at compile time is an error whose
+/// message contains the function's name.
 void fields_of_a_vector_are_name_equals_value_or_the_name_of_an_error();
 /// Is never defined: its name is the error of the compiler.
 void a_frame_of_a_vector_is_hexadecimal_and_has_at_most_128_bytes();
 /// Is never defined: its name is the error of the compiler.
 void this_model_has_an_option_or_a_value_that_the_unit_does_not_have();
 
-/// Calls `take(name, value)` for each "name=value" of a text until it returns false. Returns whether all were taken. A
-/// value may have spaces inside, but no equals sign.
+/// Calls `take(name, value)` for each "name=value" of a text until it returns false. Returns whether the whole text has
+/// this form and all calls returned true. A value may have blanks inside, but no equals sign.
 template <class Take>
 constexpr bool for_each_value(std::string_view text, Take&& take) {
   while (!text.empty()) {
-    const std::size_t equals = text.find('=');  // npos for the last value
+    const std::size_t equals = text.find('=');  // npos if this is the last value
     const std::size_t next = text.find('=', equals + 1);
     const std::size_t end = next == std::string_view::npos ? text.size() : text.rfind(' ', next);
     if (end < equals || end > text.size()) return false;
@@ -47,7 +49,8 @@ constexpr bool for_each_value(std::string_view text, Take&& take) {
   return true;
 }
 
-/// Parses a decimal number with a point.
+/// Parses a decimal number with a point into `number`. Returns false, without a change, if the text is not such a
+/// number.
 constexpr bool to_real(std::string_view text, double& number) {
   const bool negative = text.starts_with('-');
   if (negative) text.remove_prefix(1);
@@ -64,15 +67,15 @@ constexpr bool to_real(std::string_view text, double& number) {
     }
   }
   if (divisor == 0) return false;
-  number = static_cast<double>(static_cast<long double>(negative ? -digits : digits) / divisor);  // rounded once
+  // Divided as long double, so that the value is rounded only once.
+  number = static_cast<double>(static_cast<long double>(negative ? -digits : digits) / divisor);
   return true;
 }
 
-/// The parsed content of a VectorText, in storage that a Vector can point to. A text that cannot be parsed does not
-/// compile.
+/// The parsed content of a VectorText. A text that cannot be parsed does not compile.
 struct VectorParts {
   constexpr VectorParts() = default;
-  /// Reads the text; it does not compile if it is wrong.
+  /// Parses `text`. `frames_are_texts`: the frames are plain text, not hexadecimal.
   constexpr VectorParts(const VectorText& text, bool frames_are_texts) {
     append(request, text.request, frames_are_texts);
     append(reply, text.reply, frames_are_texts);
@@ -91,8 +94,8 @@ struct VectorParts {
 
   ByteBuffer<128> request{};      ///< Bytes of the request.
   ByteBuffer<128> reply{};        ///< Bytes of the reply.
-  Buffer<Expected, 24> fields{};  ///< Wanted values.
-  Error error = Error::none;      ///< Wanted error.
+  Buffer<Expected, 24> fields{};  ///< Expected fields with their values.
+  Error error = Error::none;      ///< Expected error; `Error::none`: fields are expected.
 
  private:
   static constexpr void append(ByteBuffer<128>& bytes, std::string_view hex, bool is_text) {
@@ -111,11 +114,11 @@ struct VectorParts {
   }
 };
 
-/// The parts of all vectors of a unit, one after the other.
+/// Storage for the frames and expected fields of all vectors of a unit.
 template <std::size_t byte_count, std::size_t field_count>
 struct AllParts {
-  ByteBuffer<byte_count> bytes{};          ///< Bytes of all frames.
-  Buffer<Expected, field_count> fields{};  ///< Wanted values of all vectors.
+  ByteBuffer<byte_count> bytes{};          ///< Bytes of all requests and replies, one after the other.
+  Buffer<Expected, field_count> fields{};  ///< Expected fields of all vectors, one after the other.
 };
 
 }  // namespace absenc::author

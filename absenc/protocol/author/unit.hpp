@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Makes the descriptor of a unit from its author's declaration (declaration.hpp).
+// Makes the descriptor of a unit (Unit) from the declaration that its author wrote (declaration.hpp).
 #pragma once
 
 #include <algorithm>
@@ -23,10 +23,11 @@
 
 namespace absenc::author {
 
-/// Makes the descriptor of a unit from its Declaration, which has static storage and is constexpr.
+/// Functions of the unit that the Declaration `declared` describes, and `make`, which returns its Unit. The declaration
+/// is a constexpr object with static storage.
 template <const auto& declared>
 struct Descriptor {
-  /// The declaration's type.
+  /// Type of the declaration.
   using Declared = std::remove_cvref_t<decltype(declared)>;
   /// The protocol.
   using P = typename Declared::Protocol;
@@ -34,7 +35,7 @@ struct Descriptor {
   using Format = typename P::Format;
   /// A request of the protocol.
   using Request = typename P::Request;
-  /// Tables of the declaration.
+  /// Tables of commands, models and vectors of the declaration.
   using Made = Tables<declared>;
 
   static_assert(!declared.id.empty() && !declared.name.empty() && !declared.document.empty(),
@@ -45,12 +46,13 @@ struct Descriptor {
   static_assert(Clocked<P> || declared.decode != nullptr || declared.report.put_request != nullptr,
                 "a report needs put_request");
 
-  /// Requests and replies are those of the protocol; otherwise the declaration decodes frames itself.
+  /// Whether functions of the protocol decode requests and replies; false: the link is clocked, or the declaration has
+  /// a `decode` of its own.
   static constexpr bool has_requests = !Clocked<P> && declared.decode == nullptr;
 
   // ---- Functions of the descriptor
 
-  /// Returns the reply with all checks done, or the first error.
+  /// Checks a frame and puts its fields into `sink`, as Unit::decode. Returns the first error.
   static constexpr Error decode(const Options& values, Frame asked, Frame frame, FieldSink& sink) {
     if constexpr (declared.decode != nullptr) {
       return declared.decode(declared.format(values), asked, frame, sink);
@@ -61,13 +63,14 @@ struct Descriptor {
     }
   }
 
-  /// Returns whether options of this format go together.
+  /// Returns whether the options of the format `f` do not contradict each other.
   static constexpr bool is_usable(const Format& f) {
     if constexpr (declared.is_usable != nullptr) return declared.is_usable(f);
     return true;
   }
 
-  /// Decodes a transfer of a clocked link into fields.
+  /// Checks the bits of a transfer of a clocked link and puts their fields and reading into `sink`. Returns the first
+  /// error.
   static constexpr Error decode_bits(const Format& f, BitView bits, FieldSink& sink) {
     if (!is_usable(f)) return Error::invalid_argument;
     const auto reply = P::decode(f, bits);
@@ -77,7 +80,8 @@ struct Descriptor {
     return Error::none;
   }
 
-  /// Decodes a reply into fields.
+  /// Checks an exchange of bytes and puts the fields and reading of the reply, or without a reply the fields of the
+  /// request, into `sink`. Returns the first error.
   static constexpr Error decode_bytes(const Format& f, Frame asked, Frame frame, FieldSink& sink) {
     const Result<Request> request = request_of(f, asked.bytes, frame.bytes);
     if (!request) return request.error();
@@ -93,7 +97,8 @@ struct Descriptor {
     return Error::none;
   }
 
-  /// Returns the request of an exchange, or one that fits the reply.
+  /// Returns the decoded request of an exchange; if `asked` is empty, the request that the reply shows. Returns an
+  /// error if there is no valid request.
   static constexpr Result<Request> request_of(const Format& f, Bytes asked, Bytes reply) {
     static_assert(declared.guess_request != nullptr, "a unit that sends requests needs `guess_request`");
     if (asked.empty()) {
@@ -107,17 +112,18 @@ struct Descriptor {
     return request;
   }
 
-  /// Returns the declared command.
+  /// Returns the declaration of `command`.
   static constexpr const CommandOf<P>& find(const Command& command) { return declared.commands[command.id]; }
 
-  /// Returns whether there is one argument for each of the command's, within its range.
+  /// Returns whether `arguments` has one value for each argument of the command, each within its range.
   static constexpr bool are_good(const Command& command, Arguments arguments) {
     return std::equal(
         arguments.begin(), arguments.end(), command.arguments.begin(), command.arguments.end(),
         [](std::int64_t value, const Argument& one) { return value >= one.minimum && value <= one.maximum; });
   }
 
-  /// Returns the request as it is sent.
+  /// Writes the request of a command into `out` and returns its length, as Unit::encode. Errors: invalid_argument,
+  /// unsupported, buffer_too_small.
   static Result<std::size_t> encode(const Options& values, const Command& command, Arguments arguments,
                                     MutableBytes out) {
     if (!are_good(command, arguments)) return Error::invalid_argument;
@@ -129,7 +135,8 @@ struct Descriptor {
       return encode_bytes(declared.format(values), find(command), arguments, out);
     }
   }
-  /// Writes the request of a command; returns its length.
+  /// Writes the bytes of a command's request into `out` and returns their number. Errors: invalid_argument,
+  /// unsupported, buffer_too_small.
   static Result<std::size_t> encode_bytes(const Format& f, const CommandOf<P>& one, Arguments arguments,
                                           MutableBytes out) {
     if (one.missing != nullptr && !one.missing(f).empty()) return Error::unsupported;
@@ -143,12 +150,12 @@ struct Descriptor {
     return bytes.size();
   }
 
-  /// Returns the length of the request that begins with `begin`, in bytes; 0 if that is no request.
+  /// Returns the length in bytes of the request that begins with the bytes `begin`; 0 if no request does.
   static constexpr std::size_t request_size(const Options& values, Bytes begin) {
     return P::request_size(declared.format(values), begin);
   }
 
-  /// Returns the length of the reply to `request`, in bytes.
+  /// Returns the length in bytes of the reply that begins with the bytes `begin`; 0 if no reply does.
   static constexpr std::size_t reply_size(const Options& values, Bytes begin) {
     if constexpr (declared.reply_size != nullptr) {
       return declared.reply_size(declared.format(values), begin);
@@ -157,12 +164,13 @@ struct Descriptor {
     }
   }
 
-  /// Returns where the frame that begins with `bytes` ends.
+  /// Returns where the frame ends that begins with the first of `bytes`.
   static constexpr FrameEnd frame_end(const Options& values, Direction direction, Bytes bytes) {
     if constexpr (declared.frame_end != nullptr) {
       return declared.frame_end(values, direction, bytes);
     } else if constexpr (Clocked<P>) {
-      return {FrameEnd::Kind::complete, bytes.size()};  // a pause of the clock ends a frame
+      // Each capture of a clocked link is one frame, because a pause of the clock ends it.
+      return {FrameEnd::Kind::complete, bytes.size()};
     } else {
       if (bytes.empty()) return {FrameEnd::Kind::incomplete, 1};
       const std::size_t size =
@@ -172,7 +180,7 @@ struct Descriptor {
     }
   }
 
-  /// Makes the conversation of a command in `storage`.
+  /// Constructs the conversation of a command in `storage`; a Refusal if an argument is missing or outside its range.
   static Any<Conversation> host(const Options& values, const Command& command, Arguments arguments,
                                 std::span<std::byte> storage) {
     if (!are_good(command, arguments)) {
@@ -182,14 +190,14 @@ struct Descriptor {
     return find(command).run(declared.format(values), arguments, storage);
   }
 
-  /// Makes a virtual encoder in `storage`.
+  /// Constructs a virtual encoder in `storage`; returns an empty Any if the options contradict each other.
   static Any<Device> device(const Options& values, const Shaft& shaft, std::span<std::byte> storage) {
     const Format f = declared.format(values);
     if (!is_usable(f)) return {};
     return make_device<typename Declared::Encoder>(storage, f, shaft);
   }
 
-  /// Returns the bits of position and turns.
+  /// Returns the numbers of bits of position and turns with these options.
   static constexpr Resolution resolution(const Options& values) {
     if constexpr (declared.resolution != nullptr) {
       return declared.resolution(declared.format(values));
@@ -197,7 +205,7 @@ struct Descriptor {
       return declared.format(values).resolution();
     }
   }
-  /// Returns the settings of the line for a format.
+  /// Returns the settings of the line for the format `f`.
   static constexpr LineSettings line_of(const Format& f) {
     if constexpr (declared.line != nullptr) {
       return declared.line(f);
@@ -205,10 +213,10 @@ struct Descriptor {
       return f.line();
     }
   }
-  /// Returns the settings of the line for options.
+  /// Returns the settings of the line with these options.
   static constexpr LineSettings settings(const Options& values) { return line_of(declared.format(values)); }
 
-  /// The manner of the request decides.
+  /// Returns whether the encoder answers a request, as Protocol::manner states; true for an invalid request.
   static bool is_answered(const Options& values, Frame asked) {
     const Format f = declared.format(values);
     const Result<Request> request = P::decode_request(f, asked.bytes);
@@ -216,14 +224,15 @@ struct Descriptor {
     const Manner manner = P::manner(f, *request);
     return manner.expects_reply && !manner.any_reply;
   }
-  /// Returns how long a host waits after a request before it sends the next one.
+  /// Returns how long a host must wait before it repeats the request, as Protocol::manner states; 0 for an invalid
+  /// request.
   static Time pause(const Options& values, Frame asked) {
     const Format f = declared.format(values);
     const Result<Request> request = P::decode_request(f, asked.bytes);
     return request ? P::manner(f, *request).pause : Time{};
   }
 
-  /// Returns the items of a frame, as the protocol's link carries them.
+  /// Returns the content of a frame as items of the link: bytes, or a CAN frame.
   static constexpr std::span<const ItemOf<P>> items(const Frame& frame) {
     if constexpr (std::is_same_v<ItemOf<P>, CanFrame>) {
       return {frame.can, frame.can != nullptr ? 1u : 0u};
@@ -232,12 +241,12 @@ struct Descriptor {
     }
   }
 
-  /// Returns the document's explanation of an error.
+  /// Returns the document's explanation of a reply that is refused with `error`.
   static Explanation explain(const Options& values, Error error, Frame asked, Frame reply) {
     return declared.report.explain(declared.format(values), error, items(asked), items(reply));
   }
 
-  /// Decodes the reply of a vector.
+  /// Decodes the frames of a vector, and puts the fields into `sink`. Returns the first error.
   static constexpr Error decode_vector(const Options& values, const Vector& vector, FieldSink& sink) {
     if constexpr (std::is_same_v<ItemOf<P>, CanFrame>) {
       const CanFrame request = can_frame_of_text(vector.request);
@@ -254,7 +263,8 @@ struct Descriptor {
     }
   }
 
-  /// Applies defaults, then the model, then the text. Returns whether the text was understood.
+  /// Stores in `values` the default of each option, then the values of `model`, then those of `text`. Returns whether
+  /// the text could be parsed.
   static constexpr bool resolve(std::string_view text, std::span<const OptionValue> model, Options& values) {
     for (std::size_t i = 0; i < declared.options.size(); ++i) {
       values.values[i] = declared.options[i].default_value;
@@ -268,17 +278,17 @@ struct Descriptor {
       return parsed.error() == Error::none;
     });
   }
-  /// Returns whether options are those of a model.
+  /// Returns whether `values` has the option values of the model.
   static constexpr bool agrees(const Model& model, const Options& values) {
     return std::all_of(model.values.begin(), model.values.end(),
                        [&](const OptionValue& one) { return values.values[one.option] == one.value; });
   }
 
-  /// Returns whether a vector decodes to its stated fields.
+  /// Returns whether decoding a vector gives the fields or the error that it states.
   static constexpr bool holds(const Vector& vector) {
     Options values;
     bool known = resolve(vector.options, {}, values);
-    // The first model that agrees with the text is used, as by resolve_options.
+    // The first model whose values match the text is used, as by resolve_options.
     for (const Model& model : Made::models) {
       Options of_model;
       known = known && resolve(vector.options, model.values, of_model);

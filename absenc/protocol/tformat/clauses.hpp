@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Demands of the document on encoder and host, with their paragraphs.
+// The clauses of the T-format document for encoders and hosts, with their paragraphs.
 #pragma once
 
 #include <array>
@@ -9,7 +9,8 @@
 
 namespace absenc::tformat {
 
-/// Alarms that a reset clears, except over-heat, which returns as long as the encoder is hot.
+/// Alarms that a reset must clear (mask of ALMC). Over-heat is left out, because it returns as long as the encoder is
+/// hot.
 inline constexpr std::int64_t latched_alarms = alarms::latched & ~alarms::over_heat;
 
 /// Clauses of the document for the encoder.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual Smart-Abs: answers as paragraphs 6 to 10 of the specification state, and lists the rules that its host
-// breaks.
+// A virtual Smart-Abs encoder (T-format): answers as paragraphs 6 to 10 of the specification state, and records the
+// rules that its host breaks.
 #pragma once
 
 #include <array>
@@ -13,15 +13,15 @@
 
 namespace absenc::tformat {
 
-/// Index of a condition.
+/// Indexes of the virtual encoder's conditions, in the order of `conditions`.
 enum ConditionIndex : std::size_t { battery_voltage, temperature };
-/// Conditions of the virtual encoder.
+/// Conditions of the virtual encoder's environment that users can set.
 inline constexpr std::array<Condition, 2> conditions{{
     {"battery", "mV", "voltage of the external battery; 0: there is none, as always with battery=false", 0, 4750, 3600},
     {"temperature", "degC", "of the board", -20, 127, 35},
 }};
 
-/// The memory of the virtual encoder.
+/// Properties of the virtual encoder's paged memory.
 inline constexpr author::PagedMemory paged_memory{
     .areas = memory_areas,
     .select_address = page_select_address,
@@ -33,7 +33,7 @@ inline constexpr author::PagedMemory paged_memory{
     .refused_rule = "what was refused as busy was not asked for again",
 };
 
-/// A virtual encoder.
+/// A virtual Smart-Abs encoder with its alarms, EEPROM, battery and temperature.
 class VirtualEncoder final : public author::PagedMemoryDevice {
  public:
   /// Constructs an encoder that is off until `power_on`. `shaft` must outlive it.
@@ -46,13 +46,13 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   }
   [[nodiscard]] MutableBytes memory() override { return memory_; }
 
-  /// Returns the EEPROM writes so far, of 100 000 permitted in total (6.1.1).
+  /// Returns the number of EEPROM writes so far; the document permits 100 000 in total (6.1.1).
   [[nodiscard]] std::uint32_t writes() const { return writes_; }
   void raise_alarms(std::uint32_t bits) override {
     latches_ |= static_cast<std::uint8_t>(bits & (alarms::latched | alarms::counting_error));
     forced_ |= static_cast<std::uint8_t>(bits & (alarms::full_absolute_status | alarms::battery_alarm));
   }
-  /// Ends the cause of alarms; latched alarms stay until a host clears them.
+  /// Ends the alarms `bits` and their cause, including latched alarms.
   void lower_alarms(std::uint32_t bits) override {
     latches_ &= static_cast<std::uint8_t>(~bits);
     forced_ &= static_cast<std::uint8_t>(~bits);
@@ -63,7 +63,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     if (is_on(now)) update(now);
     if (off_) watch_battery();
   }
-  /// Returns the reply to ID 3 at this time.
+  /// Returns the reply to a request with data ID 3 at `now`: position, turns, encoder id, status and alarms.
   [[nodiscard]] Reply everything(Time now) const {
     const std::uint64_t mask = low_mask(format_.singleturn_bits);
     const std::uint8_t almc = alarms_now();
@@ -77,7 +77,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     }
     return reply;
   }
-  /// Switches the encoder on.
+  /// Switches the encoder on at `now`; without effect if it is on.
   void power_on(Time now, PowerOn kind) override {
     if (!off_) return;
     off_ = false;
@@ -86,8 +86,9 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     } else {
       counter_lap_ = lap(now);
     }
-    // Without a battery nothing counted the turns, even if a battery is connected again. Over_speed and
-    // counter_overflow are indefinite then; this encoder clears them. Over_heat does not need the battery (6.5).
+    // If the battery failed while the power was off, nothing counted the turns, even if a battery is connected again.
+    // Over_speed and counter_overflow are indefinite then; this encoder clears them. Over_heat does not need the
+    // battery (6.5).
     if (battery_lost_) {
       latches_ = static_cast<std::uint8_t>((latches_ & alarms::over_heat) | alarms::battery_error);
       set_turns(0, now);
@@ -97,7 +98,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     Responder::power_on(now, kind);
     if (!has_battery() && kind == PowerOn::real) restart(now + start_up_without_battery);
   }
-  /// Switches the encoder off.
+  /// Switches the encoder off at `now`; without effect if it is off.
   void power_off(Time now) override {
     if (off_) return;
     if (is_on(now)) update(now);
@@ -112,12 +113,16 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   }
 
  private:
-  static constexpr std::int32_t battery_error_voltage = 2750;  // mV, typical: this voltage or less (5.4, 6.5)
+  // MV, typical: battery_error at this voltage or less (5.4, 6.5).
+  static constexpr std::int32_t battery_error_voltage = 2750;
   static constexpr std::int32_t battery_alarm_voltage = 3100;
-  static constexpr std::int32_t full_absolute_speed = 100'000;   // 1/1000 rpm (5.4.1)
-  static constexpr std::int32_t standing_still = 1'000;          // 1/1000 rpm: trembling of a servo at rest
-  static constexpr std::int32_t power_off_speed = 6'000'000;     // 1/1000 rpm (5.4.2)
-  static constexpr std::int32_t power_off_acceleration = 4'000;  // rad/s^2
+  // 1/1000 rpm: switched on at this speed or more, full_absolute_status is set (5.4.1).
+  static constexpr std::int32_t full_absolute_speed = 100'000;
+  static constexpr std::int32_t standing_still = 1'000;  // 1/1000 rpm: trembling of a servo at rest
+  // 1/1000 rpm: fastest that the counter follows without power (5.4.2).
+  static constexpr std::int32_t power_off_speed = 6'000'000;
+  // Rad/s^2: greatest that the counter follows without power.
+  static constexpr std::int32_t power_off_acceleration = 4'000;
   static constexpr std::int32_t power_off_timer_acceleration = 80'000;
   static constexpr Time power_off_timer = 5s;
 
@@ -125,7 +130,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
 
   static constexpr std::int32_t magnitude(std::int32_t value) { return value < 0 ? -value : value; }
 
-  // EEPROM: the user's pages, the over-heat threshold, the zero position (4 bytes, little endian).
+  // Layout of the stored memory: the user's pages, the over-heat threshold, the zero position (4 bytes, little endian).
   static constexpr std::size_t threshold_at =
       author::offset_of(memory_areas, service_page, overheat_address, is_stored);
   static constexpr std::size_t zero_at = stored_bytes;
@@ -141,8 +146,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     reply.append(encode_reply(*made).view());
     return Answer::sent;
   }
-  // The encoder searches for the next start bit if none follows (8.1). The end of such a frame is unknown, so a missing
-  // start bit ends it (8.2, 9.2).
+  // Returns whether a flawed request gets a refusal. After a missing start bit the encoder searches for the next one
+  // (8.1). The end of such a frame is unknown, so a missing start bit ends it (8.2, 9.2).
   bool is_refused(Flaw flaw, Bytes heard) override {
     if (flaw == Flaw::unknown && !has_sync_code(heard[0])) return false;
     if (flaw == Flaw::unknown && heard[0] != control_field(heard[0] >> 3)) refused_status_ |= status::parity_error;
@@ -161,7 +166,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     if (!is_reset(request.id)) end_resets();
     if (is_memory_access(request.id)) return access_memory(request, at);
     Reply reply = everything(at);
-    reply.id = request.id;                                  // encoding uses the fields that this id carries
+    reply.id = request.id;                                  // encode_reply uses only the fields that this id carries
     if (is_reset(request.id)) count_reset(request.id, at);  // the tenth reply still shows the old alarms
     return reply;
   }
@@ -192,7 +197,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
 
   // ---- Resets
 
-  // A request that was sent too fast does not count for the reset, but it was sent.
+  // Ends a sequence of reset requests, and checks that ten were sent. `resets_sent_` counts all requests,
+  // `reset_count_` only those that were not sent too fast.
   void end_resets() {
     if (resets_sent_ > 0 && resets_sent_ < reset_requests) note(false, ten_rule);
     reset_count_ = resets_sent_ = 0;
@@ -226,7 +232,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   [[nodiscard]] std::uint32_t zero() const {
     return static_cast<std::uint32_t>(load_little_endian(Bytes(memory_).subspan(zero_at, 4)));
   }
-  // Returns counts since the zero of the shaft, minus the programmed zero.
+  // Returns the position in counts since the zero of the shaft, minus the programmed zero.
   [[nodiscard]] std::int64_t counts(Time now) const {
     return (shaft_->at(now).position >> (32 - format_.singleturn_bits)) - zero();
   }
@@ -246,7 +252,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     if (battery_now() <= battery_alarm_voltage) bits |= alarms::battery_alarm;
     return static_cast<std::uint8_t>(bits);
   }
-  // Updates everything that changes with time.
+  // Updates all state that changes with time: the pending zero, full_absolute_status, counter_overflow and over_heat.
   void update(Time now) {
     if (zero_pending_ && now >= written_at()) write_zero();
     if (magnitude(shaft_->at(now).speed_millirpm) < full_absolute_speed) full_absolute_ = false;
@@ -259,7 +265,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     const std::uint8_t threshold = memory_[threshold_at];
     if ((threshold & 0x80) != 0 && conditions_[temperature] > (threshold & 0x7F)) latches_ |= alarms::over_heat;
   }
-  // Sets the zero and leaves the turns unchanged.
+  // Stores the zero that was requested, and leaves the turns unchanged.
   void write_zero() {
     zero_pending_ = false;
     const std::uint64_t zeroed = static_cast<std::uint64_t>(zero_request_) & low_mask(format_.singleturn_bits);
@@ -272,7 +278,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
 
   [[nodiscard]] std::int64_t battery_now() const { return format_.battery ? conditions_[battery_voltage] : 0; }
   [[nodiscard]] bool has_battery() const { return battery_now() > battery_error_voltage; }
-  // Notes, while the power is off, that the battery failed: even a short failure is reported afterwards (6.5).
+  // Notes whether the battery has failed while the power is off: even a short failure is reported afterwards (6.5).
   void watch_battery() { battery_lost_ = battery_lost_ || !has_battery(); }
 
   void started(Time at) override { full_absolute_ = magnitude(shaft_->at(at).speed_millirpm) >= full_absolute_speed; }
@@ -286,7 +292,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
       const std::int32_t limit = at - from < power_off_timer ? power_off_timer_acceleration : power_off_acceleration;
       if (magnitude(state.speed_millirpm) <= power_off_speed && magnitude(state.acceleration) <= limit) continue;
       latches_ |= alarms::over_speed;
-      ++turn_offset_;  // one turn is missed: the flag means that the count is wrong
+      ++turn_offset_;  // the counter misses one turn, because over_speed means that the count is wrong
       return;
     }
   }
@@ -300,19 +306,19 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   std::array<std::uint8_t, memory_size> memory_{};
   std::uint32_t writes_ = 0;
 
-  std::optional<Time> off_since_{};  // none: it was never on, or it is on
+  std::optional<Time> off_since_{};  // time of the last power off; none: the encoder was never on, or is on
   bool off_ = true;
-  bool battery_lost_ = false;  // since the last power off
+  bool battery_lost_ = false;  // the battery failed since the last power off
 
   std::int64_t turn_offset_ = 0;  // subtracted from the turns of the shaft
-  std::int64_t counter_lap_ = 0;  // lap of the turn counter at the last update
+  std::int64_t counter_lap_ = 0;  // how often the turn counter had overflowed at the last update
   std::uint8_t latches_ = 0;
-  std::uint8_t forced_ = 0;  // unlatched alarms that tests and users raised
+  std::uint8_t forced_ = 0;  // alarms without latch that `raise_alarms` raised
   bool full_absolute_ = false;
 
   bool zero_pending_ = false;
   std::int64_t zero_request_ = 0;  // counts that become zero when the EEPROM is written
-  std::int64_t zero_turns_ = 0;    // turns that stay unchanged then
+  std::int64_t zero_turns_ = 0;    // number of turns that must be the same after the EEPROM is written
 
   DataId reset_id_{};
   unsigned reset_count_ = 0;

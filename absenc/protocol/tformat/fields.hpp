@@ -11,7 +11,7 @@
 
 namespace absenc::tformat {
 
-/// Flags of SF (6.3.2).
+/// Descriptions of the bits of SF, the status field of replies (6.3.2), from bit 0 on.
 inline constexpr std::array<FlagInfo, 8> status_flags{{
     {"", "", ""},
     {"", "", ""},
@@ -24,7 +24,8 @@ inline constexpr std::array<FlagInfo, 8> status_flags{{
     {"delimiter_error", "the encoder received the request with a wrong stop bit", "send the same request again"},
 }};
 
-/// Flags of ALMC (6.5). An encoder declared to have no battery reports no battery alarms.
+/// Descriptions of the bits of ALMC, the alarms in a reply to data ID 3 (6.5), from bit 0 on. An encoder declared to
+/// have no battery reports no battery alarms.
 inline constexpr std::array<FlagInfo, 8> alarm_flags{{
     {"over_speed", "the shaft turned faster than the counter follows while the power was off: turns may be wrong",
      "return to the origin, then `absenc reset-multiturn` or `absenc clear-alarms`"},
@@ -44,28 +45,30 @@ inline constexpr std::array<FlagInfo, 8> alarm_flags{{
      "replace the battery with the encoder switched on; without a battery set battery=false", true},
 }};
 
-/// Values of a frame or a procedure, in the order of the wire.
+/// Values of the fields of a frame, or of a procedure's result, in the order of the wire. A member without a value is
+/// not in the frame.
 struct Values {
-  std::optional<DataId> data_id{};                   ///< Data ID of request or reply.
-  std::optional<std::uint8_t> control_field{};       ///< CF of the request: sync code, data id, parity.
-  std::optional<std::uint8_t> status{};              ///< SF of the reply.
+  std::optional<DataId> data_id{};                   ///< Data ID of the request or reply.
+  std::optional<std::uint8_t> control_field{};       ///< First byte of the request (CF): sync code, data ID, parity.
+  std::optional<std::uint8_t> status{};              ///< Status of the reply (SF), described by `status_flags`.
   std::optional<std::uint32_t> singleturn{};         ///< Position within the turn, in counts (ABS).
   std::optional<std::uint8_t> encoder_id{};          ///< ENID: the kind of encoder.
-  std::optional<std::uint32_t> multiturn{};          ///< Turns (ABM).
-  std::optional<std::uint8_t> alarms{};              ///< Alarms (ALMC).
+  std::optional<std::uint32_t> multiturn{};          ///< Number of turns (ABM).
+  std::optional<std::uint8_t> alarms{};              ///< Alarms (ALMC), described by `alarm_flags`.
   std::optional<std::uint8_t> page{};                ///< Page of a memory access.
   std::optional<std::uint8_t> address{};             ///< Address of a memory access (ADF).
   std::optional<std::uint8_t> busy{};                ///< 1: the encoder is busy and did not execute the request.
-  std::optional<std::uint8_t> value{};               ///< Byte in memory (EDF).
-  std::optional<Bytes> data{};                       ///< Bytes in memory from `address` on.
+  std::optional<std::uint8_t> value{};               ///< Value of the memory byte (EDF).
+  std::optional<Bytes> data{};                       ///< Values of several memory bytes, from `address` on.
   std::optional<std::int8_t> temperature{};          ///< Temperature of the board, in degC.
-  std::optional<bool> overheat_enabled{};            ///< Whether over_heat is watched.
-  std::optional<std::uint8_t> overheat_threshold{};  ///< Threshold of over_heat, in degC.
+  std::optional<bool> overheat_enabled{};            ///< Whether the encoder raises over_heat.
+  std::optional<std::uint8_t> overheat_threshold{};  ///< Temperature above which over_heat is raised, in degC.
   std::optional<bool> written{};                     ///< Whether the byte was written; false: it had the value already.
-  std::optional<std::uint8_t> page_left{};  ///< Page that is left selected although the page before is unknown.
+  /// Page that a procedure leaves selected because it could not select the page from before again.
+  std::optional<std::uint8_t> page_left{};
 };
 
-/// Fields of requests and replies.
+/// Table of the fields of requests, replies and results.
 inline constexpr auto fields = [] {
   using author::field;
   using author::in_hex;
@@ -92,7 +95,7 @@ inline constexpr auto fields = [] {
           "memory page that is left selected, also for whoever reads next: which one was before is not known"));
 }();
 
-/// Returns the values of a request.
+/// Returns the values of the fields of a request.
 [[nodiscard]] constexpr Values values_of(const Request& request) {
   Values all{.data_id = request.id, .control_field = control_field(request.id)};
   if (is_memory_access(request.id)) all.address = request.address;
@@ -100,8 +103,8 @@ inline constexpr auto fields = [] {
   return all;
 }
 
-/// Returns the values of a reply. Without a battery the turns are invalid and not shown; neither are the battery's
-/// alarms, which are always set then.
+/// Returns the values of the fields of a reply. Without a battery the turns are invalid and left out; so are the
+/// battery's alarms, which are always set then.
 [[nodiscard]] constexpr Values values_of(const Format& format, const Reply& reply) {
   if (is_memory_access(reply.id)) {
     return {.data_id = reply.id, .address = reply.address, .busy = reply.busy, .value = reply.value};
@@ -115,7 +118,7 @@ inline constexpr auto fields = [] {
   return all;
 }
 
-/// Returns the bits of a field in a valid reply that carries it (Figures of 6.3).
+/// Returns the bits of a valid reply that carry `field` (Figures of 6.3); none if the field has no fixed place.
 [[nodiscard]] constexpr BitRanges place_of(const Format& format, Bytes reply, const FieldInfo& field) {
   const DataId id = data_id(reply[0]).value_or(DataId::everything);
   const bool everything = id == DataId::everything;

@@ -21,8 +21,9 @@
 
 namespace absenc::tformat {
 
-inline constexpr std::uint8_t busy_bit = 0x80;      ///< busy flag in the ADF of replies
-inline constexpr unsigned full_absolute_bits = 5;   ///< valid bits of the position with full_absolute_status (5.4.1)
+inline constexpr std::uint8_t busy_bit = 0x80;  ///< busy bit in ADF, the address field of replies
+/// Number of valid bits of the position with the alarm full_absolute_status (5.4.1).
+inline constexpr unsigned full_absolute_bits = 5;
 inline constexpr std::size_t request_capacity = 4;  ///< Length of the longest request in bytes.
 inline constexpr std::size_t reply_capacity = 11;   ///< Length of the longest reply in bytes.
 /// Bytes of a request.
@@ -30,38 +31,39 @@ using RequestBytes = ByteBuffer<request_capacity>;
 /// Bytes of a reply.
 using ReplyBytes = ByteBuffer<reply_capacity>;
 
-/// G(X) = X^8 + 1 (6.3.4) equals the exclusive OR of all bytes. `checksum` computes it by `reduce`, whose order is
-/// free, because a loop would wait for each byte in turn.
+/// Parameters of the CRC (6.3.4). Its polynomial X^8 + 1 makes it the exclusive OR of all bytes. `checksum` computes it
+/// by `reduce`, whose order is free, because a loop would wait for each byte in turn.
 inline constexpr CrcParameters crc_parameters{8, 0x01, 0, true, true, 0};
 
-/// Returns the checksum.
+/// Returns the CRC of `bytes` (6.3.4); 0 if `bytes` is a frame with its right CRC.
 [[nodiscard]] constexpr std::uint8_t checksum(Bytes bytes) {
   return std::reduce(bytes.begin(), bytes.end(), std::uint8_t{0},
                      [](std::uint8_t one, std::uint8_t other) -> std::uint8_t { return one ^ other; });
 }
 
-/// Returns CF: sync code 010, the id, and its even parity (6.3.1).
+/// Returns CF, the control field of a request: sync code 010, the data ID, and its even parity (6.3.1).
 [[nodiscard]] constexpr std::uint8_t control_field(std::uint8_t id) {
-  constexpr unsigned odd_parities = 0x6996;  // one bit per id: a small core needs many steps to compute a parity
+  // One bit for each ID, because a small core needs many steps to compute a parity.
+  constexpr unsigned odd_parities = 0x6996;
   return static_cast<std::uint8_t>(0x02u | (id & 0xFu) << 3 | (odd_parities >> (id & 0xF) & 1) << 7);
 }
-/// Returns the control field of a request.
+/// Returns CF, the control field of a request with this data ID.
 [[nodiscard]] constexpr std::uint8_t control_field(DataId id) { return control_field(static_cast<std::uint8_t>(id)); }
 
-/// Returns whether a control field has the sync code.
+/// Returns whether a control field has the right sync code.
 [[nodiscard]] constexpr bool has_sync_code(std::uint8_t field) { return (field & 0x07) == 0x02; }
 
-/// Returns whether a request reads or writes the memory.
+/// Returns whether requests with this data ID read or write the memory.
 [[nodiscard]] constexpr bool is_memory_access(DataId id) {
   return id == DataId::read_memory || id == DataId::write_memory;
 }
-/// Returns whether a request is one of those that reset.
+/// Returns whether ten requests with this data ID reset something: alarms, the zero, or the turns.
 [[nodiscard]] constexpr bool is_reset(DataId id) {
   return id == DataId::clear_alarms || id == DataId::zero || id == DataId::reset_multiturn;
 }
 
 namespace detail {
-// Lengths of requests and replies, by the id; 0: Table 1 does not list the id.
+// Lengths in bytes of request and reply of one data ID; 0: Table 1 does not list the ID.
 struct Lengths {
   std::uint8_t request = 0;
   std::uint8_t reply = 0;
@@ -77,26 +79,26 @@ inline constexpr std::array<Lengths, 16> lengths = [] {
 }();
 }  // namespace detail
 
-/// Returns the length of a request in bytes.
+/// Returns the length in bytes of a request with this data ID; 0: Table 1 does not list the ID.
 [[nodiscard]] constexpr std::size_t request_length(DataId id) {
   return detail::lengths[static_cast<std::size_t>(id)].request;
 }
-/// Returns the length of a reply in bytes.
+/// Returns the length in bytes of the reply to this data ID; 0: Table 1 does not list the ID.
 [[nodiscard]] constexpr std::size_t reply_length(DataId id) {
   return detail::lengths[static_cast<std::size_t>(id)].reply;
 }
 
-/// Returns the id of a control field, whatever its parity; nothing for an id that Table 1 does not list.
+/// Returns the data ID in a control field, whatever its parity; nothing for an ID that Table 1 does not list.
 [[nodiscard]] constexpr std::optional<DataId> data_id(std::uint8_t field) {
   const auto id = static_cast<DataId>((field >> 3) & 0xF);
   return request_length(id) != 0 ? std::optional(id) : std::nullopt;
 }
 
-/// A request of the protocol.
+/// A request of the T-format.
 struct Request {
   DataId id = DataId::everything;  ///< Data ID of the request.
-  std::uint8_t address = 0;        ///< memory access: address 0 to 127
-  std::uint8_t value = 0;          ///< write_memory: byte to be written
+  std::uint8_t address = 0;        ///< data IDs of memory access: address of the byte, 0 to 127
+  std::uint8_t value = 0;          ///< data ID write_memory: byte to be written
 };
 
 /// Returns whether a request selects a page of the memory.
@@ -104,20 +106,21 @@ struct Request {
   return request.id == DataId::write_memory && request.address == page_select_address;
 }
 
-/// The fields of a reply; those that its id does not carry are 0. The order makes it four words.
+/// A decoded reply; members that its data ID does not carry are 0. The order of the members makes the struct four words
+/// long.
 struct Reply {
   DataId id = DataId::everything;  ///< Data ID of the reply.
-  std::uint8_t status = 0;         ///< Status field.
-  std::uint8_t address = 0;        ///< Address of the memory byte.
-  bool busy = false;               ///< Whether the memory is busy.
-  std::uint32_t singleturn = 0;    ///< Position in counts.
-  std::uint32_t multiturn = 0;     ///< Turns.
-  std::uint8_t encoder_id = 0;     ///< Encoder identifier.
-  std::uint8_t alarms = 0;         ///< Alarms.
-  std::uint8_t value = 0;          ///< Value of the memory byte.
+  std::uint8_t status = 0;         ///< Status field (SF): bits of the namespace `status`.
+  std::uint8_t address = 0;        ///< Address of the memory byte (ADF).
+  bool busy = false;               ///< Whether the memory is busy, so that the request was not executed.
+  std::uint32_t singleturn = 0;    ///< Position within the turn, in counts (ABS).
+  std::uint32_t multiturn = 0;     ///< Number of turns (ABM).
+  std::uint8_t encoder_id = 0;     ///< Kind of the encoder (ENID).
+  std::uint8_t alarms = 0;         ///< Alarms (ALMC): bits of the namespace `alarms`.
+  std::uint8_t value = 0;          ///< Value of the memory byte (EDF).
 };
 
-/// Returns the request as it is sent.
+/// Returns the bytes of a request.
 [[nodiscard]] constexpr RequestBytes encode_request(const Request& request) {
   RequestBytes bytes;
   bytes.push_back(control_field(request.id));
@@ -128,12 +131,12 @@ struct Reply {
   return bytes;
 }
 
-/// Decodes a request. Errors: wrong_length; bad_framing (sync code); bad_checksum (parity of the id, or CRC);
-/// unsupported (an id that Table 1 does not list); out_of_range (the busy bit is 0 in requests).
+/// Decodes a request. Errors: wrong_length; bad_framing (sync code); bad_checksum (parity of the data ID, or CRC);
+/// unsupported (an ID that Table 1 does not list); out_of_range (the busy bit is set, which is 0 in requests).
 [[nodiscard]] constexpr Result<Request> decode_request(Bytes bytes) {
   if (bytes.empty()) return Error::wrong_length;
   if (!has_sync_code(bytes[0])) return Error::bad_framing;
-  // Checked first, because the length depends on the id.
+  // The parity is checked first, because the length depends on the data ID.
   if (bytes[0] != control_field(bytes[0] >> 3)) return Error::bad_checksum;
   const std::optional<DataId> id = data_id(bytes[0]);
   if (!id) return Error::unsupported;
@@ -144,7 +147,7 @@ struct Reply {
   return Request{*id, bytes[1], *id == DataId::write_memory ? bytes[2] : std::uint8_t{0}};
 }
 
-/// Returns the reply as it is sent.
+/// Returns the bytes of a reply.
 [[nodiscard]] constexpr ReplyBytes encode_reply(const Reply& reply) {
   std::array<std::uint8_t, reply_capacity> frame{control_field(reply.id), reply.status};
   const auto store = [&frame](std::size_t at, std::uint32_t value) {
@@ -170,8 +173,8 @@ struct Reply {
   return bytes;
 }
 
-/// Returns the bits of SF that these alarms demand (6.3.2): over_speed, full_absolute_status and counter_overflow do
-/// not show in SF.
+/// Returns the bits of SF that the alarms `almc` set (6.3.2): counting_error and `alarm`. The alarms over_speed,
+/// full_absolute_status and counter_overflow do not show in SF.
 [[nodiscard]] constexpr std::uint8_t status_for(std::uint8_t almc) {
   return static_cast<std::uint8_t>(((almc & alarms::counting_error) != 0 ? status::counting_error : 0) |
                                    ((almc & alarms::shown_in_status) != 0 ? status::alarm : 0));
@@ -179,7 +182,7 @@ struct Reply {
 
 namespace detail {
 
-// Returns the fields of a reply with the right length and checksum, unchecked.
+// Returns the fields of a reply, whose length must be right; their values are not checked.
 [[nodiscard]] constexpr Reply split_reply(DataId id, Bytes bytes) {
   if (is_memory_access(id)) {
     return {.id = id,
@@ -203,7 +206,7 @@ namespace detail {
 
 [[nodiscard]] constexpr Error check_memory_reply(const Format& format, const Request& request, const Reply& reply) {
   if (reply.address != request.address) return Error::unexpected_reply;
-  // Table 5: a busy encoder answers 00; an accepted write echoes its value.
+  // Table 5: a busy encoder replies with the value 00; an accepted write echoes its value.
   if (reply.busy) return format.strict && reply.value != 0 ? Error::unexpected_reply : Error::none;
   if (request.id == DataId::write_memory && reply.value != request.value) return Error::unexpected_reply;
   return Error::none;
@@ -225,8 +228,8 @@ namespace detail {
 
 }  // namespace detail
 
-/// Returns whether the first bytes are those of a reply to ID 3, although another id was requested: the encoder answers
-/// every request that it cannot accept so (8.4, 9.4).
+/// Returns whether a reply begins like a reply to data ID 3, although `asked` is another ID: the encoder answers every
+/// request that it cannot accept in this manner (8.4, 9.4).
 [[nodiscard]] constexpr bool begins_rejection(DataId asked, Bytes reply) {
   return asked != DataId::everything && !reply.empty() && reply[0] == control_field(DataId::everything);
 }
@@ -247,8 +250,8 @@ constexpr Error check_reply(const Format& format, const Request& request, const 
 
 }  // namespace detail
 
-/// Decodes and checks a reply, in this order: length, checksum, echo, refusal, fixed bits, range, cross checks; the
-/// first check that fails gives the error. A busy memory reply is no error: `busy` is set.
+/// Checks a reply in this order: length, checksum, echo, refusal, fixed bits, range, cross checks. Returns the decoded
+/// reply, or the error of the first failed check. A busy memory reply is no error: its member `busy` is set.
 [[nodiscard]] constexpr Result<Reply> decode_reply(const Format& format, const Request& request, Bytes bytes) {
   Error error = detail::check_frame(request, bytes);
   if (error != Error::none) return error;
@@ -258,31 +261,32 @@ constexpr Error check_reply(const Format& format, const Request& request, const 
   return reply;
 }
 
-/// Returns the bits of ALMC that are no alarms of this encoder, because it has no battery.
+/// Returns the bits of ALMC that are no alarms of this encoder: those of the battery, if none is connected.
 [[nodiscard]] constexpr unsigned expected_alarms(const Format& format) {
   return format.battery ? 0u : alarms::without_battery;
 }
 
-/// Alarms known from the replies since power on: bits of ALMC.
+/// Alarms (bits of ALMC) that are known from replies since power on. SF alone does not report every alarm.
 struct KnownAlarms {
-  std::uint8_t reported = 0;  ///< Alarms that were reported.
-  std::uint8_t raised = 0;    ///< Alarms that are raised.
+  std::uint8_t reported = 0;  ///< Mask of the alarms whose state is known.
+  std::uint8_t raised = 0;    ///< Alarms that are known to be raised.
 
-  /// Returns the alarms of a reply to ID 3, which reports all.
+  /// Returns the known alarms after a reply to data ID 3, whose ALMC reports all.
   [[nodiscard]] static constexpr KnownAlarms all(std::uint8_t almc) { return {0xFF, almc}; }
 };
 
-/// Returns the known alarms after a reply that carries SF and no ALMC. SF has counting_error, and one bit for
-/// over_heat, multiturn_error, battery_error and battery_alarm together: 0 reports all four clear. 1 adds nothing if
-/// one of them is known to be raised; otherwise one of them is raised, but it is unknown which. `sf_reported`: bits of
-/// SF that this encoder reports. Without a battery that one bit is always 1, and the known state of the four stays.
+/// Returns the known alarms after a reply that carries SF and no ALMC. SF has a bit for counting_error, and one bit for
+/// over_heat, multiturn_error, battery_error and battery_alarm together. If that one bit is 0, all four are clear. If
+/// it is 1 and none of the four is known to be raised, one of them is raised, but it is unknown which. `sf_reported`:
+/// bits of SF that this encoder reports. Without a battery the one bit is always 1, and the known state of the four
+/// stays.
 [[nodiscard]] constexpr KnownAlarms known_after(KnownAlarms before, std::uint8_t sf, unsigned sf_reported) {
   constexpr unsigned together = alarms::shown_in_status;
   unsigned reported = before.reported | alarms::counting_error;
   unsigned raised = before.raised & ~unsigned{alarms::counting_error};
   if ((sf & status::counting_error) != 0) raised |= alarms::counting_error;
   if ((sf_reported & status::alarm) == 0) {
-    // the state of the four alarms stays
+    // the known state of the four alarms stays
   } else if ((sf & status::alarm) == 0) {
     reported |= together;
     raised &= ~together;
@@ -294,7 +298,8 @@ struct KnownAlarms {
 
 namespace detail {
 
-// Sets which parts of a position are valid. Its top bits are valid unless full_absolute_status is known to be set.
+// Sets which parts of the position and turns in `reading` are valid. All bits of the position are valid only if
+// full_absolute_status is known to be clear; its top 5 bits are valid unless there is a counting error.
 constexpr void judge(Reading& reading, const KnownAlarms& known) {
   reading.alarms = known.raised;
   reading.alarms_reported = known.reported;
@@ -312,7 +317,8 @@ constexpr void judge(Reading& reading, const KnownAlarms& known) {
   reading.multiturn_known = reading.multiturn_bits == 0 || all_reported || lost;
 }
 
-// Returns SF as a reading shows it. A missing battery sets `alarm` for ever, so the bit tells nothing without ALMC.
+// Returns SF as a reading shows it. Without a battery, the bit `alarm` is always set in SF, so it is computed from
+// ALMC, or cleared in a reply without ALMC.
 [[nodiscard]] constexpr std::uint8_t status_of(const Format& format, bool has_alarms, const Reply& reply) {
   if (format.battery) return reply.status;
   const bool other = has_alarms && (reply.alarms & alarms::shown_in_status & ~expected_alarms(format)) != 0;
@@ -324,9 +330,9 @@ constexpr unsigned reported_status(const Format& format, bool has_alarms) {
 
 }  // namespace detail
 
-/// Returns the position in a valid reply with its validity, which ALMC decides; only a reply to ID 3 carries it. SF of
-/// other replies hides over_speed and full_absolute_status: without an ALMC since power on (`known_alarms`) it is
-/// unknown whether the position is valid.
+/// Returns the position and turns of a valid reply to `id`, with their validity, which ALMC decides. Only a reply to ID
+/// 3 carries ALMC. `known_alarms`: the last ALMC since power on; without it, the validity is unknown for other IDs,
+/// because SF hides over_speed and full_absolute_status.
 [[nodiscard]] constexpr Reading to_reading(const Format& format, DataId id, const Reply& reply,
                                            std::optional<std::uint8_t> known_alarms = std::nullopt) {
   const bool has_all = id == DataId::everything;
@@ -347,15 +353,15 @@ constexpr unsigned reported_status(const Format& format, bool has_alarms) {
   reading.alarms_reported &= ~expected_alarms(format);
   return reading;
 }
-/// Returns the reading of a reply.
+/// Returns the position and turns of a valid reply with their validity, by the data ID in the reply.
 [[nodiscard]] constexpr Reading to_reading(const Format& format, const Reply& reply,
                                            std::optional<std::uint8_t> known_alarms = std::nullopt) {
   return to_reading(format, reply.id, reply, known_alarms);
 }
 
-/// Completes a reading; see Unit.
+/// Returns the reading `now` completed by alarms that `before` knew, as Unit::remembered.
 [[nodiscard]] constexpr Reading remembered(const Reading& before, Reading now) {
-  if ((now.alarms_reported & alarms::full_absolute_status) != 0) return now;  // a reply to ID 3
+  if ((now.alarms_reported & alarms::full_absolute_status) != 0) return now;  // a reply to data ID 3 reports all alarms
   const KnownAlarms known{static_cast<std::uint8_t>(before.alarms_reported), static_cast<std::uint8_t>(before.alarms)};
   detail::judge(now, known_after(known, static_cast<std::uint8_t>(now.status), now.status_reported));
   return now;
@@ -363,52 +369,56 @@ constexpr unsigned reported_status(const Format& format, bool has_alarms) {
 
 // ---- Protocol, for the engine and the virtual encoder
 
-/// The protocol, as author layers use it: frames, lengths and times.
+/// The functions of the T-format that the engines and virtual encoders of absenc/protocol/author require (dialog.hpp,
+/// device.hpp).
 struct Protocol {
   /// Format of the encoder: the values of its options.
   using Format = tformat::Format;
-  /// A request of the protocol.
+  /// A request of the T-format.
   using Request = tformat::Request;
   /// A reply of the protocol.
   using Reply = tformat::Reply;
   static constexpr std::size_t longest_reply = reply_capacity;  ///< Greatest length of a reply in bytes.
 
-  /// Returns how long a host waits for replies.
+  /// Returns the time limits of a host.
   static constexpr author::HostTimes host_times(const Format&) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit};
   }
-  /// Reads and page selects are repeated, resets and writes never. A page change without a valid reply may still be
-  /// going on, and must not be disturbed.
+  /// Returns how a request is repeated: reads and page selects are, resets and writes never. A page change without a
+  /// valid reply may still be in progress, and must not be disturbed.
   static constexpr author::Manner manner(const Format&, const Request& request) {
     if (selects_page(request)) return {.repeats = 2, .pause = memory_time, .hold = memory_time};
     return {.repeats = request.id == DataId::write_memory || is_reset(request.id) ? 0u : 2u};
   }
-  /// Returns the request as it is sent.
+  /// Returns the bytes of a request.
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
-  /// Returns the length of the reply in bytes, as far as its first bytes show it; 0: unknown.
+  /// Returns the length of the reply in bytes, as its first bytes `so_far` show it: a refusal has the length of a reply
+  /// to ID 3.
   static constexpr std::size_t expected(const Format&, const Request& request, Bytes so_far) {
     return reply_length(begins_rejection(request.id, so_far) ? DataId::everything : request.id);
   }
-  static constexpr auto decode = decode_reply;  ///< Returns the reply with all checks done, or the first error.
-  /// A refusal may be followed by the same request at once. After any other error more bytes may follow, and sending
-  /// while the encoder sends can destroy its driver (11).
+  /// Checks and decodes the bytes of a reply; returns the reply or the error of the first failed check.
+  static constexpr auto decode = decode_reply;
+  /// Returns whether no bytes can follow a reply with this error: true for a refusal, after which the request may be
+  /// repeated at once. After any other error more bytes may follow, and sending while the encoder sends can destroy its
+  /// driver (11).
   static constexpr bool is_whole(const Format&, Error error) { return error == Error::request_rejected; }
-  /// Returns the position of a reply.
+  /// Returns the position and turns of a valid reply.
   static constexpr Reading reading(const Format& format, const Request& request, const Reply& reply) {
-    // By the request's id, which may be known when the program is written.
+    // The ID of the request is used, because it may be known at compile time.
     return to_reading(format, request.id, reply);
   }
   /// Returns when the encoder latched the position of a reply to a request that was sent at `sent_at`.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
 
-  /// Returns the request, or why it is none.
+  /// Decodes a request. Returns it, or the error of the first failed check.
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return tformat::decode_request(bytes); }
-  /// Returns the length of the request that begins with `begin`, in bytes; 0 if that is no request.
+  /// Returns the length in bytes of the request that begins with the bytes `begin`; 0 if no request does.
   static constexpr std::size_t request_size(const Format&, Bytes begin) {
     const std::optional<DataId> id = data_id(begin[0]);
     return id && begin[0] == control_field(*id) ? request_length(*id) : 0;
   }
-  /// Returns the length of the reply to `request`, in bytes.
+  /// Returns the length in bytes of the reply to `request`.
   static constexpr std::size_t reply_size(const Format&, const Request& request) { return reply_length(request.id); }
   /// Returns the times of a virtual encoder.
   static constexpr author::DeviceTimes device_times(const Format&) {

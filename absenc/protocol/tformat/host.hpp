@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads positions of T-format encoders: a machine without port, clock, heap or texts, for drives that read ten thousand
-// times a second. link/step.hpp shows how to run it; procedures with several steps are in unit.cpp.
+// Conversations that read positions of T-format encoders, without port, clock, heap or texts, for drives that read ten
+// thousand times a second. link/step.hpp shows how to run them; procedures with several steps are in unit.cpp.
 #pragma once
 
 #include <optional>
@@ -10,26 +10,27 @@
 
 namespace absenc::tformat {
 
-/// Reads data IDs 0 to 3. ID 3 carries everything. SF hides over_speed, full_absolute_status and counter_overflow, so
-/// without `known_alarms` (the ALMC of a reply to ID 3 since power on) IDs 0 and 1 are preceded by an ID 3; and an
-/// alarm that newly appears in their SF is followed by an ID 3, whose reply is the result. Nothing is repeated.
+/// Conversation that reads with one of the data IDs 0 to 3. A reply to ID 3 carries everything. SF in other replies
+/// hides over_speed, full_absolute_status and counter_overflow. So without `known_alarms` (the ALMC of a reply to ID 3
+/// since power on) a request with ID 3 precedes IDs 0 and 1; and an alarm that newly appears in SF is followed by a
+/// request with ID 3, whose reply is the result. Nothing is repeated.
 class ReadPosition : public author::HostOf<Protocol> {
  public:
-  /// Reads from an encoder of this format.
+  /// Reads from an encoder of this format with a request of data ID `id`.
   explicit ReadPosition(const Format& format, DataId id = DataId::everything,
                         std::optional<std::uint8_t> known_alarms = std::nullopt)
       : HostOf(format), id_(id), known_alarms_(known_alarms) {
     const bool alarms_first = (id == DataId::singleturn || id == DataId::multiturn) && !known_alarms;
     ask_for(alarms_first ? DataId::everything : id);
   }
-  /// Reads with this request.
+  /// Reads from an encoder of this format with the data ID of `request`.
   ReadPosition(const Format& format, const Request& request) : ReadPosition(format, request.id) {}
 
   [[nodiscard]] const Reading* reading() const final {
-    // Only after a good end.
+    // There is a position only after a successful end.
     return reading_.singleturn_bits != 0 || reading_.multiturn_bits != 0 ? &reading_ : nullptr;
   }
-  /// Returns the reply of the last good exchange.
+  /// Returns the last valid reply.
   [[nodiscard]] const Reply& reply() const { return last(); }
 
  private:
@@ -52,13 +53,14 @@ class ReadPosition : public author::HostOf<Protocol> {
   void ask_for(DataId id) { ask({id}, author::Manner{}); }
 
   DataId id_;
-  bool part_read_ = false;  // ID 0 or 1 was answered
+  bool part_read_ = false;  // a request with ID 0 or 1 was answered
   std::optional<std::uint8_t> known_alarms_;
   Reading reading_{};
 };
 
-inline constexpr Request everything{DataId::everything};  ///< Request for position, turns, identifier and alarms.
-/// Reads data ID 3 with a format known when the program is written: `static constexpr Format format{...};`.
+/// Request with data ID 3: position, turns, encoder id and alarms.
+inline constexpr Request everything{DataId::everything};
+/// Conversation that reads with data ID 3 and a format that is a constant: `static constexpr Format format{...};`.
 template <const Format& format>
 using ReadKnownPosition = author::ReadKnownPosition<Protocol, format, everything>;
 

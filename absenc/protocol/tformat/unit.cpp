@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Procedures of T-format encoders with several steps, and the declaration of the unit.
+// The commands of T-format encoders, their procedures with several steps, and the declaration of the unit.
 #include "absenc/protocol/tformat/unit.hpp"
 
 #include <array>
@@ -21,20 +21,21 @@ using namespace author;
 
 using Dialog = DialogOf<Protocol>;
 
-// Result of a procedure.
+// Result of a T-format procedure: the values of its fields, and the data to which they refer.
 struct ProcedureResult : Values {
   Reading reading{};
-  ByteBuffer<page_addresses> bytes{};  // bytes of `data`
+  ByteBuffer<page_addresses> bytes{};  // memory bytes to which the field `data` refers
   std::optional<std::uint8_t> selected{};
 };
 
 // ---- Resets (10)
 
-// Returns why this reset must not be sent; no error: it may be sent.
+// Returns why a reset with the data ID `id` must not be sent after the replies `first` and `second`; no error: it may
+// be sent.
 Outcome objection(const Format& format, DataId id, const Reply& first, const Reply& second) {
   const Reading before = to_reading(format, first);
   const Reading now = to_reading(format, second);
-  // The position is too coarse to show a movement.
+  // With full_absolute_status the position is too coarse to show a movement.
   if ((second.alarms & alarms::full_absolute_status) != 0) {
     return {Error::invalid_argument,
             "full_absolute_status: the encoder was switched on while the shaft turned, and has not seen it stand still "
@@ -52,7 +53,7 @@ Outcome objection(const Format& format, DataId id, const Reply& first, const Rep
   return {};
 }
 
-// Returns which part of the reset failed; no detail: none did.
+// Returns what the reset with the data ID `id` failed to do, as the reply `now` shows; empty if it did everything.
 Explanation failed_part(DataId id, const Reply& now, unsigned bits) {
   if (id == DataId::zero) {
     if (is_near(now.singleturn, 0, bits, zero_tolerance_millidegrees)) return {};
@@ -70,7 +71,7 @@ Explanation failed_part(DataId id, const Reply& now, unsigned bits) {
   return {};
 }
 
-// Sends data ID 7 (latched alarms), 8 (single-turn zero here) or C (turns and latched alarms): makes sure that the
+// Resets by data ID 7 (latched alarms), 8 (single-turn zero here) or C (turns and latched alarms): makes sure that the
 // shaft stands still, sends ten requests, and verifies the result.
 Procedure reset(Dialog& dialog, ProcedureResult& found, DataId id) {
   const Reply first = co_await dialog.ask({DataId::everything});
@@ -78,17 +79,19 @@ Procedure reset(Dialog& dialog, ProcedureResult& found, DataId id) {
   const Outcome why_not = objection(dialog.format(), id, first, second);
   if (why_not.error != Error::none) co_return why_not;
 
-  // Intervals count from the end of the reply, which makes 40 us or more, however the document measures them.
+  // Intervals are measured from the end of the reply, which makes 40 us or more, whatever the document measures them
+  // from.
   for (unsigned sent = 1; sent <= reset_requests; ++sent) {
     const Result<Reply> reply = co_await dialog.attempt({id}).changes().after(reset_interval);
-    // If the tenth reply is lost, the reset may have been executed: reading shows it.
+    // If the tenth reply is lost, the reset may have been executed: the reading after it shows that.
     if (!reply && sent < reset_requests) {
       co_return {reply.error(),
                  "one of the ten requests was not answered well, so the encoder has most likely done nothing: see that "
                  "with `absenc read` before you try again"};
     }
   }
-  // Only ID 8 writes the EEPROM. The tenth reply still shows the old alarms.
+  // Only ID 8 writes the EEPROM, which takes longer. The result is read again, because the tenth reply still shows the
+  // old alarms.
   const Reply now = co_await dialog.ask({DataId::everything})
                         .after(id == DataId::zero ? memory_time : reset_interval)
                         .or_say("all ten requests were sent, but whether the encoder obeyed could not be read");
@@ -101,12 +104,13 @@ Procedure reset(Dialog& dialog, ProcedureResult& found, DataId id) {
 
 // ---- Memory (6.3.5, 9.1)
 
-constexpr Time busy_limit = 2 * memory_time;  // twice the document's maximum
-constexpr Time busy_pause = 1ms;              // between two requests to a busy encoder
+constexpr Time busy_limit = 2 * memory_time;  // longest wait for a busy memory: twice the document's maximum
+constexpr Time busy_pause = 1ms;              // pause between two requests to a busy encoder
 
 constexpr std::uint8_t byte(std::int64_t argument) { return static_cast<std::uint8_t>(argument); }
 
-// Repeats a request until the encoder is ready. A page change must not be disturbed by asking whether it is over.
+// Repeats a memory request until the encoder executes it, and returns the reply or the error. A page change must not be
+// disturbed by requests that ask whether it is over.
 Part<Result<Reply>> when_ready(Dialog& dialog, const Request& request) {
   return until_ready<Protocol>(dialog, request,
                                {.limit = busy_limit,
@@ -121,7 +125,8 @@ Outcome failure(const Dialog& dialog, Error error, std::string_view step) {
           Protocol::manner(dialog.format(), dialog.request()).hold};
 }
 
-// Executes a memory request; ends the procedure at this step if the encoder does not execute it.
+// Executes a memory request and returns the value in the reply. If the encoder does not execute it, the procedure ends;
+// `step` is the detail of the error.
 Part<std::uint8_t> execute(Dialog& dialog, Request request, std::string_view step) {
   const Result<Reply> reply = co_await when_ready(dialog, request);
   if (!reply) co_await dialog.stop(failure(dialog, reply.error(), step));
@@ -157,7 +162,8 @@ Procedure read_memory(Dialog& dialog, ProcedureResult& found, Arguments argument
 }
 
 // Writes a byte on the selected page: reads it, writes it if it differs (100 000 writes are permitted in total), waits,
-// selects the page again so that the EEPROM itself is read, and compares.
+// selects the page again so that the EEPROM itself is read, and compares. Returns whether the byte was written; a
+// failure ends the procedure.
 Part<bool> write_byte(Dialog& dialog, ProcedureResult& found, std::uint8_t address, std::uint8_t value) {
   const Request look{DataId::read_memory, address};
   const std::uint8_t before = co_await execute(dialog, look, "nothing was written");
@@ -207,8 +213,8 @@ Procedure write_memory(Dialog& dialog, ProcedureResult& found, Arguments argumen
 
 // ---- The service page (7.2, 7.3); the page before it is selected again if it is known
 
-// The document shows the page as the content of address 127, but does not state that it can be read. If the encoder
-// refuses, the page before is unknown.
+// Selects the service page, and returns the page that was selected before; nothing if it is unknown. The document shows
+// the page as the content of address 127, but does not state that it can be read, so the encoder may refuse.
 Part<std::optional<std::uint8_t>> open_service_page(Dialog& dialog, ProcedureResult& found, std::string_view step) {
   const Result<Reply> before = co_await when_ready(dialog, {DataId::read_memory, page_select_address});
   found.page_left = service_page;
@@ -216,13 +222,13 @@ Part<std::optional<std::uint8_t>> open_service_page(Dialog& dialog, ProcedureRes
   co_return before&& is_page(before->value) ? std::optional(before->value) : std::nullopt;
 }
 
-// Selects the page before again. If that fails, the result of the procedure is still valid. Reading the page back shows
-// what the next user of the encoder finds.
+// Selects the page `before` again, and returns whether it is selected. If that fails, the result of the procedure is
+// still valid. Reading the page back shows what the next user of the encoder finds.
 Part<bool> restore(Dialog& dialog, ProcedureResult& found, std::optional<std::uint8_t> before) {
   if (!before) co_return false;
   if (*before != service_page) {
     const Result<Reply> selected = co_await when_ready(dialog, {DataId::write_memory, page_select_address, *before});
-    co_await dialog.rest(memory_time);  // without a valid reply the page change may still be going on
+    co_await dialog.rest(memory_time);  // without a valid reply the page change may still be in progress
     if (!selected) co_return false;
     const Result<Reply> now = co_await when_ready(dialog, {DataId::read_memory, page_select_address});
     if (!now || now->value != *before) co_return false;
@@ -239,7 +245,7 @@ Procedure read_temperature(Dialog& dialog, ProcedureResult& found) {
   co_return done;
 }
 
-// Returns the byte that stores this threshold.
+// Returns the memory byte for an over-heat threshold in degC; 0: off.
 constexpr std::uint8_t threshold_of(std::int64_t degrees) { return degrees == 0 ? 0 : byte(0x80 | degrees); }
 
 void show_threshold(ProcedureResult& found, std::uint8_t value) {
@@ -267,7 +273,7 @@ Procedure write_threshold(Dialog& dialog, ProcedureResult& found, Arguments argu
 
 constexpr Explanation explain_refusal(Bytes reply) {
   constexpr std::array<std::string_view, 4> found{
-      // indexed by ca1 and ca0
+      // index: the bits ca1 and ca0 of SF
       "it answered as to data ID 3, without a communication alarm: a data ID that it does not have, a CRC that is "
       "wrong, or an address that is closed",
       "ca0: it received the request with a parity error of the data ID",
@@ -393,7 +399,8 @@ constexpr std::size_t size_of_reply(const Format&, Bytes begin) {
   const std::optional<DataId> of = data_id(begin[0]);
   return of && begin[0] == control_field(*of) ? reply_length(*of) : 0;
 }
-/// Guesses the request of a reply: its control field has the id; the address of a memory access is that of the reply.
+/// Returns the request that a reply shows: its control field has the data ID; address and value of a memory access are
+/// those of the reply. Error: unexpected_reply (unknown ID).
 constexpr Result<Request> guess_request(const Format&, Bytes reply) {
   const std::optional<DataId> asked = data_id(reply[0]);
   if (!asked) return Error::unexpected_reply;
@@ -404,7 +411,8 @@ constexpr Result<Request> guess_request(const Format&, Bytes reply) {
   }
   return request;
 }
-/// Returns the error of a request that the encoder did not accept, which it answers like ID 3 (8.4, 9.4).
+/// Returns request_rejected if the encoder answered an invalid request like data ID 3 (8.4, 9.4), otherwise `error`,
+/// the error of the request.
 constexpr Error answer_to_bad(const Format&, Bytes, Error error, Bytes reply) {
   const bool refused = reply.size() == reply_length(DataId::everything) && checksum(reply) == 0 &&
                        reply[0] == control_field(DataId::everything);
@@ -436,7 +444,7 @@ constexpr Declaration<Protocol, VirtualEncoder> declaration{
     .alarms = fields.of<&Values::alarms>(),
     .memory = memory_areas,
     .conditions = conditions,
-    // Any pause ends a frame; some encoders tolerate one that is shorter than their own answer time.
+    // Any pause ends a frame; some encoders tolerate a pause that is shorter than their own answer time.
     .timing = {.pause_bits = 5, .turnaround = answer_time, .turnaround_limit = answer_limit},
 };
 

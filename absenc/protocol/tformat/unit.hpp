@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The unit of the T-format, for the neutral layers.
+// The protocol unit of the T-format, for the layers that know no protocol.
 #pragma once
 
 #include "absenc/protocol/unit.hpp"
 
 namespace absenc::tformat {
 
-extern constinit const Unit unit;  ///< The unit.
+extern constinit const Unit unit;  ///< Descriptor of the T-format.
 
 }  // namespace absenc::tformat

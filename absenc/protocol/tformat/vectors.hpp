@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// T-format frames with their sources. Each is decoded at compile time, so a wrong frame does not build.
+// Test vectors of the T-format: frames with their sources and decoded fields. Each is decoded at compile time, so a
+// wrong vector does not compile.
 #pragma once
 
 #include <array>
@@ -10,7 +11,7 @@ namespace absenc::tformat {
 
 using author::VectorText;
 
-/// Frames with their meaning, from documents.
+/// Test vectors of the T-format, from the document or derived from it.
 inline constexpr std::array vectors{
     VectorText{"tformat-001", "request byte Data ID 0", "seed Table 1; public", "", "02", "",
                "data_id=0 control_field=2"},
