@@ -99,13 +99,13 @@ constexpr void show(const ChainFormat& format, const ShaftState& state, std::uin
   }
 }
 
-/// Returns the life counter of the shown slave, or -1 if its check has none.
+/// Returns the life counter of the slave that the format selects, or -1 if the check of its word has none.
 [[nodiscard]] constexpr int life_counter_of(const ChainFormat& format, const ChainReply& reply) {
   const unsigned shown = format.shown();
   return format.channels[shown].check.life_counter ? reply.channels[shown].life_counter : -1;
 }
 
-/// Converts the word of the shown slave to a reading.
+/// Converts the word of the slave that the format selects to a reading.
 [[nodiscard]] constexpr Reading reading_of(const ChainFormat& format, const ChainReply& reply) {
   const unsigned shown = format.shown();
   return to_reading(format.channels[shown].word, reply.channels[shown].word, format.scale);

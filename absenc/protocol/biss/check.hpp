@@ -34,7 +34,7 @@ struct Check {
 /// Returns whether the polynomial of the CRC ends in 1; an even one does not detect every single bit error.
 [[nodiscard]] constexpr bool is_usable(const Check& check) { return check.width == 0 || (check.poly & 1) != 0; }
 
-inline constexpr Check crc6{};  ///< The usual CRC of 6 bits.
+inline constexpr Check crc6{};  ///< Check of most encoders: a CRC of 6 bits.
 /// Check of the safety position word: polynomial 0x190D9, with a life counter.
 inline constexpr Check crc16{16, 0x90D9, 0, true, true};
 

@@ -137,7 +137,7 @@ struct Target : ControlTarget {
   int executed = -1;
 };
 
-/// The CDM and CDS bits of a run, one per frame.
+/// The CDM and CDS bits of a simulated control frame, one per position frame.
 struct Transcript {
   std::string cdm;
   std::string cds;
@@ -307,7 +307,7 @@ TEST(BissControl, ExecutesCommandWhenAllSlavesAcknowledge) {
   EXPECT_EQ(master.frame().slaves, 3);
 }
 
-// Bits are counted from the start bit, as in the table.
+// Bits are counted from the start bit, as in TI's table.
 TEST(BissControl, DecoderChecksEachRuleOfAControlFrame) {
   const auto transcript_of = [](auto begin) {
     Target target;

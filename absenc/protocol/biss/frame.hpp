@@ -33,7 +33,7 @@ inline constexpr Time timeout_maximum = 40us;
 inline constexpr unsigned start_pulses = 2;
 
 /// BiSS timeout, the time for which SLO stays low after the last clock: fixed, or one and a half periods of MA
-/// (adaptive). Takes one byte.
+/// (adaptive). An object takes one byte of memory.
 class Timeout {
  public:
   constexpr Timeout() = default;  // An unknown timeout: the host waits 40 us, the virtual encoder takes 20 us.

@@ -19,13 +19,13 @@ TEST(BissProcedures, RefusesImpossibleRegistersWithoutRequest) {
   ProcedureBench one;
   const auto refused = [&one](const ControlResults&) { EXPECT_EQ(one.encoder.answer_count(), 0u); };
   const Error no = Error::invalid_argument;
-  refused(one.ask<read_memory<Format>>({60, 0, 5}, no));   // beyond the end of the bank
-  refused(one.ask<read_memory<Format>>({120, 0, 9}, no));  // beyond the last register
+  refused(one.ask<read_memory<Format>>({60, 0, 5}, no));   // the last register is beyond the end of the bank
+  refused(one.ask<read_memory<Format>>({120, 0, 9}, no));  // the registers end before the requested count
   refused(one.ask<read_memory<Format>>({64, 1, 1}, no));   // registers outside the banks are on bank 0
   refused(one.ask<write_memory<Format>>({72, 1, 7, 1}, no));
   refused(one.ask<write_memory<Format>>({72, 7, 1, 1}, no));
-  refused(one.ask<write_memory<Format>>({68, 7, 0, 1}, no));  // serial number
-  refused(one.ask<write_memory<Format>>({72, 7, 0, 0}, no));  // register defined by the maker
+  refused(one.ask<write_memory<Format>>({68, 7, 0, 1}, no));  // the serial number is read only
+  refused(one.ask<write_memory<Format>>({72, 7, 0, 0}, no));  // a register defined by the maker needs `force`
   refused(one.ask<write_memory<Format>>({3, 7, 1, 0}, no));
   EXPECT_EQ(one.ask<read_memory<Format>>({60, 0, 4}).bytes.size(), 4u);
   EXPECT_EQ(one.ask<read_memory<Format>>({120, 0, 8}).bytes.size(), 8u);
@@ -79,7 +79,8 @@ TEST(BissProcedures, EncoderExecutesCommandsOfTheStandard) {
   EXPECT_EQ(position(), Error::none);
   EXPECT_EQ(one.ask<send_command<Format>>({0, 1}).executed, true);  // switches control communication of all slaves on
   one.ask<read_setting<Format>, registers::profile>({});
-  one.ask<send_command<Format>>({1, 2}, Error::request_rejected);  // command defined by the maker
+  one.ask<send_command<Format>>({1, 2},
+                                Error::request_rejected);  // the virtual encoder lacks command 2, which makers define
 }
 
 /// An encoder that loses the written value of register 3.

@@ -35,7 +35,7 @@ TEST(E201Device, RepliesToEveryCommand) {
   expect("b", "35\r");
   expect("?", "1048581\r");
   expect(">", "000100005\r");
-  expect("1", "1048581\r");  // first position of a stream
+  expect("1", "1048581\r");  // reply to `1`: the first position of a stream
   expect("B20\r", "");
   expect("b", "20\r");
   expect(">", "00005\r");

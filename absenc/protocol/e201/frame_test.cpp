@@ -30,7 +30,7 @@ TEST(E201Frame, DistinguishesErrorsOfSamples) {
            {"c0014328ff3000000\r", Error::wrong_length},   // one digit too many
            {"c0014328ff300000\r\n", Error::wrong_length},  // LF after the CR
            {"c0014328ff3000\r0\r", Error::bad_framing},    // CR among the digits
-           {"80014328ff300000\r", Error::bad_framing},     // begins with 100
+           {"80014328ff300000\r", Error::bad_framing},     // the samples begin with 100 instead of 110
            {"c000000000000002\r", Error::truncated},       // the CDS bit is the last sample
            {"c000000000000003\r", Error::bad_framing},     // CDS is 1, and the frame is truncated
            {"c0014328ff310000\r", Error::none},            // a bit after the CRC has changed

@@ -30,7 +30,7 @@ struct InterfaceResults {
   /// Recommendation of other clocks, if the set clock does not suit the encoder.
   std::optional<std::string_view> advice{};
 
-  // Results of clock-sweep.
+  // Results of the command clock-sweep.
   unsigned frames = 0;  ///< Number of frames to read at each clock.
   /// Number of valid frames at each clock, in the order of `clocks_khz`.
   std::array<unsigned, clocks_khz.size()> valid{};

@@ -236,7 +236,7 @@ TEST_P(EncolinkHost, ReportsChannel2ThatDisagrees) {
   EXPECT_EQ(status.error, Error::cross_check_failed);
   EXPECT_TRUE(says(status.detail, "channel 2 has another position")) << status.detail;
   bench.pass(spi_pause);
-  EXPECT_EQ(bench.run("position").error, Error::none);  // positions stay readable
+  EXPECT_EQ(bench.run("position").error, Error::none);  // positions can still be read
   const RunResult read = bench.run("memory-read", {0x4C});
   EXPECT_EQ(read.error, Error::cross_check_failed);
   EXPECT_TRUE(says(read.detail, "channel 2 has another position")) << read.detail;

@@ -90,7 +90,7 @@ void Server::receive(const ByteEvent& event) {
 }
 
 void Server::frame_ended(Time at) {
-  // On a real line the silence is reported in time; otherwise whenever this program is scheduled.
+  // A real line reports the silence in time; a pseudo-terminal only when this program is scheduled.
   ended_late_ = at - quiet_since_ > frame_silence(line_) + late;
   if (!damaged_ && crc_order(frame_) == CrcOrder::low_first) {
     reply_.clear();

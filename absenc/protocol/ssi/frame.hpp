@@ -76,7 +76,7 @@ namespace detail {
   const std::size_t both = 2 * word + (format.after_word == AfterWord::separated ? 1 : 0);
   const bool twice = format.extra_clocks == 0 && bits.size == both;
   if (bits.size == clocks(format) || twice) return Error::none;
-  // Checks more clocks than a word has bits: the bits as one number must not be a possible position.
+  // The length is wrong. If a bit above the width of a word is set, the bits as one number exceed any position.
   for (std::size_t i = 0; i + word < bits.size; ++i) {
     if (bits[i]) return Error::out_of_range;
   }

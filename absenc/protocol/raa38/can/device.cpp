@@ -112,7 +112,7 @@ void VirtualNode::answer(const CanFrame& frame, Time at) {
 
 void VirtualNode::execute(const OrderInfo& info, std::uint8_t value, Time at) {
   const bool changes = info.order == Order::zero || info.order == Order::direction;
-  // Checks the rule against reading while cyclic frames are sent: an answer and a position could be confused.
+  // A host cannot distinguish the answer to these orders from a cyclic position, so it must stop the node first.
   if (changes) rules_.expect(readings_per_s_ == 0, "a setting changed while the node sends by itself", at);
   if (info.order == Order::enter) configuring_ = value == 1;
   if (info.order == Order::start && readings_per_s_ == 0) start_cyclic(format_.cyclic, at);

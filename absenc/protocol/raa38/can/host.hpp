@@ -13,7 +13,7 @@ namespace absenc::raa38::can {
 
 using namespace std::chrono_literals;
 
-// The document gives no times; these are far longer than any controller needs.
+// The document gives no reply times; the timeouts below are far longer than any controller needs.
 inline constexpr Time answer_limit = 50ms;  ///< Timeout of a reply on a bus without other frames.
 inline constexpr Time busy_limit = 250ms;   ///< Timeout of a reply on a bus that other nodes keep busy.
 /// Time for which the host listens for unsolicited frames before it sends requests.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Procedures with several frames: first those for one node, then those for all nodes on the bus.
+// Procedures of the RAA38S6 on CAN: first those for one node, then those for all nodes on the bus.
 #include <algorithm>
 
 #include "absenc/core/bits.hpp"
@@ -13,7 +13,7 @@ namespace {
 using namespace author;
 using MaybeFrame = std::optional<CanFrame>;
 
-// These numbers of frames measure the send rate to 1 % even if the adapter delivers frames some milliseconds late.
+// Least number of frames and least time that measure the send rate to 1 %, although an adapter may delay frames.
 constexpr unsigned enough_frames = 4;
 constexpr Time enough_time = 500ms;
 constexpr unsigned most_measurements = 3;  // greatest number of attempts to measure the send rate
@@ -153,7 +153,7 @@ Outcome check_zero(const Format& format, const Values& found, std::uint32_t firs
 }
 
 Outcome check_direction(const Format& format, Values& found, std::uint32_t first, std::uint32_t second) {
-  // Checks that two positions are near each other, because the shaft may have vibrated.
+  // Twice the usual tolerance, because the shaft may have vibrated both before and after the order.
   const auto is_at = [&](std::uint64_t place) {
     return is_near(second, place, format.bits, 2 * standstill_millidegrees);
   };

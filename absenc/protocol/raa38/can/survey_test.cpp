@@ -91,7 +91,6 @@ TEST(Raa38CanNode, ReportsNodeThatAnswers) {
 
 // A slow adapter delivers answers while later numbers are requested. A frame before the request for its number is no
 // answer.
-// answer.
 TEST(Raa38CanScan, AcceptsAnswersWhileSendingNextRequest) {
   for (const bool unasked_too : {false, true}) {
     Talk conversation("scan");

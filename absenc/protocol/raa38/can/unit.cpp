@@ -37,7 +37,7 @@ constexpr auto options = author::OptionsOf{
 };
 
 constexpr Argument force{"force", "1: write even what is set already", 0, 1, 0, false, Role::force};
-// CANopen uses identifiers 201 to 27F for RPDO1, by which a master moves drives, and those from 281 on for TPDO2.
+// CANopen uses identifiers 201 to 27F for RPDO1, by which a master moves drives, and identifiers from 281 on for TPDO2.
 constexpr std::string_view survey_warning =
     "asks every number, by 201#8001 to 2FF#80FF: on a CANopen bus these are process data of other devices, which may "
     "obey them";

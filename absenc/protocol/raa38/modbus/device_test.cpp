@@ -25,10 +25,10 @@ TEST(Raa38ModbusDevice, AnswersExamplesOfTheManual) {
 TEST(Raa38ModbusDevice, RefusesWithExceptionsOfTheStandard) {
   Bench bench;
   const std::pair<Wire, Wire> rows[]{
-      {{1, 4, 0, 0, 0, 1}, {1, 0x84, 1}},  // read input registers
-      {{1, 1, 0, 0, 0, 1}, {1, 0x81, 1}},  // read coils
-      {{1, 6, 0, 0, 0, 1}, {1, 0x86, 1}},  // write a register
-      {{1, 0x11}, {1, 0x91, 1}},           // report server id
+      {{1, 4, 0, 0, 0, 1}, {1, 0x84, 1}},  // function 04, read input registers, does not exist
+      {{1, 1, 0, 0, 0, 1}, {1, 0x81, 1}},  // function 01, read coils, does not exist
+      {{1, 6, 0, 0, 0, 1}, {1, 0x86, 1}},  // function 06, write a register, does not exist
+      {{1, 0x11}, {1, 0x91, 1}},           // function 11, report server id, does not exist
       {{1, 3, 0, 1, 0, 1}, {1, 0x83, 2}},  // reads register 1
       {{1, 3, 0, 0, 0, 3}, {1, 0x83, 2}},  // reads three registers
       {{1, 3, 0xFF, 0xFF, 0, 1}, {1, 0x83, 2}},

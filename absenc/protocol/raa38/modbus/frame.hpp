@@ -169,7 +169,7 @@ struct Reply {
   return reply.size() > 7 && reply[1] == function::read && reply[2] == 4 && (reply.size() == 8 || reply.back() == 0);
 }
 
-/// Returns whether a second reply leaves the length of the first one in doubt.
+/// Returns whether the length of the first of two replies is in doubt even with the second reply.
 [[nodiscard]] constexpr bool differ_doubtfully(const Reply& first, const Reply& second) {
   return second.doubtful_size != 0 && second.doubtful_size != first.doubtful_size;
 }
@@ -219,7 +219,7 @@ constexpr bool is_answer(const Request& request, Bytes reply) {
   const std::optional<std::uint8_t> refusal = detail::refusal_of(request, bytes);
   if (!refusal && !detail::length_is_right(request, bytes)) return Error::wrong_length;
   Reply reply{.function = request.function, .address = bytes[0], .order = modbus::crc_order(bytes)};
-  // The document labels the CRC of this reply "MSB first", unlike all others.
+  // The document labels the CRC of the reply to A0 "MSB first", unlike all other CRCs.
   const bool either = request.function == function::read_address;
   if (reply.order == CrcOrder::wrong || (reply.order == CrcOrder::high_first && !either)) return Error::bad_checksum;
   if (refusal) return bytes[0] == request.address ? Error::request_rejected : Error::unexpected_reply;

@@ -148,7 +148,7 @@ TEST(Raa38ModbusHost, NamesAddressThatAnswersA0) {
         ended(end, Error::timeout, "nobody answers at address 5, but A0 is answered by address 42 at 19200 baud"))
         << command;
     EXPECT_EQ(bench.encoder().settings().writes(), 0u);
-    bench.add({.address = 43});  // their answers to A0 collide
+    bench.add({.address = 43});  // the answers of both slaves to A0 collide
     EXPECT_TRUE(
         ended(bench.run_command(Format{.address = 5}, command, arguments), Error::timeout, "nobody answers at this"));
   }

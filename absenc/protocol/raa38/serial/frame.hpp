@@ -54,7 +54,7 @@ inline constexpr std::size_t frame_capacity = 6;  ///< Length of the longest fra
 inline constexpr Time trigger_width = 10us;  ///< Time T2: shortest pulse on CLK (3.1.3).
 inline constexpr Time clear_width = 1ms;     ///< Width of the pulse on CLR.
 
-// Timeouts of the host if the options do not give the ordered times.
+// Timeouts of the host, for encoders whose ordered times the options do not state.
 /// Timeout of a reply: longest T3, or longest time from a request to its reply.
 inline constexpr Time answer_limit = 100ms;
 inline constexpr Time answer_slack = 5ms;  ///< Time added to a T3 from the options to get the timeout.
@@ -66,7 +66,7 @@ inline constexpr Time scan_silence = 200ms;
 inline constexpr Time zero_limit = 500ms;  ///< Time within which the position must become zero after zero clearing.
 inline constexpr Time zero_poll = 10ms;    ///< Time between two polls of the position after zero clearing.
 
-// Times of the virtual encoder if the options do not give them.
+// Times of the virtual encoder; the options may set other ones.
 inline constexpr Time virtual_period = 10ms;        ///< Time between the virtual encoder's frames: refresh rate 100 Hz.
 inline constexpr Time virtual_acquisition = 100us;  ///< Time T3 of the virtual encoder.
 inline constexpr Time most_backlog = 50ms;          ///< Delay above which a stream of the virtual encoder drops frames.

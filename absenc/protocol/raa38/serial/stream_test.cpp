@@ -115,7 +115,7 @@ TEST(Raa38SerialStream, RejectsFrameWithHeaderInside) {
   }
 }
 
-// The checksum of FF 81 00 7F is FF: such a frame waits for the next header, but not longer.
+// The checksum of FF 81 00 7F is FF: the decoder accepts such a frame as soon as the next header follows.
 TEST(Raa38SerialStream, FrameWithFFWaitsForNextHeader) {
   const Format format{.bits = 14};
   StreamDecoder decoder(format);

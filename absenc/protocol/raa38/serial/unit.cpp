@@ -20,7 +20,7 @@ namespace {
 constexpr std::array<std::string_view, 3> mode_choices{"timing", "handshake", "bus"};
 constexpr std::array<std::string_view, 3> second_byte_choices{"auto", "81", "echo"};
 constexpr std::array<std::string_view, 3> zeroing_choices{"none", "line", "command"};
-constexpr std::int64_t most_us = 10'000'000'000;  // 10 s in nanoseconds
+constexpr std::int64_t most_us = 10'000'000'000;  // greatest time of an option: 10 s in nanoseconds
 
 using author::decimal;
 using author::option;
