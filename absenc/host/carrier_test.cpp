@@ -47,7 +47,7 @@ TEST_F(CarrierTest, CarriesAConversationByteByByte) {
   EXPECT_EQ(carrier.silences(), 0u);
 }
 
-// A machine that lists the events that it was fed, as text.
+// A machine that lists as text the events that it was fed.
 struct Fed final : Machine<std::uint8_t> {
   void feed(const ByteEvent& event) override {
     if (event.kind == ByteEvent::Kind::sent) receiving = true;
@@ -90,13 +90,13 @@ TEST_F(CarrierTest, DeliversCharactersWhenAllExpectedOnesArrived) {
               one.sent(10ns);
               characters(one, 4, 11ns);
               EXPECT_EQ(one.due(), 14ns + 1us);
-              characters(one, 2, 15ns);  // the sixth character arrives after the conversation and is dropped
+              characters(one, 2, 15ns);  // the sixth character arrives after the conversation has ended and is dropped
             }),
             "5 at 15; ");
   EXPECT_EQ(fed_by([&](auto& one) {
               one.sent(10ns);
               characters(one, 3, 11ns);
-              one.tick(20ns);  // nothing is due
+              one.tick(20ns);  // no action is due at this time
               one.tick(2us);
             }),
             "3 at 13; silence; ");
@@ -108,7 +108,7 @@ TEST_F(CarrierTest, DeliversCharactersWhenAllExpectedOnesArrived) {
             }),
             "2 at 12; error; 2 at 15; ");
   EXPECT_EQ(fed_by([&](auto& one) {
-              characters(one, 1, 5ns);  // arrives before the request is sent
+              characters(one, 1, 5ns);  // one character arrives before the request is sent
               one.sent(10ns);
               characters(one, 2, 11ns);
               one.received(std::span(reply).first(3), 15ns);
@@ -130,7 +130,7 @@ TEST_F(CarrierTest, DeliversCharactersWhenAllExpectedOnesArrived) {
             "16 at 26; 4 at 30; ");
 }
 
-// The next conversation gets none of the gathered characters of an abandoned one.
+// The next conversation gets none of the characters that were gathered for an abandoned one.
 TEST_F(CarrierTest, DropsGatheredCharactersOfAbandonedConversation) {
   Fed fed;
   carrier.start(fed, 0us);

@@ -24,7 +24,7 @@ ByteStep EchoFilter::next(Time now) {
     sent_.clear();
     held_.clear();
     echoed_ = 0;
-    // Longer than any request of a supported protocol: passed on unfiltered.
+    // The request is longer than any request of a supported protocol: its echo is not removed.
     if (!sent_.append(step.out)) return step;
     reply_due_ = step.expect;
     echo_due_ = working_mode() == EchoMode::on ? sent_.size() : 0;
@@ -35,7 +35,7 @@ ByteStep EchoFilter::next(Time now) {
   if (step.expect != 0) {
     step.expect += working_mode() == EchoMode::on ? echo_due_ : sent_.size() - std::min(sent_.size(), held_.size());
   }
-  // The echo is no answer, so the answer limit still applies.
+  // The echo is no reply, so the answer limit still applies.
   if (!passed_) step.gap = std::max(step.gap, step.answer);
   return step;
 }
@@ -111,7 +111,7 @@ void EchoFilter::decide(Time at) {
   }
   detected_ = EchoMode::off;
   if (!has_no_echo) return pass(at, bytes);
-  pass(at, bytes.first(reply));  // the bytes after the reply are not part of it
+  pass(at, bytes.first(reply));  // the bytes behind the reply do not belong to it
   pass(at, bytes.subspan(reply));
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Echo of adapters, removed in a session.
+// Tests the removal of an adapter's echo in a session.
 #include "absenc/host/echo.hpp"
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ TEST_P(Echo, IsRemovedByCount) {
   for (int i = 0; i < 3; ++i) {
     EXPECT_EQ(bench.read().error() == Error::none, GetParam().good);
   }
-  // Exchanges: read, page select (whose reply equals its request), memory read.
+  // The exchanges are a temperature read, a page select (whose reply equals its request) and a memory read.
   const auto* temperature = bench.session->run(*find_command(bench.unit, Verb::temperature));
   EXPECT_EQ(temperature->error() == Error::none, GetParam().good);
 }
@@ -55,7 +55,7 @@ TEST(EchoFilter, ReportsLineWithOnlyTheEcho) {
 }
 
 TEST(EchoFilter, ExtraByteIsNoEcho) {
-  // The first reply has one extra byte, so that it is as long as echo and reply together.
+  // The first reply has one extra byte, so that it is as long as an echo and a reply together.
   struct TooLong final : Machine<std::uint8_t> {
     explicit TooLong(Machine<std::uint8_t>& encoder) : device(encoder) {}
     void feed(const Event<std::uint8_t>& event) override { device.feed(event); }
@@ -99,7 +99,7 @@ TEST(EchoFilter, DetectsDisturbedEcho) {
   }
 }
 
-// The echo ends long before the encoder answers. That silence is no gap.
+// The echo ends long before the encoder answers: the silence behind the echo is no gap.
 TEST(EchoFilter, AnswerLimitAppliesAfterEcho) {
   Bench port_like(EchoMode::on);  // on a real port the echo is received after the `sent` event
   std::vector<std::byte> storage(port_like.unit.host_storage);

@@ -55,7 +55,7 @@ TEST(FirstReading, RefusesHalfATurn) {
   }
 }
 
-// 12 000 rpm are 200 turns a second: 0.2 of a turn in 1 ms.
+// The shaft turns at 12 000 rpm, twice the limit, which are 200 turns a second: 0.2 of a turn in 1 ms.
 TEST(FirstReading, ConfirmsFasterShaftAtThirdPosition) {
   FirstReading first(6000);
   EXPECT_FALSE(first.confirms(of_bits(13, 0, 0ms)));
@@ -67,7 +67,7 @@ TEST(FirstReading, ConfirmsFasterShaftAtThirdPosition) {
 }
 
 TEST(FirstReading, RefusesMuchFasterShaft) {
-  for (const std::uint64_t step : {1638u, 3276u, 3500u}) {  // 819 counts in 1 ms are allowed
+  for (const std::uint64_t step : {1638u, 3276u, 3500u}) {  // the limit allows 819 counts in 1 ms
     FirstReading first(6000);
     EXPECT_FALSE(first.confirms(of_bits(15, 0, 0ms)));
     EXPECT_FALSE(first.confirms(of_bits(15, 4 * step, 1ms)));

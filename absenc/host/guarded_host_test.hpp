@@ -19,8 +19,8 @@ class GuardedHost {
     valid_ = resolve_options(unit, {}, options, options_).kind == OptionError::Kind::none;
   }
 
-  /// Returns whether the conversation ended within this time, or gave its first result if it streams. `may_repeat`:
-  /// whether its requests may be repeated because they only read.
+  /// Runs `conversation`. Returns whether the conversation ended within the time `limit`, or gave its first result if
+  /// it streams. `may_repeat`: whether its requests may be repeated because they only read.
   [[nodiscard]] bool run(Conversation<Item>& conversation, Time limit, bool may_repeat = true) {
     streams_ = conversation.asks();
     emitted_ = false;
@@ -51,7 +51,7 @@ class GuardedHost {
 };
 
 /// Returns the number of faults that can turn wrong bytes into a valid frame. All other faults leave frames intact, so
-/// no wrong reading may follow from them.
+/// no wrong reading may follow from these other faults.
 [[nodiscard]] inline std::uint64_t changed_bytes(const sim::FaultyDevice& faulty) {
   using sim::FaultKind;
   std::uint64_t sum = 0;

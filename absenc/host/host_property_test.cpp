@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Unwrapping and velocity over random motions, below and above the speed at which they are valid.
+// Tests unwrapping and velocity with random motions, below and above the speed at which they are valid.
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -11,7 +11,7 @@
 namespace absenc::host {
 namespace {
 
-/// Returns the reading of an encoder with these bits at this position.
+/// Returns the reading of an encoder with the given numbers of bits at `position`.
 Reading shown(std::int64_t position, unsigned singleturn_bits, unsigned multiturn_bits, Time at) {
   const auto counts = static_cast<std::uint64_t>(position);
   Reading reading{.singleturn = counts & low_mask(singleturn_bits),
@@ -43,7 +43,8 @@ RC_GTEST_PROP(UnwrapProperty, FollowsEveryMotionBelowHalfTheRangeAStep, (std::in
   unwrapper.add(shown(position, singleturn_bits, multiturn_bits, Time{}));
   const std::int64_t offset = unwrapper.position() - position;
   for (int i = 1; i <= 200; ++i) {
-    // Steps up to one count below half the range in one direction, and up to half the range in the other.
+    // The random steps are up to one count below half the range in one direction, and up to half the range in the
+    // other.
     position += *rc::gen::weightedOneOf<std::int64_t>(
         {{8, rc::gen::inRange<std::int64_t>(-half, half)}, {1, rc::gen::just(-half)}, {1, rc::gen::just(half - 1)}});
     RC_ASSERT(unwrapper.add(shown(position, singleturn_bits, multiturn_bits, Time(i))) == Unwrapper::Joined::continued);
@@ -66,13 +67,14 @@ RC_GTEST_PROP(UnwrapProperty, TheLongestGapKeepsWithinThatLimit, ()) {
   const auto [singleturn_bits, multiturn_bits] = any_resolution();
   const auto rpm = *rc::gen::inRange<std::uint32_t>(1, 100'000);
   const Time gap = longest_gap({singleturn_bits, multiturn_bits}, {.rpm = rpm});
-  const double counts = std::ldexp(1.0, static_cast<int>(singleturn_bits)) * rpm / 60e9;  // counts in a nanosecond
+  // Counts that pass in a nanosecond at the limit.
+  const double counts = std::ldexp(1.0, static_cast<int>(singleturn_bits)) * rpm / 60e9;
   const auto half = static_cast<double>(Counter{singleturn_bits, multiturn_bits}.half());
   RC_ASSERT(counts * static_cast<double>(gap.count()) < half);
   RC_ASSERT(counts * static_cast<double>(gap.count() + 2) >= half * 0.9);
 }
 
-// Integer arithmetic gives the floating-point result, except for rounding up by at most 0.016 %.
+// The integer arithmetic of Reach gives the floating-point result, except for rounding up by at most 0.016 %.
 RC_GTEST_PROP(ReachProperty, EqualsDistanceAtHighestSpeed, ()) {
   const auto bits = *rc::gen::inRange(1u, 65u);
   const auto speed = *rc::gen::inRange<std::uint32_t>(1, 1'000'001);
@@ -88,7 +90,8 @@ RC_GTEST_PROP(ReachProperty, EqualsDistanceAtHighestSpeed, ()) {
 }
 
 RC_GTEST_PROP(VelocityProperty, EqualsSpeedInMiddleOfWindow, ()) {
-  // Speed in counts/s, acceleration in counts/s^2; readings every 0.1 to 20 ms, with a jitter of up to half of that.
+  // The motion has a random speed in counts/s, acceleration in counts/s^2; readings every 0.1 to 20 ms, with a jitter
+  // of up to half of that.
   const double speed = *rc::gen::inRange(-100'000'000, 100'000'000);
   const double acceleration = *rc::gen::inRange(-100'000'000, 100'000'000);
   const auto period = *rc::gen::inRange<std::int64_t>(100'000, 20'000'000);
@@ -112,7 +115,7 @@ RC_GTEST_PROP(VelocityProperty, OfUnwrappedTurnIsValidUpToHalfATurnPerStep, ()) 
   constexpr unsigned bits = 17;
   constexpr double revolution = 1 << bits;
   const auto period = *rc::gen::inRange<std::int64_t>(100'000, 20'000'000);
-  const double limit = revolution / 2 * 1e9 / static_cast<double>(period);  // counts/s
+  const double limit = revolution / 2 * 1e9 / static_cast<double>(period);  // highest valid speed in counts/s
   const auto measured = [&](double speed) {
     Unwrapper unwrapper(SpeedLimit{.rpm = 0});
     Velocity velocity;

@@ -79,7 +79,8 @@ void OutstandingRequests<Item>::mark_lost(Items request, Time longest) {
   entry->sent_at.clear();
 }
 
-// A late reply may belong to a request that counts as lost; the replies of later requests are then still outstanding.
+// Removes the oldest request of an entry. A late reply may belong to a request that counts as lost; the replies of
+// later requests are then still outstanding.
 template <class Item>
 void OutstandingRequests<Item>::remove_oldest(Entry& entry) {
   if (entry.lost != 0) {

@@ -11,7 +11,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr int silent_timeouts = 4;  // timeouts of silence before a request is repeated
-// Longest usual lateness; replies were only later on a line that delays every reply.
+// Longest usual lateness of a reply; replies were only later on a line that delays every reply.
 constexpr Time longest_silence = 2500ms;
 constexpr Time stall_silence = 500ms;   // silence after which the replies that a stalled line delayed are lost
 constexpr Time longest_lateness = 10s;  // a reply later than this counts as lost
@@ -50,7 +50,7 @@ Time ReplyGuard<Item>::longest_wait() const {
 
 // ---- Transitions between phases
 
-// The last request becomes outstanding if no valid reply to it was received.
+// Ends the exchange. The last request becomes outstanding if no valid reply to it was received.
 template <class Item>
 void ReplyGuard<Item>::end_exchange() {
   const bool unmatched = phase_ == Phase::matching || phase_ == Phase::listening;
@@ -76,7 +76,7 @@ void ReplyGuard<Item>::enter_delaying(const Step<Item>& request, Time now) {
   // Late replies are also awaited during a pause that the request demands. A short pause is left to the port, which is
   // more exact than its timer.
   delaying_ = {.until = request.at > now + 1ms ? request.at : now + tick, .received_at = now - request.gap};
-  if (outstanding_.full()) {  // the silence makes all of them lost, so that new ones can be stored
+  if (outstanding_.full()) {  // the delay makes all outstanding requests lost, so that new ones can be stored
     delaying_.until = std::max(delaying_.until, last_.sent_at + required_silence());
   } else if (const Entry* entry = outstanding_.find(request.out)) {
     // An encoder that did not answer twice is absent, if no reply was ever late on this line.
@@ -116,9 +116,9 @@ void ReplyGuard<Item>::enter_listening(const Entry& entry) {
   listening_ = {.until = until, .suspected = suspected};
 }
 
-// If the line delays every reply, the reply after one that was late by `suspected` follows at the interval of their
-// requests. If that interval passes in silence, and no earlier reply was nearly as late, the line had stalled, and its
-// delayed replies are lost. A CAN bus delays no frames.
+// Returns how long to listen. If the line delays every reply, the reply after one that was late by `suspected` follows
+// at the interval of their requests. If that interval passes in silence, and no earlier reply was nearly as late, the
+// line had stalled, and its delayed replies are lost. A CAN bus delays no frames.
 template <class Item>
 Time ReplyGuard<Item>::listening_time(Time suspected) const {
   const Time always_late = std::clamp(suspected * 5 / 4, required_silence(), longest_wait());
@@ -137,7 +137,8 @@ Step<Item> ReplyGuard<Item>::next(Time now) {
         return forward(now);
       case Phase::delaying:
         if (now < delaying_.until) return {.at = delaying_.until, .gap = pending_.step.gap};
-        // The request must not collide with items that still arrive. If they never end, the conversation reports noise.
+        // The request must not collide with items that still arrive. If the items never end, the conversation reports
+        // noise.
         if (delaying_.noise_end == never) delaying_.noise_end = now + noise_limit;
         if (!is_can && delaying_.received_at + pending_.step.gap > now && now < delaying_.noise_end) {
           delaying_.until = delaying_.received_at + pending_.step.gap;
@@ -150,7 +151,7 @@ Step<Item> ReplyGuard<Item>::next(Time now) {
           const std::size_t due = expected - std::min(expected, received_.size());
           return {.expect = due, .at = matching_.until, .answer = pending_.step.answer, .gap = pending_.step.gap};
         }
-        // Items that are no reply arrive without end; on CAN other nodes send them.
+        // The time limit has passed and items that are no reply still arrive; on CAN other nodes send them.
         received_.clear();
         matching_.damaged = !is_can;
         conclude_matching(true);
@@ -175,7 +176,7 @@ Step<Item> ReplyGuard<Item>::forward(Time now) {
   return step;
 }
 
-// The conversation makes a step after each reported event.
+// Feeds the events of `Report` to the conversation, which makes a step after each event, and returns its next step.
 template <class Item>
 Step<Item> ReplyGuard<Item>::next_of_conversation(Time now) {
   while (report_event()) {
@@ -311,7 +312,8 @@ void ReplyGuard<Item>::keep_foreign(const Item& item) {
   }
 }
 
-// Removes replies that answer an outstanding request and not the present one; the items after them may be its reply.
+// Removes replies that answer an outstanding request and not the present one; the items behind these replies may be the
+// reply to the present request.
 template <class Item>
 void ReplyGuard<Item>::strip_late(Time at) {
   for (std::size_t i = 0; i < outstanding_.size();) {
@@ -336,7 +338,8 @@ void ReplyGuard<Item>::conclude_matching(bool timed_out) {
     if (const Entry* entry = outstanding_.find_by_reply(received_)) return enter_listening(*entry);
   }
   const bool valid = received && !matching_.damaged && outstanding_.is_reply(last_.items, received_);
-  if (valid) outstanding_.clear();  // the line keeps the order: replies to earlier requests have arrived or are lost
+  // The line keeps the order of replies: those to earlier requests have arrived or are lost.
+  if (valid) outstanding_.clear();
   if (!received) received_.append(matching_.foreign_frame);
   enter_forwarding({.answerable = true,
                     .received = received,
@@ -348,8 +351,8 @@ void ReplyGuard<Item>::conclude_matching(bool timed_out) {
                                .received_at = matching_.received_at}});
 }
 
-// No reply can be matched on a line that is never silent. The conversation gets none of the items and ends by its own
-// time limit.
+// Ends matching because of noise: no reply can be matched on a line that is never silent. The conversation gets none of
+// the items and ends by its own time limit.
 template <class Item>
 void ReplyGuard<Item>::conclude_noise() {
   received_.clear();
@@ -361,7 +364,8 @@ void ReplyGuard<Item>::conclude_noise() {
 
 // ---- Delaying and listening
 
-// If the length of the reply is known, only the last items are checked, because noise may precede the reply.
+// Returns whether the received items end with a reply to `request`. If the length of the reply is known, only the last
+// items are checked, because noise may precede the reply.
 template <class Item>
 void ReplyGuard<Item>::drop_items(Items items, Time at) {
   if (phase_ == Phase::delaying) delaying_.received_at = at;
@@ -373,13 +377,13 @@ void ReplyGuard<Item>::drop_items(Items items, Time at) {
     if (i < outstanding_.size()) {
       drop_late_reply(&outstanding_[i], at);
     } else if (!is_can && last_.exists && ends_with_reply(last_.items, last_.expect)) {
-      // A second reply to the last request: the first one may have belonged to an earlier request.
+      // The items are a second reply to the last request: the first one may have belonged to an earlier request.
       drop_late_reply(nullptr, at);
     }
   }
 }
 
-// A reply of unknown length ends with silence.
+// Drops a late reply of unknown length, which ends with silence.
 template <class Item>
 void ReplyGuard<Item>::drop_at_silence(Time at) {
   if (received_.empty()) return;
@@ -397,7 +401,8 @@ bool ReplyGuard<Item>::ends_with_reply(Items request, std::size_t expect) const 
   return size != 0 && received_.size() >= size && outstanding_.is_reply(request, received_.view().last(size));
 }
 
-// `entry`: the outstanding request that the reply answers; null: a second reply to the last request.
+// Drops a late reply. `entry`: the outstanding request that the reply answers; null: it is a second reply to the last
+// request.
 template <class Item>
 void ReplyGuard<Item>::drop_late_reply(Entry* entry, Time at) {
   received_.clear();

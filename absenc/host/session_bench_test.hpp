@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Session with a virtual T-format encoder, in virtual time.
+// A session with a virtual T-format encoder, in virtual time, for tests.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -23,7 +23,8 @@ struct Still final : Shaft {
   }
   std::int64_t position = 0;
   const Device<std::uint8_t>* device = nullptr;
-  std::uint64_t wrong_answer = UINT64_MAX;  // number of the answer that contains `wrong_position`
+  // Number of the answer that contains `wrong_position`; the greatest number: none.
+  std::uint64_t wrong_answer = UINT64_MAX;
   std::int64_t wrong_position = 0;
 };
 
@@ -42,13 +43,13 @@ struct Bench {
     session = std::make_unique<Session<std::uint8_t>>(unit, options, *port, host_storage, mode, attempts);
   }
   const Conversation<std::uint8_t>& read() { return *session->read(*find_command(unit, Verb::read)); }
-  /// Returns the number of answers that one reading took.
+  /// Reads once and returns the number of answers that the reading took.
   std::uint64_t answers_of_a_reading() {
     const std::uint64_t before = device->answer_count();
     EXPECT_EQ(read().error(), Error::none);
     return device->answer_count() - before;
   }
-  /// Makes one answer wrong, turned by this many counts.
+  /// Makes one answer of the encoder wrong: its position is turned by `turned` counts.
   void answer_wrong(std::int64_t turned) {
     shaft.wrong_answer = device->answer_count();
     shaft.wrong_position = shaft.position + turned;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sessions with a T-format encoder, in virtual time.
+// Tests of sessions with a virtual T-format encoder, in virtual time.
 #include "absenc/host/session.hpp"
 
 #include <gtest/gtest.h>
@@ -63,7 +63,8 @@ struct OneRequest final : Machine<std::uint8_t> {
   Wire heard;
 };
 
-// The reply of an outstanding request may arrive first; ten seconds later it counts as lost.
+// The reply to an outstanding request may arrive before the reply to the next request; ten seconds later it counts as
+// lost.
 TEST(ReplyGuard, RequestsAreOutstandingForTenSeconds) {
   using Kind = Step<std::uint8_t>::Kind;
   const Bench bench(EchoMode::off);
@@ -134,9 +135,9 @@ TEST(Session, FeedsStatisticsWithEveryAttempt) {
 
   Bench good(EchoMode::off);
   good.session->observe(&statistics);
-  good.read();  // reads twice, because it is the first
+  good.read();  // reads twice, because the first position must be confirmed
   EXPECT_EQ(statistics.latencies().count(), 2u);
-  // 3 us of the encoder and 11 characters of 4 us each.
+  // The latency is 3 us of the encoder and 11 characters of 4 us each.
   EXPECT_EQ(statistics.latencies().longest(), std::chrono::microseconds(47));
 }
 
@@ -163,10 +164,11 @@ TEST(Session, ShowsTheSecondOfTwoReadingsThatAgree) {
   bench.faulty->set_rates({});
   const auto before = bench.device->answer_count();
   EXPECT_EQ(bench.read().error(), Error::none);
-  EXPECT_EQ(bench.device->answer_count(), before + 3);  // the first could be the late reply to an earlier request
+  // The first answer could be the late reply to an earlier request, so it is repeated.
+  EXPECT_EQ(bench.device->answer_count(), before + 3);
 }
 
-// Each attempt reports the frame that explains the timeout, also while a late reply may arrive.
+// Each attempt reports the frame that explains its timeout, also while a late reply may arrive.
 TEST(Session, ReplyWithWrongKindOfIdentifierExplainsTimeout) {
   struct Extended final : Machine<CanFrame> {
     void feed(const Event<CanFrame>& event) override {

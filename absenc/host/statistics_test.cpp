@@ -25,7 +25,7 @@ TEST(Latencies, AreAtMostA32ndTooLong) {
   for (std::int64_t value = 1; value < 68'000'000'000; value += value / 7 + 1) {
     Latencies latencies;
     latencies.add(Time(value));
-    latencies.add(70s);  // the longest latency would be exact
+    latencies.add(70s);  // a longer latency follows, because the longest one is stored exactly
     const std::int64_t told = latencies.percentile(0).count();
     ASSERT_GE(told, value);
     ASSERT_LE(told, value + value / 32);
@@ -49,7 +49,7 @@ TEST(Latencies, AreCountedWithinLimits) {
   for (const Time latency : {Time(9us), Time(10'400ns), Time(15us), Time(999'900ns), Time(1001us), Time(2s)}) {
     latencies.add(latency);
   }
-  // 999.9 us is in the last 1/32 below its limit.
+  // The latency 999.9 us is in the last 1/32 below its limit, so it is counted with the next limit.
   EXPECT_EQ(latencies.within(limits), (std::array<std::uint64_t, 4>{1, 3, 3, 5}));
   EXPECT_EQ(latencies.sum(), 2s + 2'035'300ns);
 }

@@ -57,7 +57,7 @@ TEST(Unwrapper, ContinuesThroughZeroOfSignedTurns) {
   EXPECT_EQ(unwrapper.position(), 1 * 1024 + 8);
   unwrapper.add(signed_turns(-1, 1023, 2ms));
   EXPECT_EQ(unwrapper.position(), -1);
-  // Beyond the end of the turn counter.
+  // This position is beyond the end of the turn counter.
   unwrapper.add(signed_turns(-7, 0, 3ms));
   unwrapper.add(signed_turns(7, 0, 4ms));
   EXPECT_EQ(unwrapper.position(), -9 * 1024);
@@ -89,7 +89,7 @@ TEST(Unwrapper, IgnoresInvalidReadings) {
 }
 
 TEST(Unwrapper, RestartsAfterTooLongAPause) {
-  Unwrapper unwrapper(SpeedLimit{.rpm = 6000});  // half a turn in 5 ms
+  Unwrapper unwrapper(SpeedLimit{.rpm = 6000});  // at this speed half a turn takes 5 ms
   unwrapper.add(singleturn(1000, 0ms));
   EXPECT_EQ(unwrapper.add(singleturn(10, 4ms)), Joined::continued);
   EXPECT_EQ(unwrapper.position(), 1034);
@@ -106,7 +106,7 @@ TEST(Unwrapper, HasADefaultLimit) {
 }
 
 TEST(Unwrapper, UsesTurnsThatTheReadingsHave) {
-  Unwrapper unwrapper(SpeedLimit{.rpm = 600});  // 8 turns in 800 ms, half a turn in 50 ms
+  Unwrapper unwrapper(SpeedLimit{.rpm = 600});  // at this speed 8 turns take 800 ms, and half a turn 50 ms
   unwrapper.add(multiturn(3, 0, 0ms));
   EXPECT_EQ(unwrapper.add(multiturn(9, 0, 700ms)), Joined::continued);
   EXPECT_EQ(unwrapper.add(multiturn(1, 0, 1500ms)), Joined::restarted);
@@ -119,7 +119,7 @@ TEST(Unwrapper, UsesTurnsThatTheReadingsHave) {
 TEST(Unwrapper, UsesSpeedOfLinearEncoder) {
   Unwrapper unwrapper;
   Reading reading = singleturn(1000, 0ms);
-  reading.unit_um = 1000;  // range 1.024 m
+  reading.unit_um = 1000;  // with 1000 um per count the counted range is 1.024 m
   unwrapper.add(reading);
   reading.singleturn = 10;
   reading.latched = 20ms;
@@ -130,7 +130,7 @@ TEST(Unwrapper, UsesSpeedOfLinearEncoder) {
 }
 
 TEST(Unwrapper, ReadingsThatArriveTogetherMayBeFarApart) {
-  // Half a turn takes 50 ms. A host that was delayed for 100 ms receives four frames at once.
+  // At 600 rpm half a turn takes 50 ms. A host that was delayed for 100 ms receives four frames at once.
   Unwrapper unwrapper(SpeedLimit{.rpm = 600}, Times::arrived);
   unwrapper.add(singleturn(0, 0ms));
   EXPECT_EQ(unwrapper.add(singleturn(10, 25ms)), Joined::continued);
@@ -143,7 +143,7 @@ TEST(Unwrapper, ReadingsThatArriveTogetherMayBeFarApart) {
 }
 
 TEST(Unwrapper, DetectsJumpOfShaft) {
-  // A tenth of a turn in 1 ms, plus 1 ms because the latch times are uncertain.
+  // The limit allows a tenth of a turn in 1 ms, plus 1 ms because the latch times are uncertain.
   Unwrapper unwrapper(SpeedLimit{.rpm = 6000});
   EXPECT_FALSE(unwrapper.jumps(multiturn(9, 0, 0ms))) << "nothing is known yet";
   unwrapper.add(multiturn(5, 0, 0ms));

@@ -88,7 +88,7 @@ TEST(Velocity, IsReportedAtOnceForAStandingShaft) {
 TEST(Velocity, WaitsForTwentyCountsUpToTwentyWindows) {
   Velocity velocity(10ms);
   for (int i = 0; i < 200; ++i) {
-    velocity.add(i / 50, i * 1ms);  // 20 counts per second
+    velocity.add(i / 50, i * 1ms);  // the shaft moves at 20 counts per second
     if (velocity.valid()) {
       ASSERT_EQ(velocity.counts_per_second(), 0) << i;
     }
@@ -127,10 +127,10 @@ TEST(Velocity, IsInvalidIfLongestWindowIsTooUncertain) {
   EXPECT_LE(good.uncertainty(), 0.26e6);
 }
 
-// Position in counts as a function of seconds.
+// Position of a shaft in counts as a function of seconds.
 using Motion = std::function<double(double)>;
 
-// `since` returns the window; the test knows the true latch times.
+// Compares each speed with the true mean speed. `since` returns the window; the test knows the true latch times.
 void expect_bounds(const Motion& motion, Time period, Time longest_jitter, unsigned seed, std::size_t least_valid) {
   std::mt19937_64 random(seed);
   const auto within = [&](Time most) {

@@ -15,7 +15,8 @@ void require(bool condition) {
   if (!condition) std::abort();
 }
 
-// Converts digits a to f to upper case, as `encode` writes them. The letters that begin commands are not among them.
+// Converts digits a to f to upper case, as `encode` writes them. The letters that begin frames are not among these
+// digits.
 std::uint8_t upper(std::uint8_t byte) {
   return byte >= 'a' && byte <= 'f' ? static_cast<std::uint8_t>(byte - 'a' + 'A') : byte;
 }
@@ -25,7 +26,7 @@ void check(Bytes line) {
   if (!frame) return;
   require(frame->size <= 8 && frame->id <= (frame->extended ? 0x1FFFFFFFu : 0x7FFu));
   const slcan::LineText again = slcan::encode(*frame);
-  // equal length, or 4 digits of time at the end
+  // The two lines have equal length, or the first has 4 digits of time at its end.
   require(again.size() - 1 == line.size() || again.size() + 3 == line.size());
   for (std::size_t i = 0; i + 1 < again.size(); ++i) require(again[i] == upper(line[i]));
 }
@@ -40,7 +41,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     require(reader.line().size() <= slcan::line_capacity);
     check(reader.line());
   }
-  // A frame behind arbitrary bytes is found.
+  // A valid frame that follows arbitrary bytes must be found.
   const CanFrame frame{.id = 0x120, .size = 1, .data = {0x47}};
   slcan::LineReader::LineEvent found{};
   const slcan::LineText text = slcan::encode(frame);

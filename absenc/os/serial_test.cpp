@@ -133,7 +133,8 @@ TEST(SerialPort, IsForOneProgramAtATime) {
     const Failure failure = failure_of([&] { const SerialPort second(terminal.path, {.rate = 9600}); });
     EXPECT_EQ(failure.kind(), Kind::in_use);
     EXPECT_TRUE(contains(failure, "(process " + std::to_string(::getpid()) + ")")) << failure.what();
-    EXPECT_EQ(rate_of(*terminal_state(terminal.master.get())), fast.rate);  // the first user's settings are not changed
+    // The settings of the first user are not changed.
+    EXPECT_EQ(rate_of(*terminal_state(terminal.master.get())), fast.rate);
   }
   int exclusive = 1;
   const Descriptor slave(::open(terminal.path.c_str(), O_RDWR | O_NOCTTY));

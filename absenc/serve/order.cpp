@@ -66,7 +66,7 @@ class OptionalReads {
 
   /// Returns why the last request of this object failed.
   [[nodiscard]] const std::string& reason() const { return last_; }
-  /// Returns false if the options of the encoder exclude the last request.
+  /// Returns false if the last request was not sent, because the options of the encoder exclude it.
   [[nodiscard]] bool was_sent() const { return was_sent_; }
   [[nodiscard]] OrderResult done(Json json) const {
     if (answered_) return {true, "read", std::move(json), ChangeState::none};

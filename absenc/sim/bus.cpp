@@ -8,7 +8,8 @@ namespace absenc::sim {
 
 namespace {
 
-// A transfer that begins later than this is held back: once handed to the port it would block the other devices.
+// Time before its beginning at which a transfer is passed to the port. Earlier, the transfer would block the other
+// devices.
 constexpr Time soon = std::chrono::milliseconds(1);
 
 // Returns the shorter of two limits; 0 means no limit.

@@ -17,7 +17,7 @@ using Wire = std::vector<std::uint8_t>;
 
 constexpr LineSettings settings{.rate = 1'000'000};
 
-/// Sends `reply` at `after` behind its `key`, if the key is the first byte after silence.
+/// A device that sends `reply` at the time `after` behind its `key`, if the key is the first byte after silence.
 struct Responder final : Machine<std::uint8_t> {
   Responder(std::uint8_t its_key, Wire its_reply, Time its_after = 5us)
       : key(its_key), reply(std::move(its_reply)), after(its_after) {}
@@ -60,7 +60,7 @@ struct Responder final : Machine<std::uint8_t> {
   bool idle = true;
 };
 
-/// Sends one request byte after the other, each when the line has been idle long enough for all devices.
+/// A host that sends one request byte after the other, each when the line has been idle long enough for all devices.
 struct Requester final : Machine<std::uint8_t> {
   explicit Requester(const Wire& all) : requests(all.begin(), all.end()) {}
 
@@ -100,7 +100,8 @@ TEST(Bus, DeliversSameBytesAsLine) {
     std::vector<std::unique_ptr<Responder>> made;
     made.push_back(std::make_unique<Responder>(1, Wire{0x11, 0x22, 0x33}));
     made.push_back(std::make_unique<Responder>(2, Wire{0xF0, 0xAA, 0x55}));
-    made.push_back(std::make_unique<Responder>(2, Wire{0x3C, 0xFF}));  // answers the same request at the same time
+    // This device answers the same request at the same time as another one.
+    made.push_back(std::make_unique<Responder>(2, Wire{0x3C, 0xFF}));
     return made;
   };
   const Wire requests{1, 2, 9, 1};
@@ -122,7 +123,7 @@ TEST(Bus, DeliversSameBytesAsLine) {
 
 TEST(Bus, MergesOverlappingTransfersAndSendsTheRestLater) {
   Responder first(1, {0x81, 0x7E});
-  Responder second(1, {0x0F, 0x0F}, 5us + 12us);  // starts about one character later
+  Responder second(1, {0x0F, 0x0F}, 5us + 12us);  // this device starts about one character later than the first one
   Responder late(1, {0x77}, 50ms);
   Bus bus({&second, &first, &late}, settings.character());
   Line<std::uint8_t> line(LinkKind::half_duplex, settings);

@@ -7,10 +7,10 @@ namespace absenc::sim {
 
 namespace {
 
-/// The part of a frame that is covered by the CRC and, with the CRC itself, by bit stuffing.
+/// The bits of a frame that are covered by the CRC and, together with the CRC, by bit stuffing.
 class StuffedBits {
  public:
-  /// Appends the lower `count` bits, most significant first.
+  /// Appends the lower `count` bits of `value`, most significant first.
   void append(std::uint32_t value, unsigned count) {
     while (count-- > 0) append((value >> count & 1) != 0);
   }

@@ -36,7 +36,7 @@ void FaultyDevice::feed(const Event<std::uint8_t>& event) {
   using Kind = Event<std::uint8_t>::Kind;
   switch (event.kind) {
     case Kind::received:
-      // A request that began while the device ignored the line is ignored to its end.
+      // A request that began while the device ignored the line is ignored until it ends.
       if (ignores_line_ || event.at - last_ignored_at_ <= 2 * device_gap_) {
         last_ignored_at_ = event.at;
       } else {
@@ -47,7 +47,7 @@ void FaultyDevice::feed(const Event<std::uint8_t>& event) {
       if (ignores_line_) return;
       break;
     case Kind::silence:
-      if (silent_until_ != never) return;  // the device expects `sent`: its suppressed reply still lasts
+      if (silent_until_ != never) return;  // the device expects `sent`: the reply that a fault suppressed still lasts
       break;
     case Kind::sent:
       ignores_line_ = false;
@@ -112,7 +112,7 @@ bool FaultyDevice::strikes(FaultKind kind) {
   return true;
 }
 
-// Applies the faults to `reply`. Returns false when nothing is to be sent.
+// Applies random faults to `reply`. Returns false when nothing is to be sent.
 bool FaultyDevice::damage(Step<std::uint8_t>& reply, Time now) {
   const std::vector<std::uint8_t> request = std::exchange(request_, {});
   const auto faults_before = counts_;
@@ -143,7 +143,7 @@ bool FaultyDevice::damage(Step<std::uint8_t>& reply, Time now) {
   return !reply_.empty();
 }
 
-// Flips 1 to 3 different bits.
+// Flips 1 to 3 different bits of `bytes`.
 void FaultyDevice::flip_bits(std::span<std::uint8_t> bytes) {
   std::array<std::uint64_t, 3> flipped{};
   const std::uint64_t count = 1 + random_.below(flipped.size());

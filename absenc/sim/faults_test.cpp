@@ -24,13 +24,13 @@ using StepKind = Step<std::uint8_t>::Kind;
 const ByteVector request{0x32, 0x05};
 const ByteVector reply{0x11, 0x22, 0x33, 0x44};
 
-// Answers every two bytes 3 us later, and counts the bytes received while it sends or is about to send.
+// A device that answers every two bytes 3 us later, and counts the bytes received while it sends or is about to send.
 class Device final : public Machine<std::uint8_t> {
  public:
   void feed(const Event<std::uint8_t>& event) override {
     if (event.kind == Kind::sent) sending = false;
     if (event.kind == Kind::timer) ++timers;
-    // A violation by the port, which must not report `silence` during a transfer.
+    // This counts as a violation by the port, which must not report `silence` during a transfer.
     if (event.kind == Kind::silence && sending) ++violations;
     if (event.kind != Kind::received) return;
     if (sending) ++violations;
@@ -181,7 +181,7 @@ TEST_F(Faults, GarbageComesBeforeTheReply) {
 
 TEST_F(Faults, DeviceContinuesAfterSuppressedReply) {
   damage(FaultKind::silence);
-  device.timer_at = microseconds(500);  // timers of the device still run
+  device.timer_at = microseconds(500);  // a timer of the device, which must still run
   EXPECT_TRUE(exchange().empty());
   EXPECT_FALSE(device.sending);
   EXPECT_EQ(device.timers, 1);
@@ -199,7 +199,8 @@ TEST_F(Faults, RequestCorruptReachesTheDeviceOnly) {
   EXPECT_EQ(faulty->count(FaultKind::request_corrupt), 2u);
 }
 
-// The host's next request after 150 us falls into the delay. The device must not count that as a violation by the host.
+// The next request of the host, after 150 us, is sent during the added delay of the reply. The device must not count
+// that as a violation by the host.
 TEST_F(Faults, StretchedReplyCausesNoViolation) {
   damage(FaultKind::delay);
   for (const FaultKind kind : {FaultKind::delay, FaultKind::repeat}) {
@@ -219,7 +220,7 @@ TEST_F(Faults, StretchedReplyCausesNoViolation) {
   EXPECT_EQ(device.violations, 0);
 }
 
-// The device takes half of a damaged request for a whole one and answers while the host still sends.
+// The device takes half of a damaged request for a whole request and answers while the host still sends.
 TEST_F(Faults, DamagedRequestCausesNoViolation) {
   damage(FaultKind::request_corrupt);
   host.request_bytes = {1, 2, 3, 4};
@@ -240,14 +241,14 @@ TEST_F(Faults, RequestWithIgnoredBeginningIsIgnored) {
   }
   line.run_until(microseconds(1000));
   EXPECT_EQ(device.received.size(), 2u);
-  EXPECT_EQ(exchange().size(), 8u);  // the next request is answered again
+  EXPECT_EQ(exchange().size(), 8u);  // the request after the ignored one is answered again
 }
 
 TEST_F(Faults, EarlyRequestIsAViolation) {
   damage(FaultKind::corrupt);
   host.send_now = true;
   line.wake(node);
-  line.run_until(microseconds(40));  // at this time the reply has begun
+  line.run_until(microseconds(40));  // at 40 us the reply has begun
   host.send_now = true;
   line.wake(node);
   line.run_until(microseconds(1000));

@@ -26,7 +26,7 @@ class LatePort final : public Port<Item> {
 
   void begin(const Step<Item>& step) override {
     if (step.kind == Step<Item>::Kind::transfer || step.kind == Step<Item>::Kind::pulse) {
-      // The line's time may be behind this port's time: the transfer begins now.
+      // The time of the line may be behind the time of this port: the transfer begins now.
       rest(std::max(time_, step.at));
       quiet_since_ = time_;
       received_ = silence_reported_ = false;
@@ -65,7 +65,7 @@ class LatePort final : public Port<Item> {
     }
   }
 
-  /// Advances the time to `until`; items received meanwhile are delivered later.
+  /// Advances the time of the port to `until`; items received meanwhile are delivered later.
   void rest(Time until) {
     while (time_ < until) {
       const Event<Item> event = inner_->wait({.at = until});

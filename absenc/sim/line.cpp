@@ -78,7 +78,7 @@ bool Line<Item>::done(Node node) const {
   return nodes_[node]->done;
 }
 
-// Returns the node whose timer or silence is due first.
+// Returns the node whose timer or silence event is due first.
 template <class Item>
 auto Line<Item>::next_deadline() const -> Node {
   Node first = 0;
@@ -118,7 +118,8 @@ bool Line<Item>::step() {
   const Time time = next_event();
   if (time == never) return false;
   now_ = time;
-  // At equal times deadlines come after events that end then (a character has arrived) and before the arbitration.
+  // At equal times timers and silences come after events that end then (a character has arrived) and before the
+  // arbitration.
   const Node late = next_deadline();
   if (scheduled_.empty() || scheduled_.top().at > time ||
       (scheduled_.top().kind == Kind::arbitrate && nodes_[late]->due == time)) {
@@ -142,7 +143,7 @@ bool Line<Item>::step() {
     case Kind::finished:
       if (current) finish(node);
       break;
-    case Kind::frame:  // the bus becomes free even if the sender was replaced
+    case Kind::frame:  // the bus becomes free even if the machine of the sender was replaced
       frame_on_bus_ = false;
       if (current) end_frame(node);
       schedule(Kind::arbitrate, now_, node);
@@ -176,7 +177,7 @@ void Line<Item>::feed(Node node, const Event<Item>& event) {
   serve(node);
 }
 
-// Takes steps from the machine until it waits.
+// Takes steps from the node's machine until it waits.
 template <class Item>
 void Line<Item>::serve(Node node) {
   using Kind = typename Step<Item>::Kind;
@@ -207,7 +208,7 @@ void Line<Item>::serve(Node node) {
   state.due = never;  // the machine is done: no later event wakes it
 }
 
-// Accepts a transfer or pulse; it begins now or at its time.
+// Accepts a transfer or pulse of a node; it begins at once or at its time `at`.
 template <class Item>
 void Line<Item>::accept_step(Node node, const Step<Item>& step) {
   State& state = *nodes_[node];
@@ -229,8 +230,7 @@ void Line<Item>::accept_step(Node node, const Step<Item>& step) {
   state.hold_low = step.hold_low;
   state.accepted_at = now_;
   ++state.begin_generation;
-  // Scheduled instead of begun at once, so that every node served or attached at this time is handled first, in any
-  // order.
+  // The beginning is scheduled, so that every node served or attached at this time is handled first, in any order.
   if (!driven) schedule(ScheduledEvent::Kind::begin, step.at, node);
 }
 
@@ -249,7 +249,7 @@ void Line<Item>::deadline(Node node) {
     feed(node, {.kind = Event<Item>::Kind::timer, .at = now_});
     return;
   }
-  // A character that has begun is no silence: its end arms the limit again.
+  // The silence limit does not pass during a character: the end of the character starts it again.
   if (busy_towards(state)) {
     state.due = std::min(now_ + state.settings.character(), state.timer_due);
     return;

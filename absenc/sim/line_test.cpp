@@ -17,7 +17,7 @@ namespace {
 using std::chrono::microseconds;
 using Byte = std::uint8_t;
 
-// Returns the step in `todo` once, and waits otherwise.
+// A machine that returns the step in `todo` once, and waits otherwise.
 class Puppet final : public Machine<Byte> {
  public:
   void feed(const Event<Byte>& event) override {
@@ -120,12 +120,13 @@ TEST(FullDuplex, HasOneWirePerDirection) {
   line.attach(NodeRole::device, another);
   line.attach(NodeRole::host, host);
   line.run_until(microseconds(100));
-  EXPECT_EQ(items, "0:0 2:6 1:0 0:2 1:2 ");  // bytes of the two devices are ANDed, the byte of the host is intact
+  EXPECT_EQ(items, "0:0 2:6 1:0 0:2 1:2 ");  // the bytes of the two devices are ANDed, the byte of the host is intact
   EXPECT_EQ(host.log, "10000 received 10000 sent 20000 received ");
-  EXPECT_EQ(one.log, "10000 received 20000 sent ");  // received from the host, not from the other device
+  // This device received the byte of the host, not the one of the other device.
+  EXPECT_EQ(one.log, "10000 received 20000 sent ");
 }
 
-// Sends one frame when its timer expires, or at a set time.
+// A machine that sends one frame when its timer expires, or at a set time.
 class CanPuppet final : public Machine<CanFrame> {
  public:
   CanPuppet(std::uint32_t id, Time at, bool by_timer) : frame_{.id = id}, at_(at), by_timer_(by_timer) {}

@@ -79,7 +79,7 @@ void Line<Item>::begin_characters(Node node) {
   frame_character(node);
 }
 
-// Synchronises every idle receiver to the character that begins now.
+// Synchronises the receiver of every idle node to the character that begins now.
 template <class Item>
 void Line<Item>::frame_character(Node sender) {
   for (const auto& receiver : nodes_) {
@@ -112,7 +112,7 @@ void Line<Item>::end_character(Node node) {
     if (!receives_from(receiver, sender)) continue;
     if (receiver.framed_sender == node && receiver.framed_from == from) {
       deliver(other, node, item, false);
-    } else {  // part of another sender's character, but not silence either
+    } else {  // the character is part of another sender's character, but the line is not silent either
       receiver.silence.busy(now_);
       if (!receiver.done) arm(receiver);
     }
@@ -237,7 +237,7 @@ void Line<Item>::end_frame(Node node) {
   }
 }
 
-// line.cpp instantiates the class; these members are defined here and must be instantiated explicitly.
+// line.cpp instantiates the class; the members in this file must be instantiated explicitly.
 template void Line<std::uint8_t>::begin(Node);
 template bool Line<std::uint8_t>::receives_from(const State&, const State&) const;
 template bool Line<std::uint8_t>::busy_towards(const State&) const;

@@ -26,7 +26,7 @@ struct Quotient {
 };
 
 // Returns a * b / divisor, whose 128-bit product has no type in standard C++: long multiplication modulo the divisor,
-// one bit of b at a time. The divisor is below 2^63; `whole` wraps as a position does.
+// one bit of b at a time. The divisor is below 2^63; The quotient `whole` wraps as a position does.
 Quotient multiply_divide(std::uint64_t a, std::uint64_t b, std::uint64_t divisor) {
   const std::uint64_t a_whole = a / divisor;
   const std::uint64_t a_remainder = a % divisor;
@@ -88,8 +88,8 @@ std::optional<Motion::Knot> knot(std::string_view line) {
   if (comma == std::string_view::npos) return {};
   const auto seconds = number(line.substr(0, comma));
   const auto degrees = number(line.substr(comma + 1));
-  // Limits: 4e9 s are 126 years, 3.8e11 degrees a little less than 2^30 revolutions, so a difference of two cannot
-  // overflow.
+  // The limits are 4e9 s, which are 126 years, and 3.8e11 degrees, a little less than 2^30 revolutions, so the
+  // difference of two values cannot overflow.
   if (!seconds || !degrees || std::abs(*seconds) > 4e9 || std::abs(*degrees) > 3.8e11) return {};
   return Motion::Knot{Time(std::llround(*seconds * 1e9)), std::llround(*degrees / 360 * revolution)};
 }
@@ -113,7 +113,8 @@ Motion Motion::sine(std::int64_t start, double amplitude_degrees, double frequen
 
 Motion Motion::path(std::int64_t start, std::istream& csv, std::string_view name) {
   constexpr std::size_t longest_line = 1024;
-  constexpr std::size_t most_knots = 4'000'000;  // limit: one hour with a thousand points per second
+  // Greatest number of points of a path: one hour with a thousand points per second.
+  constexpr std::size_t most_knots = 4'000'000;
   Path path;
   std::array<char, longest_line + 1> buffer;
   bool heading_allowed = true;
@@ -159,14 +160,14 @@ ShaftState Motion::offset_at(const ConstantSpeed& speed, Time time) {
 }
 
 ShaftState Motion::offset_at(const Sine& sine, Time time) {
-  // Whole periods are removed exactly, so that the phase is as accurate after a day as at the start.
-  constexpr std::uint64_t one_period = 1'000'000'000'000'000;  // one period in micro-hertz * ns
+  // Whole periods of the sine are removed exactly, so that the phase is as accurate after a day as at the start.
+  constexpr std::uint64_t one_period = 1'000'000'000'000'000;  // one period of the sine in micro-hertz * ns
   const auto phase = multiply_divide(sine.micro_hertz, magnitude(time.count()), one_period).remainder;
   const double turn = static_cast<double>(phase) / static_cast<double>(one_period);
   const double angle = 2 * std::numbers::pi * (time.count() < 0 ? -turn : turn);
-  // Angular frequency of the phase in rad/s.
+  // Angular frequency of the sine in rad/s.
   const double angular = 2 * std::numbers::pi * static_cast<double>(sine.micro_hertz) / 1e6;
-  const double speed = sine.amplitude * angular * std::cos(angle);  // speed in revolutions per second
+  const double speed = sine.amplitude * angular * std::cos(angle);  // speed of the shaft in revolutions per second
   const double acceleration = -sine.amplitude * angular * angular * std::sin(angle);
   return {std::llround(sine.amplitude * std::sin(angle) * revolution), saturated(speed * 60e3),
           saturated(acceleration * 2 * std::numbers::pi)};

@@ -50,7 +50,8 @@ TEST(Motion, ConstantSpeedIsExactAfterADay) {
 }
 
 TEST(Motion, ConstantSpeedWrapsInsteadOfOverflowing) {
-  const Motion motion = Motion::constant_speed(0, 1'000'000);  // reaches 2^31 revolutions after 35.8 h
+  // At this speed the position reaches 2^31 revolutions after 35.8 h.
+  const Motion motion = Motion::constant_speed(0, 1'000'000);
   const auto wrapped = static_cast<std::int64_t>(60'000'000'000u * static_cast<std::uint64_t>(revolution));
   EXPECT_EQ(motion.at(1000h).position, wrapped);
 }

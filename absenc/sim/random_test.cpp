@@ -26,8 +26,8 @@ TEST(Random, BelowReachesEveryNumberEquallyOften) {
 
 TEST(Random, BelowIsNotSkewedByAHugeLimit) {
   Random random(2);
-  const std::uint64_t limit = std::uint64_t{3} << 62;  // plain `value % limit` would make the lower third twice as
-                                                       // likely
+  // With this limit, plain `value % limit` would make the lower third twice as likely.
+  const std::uint64_t limit = std::uint64_t{3} << 62;
   int lower_third = 0;
   for (int i = 0; i < 30'000; ++i) lower_third += random.below(limit) < limit / 3 ? 1 : 0;
   EXPECT_NEAR(lower_third, 10'000, 400);

@@ -13,7 +13,7 @@ namespace absenc::sim {
 
 namespace {
 
-// Copies `items` to `to`. Sizes are mostly equal, so resize rarely allocates or fills.
+// Copies `items` to `to`. The sizes of both are mostly equal, so resize rarely allocates or fills.
 template <class Item>
 void copy(std::span<const Item> items, std::vector<Item>& to) {
   to.resize(items.size());
@@ -122,7 +122,7 @@ Event<Item> RoughLine<Item>::wait(const Step<Item>& step) {
   for (;;) {
     Time quiet = silence_.due(step.answer, step.gap);
     const Time arrival = front_ != back_ ? in_transit_[front_].at : never;
-    // the item is being received, so the line is not silent
+    // an item is being received, so the line is not silent
     if (arrival != never && in_transit_[front_].first <= quiet) quiet = never;
     const Time mine = std::min(timer, quiet);
     const Time next = due();
@@ -270,7 +270,7 @@ void RoughLine<Item>::enqueue(Time start, Time first, Time end, std::span<const 
   damage(arrived.items);
   if (host_rate_ != device_rate_) arrived.items.clear();
   const Time late = host_is_clock() ? Time{} : lateness();
-  // A line keeps the order of its frames.
+  // A frame arrives after the frames sent before it, because a line keeps their order.
   const Time before = back_ != front_ ? in_transit_[back_ - 1].at : Time{};
   arrived.sent = start;
   arrived.at = std::max(end + late, before);
@@ -296,7 +296,8 @@ void RoughLine<Item>::draw_skip() {
     skip_ = 0;
     return;
   }
-  const double chance = static_cast<double>((random_.next() >> 11) + 1) * 0x1p-53;  // + 1: the chance is never 0
+  // One is added so that the chance is never 0.
+  const double chance = static_cast<double>((random_.next() >> 11) + 1) * 0x1p-53;
   skip_ = static_cast<std::uint64_t>(std::log(chance) / std::log1p(-rates_.bit));
 }
 
@@ -373,11 +374,11 @@ void RoughLine<Item>::damage(std::vector<Item>& items) {
   if (talked) add_other_sender(items);
   struck = struck || talked;
   if constexpr (std::is_same_v<Item, CanFrame>) {
-    if (struck) items.clear();  // the controllers detect the damage, and no node receives the frame
+    if (struck) items.clear();  // the CAN controllers detect the damage, and no node receives the frame
   }
   if (rates_.doubled > 0 && random_.chance(rates_.doubled) && !items.empty()) {
     double_item(items, count);
-    // On CAN the sender repeats a frame when the acknowledge bit is lost.
+    // A doubled CAN frame: the sender repeats a frame when the acknowledge bit is lost.
     if constexpr (std::is_same_v<Item, CanFrame>) items.push_back(items.front());
     struck = true;
   }

@@ -27,7 +27,8 @@ SimPort<Item>::SimPort(LinkKind kind, LineSettings settings, Machine<Item>& devi
   if (real_time_.now) start_ = real_time_.now();
 }
 
-// Advances the line to real time: events that were due have then happened, whether or not a caller waited for them.
+// Advances the line to real time: all events up to that time have then happened, whether or not a caller waited for
+// them.
 template <class Item>
 void SimPort<Item>::keep_pace() {
   if (real_time_.now) line_.run_until(real_time_.now() - start_);
@@ -56,7 +57,7 @@ void SimPort<Item>::begin(const Step<Item>& step) {
 
 template <class Item>
 Event<Item> SimPort<Item>::wait(const Step<Item>& step) {
-  // With a real-time clock the line may already have passed the timer's time.
+  // With a real-time clock the line may already have passed the time of the requested timer.
   const bool is_past = step.at > last_event_at_ && step.at <= line_.now();
   if (host_end_.queue.empty() && is_past) host_end_.feed({.kind = Event<Item>::Kind::timer, .at = step.at});
   if (host_end_.queue.empty()) advance(step);
@@ -70,7 +71,7 @@ Event<Item> SimPort<Item>::wait(const Step<Item>& step) {
 
 template <class Item>
 void SimPort<Item>::advance(const Step<Item>& step) {
-  // The limits apply only during this wait, so no silence is reported for a step that ended long ago.
+  // The limits of silence apply only during this wait, so no silence is reported for a step that ended long ago.
   struct Disarm {
     SimPort& port;
     ~Disarm() {
@@ -87,7 +88,8 @@ void SimPort<Item>::advance(const Step<Item>& step) {
 template <class Item>
 template <class Done>
 void SimPort<Item>::run_until(const Done& done) {
-  constexpr Time idle = std::chrono::milliseconds(100);  // no event is expected, but the sleep may be interrupted
+  // Longest sleep while no event is expected; it is short, so that the sleep may be interrupted.
+  constexpr Time idle = std::chrono::milliseconds(100);
   while (!done()) {
     const Time due = line_.next_event();
     if (!real_time_.now) {

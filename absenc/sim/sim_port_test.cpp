@@ -16,7 +16,7 @@ using std::chrono::microseconds;
 using Kind = Event<std::uint8_t>::Kind;
 using StepKind = Step<std::uint8_t>::Kind;
 
-// Answers each byte with itself and its successor 3 us later.
+// A device that answers each byte with the same byte and its successor 3 us later.
 class Responder final : public Machine<std::uint8_t> {
  public:
   void feed(const Event<std::uint8_t>& event) override {
@@ -37,7 +37,7 @@ class Responder final : public Machine<std::uint8_t> {
   bool pending_ = false;
 };
 
-// Sends a given number of requests, 100 us apart, and emits every reply.
+// A host that sends a given number of requests, 100 us apart, and emits every reply.
 class Requester final : public Machine<std::uint8_t> {
  public:
   explicit Requester(int times) : left_(times) {}
@@ -130,7 +130,7 @@ TEST(SimPort, ConfigureChangesTheHostsEnd) {
   EXPECT_EQ(port.wait({}).at, microseconds(5));
 }
 
-// A clock that advances 7 us at every look and 30 us too far in every sleep.
+// A clock that advances by 7 us each time it is read, and sleeps 30 us too long.
 struct SlowWorld {
   Time clock = std::chrono::seconds(1000);
   int sleeps = 0;
@@ -150,7 +150,8 @@ TEST(SimPort, KeepsPaceWithRealTimeAndStampsExactly) {
   Requester requester(50);
   std::vector<Time> times;
   EXPECT_TRUE(host::drive(requester, port, [&] {
-    if (times.size() == 10) world.clock += microseconds(5000);  // the caller is busy with something else
+    // The caller of the port is busy with something else for 5 ms.
+    if (times.size() == 10) world.clock += microseconds(5000);
     EXPECT_EQ(requester.last.kind, Kind::received);
     EXPECT_EQ(requester.last.items.back(), 0x42);
     EXPECT_EQ(requester.last.at - requester.sent_at, microseconds(23));
@@ -176,13 +177,13 @@ TEST(SimPort, LimitsRunOnlyDuringWaits) {
     EXPECT_EQ(port.wait(impatient).kind, Kind::sent);
     EXPECT_EQ(port.wait(impatient).kind, Kind::received);
     EXPECT_EQ(port.wait(impatient).kind, Kind::received);
-    world.clock += microseconds(1000);  // no silence is reported for the previous step
+    world.clock += microseconds(1000);  // no silence is reported for the step before the pause
     (void)port.now();
   }
   EXPECT_EQ(port.wait(impatient).kind, Kind::silence);
 }
 
-// A configuration is carried out at the present time, not at the time of the last event.
+// A configure step is carried out at the present time, not at the time of the last event.
 TEST(SimPort, ReportsTimerThatPassedMeanwhile) {
   SlowWorld world;
   Mute mute;

@@ -12,14 +12,15 @@ namespace absenc::sim {
 
 namespace {
 
-// Indices of the wires, in the order in which the constructor names them.
+// Indices of the wires of each kind of link, in the order in which the constructor names them.
 constexpr std::size_t line = 0;
 constexpr std::size_t host = 0, device = 1;
 constexpr std::size_t cs = 0, sck = 1, mosi = 2, miso = 3;
 constexpr std::size_t clock = 0, data = 1;
 constexpr std::size_t can = 0;
 
-// Divides `length` into equal parts; the call returns the boundary after `part`, to the nearest nanosecond.
+// Division of `length` into equal parts; the call operator returns the boundary after `part`, to the nearest
+// nanosecond.
 struct EvenDivision {
   Time start;
   Time length;

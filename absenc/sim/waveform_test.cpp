@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests waveforms as text, and as the decoders of sigrok-cli read them.
+// Tests waveforms as text, and with the decoders of sigrok-cli as independent readers.
 #include "absenc/sim/waveform.hpp"
 
 #include <gmock/gmock-matchers.h>
@@ -145,7 +145,7 @@ TEST(Waveform, SpiClockBeginsAfterSelectLead) {
 
 TEST(Waveform, ClockedBits) {
   Picture at_once(LinkKind::clocked, slow);
-  const std::array<std::uint8_t, 1> bits{0x50};  // the bits are 010
+  const std::array<std::uint8_t, 1> bits{0x50};  // the word is the three bits 010
   at_once.transfer({1us, 4us, 3, {}, bits});
   EXPECT_EQ(body(at_once),
             "#0\n1!\n1\"\n#1000\n0!\n0\"\n#1500\n1!\n1\"\n#2000\n0!\n#2500\n1!\n0\"\n#3000\n0!\n"
@@ -165,8 +165,8 @@ TEST(Waveform, DataIsLowForTheTimeoutBehindTheLastEdge) {
   picture.transfer(seen);
   EXPECT_THAT(body(picture), ::testing::EndsWith("#3000\n0!\n#3500\n1!\n0\"\n#23500\n1\"\n#33500\n"));
 
-  // BiSS: the data line is low for 20 us or one and a half periods. SSI: for the monoflop time, from the edge behind
-  // the last bit.
+  // After the last bit the device holds the data line low. BiSS: for 20 us or one and a half periods. SSI: for the
+  // monoflop time, from the edge behind the last bit.
   biss::Format biss{};
   const auto biss_low = [&] {
     biss::testing::Bench bench(biss::line_settings, biss);
@@ -225,7 +225,7 @@ TEST(Waveform, PassesSettledChangesToSink) {
   device.send({0x55, 0x00, 0x55, 0x00}, 14us);
   line.attach(NodeRole::host, host);
   line.attach(NodeRole::device, device);
-  line.run_until(45us);  // within the fourth character of both
+  line.run_until(45us);  // this time lies within the fourth character of both senders
   EXPECT_EQ(line.settled(), 40us);
   EXPECT_EQ(counter.last, 33us);
   EXPECT_EQ(counter.commented, 30us);
@@ -244,7 +244,7 @@ struct Sigrok : ::testing::Test {
   }
   ~Sigrok() override { std::filesystem::remove_all(directory); }
 
-  // Returns the annotations, one per line, without the decoder's name.
+  // Returns the annotations of a sigrok decoder, one per line, without its name.
   [[nodiscard]] std::string decode(Picture& waveform, const std::string& decoder, const std::string& what) const {
     const std::filesystem::path file = directory / "waveform.vcd";
     std::ofstream(file) << waveform.vcd();
@@ -267,7 +267,7 @@ struct Sigrok : ::testing::Test {
   std::filesystem::path directory;
 };
 
-// Returns the bits as the decoder prints them: each word backwards.
+// Returns `bits` as the sigrok decoder prints them: each word backwards.
 std::string bits_of(BitView bits) {
   std::string text;
   for (std::size_t i = bits.size; i-- > 0;) text += bits[i] ? "1 " : "0 ";
@@ -358,7 +358,7 @@ TEST_F(Sigrok, ReadsTheBytesOfTformat) {
   Picture waveform(LinkKind::half_duplex, tformat::line_settings);
   waveform.observe(bench.line);
   bench.shaft.put(3, 4660);
-  bench.pass(20us);  // a decoder needs to see the line idle first
+  bench.pass(20us);  // a sigrok decoder needs to see the line idle first
   tformat::ReadPosition read({});
   bench.run(read);
   ASSERT_EQ(read.error(), Error::none);

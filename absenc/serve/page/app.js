@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Selects the view from the address and passes the server's events to it.
+// Main script of the page: selects the view (overview or one encoder) from the address, and passes the events of the server to it.
 import {askToken} from "./dialog.js";
 import {setText} from "./dom.js";
 import {EncoderPage} from "./encoder.js";
@@ -29,7 +29,7 @@ function lose(why, refused = false) {
   view.lose(refused ? why : undefined);
 }
 
-// Also offers the token dialog, because the server may require a token for reading.
+// Shows an error, and also the token dialog, because the server may require a token for reading.
 function explain(why, refused) {
   lose(why, refused);
   tokenButton.hidden = false;
@@ -56,7 +56,7 @@ function take(event, data) {
   view.take(event, data);
 }
 
-// Returns invalid percent-encoding unchanged: no encoder has that name, so the page reports it as unknown.
+// Returns the decoded text of an address. Invalid percent-encoding is returned unchanged: no encoder has that name, so the page reports it as unknown.
 function decoded(text) {
   try {
     return decodeURIComponent(text);
@@ -92,7 +92,7 @@ async function greet() {
   try {
     tokenButton.hidden = !(await tokenInfo()).tokens;
   } catch {
-    // ignored: the event stream reports an unreachable server
+    // the error is ignored: the event stream reports an unreachable server
   }
 }
 

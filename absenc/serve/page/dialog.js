@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Dialogs: token, confirmation of commands, acknowledgement of alarms.
+// Dialogs of the page: token, confirmation of commands, acknowledgement of alarms.
 import {element, terms} from "./dom.js";
 import {plain, forPeople} from "./words.js";
 import {forgetToken, tokenInfo, tryToken} from "./server.js";
@@ -89,7 +89,7 @@ export async function askCommand(name, command, now, then) {
     } catch (error) {
       text = `not known: ${error.message}`;
     }
-    if (question !== asked) return;  // a newer request has replaced this one
+    if (question !== asked) return;  // the answer belongs to an earlier question, which a newer one has replaced
     before.replaceChildren(text);
     before.closest("dl > div")?.toggleAttribute("hidden", text === "");
   };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Creates elements, drawings and tables. Texts from the server are inserted as text, never as markup.
+// Functions that create elements, drawings and tables of the page. Texts from the server are inserted as text, never as markup.
 
 /** Creates an element: element("p", {class: "why"}, "text", child). */
 export function element(name, attributes = {}, ...children) {
@@ -64,7 +64,7 @@ export const rich = (text) => text.split("`").map((part, i) => (i % 2 === 1 ? el
 export function dial() {
   const needle = drawing("line", {class: "needle", y1: 0, y2: -36});
   const ticks = Array.from({length: 12}, (_, i) => drawing("line", {class: "tick", y1: -46, y2: -40, transform: `rotate(${30 * i})`}));
-  const node = drawing("svg", {viewBox: "-50 -50 100 100", class: "dial off", "aria-hidden": "true"},  // screen readers get the number beside it
+  const node = drawing("svg", {viewBox: "-50 -50 100 100", class: "dial off", "aria-hidden": "true"},  // hidden from screen readers: they get the number beside the dial
                        drawing("circle", {r: 46}), ...ticks, needle, drawing("circle", {class: "hub", r: 5}));
   let shown;
   return {
@@ -99,7 +99,7 @@ export function scale() {
 }
 
 const SPARK_S = 60;
-const SPARK_LOST_S = 15;  // width of the area that marks the time without readings
+const SPARK_LOST_S = 15;  // width of the area of a small plot that marks the time without readings, in seconds
 
 /** Creates the small plot of the last minute. */
 export function spark() {

@@ -8,18 +8,18 @@ import {Trace, isMarked, markText, quantities} from "./plots.js";
 import {download, pathOf, request, tokenInfo} from "./server.js";
 import {SHAPES, belowFigure, clock, condition, duration, fieldName, fieldText, figure, forPeople, eventKind, lastText, microseconds, numberText, plain, sentence, valueText, faultLines} from "./words.js";
 
-const LIVE_MS = 20000;      // the server stores the points of this time
+const LIVE_MS = 20000;      // length of the live plot: the server stores the points of this time
 const LOST_SHARE = .15;     // share of a lost encoder's plot that shows the time without readings
 const MOST_POINTS = 2500;
 const REFRESH_MS = 1000;
-const WRITTEN_MS = 1500;    // after this time an event is in the history
+const WRITTEN_MS = 1500;    // after this time a new event is in the history, in milliseconds
 const PAST_MS = 10000;
 const MOST_EVENTS = 100;
 const RANGES = {live: ["Live", 0], "10m": ["10 min", 600], "1h": ["1 h", 3600], "24h": ["24 h", 86400], "7d": ["7 days", 604800], all: ["All", 31 * 86400]};
 const TABS = {history: "History", exchanges: "Exchanges", settings: "Settings", memory: "Memory", doctor: "Doctor"};
 const AWAY = ["opening", "lost", "examined"];
 const SHOWN_COMMANDS = 3;
-const LEAST_MS = 12;      // minimum time between two stored points
+const LEAST_MS = 12;      // minimum time between two stored points of the plot
 
 const byteText = (byte) => (Number.isNaN(byte) ? "?" : `0x${byte.toString(16).toUpperCase().padStart(2, "0")} (${byte})`);
 
@@ -28,7 +28,7 @@ function limitText(us) {
   return us >= 1e3 ? `${us / 1e3} ms` : `${us} µs`;
 }
 
-// Returns the rows from the first to the last bucket that is not empty.
+// Returns the rows of the latency table, from the first to the last bucket that is not empty.
 function latencyRows(buckets) {
   const filled = buckets.map(({count}) => count !== 0);
   return buckets.slice(Math.max(0, filled.indexOf(true)), filled.lastIndexOf(true) + 1)
@@ -39,9 +39,9 @@ export class EncoderPage {
   constructor(main, bar, name, values) {
     this.name = name;
     this.trace = name;
-    this.points = [];     // points as [at_ms, position, speed]
+    this.points = [];     // points of the live plot as [at_ms, position, speed]
     this.events = [];
-    this.loss = 0;        // number of connection losses: a response from before a loss is ignored
+    this.loss = 0;        // number of connection losses: a response to a request from before a loss is ignored
     this.hasHistory = true;
     this.values = new Map(values);
     this.build(main, bar);
@@ -65,7 +65,7 @@ export class EncoderPage {
     this.below = element("p", {class: "below"});
     this.ranges = element("div");
     this.units = element("div");
-    this.scale.node.hidden = true;  // hidden until the encoder is known to be linear
+    this.scale.node.hidden = true;  // the scale is hidden until the encoder is known to be linear
     this.plot = element("div", {class: "plot", hidden: true, role: "img", "aria-label": "trace"});
     this.noTrace = element("p", {class: "faint"});
     this.wrong = element("div");
@@ -189,7 +189,7 @@ export class EncoderPage {
       this.points.unshift(...body.points.filter(([at]) => at < first));
       this.changed = true;
     } catch {
-      // ignored: the event stream reports an unreachable server
+      // the error is ignored: the event stream reports an unreachable server
     }
   }
 
@@ -218,7 +218,7 @@ export class EncoderPage {
     if (scaled) this.scale.move(encoder.position_mm === null ? null : encoder.position_mm / encoder.length_mm, `${numberText(encoder.length_mm)} mm`);
     const counts = encoder.counts === null ? [] : [`${numberText(encoder.counts)} ${encoder.counts_in_all === null ? "counts" : `of ${numberText(encoder.counts_in_all)} counts`}`];
     showParts(this.below, [...belowFigure(encoder, state.at_ms), ...counts]);
-    // No command can reach the encoder in these states; the doctor finds the reason.
+    // In the states of AWAY no command can reach the encoder; the doctor finds the reason.
     for (const button of this.commands.querySelectorAll("[data-command]")) button.disabled = AWAY.includes(encoder.state);
     this.showWrong();
     this.showChoices();
@@ -358,7 +358,7 @@ export class EncoderPage {
     try {
       answer = await request(pathOf(this.name));
     } catch {
-      return;  // ignored: the event stream reports an unreachable server
+      return;  // the error is ignored: the event stream reports an unreachable server
     }
     if (this.closed || this.loss !== loss || answer.status !== 200) return;
     const encoder = answer.body;
@@ -508,7 +508,7 @@ export class EncoderPage {
       }
       this.changed = true;
     } catch {
-      // ignored: the event stream reports an unreachable server
+      // the error is ignored: the event stream reports an unreachable server
     } finally {
       this.loading = false;
     }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Panels for examination, settings and memory. Each one reads when its button is pressed, and shows the time of reading.
+// Panels for examination, settings and memory of an encoder. Each panel reads when its button is pressed, and shows the time of reading.
 import {element, setText, table, terms} from "./dom.js";
 import {pathOf, request} from "./server.js";
 import {fieldName, plain, sentence, valueText, forPeople} from "./words.js";
 
 const inLine = () => (matchMedia("(max-width: 40rem)").matches ? 8 : 16);
-const GONE = new Set(["opening", "lost", "ended"]);  // the port may return with another encoder
+const GONE = new Set(["opening", "lost", "ended"]);  // states after which the port may return with another encoder
 const THERE = new Set(["live", "examined"]);
 
 const hex = (number, digits) => number.toString(16).toUpperCase().padStart(digits, "0");
@@ -149,7 +149,7 @@ export class Examine {
     this.doctor = new Doctor(name);
     this.settings = new Settings(name);
     this.memory = new Memory(name);
-    this.has = {settings: false, memory: false};  // set by `describe`
+    this.has = {settings: false, memory: false};  // whether the encoder has readable settings and memory; set by `describe`
   }
 
   /** Sets which settings and memory the encoder has. */

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Overview: a card for each encoder, faulty ones first, with filter and counts in the bar.
+// Overview page: a card for each encoder, faulty ones first, with filter and counts in the bar.
 import {breakable, dial, element, rich, scale, setClass, setHidden, setText, spark, toggleClass} from "./dom.js";
 import {request} from "./server.js";
 import {GROUPS, GROUP_WORDS, MORE_WORDS, SHAPES, belowFigure, condition, figure, numberText, faultLines} from "./words.js";
@@ -14,7 +14,7 @@ const MOST_WORDS = 2;
 /** Creates the large figure with its unit, for a card or the page of an encoder. */
 export function figureNode() {
   const digits = element("span", {class: "digits"});
-  const widest = element("span", {class: "widest", "aria-hidden": "true"});  // reserves the width of the widest value so far
+  const widest = element("span", {class: "widest", "aria-hidden": "true"});  // invisible text that reserves the width of the widest value so far
   const unit = element("span", {class: "unit"});
   const node = element("p", {class: "figure"}, element("span", {class: "number"}, widest, digits), unit);
   let sizes;
@@ -185,7 +185,7 @@ export class Overview {
       const {status, body} = await request("api/minute");
       if (status === 200) this.minutes = new Map(body.encoders.map((encoder) => [encoder.encoder, encoder.seconds]));
     } catch {
-      // ignored: the event stream reports an unreachable server
+      // the error is ignored: the event stream reports an unreachable server
     }
     for (const card of this.cards.values()) this.seedCard(card);
   }
@@ -265,7 +265,7 @@ export class Overview {
     this.noMatch.toggleAttribute("hidden", shown.length > 0 || cards.length === 0);
     const nodes = shown.map((card) => card.node);
     if (nodes.length === this.list.childElementCount && nodes.every((node, i) => node === this.list.children[i])) return;
-    // The card with the focus is not moved, because a moved node loses the focus; the others are placed around it.
+    // The card with the focus is not moved, because a moved node loses the focus; the other cards are placed around it.
     const kept = nodes.find((node) => node.contains(document.activeElement));
     for (const node of [...this.list.children]) {
       if (node !== kept) node.remove();

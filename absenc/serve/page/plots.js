@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Plot of one encoder, from live points or the history.
+// Plots of position and speed of one encoder, from live points or the history.
 /* global Dygraph */
 import {eventKind, plain, clock} from "./words.js";
 
@@ -28,7 +28,7 @@ export function quantities(encoder) {
   };
 }
 
-// Creates grid labels with enough decimals to distinguish neighbours.
+// Returns a function that creates grid labels with enough decimals to distinguish neighbours.
 function gridLines(quantity) {
   return (low, high, pixels, options, graph, values) => {
     if (quantity.turn === 360 && high - low > 300) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Requests to the server, with the token, and its event stream, which reports a lost connection at once.
+// Requests to the server, with the token, and the event stream of the server, which reports a lost connection at once.
 
 let token = sessionStorage.getItem("token") ?? "";
 
