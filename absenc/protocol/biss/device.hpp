@@ -197,7 +197,7 @@ class VirtualEncoderOf final : public author::ClockedDevice {
     needed_ = clocks(encoder_.format(), behaviour.latency, period);
   }
   void clocked(Time at, std::size_t clocks) override {
-    // A host cannot know whether the encoder needs the start sequence, so it is accepted at any time.
+    // The start sequence is accepted at any time, because a host cannot know whether the encoder needs it.
     if (is_start_sequence(clocks)) {
       start_sequence_received_ = true;
     } else if (needed_ > 0) {

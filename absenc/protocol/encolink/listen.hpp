@@ -57,7 +57,7 @@ class Listen final : public Conversation<std::uint8_t> {
   std::array<std::uint8_t, 1024> bytes_{};  // received bytes; the size is the most that a port delivers at once
   std::size_t begin_ = 0;                   // index of the first byte that was not examined yet
   std::size_t end_ = 0;
-  ReplyBytes frame_;  // the last valid or damaged frame
+  ReplyBytes frame_;  // last frame that was received, valid or damaged
   Position position_{};
   Reading reading_{};
   Time deadline_{};

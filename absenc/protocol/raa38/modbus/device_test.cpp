@@ -29,11 +29,11 @@ TEST(Raa38ModbusDevice, RefusesWithExceptionsOfTheStandard) {
       {{1, 1, 0, 0, 0, 1}, {1, 0x81, 1}},  // function 01, read coils, does not exist
       {{1, 6, 0, 0, 0, 1}, {1, 0x86, 1}},  // function 06, write a register, does not exist
       {{1, 0x11}, {1, 0x91, 1}},           // function 11, report server id, does not exist
-      {{1, 3, 0, 1, 0, 1}, {1, 0x83, 2}},  // reads register 1
-      {{1, 3, 0, 0, 0, 3}, {1, 0x83, 2}},  // reads three registers
+      {{1, 3, 0, 1, 0, 1}, {1, 0x83, 2}},  // request of register 1, which does not exist
+      {{1, 3, 0, 0, 0, 3}, {1, 0x83, 2}},  // request of three registers, but only two exist
       {{1, 3, 0xFF, 0xFF, 0, 1}, {1, 0x83, 2}},
-      {{1, 3, 0, 0, 0, 0}, {1, 0x83, 3}},    // reads no register
-      {{1, 3, 0, 0, 0, 126}, {1, 0x83, 3}},  // reads more registers than a frame can carry
+      {{1, 3, 0, 0, 0, 0}, {1, 0x83, 3}},    // request of 0 registers
+      {{1, 3, 0, 0, 0, 126}, {1, 0x83, 3}},  // request of more registers than a frame can carry
       {{1, 3, 0, 0}, {1, 0x83, 3}},          // truncated request
   };
   for (const auto& [request, reply] : rows) EXPECT_EQ(bench.body(request), reply);

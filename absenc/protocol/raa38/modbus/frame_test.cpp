@@ -141,7 +141,7 @@ TEST(Raa38ModbusProbe, FindsRegistersAndLeastBits) {
   Evidence evidence;
   ASSERT_TRUE(modbus_unit.probe(options, std::vector<Capture>{{{}, hex<"010304001fabcd7550">}}, evidence));
   EXPECT_EQ(options.values, options_of(fine).values) << "two registers are what so many bits need";
-  EXPECT_EQ(evidence.possible, 3u);  // 21 bits; register counts auto and 2
+  EXPECT_EQ(evidence.possible, 3u);  // three option values are possible: 21 bits, and registers auto and 2
   const std::vector<Capture> damaged{{{}, hex<"010302017ff834">}, {{}, hex<"010302017ff835">}};
   EXPECT_FALSE(modbus_unit.probe(options, damaged, evidence));
   EXPECT_TRUE(says(evidence.reasons, "checksum"));
