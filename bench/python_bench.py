@@ -39,7 +39,7 @@ def measured(arguments):
 
 
 def compare(title, rounds, sides):
-    """Measures the sides in turn and prints their ratios to the first one."""
+    """Measures the programs `sides` in turn and prints their ratios to the first program."""
     runs = {name: [] for name in sides}
     for _ in range(rounds):
         for name, arguments in sides.items():

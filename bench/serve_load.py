@@ -82,7 +82,7 @@ class Server:
 
 
 class Streams:
-    """Open event streams. Everything is read from all of them; the times of readings are stored for some."""
+    """Open event streams of the server. All data is read from each; times of readings are stored for some streams."""
 
     def __init__(self, server, encoders):
         self.selector = selectors.DefaultSelector()

@@ -62,7 +62,7 @@ def cost(folder, broker):
 
 
 def delay(folder, broker):
-    """Measures the time from a reading to its receiver."""
+    """Measures the time from a reading to its arrival at an MQTT receiver."""
     receiver = Receiver(broker.port, "bench/+/readings")
     late = []
     receiver.client.on_message = lambda client, data, message: late.extend(

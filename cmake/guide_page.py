@@ -12,18 +12,18 @@ GITHUB_COMMENT = re.compile(r"<!--.*?-->\n?", re.DOTALL)
 
 
 def escaped(text):
-    """Text that roff takes for nothing of its own, with every character that groff's ASCII input lacks by its name."""
+    """Returns `text` escaped for roff; characters that groff's ASCII input lacks are written by their names."""
     text = text.replace("\\", "\\e").replace("-", "\\-").replace("'", "\\(aq").replace("`", "\\(ga").replace("^", "\\(ha").replace("~", "\\(ti")
     return "".join(one if ord(one) < 128 else f"\\[u{ord(one):04X}]" for one in text)
 
 
 def line_of(text):
-    """A line of output that does not begin like a request."""
+    """Returns `text` as a line of output that does not begin like a roff request."""
     return "\\&" + text if text.startswith(".") else text
 
 
 def target_of(address, page):
-    """What stands behind the text of a link: the man page of another page of the guide, or the path in the repository."""
+    """Returns the target shown after a link: the man page of another guide page, or the path in the repository."""
     path, _, _ = address.partition("#")
     if re.match(r"https?:", address):
         return address
@@ -35,7 +35,7 @@ def target_of(address, page):
 
 
 def inline(text, page):
-    """Code and strong text in bold, emphasis in italics, links as their text and target."""
+    """Returns Markdown text as roff: code and strong text in bold, emphasis in italics, links as text and target."""
     parts = re.split(r"(`[^`]+`|\*\*[^*]+\*\*|\*[^*\s][^*]*\*|!?\[[^\]]*\]\([^)]+\))", text)
     out = ""
     for part in parts:
@@ -54,7 +54,7 @@ def inline(text, page):
 
 
 def breakable(text, length):
-    """Text whose words of at least this length may be broken at punctuation, and before a capital letter."""
+    """Returns `text` with words of at least `length` characters breakable at punctuation and before a capital."""
     return re.sub(rf"\S{{{length},}}", lambda word: broken(word[0]), text)
 
 
@@ -74,7 +74,7 @@ def longest_word(text):
 
 
 def paragraphs(head, body, page):
-    """The rows of a table that is too wide for a terminal, each as its first cell with the others below."""
+    """Returns a table that is too wide for a terminal as paragraphs: each row's first cell with the others below."""
     out = []
     for row in body:
         rest = "; ".join(f"{inline(name, page)}: {inline(cell, page)}" for name, cell in zip(head[1:], row[1:]) if cell)
@@ -83,7 +83,7 @@ def paragraphs(head, body, page):
 
 
 def table(lines, page):
-    """A table of tbl whose columns wrap, the first line as its head."""
+    """Returns a Markdown table as a table of tbl whose columns wrap; the first line is its head."""
     rows = [[cell.strip().replace("\0", "|") for cell in line.strip().strip("|").replace("\\|", "\0").split("|")] for line in lines]
     head, body = rows[0], rows[2:]
     if sum(max(longest_word(row[i]) for row in [head, *body] if i < len(row)) + 4 for i in range(len(head))) > NARROWEST:
@@ -133,7 +133,7 @@ def body_of(text, page):
             while i < len(lines) and lines[i].strip() and not re.match(r"^(#+ |\||\s*```|\s*(-|\d+\.) )", lines[i]):
                 words.append(lines[i].strip())
                 i += 1
-            if not words:  # looks like a mark and is none
+            if not words:  # a line that only looks like a mark of Markdown
                 words, i = [line], i + 1
             joined = " ".join(words)
             if not re.fullmatch(r"(!\[[^\]]*\]\([^)]+\)\s*)+", joined):  # a terminal shows no pictures

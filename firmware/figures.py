@@ -30,7 +30,7 @@ def sizes(program):
 
 
 def marks(program):
-    """Returns the addresses of the marks, as arguments of the plugin. Thumb functions have bit 0 set."""
+    """Returns the addresses of count_begin and count_end as arguments of the plugin. Thumb functions have bit 0 set."""
     symbols = {name: int(address, 16) for address, _, name in
                re.findall(r"^([0-9a-f]+) (\w) (\w+)$", output("arm-none-eabi-nm", program), re.MULTILINE)}
     return f"begin={symbols['count_begin'] & ~1:#x},end={symbols['count_end'] & ~1:#x}"
@@ -91,7 +91,7 @@ def put_into_page(table):
 
 
 def differences(wanted, found):
-    """Returns the figures outside the tolerance, in words; also those that are missing on one side."""
+    """Returns the figures that differ beyond the tolerance or are missing on one side, in words."""
     if wanted["compiler"] != found["compiler"]:
         return [f"the table is from {wanted['compiler']}, but this compiler is {found['compiler']}: run ./dev firmware --figures"]
     found_differences = []

@@ -15,7 +15,7 @@ RESERVED = {"absenc", "core", "link", "protocol", "host", "sim", "capture", "os"
 
 
 def list_unit(text, name):
-    """all.cpp with one unit more: its include in order, its line at the end of `listed`."""
+    """Returns the text of all.cpp with the unit `name` added: its include in order, its line at the end of `listed`."""
     lines = text.splitlines()
     include = f'#include "absenc/protocol/{name}/unit.hpp"'
     existing = [i for i, line in enumerate(lines) if re.match(r'#include "absenc/protocol/\w+/unit\.hpp"', line)]

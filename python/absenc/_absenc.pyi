@@ -22,23 +22,23 @@ class Reading:
         """Single-turn position in counts; None: invalid."""
     @property
     def multiturn(self) -> Optional[int]:
-        """Revolutions; None: not reported, or invalid."""
+        """Number of revolutions; None: not reported, or invalid."""
     @property
     def singleturn_bits(self) -> int: ...
     @property
     def singleturn_valid_bits(self) -> int:
-        """Number of valid bits, from the highest; some encoders have fewer while they turn fast."""
+        """Number of valid bits of the position, from the highest; some encoders report fewer while they turn fast."""
     @property
     def multiturn_bits(self) -> int: ...
     @property
     def ready(self) -> bool:
-        """False while the encoder reports that it is starting."""
+        """Whether the encoder is ready; False while it reports that it is starting."""
     @property
     def valid(self) -> bool:
         """Whether the position is known to be valid."""
     @property
     def singleturn_valid(self) -> Optional[bool]:
-        """Whether the position is valid; None: not reported."""
+        """Whether the single-turn position is valid; None: not reported."""
     @property
     def multiturn_valid(self) -> Optional[bool]:
         """Whether the revolutions are valid; None: not reported, or the encoder has none."""
@@ -60,7 +60,7 @@ class Sample:
         """Kind of sample: "reading"; "failed": see `error`; "lost": the port has just disappeared; "absent"; "back"."""
     @property
     def time_s(self) -> float:
-        """Seconds of time.monotonic(); for a reading, when its position was latched."""
+        """Time of the sample, in seconds of time.monotonic(); for a reading, when its position was latched."""
     @property
     def reading(self) -> Optional[Reading]: ...
     @property
@@ -75,13 +75,13 @@ class Sample:
         encoder is linear."""
     @property
     def speed_uncertainty_rpm(self) -> Optional[float]:
-        """Greatest difference of the true mean speed from `speed_rpm`."""
+        """Greatest difference of the true mean speed from `speed_rpm`, in rpm."""
     @property
     def speed_mm_s(self) -> Optional[float]:
-        """Like `speed_rpm`, for a linear encoder; None for a rotary one."""
+        """Mean speed of a linear encoder in mm/s, like `speed_rpm`; None for a rotary encoder."""
     @property
     def speed_uncertainty_mm_s(self) -> Optional[float]:
-        """Greatest difference of the true mean speed from `speed_mm_s`."""
+        """Greatest difference of the true mean speed from `speed_mm_s`, in mm/s."""
     @property
     def speed_delay_s(self) -> Optional[float]: ...
     @property
@@ -108,16 +108,16 @@ class Sample:
         """Electrical angle of the motor, 0 to below 360; None: invalid, or pole_pairs or pole_pair_mm is not set."""
     @property
     def confirmed(self) -> bool:
-        """Whether the position agrees with that of another reading, within the speed limit."""
+        """Whether another reading confirms the position: the two differ by no more than the speed limit permits."""
     @property
     def restarted(self) -> bool:
-        """The position jumped, or the travel since the last reading is unknown: `position` starts again."""
+        """Whether `position` starts again, because it jumped or the travel since the last reading is unknown."""
     @property
     def text(self) -> str:
         """Why the sample has no reading, or why `position` starts again; "" otherwise."""
     @property
     def error(self) -> Any:
-        """The absenc.errors.EncoderError of a failed attempt, or None."""
+        """The absenc.errors.EncoderError of a failed attempt; None for other samples."""
 
 class Samples:
     def next(self) -> Sample: ...

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Types of arguments and results, and checks of arguments."""
+"""Types of the arguments and results of absenc, and checks of arguments."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
@@ -16,7 +16,7 @@ Field = Union[None, bool, int, float, str, bytes, tuple[str, ...]]
 
 
 def natural(name: str, value: float, least: int = 0, most: int = 2**32 - 1) -> int:
-    """Returns the argument `name` as int; 24e6 is as good as 24000000. Raises UsageError outside of these limits."""
+    """Returns the argument `name` as int; 24e6 is as good as 24000000. Raises UsageError outside of the limits."""
     if not isinstance(value, Real) or value != value // 1 or not least <= value <= most:
         raise UsageError(f"{name} is a whole number from {least} to {most}, not {value!r}")
     return int(value)
@@ -26,7 +26,7 @@ def texts(options: Mapping[str, Value]) -> list[str]:
     """Converts `singleturn=5, alarm=["a", "b"]` to "singleturn=5", "alarm=a", "alarm=b"; None is omitted."""
     settings = []
     for name, value in options.items():
-        if value is None:  # None is the default of keywords
+        if value is None:  # None is the default of keywords: the option is not given
             continue
         if isinstance(value, bool):
             settings.append(f"{name}={str(value).lower()}")

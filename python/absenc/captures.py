@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Decodes captures to NumPy columns."""
+"""Decodes captures of an encoder's line to NumPy columns."""
 from __future__ import annotations
 
 import os
@@ -19,7 +19,7 @@ Masked = np.ma.MaskedArray[Any, np.dtype[Any]]
 
 
 class Column(NamedTuple):
-    """Description of a column."""
+    """Description of a column of a capture or recording."""
 
     name: str
     unit: str  #: unit of the values: "s", "deg", "us" ...; "": none
@@ -38,7 +38,7 @@ class Table:
         return len(self.rows)
 
     def keys(self) -> list[str]:
-        """Returns the names of the columns, so that `dict(recording)` has the values of each."""
+        """Returns the names of the columns, so that `dict(recording)` has the values of each column."""
         return list(self.columns)
 
     def __getitem__(self, column: str) -> Masked:
@@ -78,7 +78,7 @@ class Capture(Table):
         self.notes = notes  #: damage of the file, and settings that were detected
 
     def good(self) -> npt.NDArray[np.bool_]:
-        """Returns which rows have no error. Missing and invalid values of these rows are masked, too."""
+        """Returns which rows have no error. Missing and invalid values of such rows are masked in the columns, too."""
         return np.asarray(self.rows.data["error"] == "", np.bool_)
 
 
@@ -153,8 +153,8 @@ def decode_batches(
     model: str = "",
     **options: Value,
 ) -> Iterator[Capture]:
-    """Decodes like `decode`, in captures of at most `rows` rows, for files larger than memory. The last has the
-    notes."""
+    """Decodes like `decode`, in captures of at most `rows` rows, for files larger than memory. The last
+    capture has the notes."""
     most = natural("rows", rows, least=1)
     return _batches(_open(file, unit, channel, raw_channels, rate, baud, parity, model, options), most)
 

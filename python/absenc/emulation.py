@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Virtual encoders at ports that programs open like those of real ones."""
+"""Virtual encoders, at ports that programs open like those of real encoders."""
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -44,7 +44,7 @@ class Emulation:
 
     @property
     def tcp_port(self) -> int:
-        """TCP port on 127.0.0.1; 0 without `tcp`."""
+        """Number of the TCP port on 127.0.0.1; 0 without the argument `tcp`."""
         return self._emulation.tcp_port
 
     @property
@@ -54,7 +54,7 @@ class Emulation:
 
     @property
     def protocol(self) -> Protocol:
-        """The protocol, with the names of alarms and conditions."""
+        """The protocol of the virtual encoder, with the names of its alarms and conditions."""
         return protocol[self._emulation.unit]
 
     def power_off(self) -> None:
@@ -62,7 +62,7 @@ class Emulation:
         self._emulation.power_off()
 
     def power_on(self, *, real: bool = False) -> None:
-        """Switches the encoder on. `real`: it needs the start-up time of the document."""
+        """Switches the encoder on. `real`: the encoder needs the start-up time of its document."""
         self._emulation.power_on(real)
 
     def raise_alarm(self, name: str) -> None:
@@ -70,7 +70,7 @@ class Emulation:
         self._emulation.raise_alarm(name)
 
     def lower_alarm(self, name: str) -> None:
-        """Ends the cause of an alarm."""
+        """Ends the cause of an alarm, which the encoder may still report until it is cleared."""
         self._emulation.lower_alarm(name)
 
     def set_condition(self, name: str, value: int) -> None:
@@ -78,7 +78,7 @@ class Emulation:
         self._emulation.set_condition(name, value)
 
     def set_fault(self, kind: str, rate: float) -> None:
-        """Sets the share of replies, 0 to 1, with a kind of fault: "corrupt", "drop" ... Other kinds are unchanged."""
+        """Sets the share of replies, 0 to 1, with a kind of fault: "corrupt", "drop" ... Other faults are unchanged."""
         self._emulation.set_fault(kind, rate)
 
     def clear_faults(self) -> None:
@@ -97,7 +97,7 @@ class Emulation:
 
     @property
     def first_violation(self) -> str:
-        """The first violation; "": none."""
+        """The first violation of the document by the host, as words; "": none."""
         return self._emulation.first_violation()
 
 

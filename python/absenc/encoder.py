@@ -26,15 +26,15 @@ class Info(NamedTuple):
     unit: str  #: id of the protocol: "tformat"
     name: str  #: maker and protocol, for people
     model: Optional[str]  #: name of the model; None: no model has these options
-    options: list[str]  #: options: "name=value"
+    options: list[str]  #: options in effect: "name=value"
     answers: dict[str, dict[str, Field]]  #: replies, by command
     failures: dict[str, EncoderError]  #: errors of commands that failed, by command
 
 
 class Recorded(NamedTuple):
-    """Summary of a recording."""
+    """Summary of a recording that `Encoder.record` has written."""
 
-    paths: list[str]  #: the file, or its parts in order
+    paths: list[str]  #: path of the recording, or of its parts in order
     readings: int
     failures: int  #: failed attempts to read
     gaps: int
@@ -73,7 +73,7 @@ class Samples:
         try:
             sample = await asyncio.get_running_loop().run_in_executor(self._thread, self._next)
         except asyncio.CancelledError:
-            self._encoder.stop(True)  # ends the wait in the thread
+            self._encoder.stop(True)  # ends the wait for a sample in the thread
             self._thread.shutdown(wait=True)
             self._encoder.stop(False)
             raise
@@ -84,13 +84,13 @@ class Samples:
 
 
 class Memory:
-    """Memory of an encoder. Written bytes are read back."""
+    """Access to the memory of an encoder. Written bytes are read back."""
 
     def __init__(self, encoder: _absenc.Encoder) -> None:
         self._encoder = encoder
 
     def read(self, address: int, count: int = 1, *, page: int = 0) -> bytes:
-        """Reads `count` bytes from `address` on."""
+        """Reads and returns `count` bytes from `address` on."""
         return self._encoder.memory_read(
             natural("address", address), natural("count", count), natural("page", page)
         )
@@ -106,7 +106,7 @@ class Memory:
 
 
 class Config:
-    """Settings of an encoder."""
+    """Access to the settings of an encoder."""
 
     def __init__(self, encoder: _absenc.Encoder) -> None:
         self._encoder = encoder
@@ -117,7 +117,7 @@ class Config:
         return self._encoder.settings_names()
 
     def get(self, name: str) -> dict[str, Field]:
-        """Reads one setting and returns its values."""
+        """Reads one setting and returns its values by name."""
         return self._encoder.settings_get(name)
 
     def set(self, name: str, *values: int, **named: int) -> dict[str, Field]:
@@ -192,7 +192,8 @@ class Encoder:
         return None if names is None else [flag for flag in self.protocol.alarms if flag.name in names]
 
     def info(self) -> Info:
-        """Runs all reading commands without arguments: identification, temperature, settings."""
+        """Runs all commands that only read and need no arguments (identification, temperature, settings), and returns
+        their replies."""
         answers: dict[str, dict[str, Field]] = {}
         failures: dict[str, EncoderError] = {}
         for name in self._encoder.questions():
@@ -209,12 +210,12 @@ class Encoder:
 
     @property
     def commands(self) -> dict[str, Command]:
-        """Commands for `run`, by name."""
+        """Commands of the protocol that `run` accepts, by name."""
         return self.protocol.commands
 
     @property
     def memory(self) -> Memory:
-        """Access to the memory."""
+        """Access to the memory of the encoder."""
         return Memory(self._encoder)
 
     @property
@@ -225,7 +226,7 @@ class Encoder:
 
     @property
     def config(self) -> Config:
-        """Access to the settings."""
+        """Access to the settings of the encoder."""
         return Config(self._encoder)
 
     @property
@@ -235,7 +236,7 @@ class Encoder:
 
     @property
     def address(self) -> str:
-        """Address without options: "tformat:/dev/ttyUSB0"."""
+        """Address of the encoder without options: "tformat:/dev/ttyUSB0"."""
         return self._encoder.address
 
     @property

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from . import _absenc
 from ._values import Field, Value, texts
 
-#: Bytes, or text: "1A 00"; on CAN "1FF:022B", on clocked links "0001".
+#: A frame: bytes, or text: "1A 00"; on CAN "1FF:022B", on clocked links "0001".
 Frame = Union[bytes, bytearray, memoryview, str]
 
 

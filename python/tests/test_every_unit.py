@@ -100,7 +100,7 @@ def test_decodes_every_vector(unit):
                 continue
             valid.add(name)
             assert json_value(fields[name]) == value, (name, vector)
-    assert invalid <= valid  # a field that is invalid in one vector is valid in another
+    assert invalid <= valid  # each field that is invalid in one vector is valid in another vector of the unit
 
 
 def test_reads_alarm_of_virtual_encoder(unit, absenc_emulate):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests loading of recordings of `absenc record`."""
+"""Tests that `absenc.load` loads recordings of `absenc record`."""
 import csv
 import json
 import os

@@ -23,8 +23,8 @@ class TextLines {
  public:
   explicit TextLines(Source& source) : source_(source) {}
 
-  /// Returns the next line without its end ("\n" or "\r\n"), valid until the next call. Returns false at the end of the
-  /// file, or if a line is longer than `longest_line`.
+  /// Reads the next line, without its end ("\n" or "\r\n"), into `line`, valid until the next call. Returns false at
+  /// the end of the file, or if a line is longer than `longest_line`.
   [[nodiscard]] bool next(std::string_view& line);
 
   /// Returns the offset in the file of the line that `next` returned last.

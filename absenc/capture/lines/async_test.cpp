@@ -278,7 +278,7 @@ class Slow final : public Reader {
   [[nodiscard]] const Layout& layout() const override { return reader_.layout(); }
   [[nodiscard]] const std::vector<Damage>& damages() const override { return reader_.damages(); }
 
-  // Threads other than the joining one wait here until all claimed blocks have been delivered.
+  // Threads other than the thread that joins the blocks wait here until all claimed blocks have been delivered.
   [[nodiscard]] bool claim(Block& block) override {
     std::unique_lock lock(mutex_);
     if (!is_joining() && claimed_ != arrived_) {
@@ -290,7 +290,7 @@ class Slow final : public Reader {
     claimed_ += more ? 1 : 0;
     return more;
   }
-  // The joining thread waits in `fill` until another thread claims a block at the same time.
+  // The thread that joins the blocks waits in `fill` until another thread claims a block at the same time.
   void fill(Block& block) override {
     std::unique_lock lock(mutex_);
     if (is_joining()) wait(lock, [this] { return overlaps_; });
