@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Decides whether a position can be trusted. Encoders send well-formed wrong positions while they start, and no
-// checksum detects all damage: a position is trusted when a second one agrees with it.
+// checksum detects all damage: a position is trusted when the next one is near enough to it.
 #pragma once
 
 #include <cstdint>

@@ -110,7 +110,7 @@ class ReplyGuard final : public Machine<Item> {
   };
   struct LastRequest {
     bool exists = false;
-    Request items{};  // the request; empty for a pulse
+    Request items{};  // items of the last request; empty if it was a pulse
     std::size_t expect = 0;
     Time sent_at{};  // end of the last transfer, even if that was no request
   };

@@ -250,7 +250,7 @@ class Session {
         return conversation;
       }
       ++counters_.errors[static_cast<std::size_t>(error)];
-      if (error == Error::timeout) doubt();  // the encoder may have been switched off
+      if (error == Error::timeout) doubt();  // after a timeout the encoder may have been switched off
       if (number >= attempts || error == Error::invalid_argument || error == Error::not_still) return conversation;
       if (error == Error::timeout && late() != late_before) return conversation;  // another attempt would be late again
       ++counters_.repeated;
@@ -342,7 +342,7 @@ class Session {
   bool confirmed_ = false;              // the last reading was confirmed
   bool known_ = false;                  // a reading was confirmed since the last doubt
   bool streaming_ = false;              // `current_` has stopped at a result and can continue
-  std::uint64_t discarded_before_ = 0;  // discarded frames of the present stream when it stopped last
+  std::uint64_t discarded_before_ = 0;  // number of discarded frames of the present stream when it stopped last
   Counters counters_;
   Statistics<Item>* statistics_ = nullptr;
 };

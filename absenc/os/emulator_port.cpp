@@ -70,7 +70,8 @@ EmulatorPort::EmulatorPort(std::string link, std::optional<std::uint16_t> tcp_po
     if (*end) poller().add(end->get());
   }
   link_ = std::move(link);
-  if (!link_.empty()) make_link();  // last step: a program that waits for the link may open it at once
+  // Last step of the constructor: a program that waits for the link may open it at once.
+  if (!link_.empty()) make_link();
 }
 
 EmulatorPort::~EmulatorPort() {

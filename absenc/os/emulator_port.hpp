@@ -32,7 +32,7 @@ class EmulatorPort final : public StreamPort {
   [[nodiscard]] const std::string& path() const { return link_.empty() ? terminal_ : link_; }
   /// Returns the TCP port, or 0 when the port does not listen.
   [[nodiscard]] std::uint16_t tcp_port() const { return tcp_port_; }
-  /// Returns the number of bytes that were lost because an end did not read them.
+  /// Returns the number of bytes that were lost because a terminal or TCP client did not read them.
   [[nodiscard]] std::uint64_t dropped() const { return dropped_; }
 
  private:

@@ -80,8 +80,8 @@ class SpiPort final : public Port<std::uint8_t> {
   Waiting<std::uint8_t> waiting_;
   Time sent_at_{};                 // end of the last transfer
   Time sent_late_{};               // duration of the system call of the last transfer
-  bool sent_pending_ = false;      // `sent` is still to be reported
-  bool received_pending_ = false;  // `received` is still to be reported, after `sent`
+  bool sent_pending_ = false;      // whether the event `sent` is still to be reported
+  bool received_pending_ = false;  // whether the event `received` is still to be reported, after `sent`
   bool idle_low_ = false;          // the data line was low before the first bit of a clocked transfer
 };
 

@@ -92,7 +92,7 @@ class StreamPort : public Port<std::uint8_t> {
   Waiting<std::uint8_t> waiting_;
   Time sent_at_{};             // end of the last transfer
   Time sent_late_{};           // time by which the last transfer may have ended earlier
-  bool sent_pending_ = false;  // `sent` is still to be reported
+  bool sent_pending_ = false;  // whether the event `sent` is still to be reported
   std::array<std::uint8_t, 4096> buffer_;
 };
 

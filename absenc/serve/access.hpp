@@ -67,7 +67,7 @@ class Access {
   std::string public_origin_;  // origin of `public_url`, for example "https://encoders.example:8443"; "": no proxy
   bool on_loopback_;
   ServerEvents* server_events_;
-  mutable std::mutex mutex_;  // guards all members below
+  mutable std::mutex mutex_;  // mutex that guards all members below
   std::vector<Secret> tokens_;
   mutable std::map<std::string, Guesses> guesses_;  // wrong tokens within the last minute, by the address of the client
   mutable std::uint64_t wrong_tokens_ = 0;

@@ -24,12 +24,12 @@ namespace {
 constexpr std::int64_t most_rows = 5000;         // greatest number of rows in one JSON response
 constexpr std::int64_t rows_of_a_page = 10'000;  // rows of CSV that are read from the history at a time
 
-/// An error that is answered with status 400.
+/// An error that is answered with HTTP status 400.
 struct BadRequest : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// An error that is answered with status 404.
+/// An error that is answered with HTTP status 404.
 struct NotFound : std::runtime_error {
   using std::runtime_error::runtime_error;
 };

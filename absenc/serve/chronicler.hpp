@@ -64,13 +64,13 @@ class Chronicler {
   const Fleet* fleet_;
   ServerEvents* server_events_;
   ClockWatch clock_;
-  mutable std::mutex mutex_;  // guards all members below
+  mutable std::mutex mutex_;  // mutex that guards all members below
   std::condition_variable_any changed_;
   std::vector<ServerEvent> unwritten_events_;
   std::uint64_t added_ = 0;  // number of events since the start, including those in `unwritten_events_`
   std::vector<std::pair<std::uint64_t, std::function<void()>>> waiting_;
   Health health_;
-  std::jthread thread_;  // last member: the thread uses all others
+  std::jthread thread_;  // last member, because the thread uses all others
 };
 
 }  // namespace absenc::serve

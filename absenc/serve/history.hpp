@@ -56,7 +56,7 @@ class HistoryReader {
   Sqlite& database();
 
   std::string path_;
-  std::mutex mutex_;  // guards all members below
+  std::mutex mutex_;  // mutex that guards all members below
   std::optional<Sqlite> database_;
   std::string refused_;
 };

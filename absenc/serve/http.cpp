@@ -87,7 +87,7 @@ struct Stream::Sending {
   std::size_t most;
   std::function<void()> on_empty;
 
-  std::mutex mutex;  // guards all members below
+  std::mutex mutex;  // mutex that guards all members below
   std::deque<Text> queue;
   std::size_t sent_of_first = 0;
   MHD_Connection* suspended = nullptr;
@@ -189,7 +189,7 @@ struct Reply::Exchange {
   bool called = false;
   std::uint64_t body = 0;
 
-  std::mutex mutex;  // guards all members below
+  std::mutex mutex;  // mutex that guards all members below
   std::optional<Response> response;
   std::shared_ptr<Stream> stream;
   MHD_Connection* suspended = nullptr;
@@ -217,7 +217,7 @@ struct HttpServer::Daemon {
   os::Listener listener;
   MHD_Daemon* daemon = nullptr;
 
-  std::mutex mutex;  // guards all members below
+  std::mutex mutex;  // mutex that guards all members below
   bool ending = false;
   Connections connections{os::end_connection};
   std::unordered_map<Exchange*, std::weak_ptr<Exchange>> exchanges;

@@ -55,12 +55,12 @@ class MqttCollector {
   std::string unreported_reason_;
   Time next_report_{};
 
-  mutable std::mutex mutex_;  // guards all members below
+  mutable std::mutex mutex_;  // mutex that guards all members below
   std::condition_variable_any changed_;
   std::vector<ServerEvent> waiting_;
   Figures figures_;
   Time last_dropped_{};
-  std::jthread thread_;  // last member: the thread uses all others
+  std::jthread thread_;  // last member, because the thread uses all others
 };
 
 }  // namespace absenc::serve

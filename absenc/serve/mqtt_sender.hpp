@@ -87,10 +87,10 @@ class MqttSender {
   // Reasons of lost connections that were reported since the last reported connection.
   std::set<std::string> reported_losses_;
 
-  mutable std::mutex mutex_;  // guards all members below
+  mutable std::mutex mutex_;  // mutex that guards all members below
   std::condition_variable_any changed_;
   Figures figures_;
-  std::jthread thread_;  // last member: the thread uses all others
+  std::jthread thread_;  // last member, because the thread uses all others
 };
 
 }  // namespace absenc::serve

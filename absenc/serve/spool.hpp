@@ -119,7 +119,7 @@ class Spool {
   std::int64_t most_bytes_;
   std::string run_;
 
-  std::mutex mutex_;  // guards all members up to `shown_mutex_`
+  std::mutex mutex_;  // mutex that guards all members up to `shown_mutex_`
   SpoolFacts facts_;
   std::map<std::string, std::uint64_t> unwritten_numbers_;
   std::optional<os::OwnedFolder> folder_;
@@ -139,7 +139,8 @@ class Spool {
   std::unordered_map<std::int64_t, Place> places_;
   std::set<std::int64_t> unmarked_;  // ids of acknowledged messages whose mark the disk did not store
 
-  mutable std::mutex shown_mutex_;  // guards all members below, so that reading them never waits for the disk
+  // Mutex that guards all members below, so that reading them never waits for the disk.
+  mutable std::mutex shown_mutex_;
   Counts stored_{};
   std::int64_t stored_bytes_ = 0;
   Condition condition_{};

@@ -26,7 +26,7 @@ class UdpSender {
   const Fleet* fleet_;
   std::mutex mutex_;
   std::condition_variable_any changed_;
-  std::jthread thread_;  // last member: the thread uses all others
+  std::jthread thread_;  // last member, because the thread uses all others
 };
 
 }  // namespace absenc::serve

@@ -154,7 +154,7 @@ class Watch {
   Time offset_;
   ServerEvents* server_events_;
 
-  mutable std::mutex mutex_;  // guards all members below
+  mutable std::mutex mutex_;  // mutex that guards all members below
   std::condition_variable_any changed_;
   Snapshot current_;
   Details details_;
@@ -172,7 +172,7 @@ class Watch {
   bool restarted_ = false;
   bool command_runs_ = false;  // whether a command runs that must not be interrupted
 
-  std::jthread thread_;  // last member: the thread uses all others
+  std::jthread thread_;  // last member, because the thread uses all others
 };
 
 }  // namespace absenc::serve

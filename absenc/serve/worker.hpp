@@ -46,7 +46,7 @@ class Worker {
   std::mutex mutex_;
   std::condition_variable_any changed_;
   std::deque<std::function<void()>> jobs_;
-  std::jthread thread_;  // last member: the thread uses all others
+  std::jthread thread_;  // last member, because the thread uses all others
 };
 
 }  // namespace absenc::serve

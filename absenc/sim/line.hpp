@@ -64,11 +64,11 @@ class Line {
   void wake(Node node);
   /// Sets whether a node receives what it sends.
   void set_echo(Node node, bool echo);
-  /// Calls `observer` for each item on the line.
+  /// Makes the line call `observer` for each item on it.
   void observe(Observer observer);
-  /// Calls `observer` for each transfer of an SPI or clocked link.
+  /// Makes the line call `observer` for each transfer of SPI bytes or clocked bits.
   void observe_transfers(TransferObserver observer);
-  /// Calls `observer` for each pulse on an extra wire.
+  /// Makes the line call `observer` for each pulse on an extra wire.
   void observe_pulses(PulseObserver observer);
 
   /// Returns the virtual time.

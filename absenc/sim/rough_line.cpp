@@ -296,7 +296,7 @@ void RoughLine<Item>::draw_skip() {
     skip_ = 0;
     return;
   }
-  // One is added so that the chance is never 0.
+  // One is added so that the random chance is never 0.
   const double chance = static_cast<double>((random_.next() >> 11) + 1) * 0x1p-53;
   skip_ = static_cast<std::uint64_t>(std::log(chance) / std::log1p(-rates_.bit));
 }

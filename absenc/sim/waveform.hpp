@@ -35,9 +35,9 @@ class Waveform {
   };
   /// Receives level changes and comments in the order of time, as soon as their order is known.
   struct Sink {
-    /// Inverts the level of the wire with this index in `wires()`.
+    /// Receives a level change of the wire with this index in `wires()`.
     virtual void change(Time at, std::size_t wire) = 0;
-    /// Describes one item in words.
+    /// Receives a description of one drawn item in words.
     virtual void comment(Time at, std::string_view words) = 0;
 
    protected:
