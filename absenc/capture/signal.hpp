@@ -64,8 +64,9 @@ struct Burst {
   bool low_after = false;    // the clock rests at its low level after the burst
   bool fell_before = false;  // the clock, high behind the previous word, fell during the rest between the two words
   bool has_last = false;     // `last` is known: the level of the encoder's data line behind the last clock change
-  bool last = false;  // level of the encoder's data line behind the last clock change: a host that gives n clocks for n
-                      // bits takes its last bit there
+  // Level of the encoder's data line behind the last clock change: a host that gives n clocks for n bits takes its last
+  // bit there.
+  bool last = false;
 };
 
 struct CanRecord {
@@ -86,9 +87,10 @@ struct Damage {
 /// A part of a capture that is decoded on its own. It owns its storage, which is used again for the next part.
 struct Block {
   std::uint64_t index = 0;  // 0, 1, 2 ... in the order of time
-  Tick first = 0;  // tick of the first sample, or time from which the changes are valid; after damage it may be later
-                   // than the end of the previous block, because the data between them is missing
-  Tick end = 0;    // tick behind the last tick of the block
+  // Tick of the first sample, or time from which the changes are valid; after damage it may be later than the end of
+  // the previous block, because the data between them is missing.
+  Tick first = 0;
+  Tick end = 0;                       // tick behind the last tick of the block
   std::vector<std::uint8_t> samples;  // samples: `bytes_per_sample` bytes each, little endian, channel 0 in bit 0
   unsigned bytes_per_sample = 1;      // 1, 2, 4 or 8
   std::vector<Changes> changes;       // for captures of kind changes: one entry for each channel

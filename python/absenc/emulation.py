@@ -70,7 +70,7 @@ class Emulation:
         self._emulation.raise_alarm(name)
 
     def lower_alarm(self, name: str) -> None:
-        """Ends the cause of an alarm, which the encoder may still report until it is cleared."""
+        """Ends the cause of an alarm; a latched alarm is reported until a host clears it."""
         self._emulation.lower_alarm(name)
 
     def set_condition(self, name: str, value: int) -> None:

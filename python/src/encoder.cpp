@@ -218,8 +218,8 @@ py::bytes memory_read(PyEncoder& encoder, std::uint32_t address, std::uint32_t c
   client::MemoryImage wanted;
   for (std::uint32_t i = 0; i < count; ++i) {
     const client::MemoryAddress at{page, address + i};
-    client::require_open(unit, {{at, 0}}, client::MemoryAccess::read);  // each address is checked separately, because
-                                                                        // `count` may be very large
+    // Each address is checked separately, because `count` may be very large.
+    client::require_open(unit, {{at, 0}}, client::MemoryAccess::read);
     wanted[at] = 0;
   }
   const client::MemoryImage image = encoder.use([&](client::Encoder& one) { return one.memory().read(wanted); });

@@ -60,8 +60,8 @@ std::string_view first_word(const Subcommand& subcommand) {
 }
 
 std::string_view last_word(const Subcommand& subcommand) {
-  return subcommand.name.substr(subcommand.name.find(' ') + 1);  // also for a name without a blank: npos + 1 is 0, so
-                                                                 // the result is the whole name
+  // Also for a name without a blank: npos + 1 is 0, so the result is the whole name.
+  return subcommand.name.substr(subcommand.name.find(' ') + 1);
 }
 
 std::vector<std::string_view> words_after(std::string_view first) {

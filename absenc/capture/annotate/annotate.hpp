@@ -48,10 +48,11 @@ class Annotator {
     LineTicks ticks{};
     Tick begin = 0;              // first tick of the capture
     bool begins_silent = false;  // the line was silent before the capture
-    bool by_arrival = false;  // a character's times are those of its arrival at a program, not those on the line; only
-                              // for one channel
-    Tick gap = 1;  // by_arrival: shortest pause that must come from the line, because the transport from line to
-                   // program does not cause such pauses
+    // A character's times are those of its arrival at a program, not those on the line; only for one channel.
+    bool by_arrival = false;
+    // by_arrival: shortest pause that must come from the line, because the transport from line to program does not
+    // cause such pauses.
+    Tick gap = 1;
   };
 
   /// `unit` and `sink` must outlive the annotator.

@@ -22,8 +22,8 @@ namespace {
 
 constexpr std::string_view magic = "<SALEAE>";
 constexpr double ticks_per_second = 1e12;
-constexpr double longest_seconds = 8e6;  // limit for times in a file, 92 days: less than 64-bit ticks with a sign can
-                                         // hold
+// Limit for times in a file, 92 days: less than 64-bit ticks with a sign can hold.
+constexpr double longest_seconds = 8e6;
 constexpr std::size_t transitions_at_once = 1 << 13;
 
 template <class Unsigned>

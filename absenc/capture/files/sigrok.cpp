@@ -28,8 +28,8 @@ namespace {
 constexpr std::uint64_t largest_piece = 1 << 24;  // sigrok-cli writes pieces of 4 MiB, PulseView of 10 MiB
 constexpr std::uint64_t streamed_bytes = 1 << 22;
 constexpr std::uint64_t longest_metadata = 1 << 20;
-constexpr std::uint64_t believable = std::uint64_t{1} << 60;  // limit for the bytes of a capture; larger sizes are
-                                                              // errors
+// Limit for the bytes of a capture; larger sizes are errors.
+constexpr std::uint64_t believable = std::uint64_t{1} << 60;
 constexpr const char* copy_again = "copy the file again from where it came";
 
 struct Metadata {

@@ -79,8 +79,8 @@ TEST(Sigrok, OnePieceThatIsLargeComesInParts) {
 }
 
 TEST(Sigrok, SamplesOfThreeBytesAreSpread) {
-  for (const std::size_t count : {std::size_t{1000}, std::size_t{6'000'000}}) {  // one piece that is a single block,
-                                                                                 // and one that is read in parts
+  // One piece that is a single block, and one that is read in parts.
+  for (const std::size_t count : {std::size_t{1000}, std::size_t{6'000'000}}) {
     const FileBytes samples = wave(3 * count);
     const auto reader = open_bytes(session(sigrok_metadata("1 MHz", 24, 3), {{"logic-1-1", samples}}));
     const CaptureContents contents = read_all(*reader);
@@ -246,8 +246,8 @@ TEST(Sigrok, ReadsEverythingBeforeACut) {
       const FileBytes file = cut_at(good, size);
       if (size < first + 39) {  // the first piece is completely missing
         const std::string why = problem(file);
-        const std::size_t seen = size + (deflate ? 1 : 0);  // number of bytes needed for all samples: the last byte of
-                                                            // deflated data only marks the end
+        // Number of bytes needed for all samples: the last byte of deflated data only marks the end.
+        const std::size_t seen = size + (deflate ? 1 : 0);
         EXPECT_NE(why.find("cut off at byte "), std::string::npos) << why;
         EXPECT_NE(why.find(seen < metadata - 30 ? "version:"
                            : seen < first       ? "metadata:"
@@ -263,8 +263,8 @@ TEST(Sigrok, ReadsEverythingBeforeACut) {
       const Damage& damage = reader->damages()[0];
       EXPECT_EQ(damage.tick, contents.samples.size());
       EXPECT_LE(damage.offset, size);
-      EXPECT_GE(damage.offset + 39, std::min(size, directory));  // a damage may be reported at the beginning of an
-                                                                 // incomplete header
+      // A damage may be reported at the beginning of an incomplete header.
+      EXPECT_GE(damage.offset + 39, std::min(size, directory));
       EXPECT_EQ(damage.note, size >= directory + 4);
       EXPECT_NE(damage.what.find("cut off"), std::string::npos);
       if (deflate) continue;

@@ -20,8 +20,8 @@ namespace absenc::capture {
 namespace {
 
 constexpr std::uint64_t block_text = 1 << 20;
-constexpr std::size_t block_changes = 1 << 20;  // limit of the changes in a block, in addition to that of its bytes,
-                                                // because one identifier may drive many channels
+// Limit of the changes in a block, in addition to that of its bytes, because one identifier may drive many channels.
+constexpr std::size_t block_changes = 1 << 20;
 
 enum class Value : std::uint8_t { low, high, unknown, none };
 

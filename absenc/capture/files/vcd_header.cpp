@@ -132,8 +132,8 @@ void VcdHeader::read_variable() {
   if (!has_width || width < 1 || names_.size() + static_cast<std::size_t>(width) > most_channels) {
     fail("declares " + name.substr(0, 80) + " with an impossible width, or more than 65536 channels in all");
   }
-  if (std::abs(left - right) != width - 1) {  // the range has another width than the variable: it is the index of an
-                                              // array element
+  // The range has another width than the variable: it is the index of an array element.
+  if (std::abs(left - right) != width - 1) {
     name += ranged ? "[" + std::to_string(left) + "]" : "";
     left = width - 1;
     right = 0;

@@ -23,8 +23,8 @@ class ZipArchive {
 
   struct Entry {
     std::uint64_t index = 0;
-    std::uint64_t size = 0;  // size of the expanded entry according to the directory; reliable only after the entry was
-                             // read
+    // Size of the expanded entry according to the directory; reliable only after the entry was read.
+    std::uint64_t size = 0;
   };
   /// Finds an entry by its name and describes it in `entry`. Returns false if the archive has no such entry.
   [[nodiscard]] bool find(const std::string& name, Entry& entry) const;

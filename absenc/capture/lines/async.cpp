@@ -12,10 +12,10 @@ namespace absenc::capture {
 namespace {
 
 constexpr Tick never = std::numeric_limits<Tick>::max();
-constexpr Tick characters_ahead = 12;   // number of characters examined to find the first start bit
-constexpr std::size_t candidates = 16;  // number of falling edges tried as the first start bit: more than 16 within a
-                                        // character are noise
-constexpr std::size_t step = 64;        // number of changes after which the true state is compared with the guess again
+constexpr Tick characters_ahead = 12;  // number of characters examined to find the first start bit
+// Number of falling edges tried as the first start bit: more than 16 within a character are noise.
+constexpr std::size_t candidates = 16;
+constexpr std::size_t step = 64;  // number of changes after which the true state is compared with the guess again
 
 }  // namespace
 

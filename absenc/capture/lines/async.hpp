@@ -95,10 +95,10 @@ class AsyncDecoder {
 
   Start start_;
   bool begun_ = false;
-  Tick origin_ = 0;             // first tick of the first part
-  Tick end_ = 0;                // end of the last part, in ticks
-  bool line_ = true;            // level of the line behind all changes fed so far; idle is high, as an inverted line is
-                                // inverted before
+  Tick origin_ = 0;  // first tick of the first part
+  Tick end_ = 0;     // end of the last part, in ticks
+  // Level of the line behind all changes fed so far; idle is high, as an inverted line is inverted before.
+  bool line_ = true;
   bool level_ = true;           // level before the first of `edges_`
   std::vector<Tick> edges_;     // changes from the first incomplete character on
   std::optional<Tick> unsure_;  // time of a change that may be part of a glitch

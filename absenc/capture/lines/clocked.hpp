@@ -12,24 +12,26 @@ namespace absenc::capture {
 
 /// Settings of a clocked line. The idle level of the clock does not matter: a word is a sequence of its changes.
 struct ClockedFormat {
-  bool rising = false;       // true: the rising edge of the clock samples a bit, false: the falling edge; the bit is
-                             // the level just before the edge
+  // True: the rising edge of the clock samples a bit, false: the falling edge; the bit is the level just before the
+  // edge.
+  bool rising = false;
   bool has_select = false;   // words end with chip select; the clock may pause within a word
   bool select_high = false;  // chip select is active high
   Tick pause = 0;            // without chip select: a clock that rests longer than this ends a word, in ticks
-  Tick settle = 0;           // without chip select: the last bit is sampled this long behind the last clock change, in
-                             // ticks; 0: not sampled
-  Tick change_pause = 0;  // without chip select: a clock that rests longer than this also ends a word if the data line
-                          // changes during the rest, later than `settle` (end of a timeout or a monoflop); 0: it does
-                          // not
+  // Without chip select: the last bit is sampled this long behind the last clock change, in ticks; 0: not sampled.
+  Tick settle = 0;
+  // Without chip select: a clock that rests longer than this also ends a word if the data line changes during the rest,
+  // later than `settle` (end of a timeout or a monoflop); 0: it does not.
+  Tick change_pause = 0;
 };
 
 /// Lengths of the rests of a clock, measured from its first changes.
 struct ClockRests {
   Tick half_period = 0;
   Tick longest = 0;
-  std::vector<Tick> pauses;  // possible limits, in ticks, above which a rest ends a word: three periods, then one value
-                             // between each two clearly different lengths of rests, the shortest first
+  // Possible limits, in ticks, above which a rest ends a word: three periods, then one value between each two clearly
+  // different lengths of rests, the shortest first.
+  std::vector<Tick> pauses;
 };
 
 /// Measures the rests of a clock; returns nothing if the clock has too few changes.

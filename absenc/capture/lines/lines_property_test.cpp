@@ -81,8 +81,8 @@ constexpr std::array decode_setups{DecodeSetup{1, Content::samples}, DecodeSetup
                                    DecodeSetup{5, Content::samples}};
 
 std::size_t any_block_size(Random& random, std::size_t ticks) {
-  const std::size_t least = ticks / 200 + 1;  // smallest block in ticks: with smaller blocks a test case would take a
-                                              // second
+  // Smallest block in ticks: with smaller blocks a test case would take a second.
+  const std::size_t least = ticks / 200 + 1;
   return least + below(random, below(random, 2) == 0 ? 8 : ticks);
 }
 

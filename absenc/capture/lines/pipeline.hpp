@@ -34,8 +34,8 @@ struct AsyncLine {
 struct AsyncOutcome {
   std::string problem;  // reason why nothing could be decoded, as a sentence; "": none
   std::vector<AsyncFormat> formats;
-  std::vector<double> measured_baud;  // baud rate of each line, measured over the whole capture; 0: no good character,
-                                      // or a file without times
+  // Baud rate of each line, measured over the whole capture; 0: no good character, or a file without times.
+  std::vector<double> measured_baud;
   std::vector<AsyncDecoder::Statistics> statistics;
 };
 

@@ -10,10 +10,10 @@ namespace absenc::capture {
 
 namespace {
 
-constexpr std::size_t enough_changes = 16384;     // number of changes of a line that suffice to detect its settings
-constexpr std::size_t most_changes = 64 * 16384;  // limit for the changes stored of one line while another line has too
-                                                  // few
-constexpr double fewest_ticks = 2.5;              // shortest bit time, in ticks
+constexpr std::size_t enough_changes = 16384;  // number of changes of a line that suffice to detect its settings
+// Limit for the changes stored of one line while another line has too few.
+constexpr std::size_t most_changes = 64 * 16384;
+constexpr double fewest_ticks = 2.5;  // shortest bit time, in ticks
 
 class AsyncDecoding {
  public:

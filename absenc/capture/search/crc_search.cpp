@@ -13,9 +13,9 @@ namespace absenc::capture {
 
 namespace {
 
-constexpr double settled_log2 = -20;    // log2 of one in a million: a solution below this chance is settled
-constexpr int most_common_degree = 63;  // highest degree of a common divisor that is factorised; a higher one has too
-                                        // many factors
+constexpr double settled_log2 = -20;  // log2 of one in a million: a solution below this chance is settled
+// Highest degree of a common divisor that is factorised; a higher one has too many factors.
+constexpr int most_common_degree = 63;
 constexpr unsigned widest = 16;
 
 class CrcSearch {
@@ -257,8 +257,8 @@ class CrcSearch {
     for (shape.trailing = 0; shape.trailing + 1 < frames_.shortest; ++shape.trailing) {
       const bool is_check = !never_changes(shape);
       for (const CheckKind kind : {CheckKind::sum, CheckKind::difference, CheckKind::exclusive_or}) {
-        std::map<std::uint8_t, std::vector<std::size_t>> firsts;  // possible positions of the first covered byte, by
-                                                                  // the constant of the sum
+        // Possible positions of the first covered byte, by the constant of the sum.
+        std::map<std::uint8_t, std::vector<std::size_t>> firsts;
         for (std::size_t first = 0; first < frames_.shortest - shape.trailing - 1; ++first) {
           ++shapes_;
           const std::optional<std::uint8_t> constant =

@@ -13,8 +13,8 @@ namespace absenc::capture {
 namespace {
 
 constexpr unsigned many_attempts = 1u << 20;  // number of random replies tried if there are only one or two frames
-constexpr unsigned enough_accepted = 256;     // number of accepted random replies after which the rate has an error of
-                                              // some percent
+// Number of accepted random replies after which the rate has an error of some percent.
+constexpr unsigned enough_accepted = 256;
 
 /// Stores the position that a good reply reports.
 struct PositionSink final : FieldSink {

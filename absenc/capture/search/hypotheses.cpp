@@ -11,8 +11,8 @@ namespace absenc::capture {
 namespace {
 
 constexpr std::int64_t most_bits = 64;
-constexpr std::size_t telling = 32;  // number of exchanges tried first: options that explain none of these explain
-                                     // nothing
+// Number of exchanges tried first: options that explain none of these explain nothing.
+constexpr std::size_t telling = 32;
 
 struct NoEvidence final : EvidenceSink {
   void put(const OptionEvidence&) override {}

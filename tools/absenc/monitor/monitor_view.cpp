@@ -198,8 +198,8 @@ void draw_position(Screen& screen, int row, const MonitoredEncoder& shown) {
   const Unit& unit = *shown.watch->uri().unit;
   if (is_live(snapshot)) {
     const bool has_room =
-        unit.second_status == nullptr && unit.second_alarms == nullptr;  // the status of an encoder with two channels
-                                                                         // is drawn below
+        // The status of an encoder with two channels is drawn below.
+        unit.second_status == nullptr && unit.second_alarms == nullptr;
     const Reading& reading = snapshot.last.reading;
     const Doubt doubt = doubt_of(snapshot.last);
     const std::string text =

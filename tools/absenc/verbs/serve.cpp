@@ -19,8 +19,8 @@ namespace {
 constexpr std::string_view usual_host = "127.0.0.1";
 constexpr std::uint16_t usual_port = 8420;
 constexpr std::string_view no_history = "none";
-constexpr Time between_looks = std::chrono::milliseconds(100);  // period in which signals are checked: polled, because
-                                                                // another thread may receive the signal
+// Period in which signals are checked: polled, because another thread may receive the signal.
+constexpr Time between_looks = std::chrono::milliseconds(100);
 
 // Sets host and port of the server from "HOST:PORT", "HOST" or ":PORT". Throws UsageError.
 void set_place(serve::Choices& choices, std::string_view written) {

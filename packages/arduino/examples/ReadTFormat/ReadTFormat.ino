@@ -10,8 +10,8 @@ using namespace absenc;
 constexpr int direction_pin = 2;                        // DE and /RE of the transceiver; high: transmit
 constexpr std::uint32_t period_us = 10'000;             // time between two readings
 constexpr std::uint32_t fastest_rpm = 6'000;            // highest speed of the axis
-constexpr Time latency = std::chrono::milliseconds(2);  // greatest delay between line and program, by loop() and the
-                                                        // port's buffers
+// Greatest delay between line and program, by loop() and the port's buffers.
+constexpr Time latency = std::chrono::milliseconds(2);
 
 constexpr tformat::Format format{.singleturn_bits = 17, .multiturn_bits = 16, .encoder_id = 0x11};
 
