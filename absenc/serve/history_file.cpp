@@ -150,7 +150,7 @@ std::string HistoryFile::set_aside() {
   return name;
 }
 
-// Renames the history file and its log: under its old name SQLite would write it into the damaged file.
+// Renames the history file and its log: SQLite would write a log of the old name into the next file there.
 std::string HistoryFile::set_aside(const std::string& path) {
   std::string name = new_name_beside(path);
   rename_to(path, name);
