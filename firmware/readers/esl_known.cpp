@@ -5,7 +5,7 @@
 #include "firmware/readers/reader.hpp"
 
 namespace {
-// A drive knows the profile of its encoder at compile time.
+// The profile is a constant, because a drive knows the profile of its encoder at compile time.
 constexpr absenc::esl::Profile profile{};
 constexpr absenc::esl::Request request{};
 }  // namespace

@@ -5,7 +5,7 @@
 #include "firmware/readers/reader.hpp"
 
 namespace {
-// A drive knows the format of its encoder at compile time.
+// The format is a constant, because a drive knows the format of its encoder at compile time.
 constexpr absenc::tformat::Format format{};
 }  // namespace
 

@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t read_at_once = 1 << 18;
 
-// Parses all of `text` as a whole number of at most `most` digits. Returns nothing or false for another text.
+// Parses all of `text` as a whole number of at most `most` digits; returns nothing for another text.
 template <class Number>
 std::optional<Number> whole(std::string_view text, std::size_t most) {
   Number value = 0;

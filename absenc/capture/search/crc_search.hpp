@@ -25,9 +25,9 @@ inline constexpr std::size_t longest_checked_word = 128;  // longest frame of bi
 
 enum class CheckKind : std::uint8_t {
   crc,
-  sum,           // 8 bits: constant + sum of the bytes
-  difference,    // 8 bits: constant - sum of the bytes
-  exclusive_or,  // 8 bits: constant ^ all bytes
+  sum,           // checksum of 8 bits: constant + sum of the bytes
+  difference,    // checksum of 8 bits: constant - sum of the bytes
+  exclusive_or,  // checksum of 8 bits: constant ^ all bytes
 };
 
 /// A checksum that explains all frames. Positions count bytes, or bits in frames of bits. The end of the covered part

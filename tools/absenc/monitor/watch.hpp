@@ -43,8 +43,8 @@ struct Snapshot {
   Time median{};               // median of the latencies
   Time percentile_99{};
   Time longest{};
-  std::vector<std::string> trace{};    // printed readings; only with details; the newest last
-  std::vector<BadExchangeText> bad{};  // bad exchanges; only with details; the newest first
+  std::vector<std::string> trace{};    // readings as printed text, the newest last; only with details
+  std::vector<BadExchangeText> bad{};  // last bad exchanges, the newest first; only with details
   std::vector<std::string>
       fields{};  // only with details: "name value" of the last reply's fields that the reading lacks
 };
