@@ -105,7 +105,6 @@ class Emulation {
 /// Starts a virtual encoder and returns it. `text` is an address without `sim:`, as
 /// "tformat?model=23-bit&motion=rpm=60&fault=corrupt=0.01". The link of the unit must carry characters or CAN frames.
 /// Throws UsageError, os::Failure.
-/// UsageError, os::Failure.
 [[nodiscard]] inline Emulation emulate(std::string_view text, const EmulateChoices& choices = {}) {
   return {text, choices};
 }

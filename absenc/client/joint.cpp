@@ -6,7 +6,7 @@
 namespace absenc::client {
 
 double joint_degrees(const Joint& joint, double position_deg) {
-  return joint.direction * (position_deg - joint.offset) / joint.gear + 0.0;  // no "-0"
+  return joint.direction * (position_deg - joint.offset) / joint.gear + 0.0;  // adding 0.0 turns -0.0 into 0.0
 }
 
 double joint_millimetres(const Joint& joint, double position_mm) {
@@ -19,7 +19,7 @@ double electrical_degrees(const Joint& joint, double position) {
                                               : way * joint.pole_pairs;
   const double within = std::fmod(angle, 360);
   const double positive = within < 0 ? within + 360 : within;
-  return positive < 360 ? positive + 0.0 : 0;  // The sum of 360 and a tiny negative angle is rounded to 360.
+  return positive < 360 ? positive + 0.0 : 0;  // a tiny negative angle plus 360 is rounded to 360, which must become 0
 }
 
 Estimate joint_speed(const Joint& joint, const Estimate& speed) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Mechanics between an encoder and its drive, and the angles of joint and motor that follow from the position.
+// Mechanics between an encoder and its drive: angles of joint and motor that follow from the encoder's position.
 #pragma once
 
 #include <optional>
@@ -9,8 +9,8 @@
 
 namespace absenc::client {
 
-/// Settings of an address, after `?`, and of absenc.toml. They add angles to a sample and leave the values of the
-/// encoder as they are.
+/// How an encoder is mounted in its drive: settings of an address, after `?`, or of absenc.toml. They add angles to a
+/// sample and leave the values of the encoder as they are.
 ///
 ///   joint_deg      = direction * (position_deg - offset_deg) / gear
 ///   electrical_deg = direction * (angle_deg - offset_deg) * pole_pairs  modulo 360, from 0 to below 360
@@ -21,21 +21,21 @@ namespace absenc::client {
 ///   joint_mm       = direction * (position_mm - offset_mm)
 ///   electrical_deg = direction * (position_mm - offset_mm) / pole_pair_mm * 360  modulo 360
 struct Joint {
-  int direction = 1;        ///< 1, or -1 if the joint turns against the encoder.
-  double offset = 0;        ///< Position of the encoder where the joint is at 0, in degrees (mm for linear encoders).
-  double gear = 1;          ///< Turns of the encoder for one turn of the joint, above 0; rotary encoders only.
-  int pole_pairs = 0;       ///< Pole pairs of the motor on the encoder's shaft; 0: not set; rotary encoders only.
+  int direction = 1;   ///< Direction of the joint: 1, or -1 if the joint turns against the encoder.
+  double offset = 0;   ///< Position of the encoder where the joint is at 0, in degrees (mm for linear encoders).
+  double gear = 1;     ///< Turns of the encoder for one turn of the joint, above 0; rotary encoders only.
+  int pole_pairs = 0;  ///< Number of pole pairs of the motor on the encoder's shaft; 0: not set; rotary encoders only.
   double pole_pair_mm = 0;  ///< Length of a pole pair of a linear motor, in mm; 0: not set; linear encoders only.
   bool is_set = false;      ///< Whether direction, offset or gear was set, so that samples have joint angles.
 
-  /// Returns whether the encoder of the motor is configured.
+  /// Returns whether the pole pairs of a motor are set, so that samples have an electrical angle.
   [[nodiscard]] bool has_motor() const { return pole_pairs != 0 || pole_pair_mm > 0; }
 };
 
 /// Angles of joint and motor from one reading. A member is empty if it was not configured, is invalid or is unknown.
 struct JointAngles {
-  /// Angle of a rotary joint, in degrees. Also empty if the turn is unknown and `gear` is not 1; with `gear` 1 the
-  /// angle is right up to whole turns.
+  /// Angle of a rotary joint, in degrees. Also empty if the number of turns is unknown and `gear` is not 1; with `gear`
+  /// 1 and unknown turns, the angle is right up to whole turns.
   std::optional<double> joint_deg{};
   std::optional<double> joint_mm{};  ///< Position of a linear joint, in millimetres.
   /// Speed of a rotary joint in revolutions per minute; without a value if it is not known.
@@ -44,14 +44,15 @@ struct JointAngles {
   std::optional<double> electrical_deg{};      ///< Electrical angle of the motor, in degrees, from 0 to below 360.
 };
 
-/// Returns the angle of the joint, in degrees. `position_deg` is the encoder's angle, continued past the end of a turn.
+/// Returns the angle of a rotary joint, in degrees. `position_deg` is the encoder's angle, continued past the end of a
+/// turn.
 [[nodiscard]] double joint_degrees(const Joint& joint, double position_deg);
-/// Returns the position of the carriage, in millimetres.
+/// Returns the position of a linear joint, in millimetres. `position_mm` is the position of the encoder.
 [[nodiscard]] double joint_millimetres(const Joint& joint, double position_mm);
-/// Returns the electrical angle, in degrees, from 0 to below 360. `position` is the angle within the turn in degrees,
-/// or the position of a linear encoder in mm.
+/// Returns the electrical angle of the motor, in degrees, from 0 to below 360. `position` is the encoder's angle within
+/// the turn in degrees, or the position of a linear encoder in mm.
 [[nodiscard]] double electrical_degrees(const Joint& joint, double position);
-/// Returns the speed of the joint, in the unit of `speed`.
+/// Returns the speed of the joint, in the unit of `speed`, which is the speed of the encoder.
 [[nodiscard]] Estimate joint_speed(const Joint& joint, const Estimate& speed);
 
 }  // namespace absenc::client

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compares angles of joint and motor with the motion of virtual encoders over several turns.
+// Compares angles of joint and motor with the motion of virtual encoders, over several turns.
 #include "absenc/client/joint.hpp"
 
 #include <gtest/gtest.h>
@@ -82,7 +82,7 @@ TEST(Joint, FollowsTheShaftOverSeveralTurnsInBothDirections) {
   const std::string more = "&pole_pairs=5&offset_deg=-40.5&gear=";
   expect_angles("sim:tformat?multiturn=100&motion=rpm=300" + more + "50", 1, -40.5, 50, 5);
   expect_angles("sim:tformat?multiturn=100&motion=rpm=-300&direction=-1" + more + "50/3", -1, -40.5, 50.0 / 3, 5);
-  // the counter passes 0 turns
+  // the encoder's counter of turns passes 0
   expect_angles("sim:tformat?multiturn=1&motion=rpm=-300" + more + "0.5", 1, -40.5, 0.5, 5);
 }
 
@@ -91,7 +91,7 @@ TEST(Joint, IsUnknownWithoutTurns) {
   EXPECT_FALSE(open(single + "&gear=2").samples({.count = 1}).begin()->angles.joint_deg.has_value());
   EXPECT_TRUE(open(single + "&gear=1").samples({.count = 1}).begin()->angles.joint_deg.has_value());
   EXPECT_TRUE(open(single + "&gear=2&pole_pairs=3").samples({.count = 1}).begin()->angles.electrical_deg.has_value());
-  // An alarm makes the turns invalid.
+  // This alarm makes the turns of the encoder invalid.
   const std::string lost = "sim:tformat?multiturn=5&gear=2&alarm=battery_error";
   EXPECT_FALSE(open(lost).samples({.count = 1}).begin()->angles.joint_deg.has_value());
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The memory of an encoder as an image: read, compare, write and verify.
+// The memory of an encoder as an image, with functions that read, compare, write and verify it.
 #pragma once
 
 #include <cstddef>
@@ -17,62 +17,62 @@ namespace absenc::client {
 
 /// Place of a byte in the memory of an encoder.
 struct MemoryAddress {
-  std::uint32_t page = 0;     ///< Page, 0 where the memory has no pages.
+  std::uint32_t page = 0;     ///< Number of the page; 0 if the memory has no pages.
   std::uint32_t address = 0;  ///< Address within the page.
-  /// Compares page and address.
+  /// Returns whether both are the same page and address.
   friend constexpr bool operator==(const MemoryAddress&, const MemoryAddress&) = default;
-  /// Orders by page, then by address.
+  /// Compares by page, then by address.
   friend constexpr bool operator<(const MemoryAddress& one, const MemoryAddress& other) {
     return one.page != other.page ? one.page < other.page : one.address < other.address;
   }
 };
 
-/// Bytes of a memory by their places.
+/// Bytes of a memory, by their page and address.
 using MemoryImage = std::map<MemoryAddress, std::uint8_t>;
 
-/// Consecutive addresses of one page.
+/// Bytes at consecutive addresses of one page.
 struct MemoryRun {
-  MemoryAddress first;              ///< Place of the first byte.
-  std::vector<std::uint8_t> bytes;  ///< The bytes, all on one page.
+  MemoryAddress first;              ///< Page and address of the first byte.
+  std::vector<std::uint8_t> bytes;  ///< The bytes, from `first` on.
 };
 
-/// Returns the bytes as runs in order of address, each of at most `longest` bytes.
+/// Returns the bytes of `image` as runs in the order of their addresses, each of at most `longest` bytes.
 [[nodiscard]] std::vector<MemoryRun> runs(const MemoryImage& image, std::size_t longest = SIZE_MAX);
 
-/// Returns all addresses of a dump of the unit's memory, with values 0.
+/// Returns all addresses that a dump of the unit's memory contains, each with the value 0.
 [[nodiscard]] MemoryImage dump_addresses(const Unit& unit);
 
 /// Returns the bytes of `wanted` that are missing or different in `found`.
 [[nodiscard]] MemoryImage differing(const MemoryImage& wanted, const MemoryImage& found);
 
-/// Returns "page 2 address 0x05", or "address 0x05" for a memory without pages.
+/// Returns the address in words: "page 2 address 0x05", or "address 0x05" for a memory without pages.
 [[nodiscard]] std::string to_text(const Unit& unit, MemoryAddress at);
 
-/// Returns "page 0 to 5: 0x00 to 0x7E; page 7: 0x04, 0x06".
+/// Returns all addresses of `image` in words: "page 0 to 5: 0x00 to 0x7E; page 7: 0x04, 0x06".
 [[nodiscard]] std::string addresses_in_words(const Unit& unit, const MemoryImage& image);
 
-/// Whether bytes are read or written.
+/// Kind of access to bytes of a memory.
 enum class MemoryAccess : std::uint8_t {
   read,
   write,
-  force,  ///< also write protected bytes
+  force,  ///< write, also to write-protected bytes
 };
 
-/// Returns the reason why this access to the address is impossible, or "".
+/// Returns the reason why this access to the address is impossible; "" if it is possible.
 [[nodiscard]] std::string closed(const Unit& unit, MemoryAddress at, MemoryAccess access);
 
-/// Throws UsageError if the unit has no memory that can be read or written.
+/// Checks that the unit has a memory for this kind of access. Throws UsageError if not.
 void require_memory(const Unit& unit, MemoryAccess access);
-/// Throws UsageError if a byte of `image` is not open to this access.
+/// Checks that this access to each byte of `image` is possible. Throws UsageError if not.
 void require_open(const Unit& unit, const MemoryImage& image, MemoryAccess access);
 
 class Encoder;
 
-/// Called with the number of finished bytes and the number of all bytes.
+/// Function that is called with the number of finished bytes and the number of all bytes.
 using MemoryProgress = std::function<void(std::size_t done, std::size_t all)>;
 
-/// The memory of an open encoder, from Encoder::memory. Functions throw EncoderFailure if a command fails, and
-/// exceptions of the port.
+/// Access to the memory of an open encoder, from Encoder::memory. Functions throw EncoderFailure if a command fails,
+/// and exceptions of the port.
 class Memory {
  public:
   /// Reads and writes the memory of `encoder`, which must outlive this object.
@@ -81,15 +81,15 @@ class Memory {
   /// Returns the unit of the encoder.
   [[nodiscard]] const Unit& unit() const;
 
-  /// Checks the configured model by a reading of the position. The memory itself does not show a wrong model and would
-  /// accept the bytes.
+  /// Reads the position once, which fails if the configured model is wrong. The memory itself does not show a wrong
+  /// model and would accept the bytes. Does nothing if the unit cannot read positions.
   void check_model();
 
-  /// Reads the bytes at the addresses of `image`; dump_addresses returns all readable ones. Throws UsageError for
-  /// addresses that cannot be read.
+  /// Reads the bytes at the addresses of `image` and returns them; dump_addresses returns all readable addresses.
+  /// Throws UsageError for addresses that cannot be read.
   [[nodiscard]] MemoryImage read(const MemoryImage& image, const MemoryProgress& progress = {});
 
-  /// Writes a byte and reads it back. `before` is the stored value, if it is known.
+  /// Writes a byte and reads it back. `before` is the byte that is stored now, if it is known.
   void write(MemoryAddress at, std::uint8_t value, MemoryAccess access, std::optional<std::uint8_t> before = {});
 
  private:
@@ -98,23 +98,24 @@ class Memory {
   Encoder* encoder_;
 };
 
-/// Changes the memory to a wanted image: look, write, verify. After an exception the images still state which bytes
-/// were written and which were not. A repetition writes only bytes that still differ.
+/// A change of the memory to a wanted image, in three steps: look, write, verify. After an exception the images still
+/// state which bytes were written and which were not. If the change is repeated, it writes only bytes that still
+/// differ.
 class MemoryChange {
  public:
-  /// Prepares the change. Throws UsageError for addresses that cannot be written.
+  /// Prepares the change without sending anything. Throws UsageError for addresses that cannot be written.
   MemoryChange(Memory memory, MemoryImage wanted, MemoryAccess access);
 
-  /// Reads the stored bytes at the wanted addresses.
+  /// Reads the bytes that are stored at the wanted addresses.
   void look(const MemoryProgress& progress = {});
-  /// Writes the differing bytes one by one and reads each back.
+  /// Writes the bytes that differ, one by one, and reads each back.
   void write(const MemoryProgress& progress = {});
   /// Reads all written bytes again, because a later write may have changed an earlier byte. Throws Failure.
   void verify(const MemoryProgress& progress = {});
-  /// Reads the byte whose write was interrupted by a failure.
+  /// After a failure, reads the byte whose write was interrupted, to find out whether it was written.
   void settle();
 
-  /// Returns the wanted bytes.
+  /// Returns the wanted bytes with their addresses.
   [[nodiscard]] const MemoryImage& wanted() const { return wanted_; }
   /// Returns the bytes that `look` read at the wanted addresses.
   [[nodiscard]] const MemoryImage& found() const { return found_; }
@@ -122,11 +123,11 @@ class MemoryChange {
   [[nodiscard]] const MemoryImage& differing() const { return differing_; }
   /// Returns the bytes that were written and verified.
   [[nodiscard]] const MemoryImage& written() const { return written_; }
-  /// Returns the wanted bytes that were not written.
+  /// Returns the wanted bytes that differed and were not written.
   [[nodiscard]] MemoryImage not_written() const;
-  /// Returns the state of the last byte that was written; not_sent before the first.
+  /// Returns the state of the last byte that was written; not_sent before the first write.
   [[nodiscard]] ChangeState state() const { return state_; }
-  /// Returns the byte for which it is unknown whether it was written; at most one.
+  /// Returns the byte of which it is unknown whether it was written; empty if there is none.
   [[nodiscard]] MemoryImage unknown() const;
 
  private:

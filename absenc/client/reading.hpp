@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Flags of a reading by channel. Each flag has one of three states: clear, raised, or not reported.
+// The flags of a reading, by channel. Each flag has one of three states: clear, raised, or not reported.
 #pragma once
 
 #include <cstdint>
@@ -11,33 +11,34 @@
 
 namespace absenc::client {
 
-/// Flags of one field of the unit.
+/// States of the flags that one field of a reading reports.
 struct Flags {
-  const FieldInfo* field;                      ///< Field that defines the names of the bits; null: none.
-  std::uint32_t bits;                          ///< Bits of raised flags.
-  std::uint32_t reported = ~std::uint32_t{0};  ///< Bits of reported flags; the state of the others is unknown.
+  const FieldInfo* field;  ///< Field that defines the names of the bits; null: the unit has no such field.
+  std::uint32_t bits;      ///< Bits of the flags that are raised.
+  /// Bits of the flags that were reported; the state of the other flags is unknown.
+  std::uint32_t reported = ~std::uint32_t{0};
 
-  /// Returns whether each flag of this encoder was reported.
+  /// Returns whether each flag of the field was reported.
   [[nodiscard]] bool is_complete() const;
 
-  /// Compares field and bits.
+  /// Returns whether field, raised bits and reported bits are equal.
   friend bool operator==(const Flags&, const Flags&) = default;
 };
 
-/// Returns the alarms of each channel; empty if the unit has no such field.
+/// Returns the alarms of a reading, one entry for each channel; empty if the unit has no alarms.
 [[nodiscard]] std::vector<Flags> alarms_of(const Unit& unit, const Reading& reading);
-/// Returns the flags of the status of a reading, one entry for each field.
+/// Returns the status flags of a reading, one entry for each field; empty if the unit has no status.
 [[nodiscard]] std::vector<Flags> status_of(const Unit& unit, const Reading& reading);
 
-/// Returns status and alarms, channel by channel.
+/// Returns the flags of a reading: status and alarms of the first channel, then those of the second.
 [[nodiscard]] std::vector<Flags> flags_of(const Unit& unit, const Reading& reading);
 
-/// Returns the joined alarms of all channels: raised if one channel raises them, reported if every channel reports
+/// Returns the alarms of all channels joined: raised if one channel raises them, reported if every channel reports
 /// them. Returns nothing if the unit has no alarms.
 [[nodiscard]] std::optional<Flags> joined_alarms(const Unit& unit, const Reading& reading);
 
-/// Returns the reading; if its position was not confirmed by a second one, the validity of the position becomes
-/// unknown.
+/// Returns the reading. If `confirmed` is false, no second reading confirmed its position, so the validity of the
+/// position becomes unknown.
 [[nodiscard]] Reading checked(Reading reading, bool confirmed);
 
 }  // namespace absenc::client

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The columns of a reading, which rows of samples and rows of captures share.
+// The columns of a reading, which rows of samples and rows of captures have in common.
 #pragma once
 
 #include <span>
@@ -9,17 +9,18 @@
 
 namespace absenc::client {
 
-/// Columns of position, turns and flags. A unit with two channels has flag columns for each channel, and `alarms` with
-/// the alarms of either.
+/// The columns of position, turns and flags. A unit with two channels has columns of flags for each channel, and
+/// `alarms` with the alarms of both.
 class ReadingColumns {
  public:
-  /// Makes the columns of a unit. `unit` must outlive this object.
+  /// Makes the columns for the unit with these options. `unit` must outlive this object.
   ReadingColumns(const Unit& unit, const Options& options);
 
-  /// Returns the columns of each row, in their order.
+  /// Returns the columns, in the order in which `fill` writes their values.
   [[nodiscard]] std::span<const Column> columns() const { return columns_; }
-  /// Fills one value into each column. A value that the reading does not carry stays empty. An invalid position in
-  /// degrees or millimetres becomes `Invalid`, flags that no reply has reported become `Unknown`.
+  /// Writes the reading into `values`, one value for each column. A value that the reading does not have stays empty.
+  /// An invalid position in degrees or millimetres becomes `Invalid`; flags that no reply has reported become
+  /// `Unknown`.
   void fill(const Reading& reading, std::span<Value> values) const;
 
  private:

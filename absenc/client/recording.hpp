@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes long recordings: files with a header and a row for each reading, failure and gap. Each text line is written by
-// one system call, so that a killed process loses none; HDF5 rows are written within a second.
+// Writes long recordings: files with a header and a row for each reading, failure and gap. Each line of text is written
+// by one system call, so that a killed process loses none; HDF5 rows are written within a second.
 #pragma once
 
 #include <cstdint>
@@ -15,21 +15,23 @@
 
 namespace absenc::client {
 
-/// File, rate, and length of a recording.
+/// File, rate, and length of a recording, and the limits of its parts.
 struct RecordingSettings {
-  /// Path that ends in .csv, .jsonl or .ndjson (JSON lines), or .h5 (HDF5). The file must not exist yet.
+  /// Path of the file, which ends in .csv, .jsonl or .ndjson (JSON lines), or .h5 (HDF5). The file must not exist yet.
   std::string path;
-  std::string encoder;      ///< Name of the encoder in the header.
-  double rate_hz = 100;     ///< Intended number of readings per second; 0: as many as possible.
-  std::uint64_t every = 1;  ///< Writes every Nth reading, and each reading whose alarms differ from those before.
-  std::uint64_t count = 0;  ///< Number of written readings after which the recording ends; 0: no limit.
-  std::optional<Time> duration{};             ///< Duration after which the recording ends.
-  std::optional<std::uint64_t> part_bytes{};  ///< Size in bytes after which the next part begins.
-  std::optional<Time> part_time{};            ///< Time after which the next part begins.
+  std::string encoder;   ///< Name of the encoder, as the header of the file shows it.
+  double rate_hz = 100;  ///< Intended number of readings per second; 0: as many as possible.
+  /// Which readings are written: every Nth, and each whose alarms differ from the reading before.
+  std::uint64_t every = 1;
+  std::uint64_t count = 0;         ///< Number of written readings after which the recording ends; 0: no limit.
+  std::optional<Time> duration{};  ///< Time after which the recording ends; without a value: no limit.
+  /// Size in bytes after which the next part begins; without a value: no limit.
+  std::optional<std::uint64_t> part_bytes{};
+  std::optional<Time> part_time{};  ///< Time after which the next part begins; without a value: no limit.
 };
 
-/// A recording in progress. With parts, the files are NAME-0001.csv, NAME-0002.csv and so on; each has the header and
-/// can be read alone.
+/// A recording in progress. With a limit of the parts, the files are NAME-0001.csv, NAME-0002.csv and so on; each has
+/// the header and can be read alone.
 class Recording {
  public:
   /// Creates the first file, for readings of `encoder`, which must outlive this object. Throws UsageError, and
@@ -39,20 +41,20 @@ class Recording {
 
   /// Reads and writes until the settings, Encoder::cancel, end_when or an interrupt end the recording; then flushes to
   /// the disk. Calls `on_written` with each sample after its row was written. If the port is lost, waits until it is
-  /// back. Writes rows for loss and return of the port and for readings that were due but not taken. Returns whether
-  /// the last sample was a reading. Throws os::Failure from the disk, with kind `lost` if the file was removed or
-  /// replaced; UsageError, Failure.
+  /// open again. Also writes rows for loss and return of the port and for readings that were due but not taken. Returns
+  /// whether the last sample was a reading. Throws UsageError, Failure, and os::Failure from the disk, with kind `lost`
+  /// if the file was removed or replaced.
   bool run(const std::function<void(const Sample&)>& on_written = {});
 
-  /// Returns the counts of the rows in the files.
+  /// Returns the counts of the rows in all files.
   [[nodiscard]] RecordCounts counts() const;
-  /// Returns the number of bytes written so far.
+  /// Returns the number of bytes that were written to all files so far.
   [[nodiscard]] std::uint64_t bytes() const;
-  /// Returns when the recording began, in time of os::now.
+  /// Returns the time at which the recording began, by os::now.
   [[nodiscard]] Time start() const;
-  /// Returns the path of the file, or those of its parts so far in their order.
+  /// Returns the path of the file, or the paths of the parts so far, in their order.
   [[nodiscard]] std::vector<std::string> paths() const;
-  /// Returns "log.csv", or "log-0001.csv to log-0003.csv".
+  /// Returns the names of the files as text: "log.csv", or "log-0001.csv to log-0003.csv".
   [[nodiscard]] std::string names() const;
 
  private:

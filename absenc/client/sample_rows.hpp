@@ -19,19 +19,20 @@ namespace absenc::client {
 /// failure or event of a row without a reading.
 class SampleRows {
  public:
-  /// Whether rows also hold the motion that is computed from readings.
+  /// Whether rows also have the columns of the motion, which is computed from several readings.
   enum class With : std::uint8_t { reading, motion };
 
-  /// Makes the columns. `time_s` counts from `start`, a time of os::now. With `joint` the rows also have its angles:
-  /// `joint_deg` or `joint_mm`, with motion `joint_speed_...` and its uncertainty, and `electrical_deg`.
+  /// Makes the columns. `time_s` is the time since `start`, a time of os::now. With settings in `joint` the rows also
+  /// have its angles: `joint_deg` or `joint_mm`, with motion `joint_speed_...` and its uncertainty, and
+  /// `electrical_deg`.
   SampleRows(const Unit& unit, const Options& options, Time start, With with, const Joint& joint = {});
 
   /// Returns the columns of each row, in their order.
   [[nodiscard]] std::span<const Column> columns() const { return columns_; }
-  /// Returns the row of a sample. It is valid until the next call.
+  /// Returns the row of a sample. The row is valid until the next call.
   [[nodiscard]] const Row& of(const Sample& sample);
-  /// Returns the row of a gap in which `missed` readings were due but not taken. Only for rows with motion. It is valid
-  /// until the next call.
+  /// Returns the row of a gap at the time `at`, in which `missed` readings were due but not taken. Only for rows with
+  /// motion. The row is valid until the next call.
   [[nodiscard]] const Row& of_gap(Time at, std::uint64_t missed);
 
  private:
@@ -43,17 +44,17 @@ class SampleRows {
   void fill_angles(const Sample& sample);
 
   const Unit* unit_;
-  double unit_um_;  // Length of a count of a linear encoder, in micrometres; 0: rotary.
+  double unit_um_;  // length of one count of a linear encoder, in micrometres; 0: the encoder is rotary
   Time start_;
   With with_;
   Joint joint_;
   ReadingColumns reading_;
   std::vector<Column> columns_;
-  // Indexes of columns in a row; 0: the rows do not have the column.
+  // Index of each column in a row; 0 for a column that these rows do not have.
   std::size_t protocol_, reading_at_, confirmed_, ok_;
-  std::size_t motion_ = 0;  // index of the first motion column
+  std::size_t motion_ = 0;  // index of the first motion column; 0: no such columns
   std::size_t missed_ = 0;
-  std::size_t angles_ = 0;  // index of the first joint-angle column
+  std::size_t angles_ = 0;  // index of the first joint-angle column; 0: no such columns
   std::size_t event_, message_, sent_, received_;
   Row row_;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Settings of an encoder: read by name, written, and read back.
+// Settings of an encoder, which are read by name, written, and read back.
 #pragma once
 
 #include <cstdint>
@@ -14,52 +14,54 @@
 
 namespace absenc::client {
 
-/// The commands that write and read a setting.
+/// A setting, as the commands that write and read it.
 struct Setting {
-  const Command* setter;  ///< Command that writes the setting; null: read only.
-  const Command* getter;  ///< Command that reads the setting; null: write only.
+  const Command* setter;  ///< Command that writes the setting; null: the setting can only be read.
+  const Command* getter;  ///< Command that reads the setting; null: the setting can only be written.
 
-  /// Returns the name of the setting.
+  /// Returns the name of the setting, which is the name of its command.
   [[nodiscard]] std::string_view name() const { return getter != nullptr ? getter->name : setter->name; }
 };
 
-/// Returns the commands that read identity and settings of an encoder without arguments, in the order for a report.
+/// Returns the unit's commands that read identity, temperature and settings and need no arguments, in the order for a
+/// report.
 [[nodiscard]] std::vector<const Command*> questions(const Unit& unit);
-/// Returns those of these commands that exist with the options.
+/// Returns those of the unit's commands for identity, temperature and settings that exist with these options.
 [[nodiscard]] std::vector<const Command*> questions(const Unit& unit, const Options& options);
 
-/// Returns the settings that can be read, at least one. Throws UsageError if there are none.
+/// Returns the commands that read the unit's settings, at least one. Throws UsageError if there are none.
 [[nodiscard]] std::vector<const Command*> readable_settings(const Unit& unit);
-/// Returns the command that reads the setting. Throws UsageError, which suggests the nearest name, if the setting does
-/// not exist or cannot be read.
+/// Returns the command that reads the setting `name`. Throws UsageError if there is no such setting that can be read;
+/// it suggests the nearest name.
 [[nodiscard]] const Command& require_readable_setting(const Unit& unit, std::string_view name);
-/// Returns the setting. Throws UsageError, which suggests the nearest name, if the setting does not exist or is read
-/// only.
+/// Returns the setting `name`, which can be written. Throws UsageError if the setting can only be read, or if there is
+/// none of this name; only then it suggests the nearest name.
 [[nodiscard]] Setting require_setting(const Unit& unit, std::string_view name);
 
-/// A setting with its values before and after.
+/// Result of writing a setting.
 struct SettingChange {
-  Answer now;           ///< Value that was read back; for a setting that cannot be read, the written value.
-  bool was_so = false;  ///< Nothing was sent, because the encoder had this value already.
-  ChangeState state = ChangeState::none;  ///< State of the change; not_sent if the encoder had this value already.
-  /// A sentence about a new address, "from now on it is reached with address=3", or "".
+  Answer now;           ///< Value of the setting that was read back; if the setting cannot be read, the written value.
+  bool was_so = false;  ///< Whether nothing was sent, because the encoder already had this value.
+  ChangeState state = ChangeState::none;  ///< State of the change; not_sent if the encoder already had this value.
+  /// A sentence about a new address of the encoder, "from now on it is reached with address=3"; "": the address is
+  /// unchanged.
   std::string note{};
 };
 
 class Encoder;
 
-/// The settings of an open encoder, from Encoder::settings. Functions throw EncoderFailure if a command fails,
-/// UsageError, and exceptions of the port.
+/// Access to the settings of an open encoder, from Encoder::settings. Functions throw UsageError, EncoderFailure if a
+/// command fails, and exceptions of the port.
 class Settings {
  public:
   /// Reads and writes the settings of `encoder`, which must outlive this object.
   explicit Settings(Encoder& encoder) : encoder_(&encoder) {}
 
-  /// Returns the value of a setting.
+  /// Reads the setting `name` and returns its value.
   [[nodiscard]] Answer get(std::string_view name);
-  /// Writes a setting without confirmation by the user, reads it back and compares value by value. If the setting
-  /// changes how the encoder is reached, the connection uses the new value. Also throws Failure, whose text states what
-  /// was written, as far as it is known.
+  /// Writes the setting `name` without asking the user for confirmation, reads it back, compares all values, and
+  /// returns the result. If the setting changes how the encoder is reached, the connection uses the new value from then
+  /// on. Also throws Failure, whose text states what was written, as far as it is known.
   SettingChange set(std::string_view name, std::span<const std::int64_t> arguments);
 
  private:

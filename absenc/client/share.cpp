@@ -8,10 +8,11 @@ namespace absenc::client {
 
 namespace {
 
-// Returns an end of Wilson's score interval, which is right also for shares of 0 and 1. `side`: -1 lower, 1 upper.
+// Returns one end of Wilson's score interval, which also holds for shares of 0 and 1. `side`: -1 for the lower end, 1
+// for the upper.
 double wilson(const Share& share, double side) {
   if (share.of == 0) return side > 0 ? 1 : 0;
-  if (share.count == 0 && side < 0) return 0;  // exact, without rounding errors
+  if (share.count == 0 && side < 0) return 0;  // exactly 0, without rounding errors
   constexpr double z = 1.96;
   const auto n = static_cast<double>(share.of);
   const double p = share.rate();

@@ -14,20 +14,21 @@
 
 namespace absenc::client {
 
-/// The protocol and the options with which `tap` decodes.
+/// Settings of a tap: protocol and options for decoding, duration, and file of the record.
 struct TapChoices {
-  std::string protocol{};              ///< Identifier of the unit; "": detected from the received bytes.
-  std::string model{};                 ///< Name of a model of the unit; empty: none.
+  std::string protocol{};  ///< Identifier of the protocol's unit; "": the protocol is detected from the received bytes.
+  std::string model{};     ///< Name of a model of the unit; empty: the default model.
   std::vector<std::string> options{};  ///< Options of the unit, as "name=value".
-  Time duration{};                     ///< Time after which the tap ends; 0: at `cancel`, or at the end of the input.
-  /// File to which all frames are written, in a format that `decode` reads; "": none.
+  Time duration{};  ///< Time after which the tap ends; 0: it ends at `cancel`, or at the end of the input.
+  /// File to which all received frames are written, in a format that `decode` reads; "": no file.
   std::string record{};
-  bool replaces = false;  ///< Whether an existing file of `record` may be replaced.
+  bool replaces = false;  ///< Whether an existing file `record` may be replaced.
 };
 
-/// An input range of rows, with the columns of `Decoded`, ordered by the end of their frames and available as soon as
-/// the frame is complete. Bytes that arrive between two calls are stored. `time_s` is the time of arrival at this
-/// computer since the first byte. It is too coarse for the latency of an encoder, so `turnaround_us` is empty.
+/// An input range of rows with the columns of `Decoded`, one for each exchange on the line. Rows are ordered by the end
+/// of their frames and available as soon as their last frame is complete. Bytes that arrive between two calls are
+/// stored. `time_s` is the time of arrival at this computer since the first byte, which is too coarse for the latency
+/// of an encoder, so `turnaround_us` is empty.
 class Tap {
  public:
   /// Type of the items.
@@ -35,9 +36,9 @@ class Tap {
   /// Iterator of the range.
   using Iterator = InputIterator<Tap>;
 
-  /// Opens `place`, a port with its settings ("/dev/ttyUSB0?baud=115200", "tcp:HOST:PORT"), or "-" for raw bytes from
-  /// standard input, and waits until protocol and options are known. Writes nothing to a serial port. Throws
-  /// os::Failure, UsageError, and Failure if no protocol explains the received bytes.
+  /// Opens `place` and waits until protocol and options are known. `place` is a port with its settings
+  /// ("/dev/ttyUSB0?baud=115200", "tcp:HOST:PORT"), or "-" for raw bytes from standard input. Writes nothing to a
+  /// serial port. Throws os::Failure, UsageError, and Failure if no protocol explains the received bytes.
   explicit Tap(const std::string& place, const TapChoices& choices = {});
   /// Moves the tap; the other one may only be destroyed or assigned to.
   Tap(Tap&&) noexcept;
@@ -47,18 +48,18 @@ class Tap {
 
   /// Waits for the first row; call it once. Throws os::Failure or Failure, as every later step does.
   [[nodiscard]] Iterator begin();
-  /// Returns the end of the range.
+  /// Returns the end of the range, for comparison with an iterator.
   [[nodiscard]] static Iterator::End end() { return {}; }
   /// Returns the row at the iterator, or null at the end. It is valid until `advance`.
   [[nodiscard]] const Row* current() const { return row_; }
-  /// Waits for the next row.
+  /// Waits until the next row is complete.
   void advance();
   /// Cancels from any thread: a caller that waits for a row, now or later, gets Cancelled.
   void cancel();
 
-  /// Returns the identifier of the unit.
+  /// Returns the identifier of the unit with which the tap decodes.
   [[nodiscard]] std::string_view protocol() const;
-  /// Returns the shortest list of settings that yields the options, as "name=value".
+  /// Returns the options with which the tap decodes, as the shortest list of settings, each "name=value".
   [[nodiscard]] std::vector<std::string> options() const;
   /// Returns the columns of each row, in their order.
   [[nodiscard]] std::span<const Column> columns() const;

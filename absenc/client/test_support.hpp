@@ -10,7 +10,7 @@
 
 namespace absenc::client {
 
-/// Returns a path of a temporary file that no other test uses.
+/// Returns a path for a temporary file that no other test uses.
 inline std::string own_path(std::string_view what) {
   return testing::TempDir() + "absenc-client-" + std::string(what) + std::to_string(std::random_device{}());
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Description of a failed command, in words and with the bytes on the line.
+// Description of a failed command or reading, in words and with the bytes on the line.
 #pragma once
 
 #include <string>
@@ -12,35 +12,36 @@
 
 namespace absenc::client {
 
-/// A failed command in words. Every text may be empty.
+/// A failed command or reading in words. Every text may be empty.
 struct Trouble {
-  Error error = Error::none;  ///< Why the conversation failed.
-  std::string message{};      ///< What happened, and how the reply was identified.
-  std::string exchange{};     ///< Request and reply with their times.
-  std::string advice{};       ///< What the user can try.
-  std::string sent{};         ///< The sent bytes, as the link's wire text.
-  std::string received{};     ///< The received bytes in hexadecimal; empty: none.
-  Change change{};            ///< State of the change; only of a command that changes the encoder.
-  /// Finding of client/doctor.hpp that a failed reading looks like, "only_echo: ..."; "": none.
+  Error error = Error::none;  ///< Kind of the error.
+  std::string message{};      ///< What happened, and what the received bytes are taken for, as a sentence.
+  std::string exchange{};     ///< Request and reply with their times, as text for people.
+  std::string advice{};       ///< What the user can try; "": no advice.
+  std::string sent{};         ///< Bytes or frames that were sent, as text.
+  std::string received{};     ///< Bytes or frames that were received, as text; "": none were received.
+  Change change{};            ///< State of the change if the command changes the encoder; otherwise `none`.
+  /// Finding of client/doctor.hpp that the failed reading suggests, "only_echo: ..."; "": none.
   std::string finding{};
 
-  /// Returns the texts without the finding and without a last line end. May have several lines.
+  /// Returns error, message, exchange, advice and change as text of several lines, without the finding and without a
+  /// last line end.
   [[nodiscard]] std::string text() const;
 };
 
-/// A stored bad exchange.
+/// A failed exchange that was stored for later inspection.
 struct BadExchangeText {
-  Error error = Error::none;  ///< Why the exchange failed.
+  Error error = Error::none;  ///< Kind of the error.
   Time at{};                  ///< Time of the exchange, on the clock of the readings.
-  std::string sent{};         ///< The sent bytes, as the link's wire text.
-  std::string received{};     ///< The received bytes in hexadecimal; empty: none.
+  std::string sent{};         ///< Bytes or frames that were sent, as text.
+  std::string received{};     ///< Bytes or frames that were received, as text; "": none were received.
 };
 
-/// A command that failed, or a reading that failed.
+/// Exception for a failed command or reading.
 struct EncoderFailure : Failure {
-  /// Makes an exception with the text of `what_failed`.
+  /// Makes an exception whose text is that of `what_failed`.
   explicit EncoderFailure(Trouble what_failed) : Failure(what_failed.text()), trouble(std::move(what_failed)) {}
-  Trouble trouble;  ///< What failed, with the evidence.
+  Trouble trouble;  ///< Description of the failure, with the evidence.
 };
 
 }  // namespace absenc::client

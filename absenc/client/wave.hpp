@@ -13,29 +13,32 @@
 
 namespace absenc::client {
 
-/// Commands that `wave` draws, and how often.
+/// Commands that `draw_wave` draws, how often, and how the file is written.
 struct WaveChoices {
-  /// Commands with their arguments, as "memory-read 5", drawn in this order; empty: readings.
+  /// Commands with their arguments, as "memory-read 5", drawn in this order; empty: the command that reads the
+  /// position.
   std::vector<std::string> commands{};
-  std::uint64_t count = 1;               ///< Number of results, at least 1.
-  double rate = 1000;                    ///< Results per second; fewer if the line is slower.
-  std::uint64_t samples_per_second = 0;  ///< Sample rate of .sr files, up to 1e9; 0: 16 samples per bit of the line.
-  bool replaces = false;                 ///< Whether an existing file may be replaced.
-  /// Called from time to time with the present step. An exception of it ends the drawing and leaves no file.
+  std::uint64_t count = 1;  ///< Number of results to draw, at least 1.
+  double rate = 1000;       ///< Number of results per second; the waveform has fewer if the line is slower.
+  /// Number of samples per second in .sr files, up to 1e9; 0: 16 samples per bit of the line.
+  std::uint64_t samples_per_second = 0;
+  bool replaces = false;  ///< Whether an existing file of this name may be replaced.
+  /// Called from time to time with the present step of the work. An exception of the callback ends the drawing and
+  /// leaves no file.
   std::function<void(const std::string& what)> progress{};
 };
 
-/// Result of `wave`.
+/// Result of `draw_wave`.
 struct Waved {
-  std::uint64_t results = 0;         ///< Number of results that were drawn, failures included.
-  std::uint64_t failures = 0;        ///< Number of results that are failures.
-  Time time{};                       ///< Duration of the whole waveform.
-  std::vector<std::string> wires{};  ///< Names of the wires in the file.
+  std::uint64_t results = 0;         ///< Number of results that were drawn, including failures.
+  std::uint64_t failures = 0;        ///< Number of drawn results that are failures.
+  Time time{};                       ///< Duration of the whole waveform, in virtual time.
+  std::vector<std::string> wires{};  ///< Names of the wires that the file contains.
 };
 
-/// Draws a waveform into `file`, whose name ends in .vcd, .sr (sigrok) or .csv (like Saleae Logic 2). `text` is
-/// "tformat?motion=rpm=60", with or without a leading "sim:"; `settings` are those of `open`. Throws UsageError,
-/// Failure, os::Failure.
+/// Draws a waveform into `file`, whose name ends in .vcd, .sr (sigrok) or .csv (like Saleae Logic 2), and returns what
+/// was drawn. `text` is "tformat?motion=rpm=60", with or without a leading "sim:"; `settings` are those of `open`.
+/// Throws UsageError, Failure, os::Failure.
 [[nodiscard]] Waved draw_wave(std::string_view text, std::span<const std::string> settings, const std::string& file,
                               const WaveChoices& choices = {});
 

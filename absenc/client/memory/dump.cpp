@@ -19,7 +19,7 @@ namespace {
 constexpr std::string_view checksum_name = "checksum: ";
 constexpr std::string_view edited = "edited";
 
-/// Computes the CRC-16/IBM-3740 of the lines that are not ignored, each with one line feed.
+/// The checksum of a dump: the CRC-16/IBM-3740 of the lines that are not ignored, each with one line feed.
 class Checksum {
  public:
   void add(std::string_view line) {
@@ -36,7 +36,7 @@ class Checksum {
 
 std::string_view model_name(const Options& options) { return options.model != nullptr ? options.model->name : "none"; }
 
-// Header lines that must match the encoder: protocol and model, or the options if no model matches.
+// Returns the header lines that must match the encoder: protocol and model, or the options if no model matches.
 std::vector<std::string> header(const Unit& unit, const Options& options) {
   std::vector<std::string> lines{fmt::format("protocol: {}", unit.id), fmt::format("model: {}", model_name(options))};
   if (options.model != nullptr) return lines;
@@ -102,7 +102,8 @@ class DumpParser {
     sum_.add(lines_.line);
   }
 
-  // Removes "name NUMBER" and the character after it from the front of `text`, and returns the number.
+  // Removes `name`, a number and the character `behind` from the front of `text`, and returns the number; nothing if
+  // `text` does not begin so.
   static std::optional<std::uint32_t> take(std::string_view& text, std::string_view name, char behind) {
     if (!text.starts_with(name) || text.substr(name.size()).find(behind) == std::string_view::npos) return std::nullopt;
     const std::string_view number = text.substr(name.size(), text.find(behind, name.size()) - name.size());
@@ -160,7 +161,7 @@ class DumpParser {
   MemoryAccess access_;
   Checksum sum_;
   Dump dump_;
-  std::map<MemoryAddress, std::size_t> given_in_;  // the line in which each address was given
+  std::map<MemoryAddress, std::size_t> given_in_;  // for each address, the number of the line that gave its byte
 };
 
 }  // namespace

@@ -11,14 +11,14 @@ namespace absenc::client {
 
 struct Dump {
   MemoryImage image;
-  // Whether the dump is known to be complete: its checksum is right, or is "edited".
+  // Whether the dump is known to be complete: it has a checksum line, which is right or states "edited".
   bool checked = false;
 };
 
 [[nodiscard]] std::string to_dump(const Unit& unit, const Options& options, const MemoryImage& image);
 
-/// Parses a dump. `name` is for messages. Throws Failure for a text that is damaged, is from another kind of encoder,
-/// or has addresses that do not permit `access`.
+/// Parses a dump and returns it. `name` is the file's name in messages. Throws Failure if the text is damaged, is from
+/// another kind of encoder, or has addresses that do not permit `access`.
 [[nodiscard]] Dump parse_dump(const std::string& name, std::string_view text, const Unit& unit, const Options& options,
                               MemoryAccess access);
 

@@ -23,7 +23,7 @@ std::string replaced(std::string text, std::string_view from, std::string_view t
   return text.replace(at, from.size(), to);
 }
 
-/// Returns the error for a text that must be refused.
+/// Returns the text of the error for a dump that must be refused.
 std::string refusal(std::string_view text, MemoryAccess access = MemoryAccess::write) {
   try {
     static_cast<void>(parse_dump("file", text, unit, options_of("TS5700N8500"), access));
@@ -113,7 +113,7 @@ TEST(DumpFile, ChecksumCountsOnlyWhatCounts) {
 }
 
 TEST(DumpFile, ChecksumIsTheDocumentedOne) {
-  // CRC-16/IBM-3740 of the four lines, computed with another program.
+  // The checksum is the CRC-16/IBM-3740 of these four lines, computed with another program.
   const std::string text = to_dump(unit, options_of("TS5700N8500"), {{{0, 5}, 0x5A}, {{0, 6}, 0x5B}});
   EXPECT_TRUE(text.starts_with(small)) << text;
   EXPECT_TRUE(text.ends_with("checksum: DDEB\n")) << text;

@@ -64,7 +64,7 @@ std::string to_text(const Unit& unit, MemoryAddress at) {
 }
 
 std::string addresses_in_words(const Unit& unit, const MemoryImage& image) {
-  std::map<std::uint32_t, std::vector<std::string>> ranges;  // address ranges of each page
+  std::map<std::uint32_t, std::vector<std::string>> ranges;  // address ranges in words, by page
   for (const MemoryRun& run : runs(image)) {
     std::string text = fmt::format("0x{:02X}", run.first.address);
     if (run.bytes.size() > 1) text += fmt::format(" to 0x{:02X}", run.first.address + run.bytes.size() - 1);
@@ -72,7 +72,7 @@ std::string addresses_in_words(const Unit& unit, const MemoryImage& image) {
   }
   std::vector<std::string> pages;
   for (auto page = ranges.begin(); page != ranges.end();) {
-    auto last = page;  // last page of those with the same addresses
+    auto last = page;  // last of the consecutive pages that have the same addresses
     auto after = std::next(page);
     while (after != ranges.end() && after->first == last->first + 1 && after->second == page->second) last = after++;
     std::string text = fmt::format("{}", fmt::join(page->second, ", "));

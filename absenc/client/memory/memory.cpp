@@ -13,7 +13,7 @@ namespace absenc::client {
 
 namespace {
 
-/// Collects the values that memory_read reports.
+/// Collects the bytes that a command with Verb::memory_read reports.
 struct ReadBytes final : FieldSink {
   void put(const FieldValue& field) override {
     if (field.info->role == Role::data) data.assign(field.bytes.begin(), field.bytes.end());
@@ -22,7 +22,7 @@ struct ReadBytes final : FieldSink {
   std::vector<std::uint8_t> data;
 };
 
-// Returns the number of bytes of a run that one request can read.
+// Returns how many bytes from `at` on a single request can read.
 std::size_t most_at_once(const Unit& unit, const Command& command, MemoryAddress at) {
   const Argument* count = find_role(command.arguments, Role::count);
   const auto most = count != nullptr ? static_cast<std::size_t>(count->maximum) : 1;

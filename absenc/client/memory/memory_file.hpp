@@ -13,15 +13,15 @@ namespace absenc::client {
 
 class MemoryFile {
  public:
-  /// `path` may be a symbolic link. The constructor opens nothing.
+  /// Takes the path, which may be a symbolic link; opens nothing.
   MemoryFile(const std::string& path, std::string_view protocol, std::string_view model);
 
-  /// Fills `memory` from the file, or creates the file from `memory` if there is none. The file is then locked. Throws
-  /// Failure, and changes neither, if the file is of another kind, damaged, of another model or size, locked by another
-  /// emulator, or not writable.
+  /// Fills `memory` from the file, or creates the file from `memory` if there is none, and locks the file. Throws
+  /// Failure, and changes neither memory nor file, if the file is of another kind, damaged, of another model or size,
+  /// locked by another emulator, or not writable.
   void load(MutableBytes memory);
 
-  /// Replaces the loaded file atomically. Throws Failure.
+  /// Replaces the content of the loaded file atomically. Throws Failure.
   void save(Bytes memory, os::Durable durable);
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Saves the memory of a virtual encoder before its reply confirms a change.
+// Saves the memory of a virtual encoder to a file before the encoder's reply confirms a change.
 #pragma once
 
 #include "absenc/client/memory/memory_file.hpp"
@@ -7,12 +7,12 @@
 
 namespace absenc::client {
 
-/// Every change that a reply confirms is in the file, even if this process is killed. If saving fails, `next` throws
-/// Failure and the encoder sends no reply.
+/// A machine in front of a virtual encoder. Every change that a reply confirms is in the file, even if this process is
+/// killed. If saving fails, `next` throws Failure and the encoder sends no reply.
 template <class Item>
 class MemorySaver final : public Machine<Item> {
  public:
-  /// `line` is the device, or a machine in front of it.
+  /// Takes the machine on the line: `device` itself, or a machine in front of it.
   MemorySaver(Machine<Item>& line, Device<Item>& device, MemoryFile& file)
       : line_(&line), device_(&device), file_(&file), saved_(device.memory_version()), finished_(saved_) {}
 
@@ -20,12 +20,11 @@ class MemorySaver final : public Machine<Item> {
 
   Step<Item> next(Time now) override {
     const Step<Item> step = line_->next(now);
-    if (saved_ != device_->memory_version())
-      save(os::Durable::no);  // does not wait for the disk, which would delay the reply
+    if (saved_ != device_->memory_version()) save(os::Durable::no);  // waiting for the disk would delay the reply
     return step;
   }
 
-  /// Saves the memory and waits for the disk. Throws Failure.
+  /// Saves the memory and waits until it is on the disk. Throws Failure.
   void finish() {
     if (finished_ != device_->memory_version()) save(os::Durable::yes);
     finished_ = saved_;

@@ -20,7 +20,8 @@ namespace absenc::client {
 
 namespace {
 
-// Returns the suffix of a wire setting after its name: "", "_us" or "_active".
+// Applies a setting of a pulse wire. `what` is the end of the setting's name: "" for the wire, "_us" for the width of
+// the pulse, "_active" for its level.
 void set_pulse_wire(os::PulseWire& wire, std::string_view what, const OptionText& setting) {
   using Kind = os::PulseWire::Kind;
   constexpr std::string_view gpio = "gpio:";
@@ -39,7 +40,8 @@ void set_pulse_wire(os::PulseWire& wire, std::string_view what, const OptionText
   }
 }
 
-// Returns whether a command can be run repeatedly.
+// Returns the command, which can be run again and again. Throws UsageError if it changes the encoder or takes
+// arguments.
 const Command& reading_command(const Unit& unit, std::string_view name) {
   const Command& command = require_command(unit, name);
   if (command.changes_encoder || !command.arguments.empty()) {
@@ -121,7 +123,7 @@ bool allowed(const LinkParameter& parameter, PortKind place) {
   }
 }
 
-// Refuses a speed limit in the wrong unit, which would be ignored.
+// Refuses a speed limit of the wrong kind (rpm or mm/s), which would be ignored.
 void check_speed_limit(const EncoderAddress& uri) {
   const bool linear = uri.unit->resolution(uri.options).unit_um > 0;
   if (linear && uri.maximum_rpm != 0) {
@@ -132,7 +134,8 @@ void check_speed_limit(const EncoderAddress& uri) {
   }
 }
 
-// Takes the link parameters. The others are options of the unit, including its rate if its conversations depend on it.
+// Applies all settings: link parameters to the link, the others as options of the unit. The rate is an option if the
+// unit's conversations depend on it.
 void take_settings(EncoderAddress& uri, std::span<const OptionText> settings) {
   std::vector<OptionText> options;
   std::vector<OptionText> of_link;
@@ -179,7 +182,7 @@ std::string examples(const Unit& unit) {
   return fmt::format("{0}:spi:{1} or sim:{0}", unit.id, first(os::spi_devices(), "/dev/spidev0.0"));
 }
 
-// Checks that the place can carry the unit's kind of line.
+// Checks that the port can carry the unit's kind of line. Throws UsageError if not.
 void check_place(const EncoderAddress& uri, std::string_view address) {
   const bool is_can = uri.port_kind == PortKind::can || uri.port_kind == PortKind::slcan;
   const bool fits = is_can                           ? uri.unit->link == LinkKind::can
@@ -197,7 +200,7 @@ void check_place(const EncoderAddress& uri, std::string_view address) {
 void parse_tcp(EncoderAddress& uri, std::string_view where) {
   const std::size_t colon = where.rfind(':');
   const std::string_view host = where.substr(0, colon);
-  // The last colon precedes the port; the others belong to an IPv6 address.
+  // The last colon precedes the port number; further colons belong to an IPv6 address.
   const bool bare_ipv6 = !host.starts_with('[') && host.find(':') != std::string_view::npos;
   if (colon == std::string_view::npos || host.empty() || bare_ipv6 || (host.starts_with('[') && !host.ends_with(']'))) {
     throw UsageError(
@@ -261,13 +264,13 @@ EncoderAddress parse_place(std::string_view address) {
   return uri;
 }
 
-// Returns whether the text may be a name of absenc.toml: without ':' and '/', and not a protocol.
+// Returns whether the text may be a name of absenc.toml: it has no ':' or '/' and is no protocol.
 bool is_name(std::string_view address) {
   return !address.empty() && address.find_first_of(":/") == std::string_view::npos && address != "sim" &&
          find_unit(address) == nullptr;
 }
 
-// A name in absenc.toml has priority over that of a port.
+// Returns whether absenc.toml has an encoder of this name, which then has priority over a port of the same name.
 bool is_in_settings_file(std::string_view name) {
   const std::optional<SettingsFile> file = load_settings_file();
   return file && std::any_of(file->encoders.begin(), file->encoders.end(),
@@ -294,7 +297,8 @@ void require_once(std::span<const OptionText> settings) {
   }
 }
 
-// Applies settings in order, so that an error names the last wrong one. A virtual encoder needs all options first.
+// Applies settings up to the last one, so that an error is caused by the last. A virtual encoder needs all options
+// first.
 void try_settings(EncoderAddress uri, std::span<const OptionText> settings) {
   take_settings(uri, settings);
   const bool options_are_set = find_link_parameter(settings.back().name) != nullptr;
@@ -308,7 +312,7 @@ EncoderAddress parse_named(std::string_view name, std::span<const OptionText> wr
   std::vector<FileSetting> settings = std::move(named.settings);
   std::copy_if(named.defaults.begin(), named.defaults.end(), std::back_inserter(settings),
                [&](const FileSetting& setting) { return fits(uri, setting.name); });
-  // The settings of a virtual encoder depend on its options, so the options are applied first.
+  // Applies options first, because the settings of a virtual encoder depend on its options.
   std::stable_partition(settings.begin(), settings.end(),
                         [](const FileSetting& setting) { return find_link_parameter(setting.name) == nullptr; });
   std::vector<OptionText> all;

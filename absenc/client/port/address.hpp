@@ -31,7 +31,7 @@ struct LinkParameter {
   std::string_view name;
   std::string_view value;
   std::string_view meaning;
-  std::string_view port_kinds;  // places for which it is allowed, by the names of `port_kind_names`
+  std::string_view port_kinds;  // kinds of ports that can have the setting, as names of `port_kind_names`
   bool repeatable = false;
 };
 
@@ -81,8 +81,8 @@ inline constexpr std::array<LinkParameter, 30> link_parameters{{
     {"seed", "N", "another series of faults", "sim"},
 }};
 
-/// Returns the option that a setting of this name sets; null if none. If the unit has an option for the rate, because
-/// its silences are measured in characters, `rate_setting` sets it, whatever its name.
+/// Returns the option that a setting of this name sets; null if there is none. If the unit has an option for the rate,
+/// because its silences are measured in characters, `rate_setting` sets that option, whatever the option's name is.
 [[nodiscard]] const Option* find_option(const Unit& unit, std::string_view name);
 
 /// Returns the link parameter of this name; null if there is none.
@@ -92,8 +92,8 @@ struct EncoderAddress {
   const Unit* unit = nullptr;
   Options options;
   PortKind port_kind = PortKind::serial;
-  std::string path;  // path for serial, spi, slcan; name of the interface for can
-  std::string host;  // host name for tcp
+  std::string path;  // path of the port for serial, spi, slcan; name of the interface for can
+  std::string host;  // name or address of the host; only for tcp
   std::uint16_t port = 0;
 
   LineSettings line;
@@ -101,33 +101,33 @@ struct EncoderAddress {
   os::PulseWires wires;
   std::optional<Time> latency;
   os::SpiChoice spi;
-  std::uint32_t adapter_rate = 115'200;  // slcan: rate of the serial port, not of the bus
-  std::string log;                       // CAN log file; "": none
+  std::uint32_t adapter_rate = 115'200;  // only for slcan: rate of the serial port in bits per second, not of the bus
+  std::string log;                       // path of the CAN log file; "": no log
   host::EchoMode echo = host::EchoMode::off;
-  std::uint32_t maximum_rpm = 0;   // limit in rpm; 0: the model's, or the default
-  std::uint32_t maximum_mm_s = 0;  // limit in mm/s for linear encoders; 0: the default
+  std::uint32_t maximum_rpm = 0;   // speed limit of the shaft in rpm; 0: that of the model, or the default
+  std::uint32_t maximum_mm_s = 0;  // speed limit of a linear encoder in mm/s; 0: the default
   Joint joint;                     // how the encoder is mounted in its drive
-  const Command* reads = nullptr;  // the command for repeated reading; null: the first command with Verb::read
+  const Command* reads = nullptr;  // command for repeated readings; null: the first command with Verb::read
   DeviceSettings device;
-  std::string written;  // the address as the user wrote it, with all settings: "elbow?baud=57600"
+  std::string written;  // address as the user wrote it, with all settings: "elbow?baud=57600"
 };
 
-/// Returns the speed limit of the encoder: the user's, or else that of host::speed_limit.
+/// Returns the speed limit of the encoder: the user's, or else the one of host::speed_limit.
 [[nodiscard]] host::SpeedLimit speed_limit(const EncoderAddress& uri);
 
-/// Returns the port with its settings behind ?, as `absenc identify` takes it, if the text names a port of this
-/// computer or of the network without a protocol; otherwise "".
+/// Returns the port with its settings, as `absenc identify` takes it, if the text names a port of this computer or of
+/// the network without a protocol; otherwise nothing.
 [[nodiscard]] std::optional<std::string> bare_port(std::string_view text);
 
-/// Parses an address. `settings` ("name=value") are appended to the text; both override the settings of absenc.toml.
-/// Throws UsageError, which names the error and the nearest right name.
+/// Parses an address and returns it. `settings` ("name=value") are appended to the text; both override the settings of
+/// absenc.toml. Throws UsageError, which names the error and the nearest right name.
 [[nodiscard]] EncoderAddress parse_address(std::string_view text, std::span<const std::string> settings = {});
 
 class NamedEncoders;
-/// Returns the address of a name in absenc.toml that was read before.
+/// Parses the name of an encoder in `names`, the absenc.toml that was read before, and returns its address.
 [[nodiscard]] EncoderAddress parse_address(std::string_view name, const NamedEncoders& names);
 
-/// Returns the address without its settings: "tformat:/dev/ttyUSB0".
+/// Returns protocol and port of the address, without settings: "tformat:/dev/ttyUSB0".
 [[nodiscard]] std::string address_of(const EncoderAddress& uri);
 
 }  // namespace absenc::client

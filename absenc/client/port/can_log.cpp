@@ -31,7 +31,7 @@ void CanLog::begin(const Step<CanFrame>& step) {
   port_->begin(step);
 }
 
-// Throws Failure, because os::Failure would mean a lost port, for which callers wait.
+// Throws Failure, because callers take os::Failure for a lost port and wait for its return.
 void CanLog::write(const std::string& line) {
   try {
     file_->append(line);

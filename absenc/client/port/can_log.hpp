@@ -11,12 +11,12 @@
 
 namespace absenc::client {
 
-/// Returns a line such as "(1436509052.249713) vcan0 044#2A366C2B".
+/// Returns the line of the log for a frame, such as "(1436509052.249713) vcan0 044#2A366C2B".
 [[nodiscard]] std::string candump_line(Time since_1970, const std::string& interface, const CanFrame& frame);
 
 class CanLog final : public Port<CanFrame> {
  public:
-  /// `owner` keeps `port` alive. `wait` throws Failure if the file cannot be written or was removed.
+  /// Wraps `port`, which `owner` keeps alive. `wait` throws Failure if the file cannot be written or was removed.
   CanLog(Port<CanFrame>& port, std::shared_ptr<void> owner, std::shared_ptr<os::LineFile> file, std::string interface);
 
   Time now() override { return port_->now(); }
@@ -30,7 +30,7 @@ class CanLog final : public Port<CanFrame> {
   std::shared_ptr<void> owner_;
   std::shared_ptr<os::LineFile> file_;
   std::string interface_;
-  Time offset_;  // offset from the port's clock to the time of day
+  Time offset_;  // offset from the clock of the port to the time of day
   std::vector<CanFrame> sending_;
 };
 

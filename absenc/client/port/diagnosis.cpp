@@ -17,7 +17,8 @@ bool is_good(const Unit& unit, const Options& options, const Frame& request, con
 
 std::string bytes_text(std::size_t count) { return fmt::format("{} byte{}", count, count == 1 ? "" : "s"); }
 
-// Returns whether a good reply has an echo before it, or other bytes before or after it.
+// Finds a good reply with the echo of the request before it, or with other bytes before or after it. All texts are
+// empty if there is none.
 Diagnosis surrounded(const Unit& unit, const Options& options, const Frame& request, Bytes reply) {
   const Bytes sent = request.bytes;
   const bool echoed =
@@ -66,7 +67,8 @@ Diagnosis other_settings(const Unit& unit, const Options& options, const Frame& 
   return {};
 }
 
-// On clocked lines and CAN the text counts bits or data bytes.
+// Returns the meaning of an error for this frame, in words. On clocked lines and CAN the text counts bits or data
+// bytes.
 std::string meaning(LinkKind link, Subject subject, Error error) {
   const std::string_view frame = link == LinkKind::clocked || link == LinkKind::can ? "frame"
                                  : subject == Subject::request                      ? "request"
@@ -96,7 +98,7 @@ std::string meaning(LinkKind link, Subject subject, Error error) {
 }  // namespace
 
 Diagnosis diagnose(const Unit& unit, const Options& options, const Frame& request, const Frame& reply) {
-  // The last reply may be good, because a procedure can fail with good replies.
+  // The last reply needs no explanation if it is good: a procedure can fail with good replies.
   if (reply.empty() || is_good(unit, options, request, reply)) return {};
   if (!reply.bytes.empty() && reply.bits == 0) {
     Diagnosis found = surrounded(unit, options, request, reply.bytes);

@@ -10,29 +10,29 @@
 
 namespace absenc::client {
 
-/// The explanation of a bad reply; all texts are empty if none fits.
+/// Explanation of a bad reply; all texts are empty if there is none.
 struct Diagnosis {
-  std::string finding;    // what the reply really is
-  std::string advice;     // what to try
-  std::string setting{};  // "NAME=VALUE", the setting with which the reply would be good
+  std::string finding;    // what the received bytes really are
+  std::string advice;     // what the user can try
+  std::string setting{};  // setting "NAME=VALUE" with which the reply would be good; "": there is none
 };
 
-/// Explains a failed reply: an echo, a good reply with other bytes around it, or a good one of another model or option.
+/// Explains a bad reply: an echo, a good reply with other bytes around it, or a good reply of another model or option.
 [[nodiscard]] Diagnosis diagnose(const Unit& unit, const Options& options, const Frame& request, const Frame& reply);
 
-/// The frame that an error is about.
+/// The frame of an exchange that an error is about.
 enum class Subject : std::uint8_t { request, reply };
 
-/// Returns the frame of an error of `decode`: the reply, or a bad request.
+/// Returns which frame an error of `decode` is about: the reply, or a bad or unanswered request.
 [[nodiscard]] Subject subject_of(const Unit& unit, const Options& options, const Frame& request, const Frame& reply);
 
-/// Returns "<meaning of the error for this frame and line>: <detail>; <finding>", without empty parts, and without the
-/// finding if the detail already names its setting.
+/// Returns the message about an error: "MEANING: DETAIL; FINDING", without empty parts. MEANING is that of the error
+/// for this frame and line. FINDING is left out if the detail already names its setting.
 [[nodiscard]] std::string describe(LinkKind link, Subject subject, Error error, std::string_view detail = {},
                                    const Diagnosis& diagnosis = {});
 
-/// Explains a reply that failed with this error (or a missing reply) in one sentence, with the document's explanation
-/// and what to try.
+/// Returns a sentence that explains a bad or missing reply, with the document's explanation of the error and with
+/// advice.
 [[nodiscard]] std::string sentence_for(const Unit& unit, const Options& options, Error error, const Frame& request,
                                        const Frame& reply);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks the messages about failed exchanges: each fact is stated once.
+// Checks that messages about failed exchanges state each fact only once.
 #include "absenc/client/port/diagnosis.hpp"
 
 #include <gtest/gtest.h>
@@ -33,7 +33,7 @@ Message message_of(const Unit& unit, const Options& options, const ConversationR
   return {describe(unit.link, Subject::reply, ended.error, ended.detail, diagnosis), diagnosis};
 }
 
-/// Returns the clauses that a message repeats. Checksum and CRC count as the same word.
+/// Returns the clauses that a message repeats. "Checksum" and "CRC" are taken for the same word.
 std::set<std::string> repeated_clauses(std::string message) {
   for (std::size_t at = 0; (at = message.find("CRC", at)) != std::string::npos;) message.replace(at, 3, "checksum");
   std::set<std::string> once;
@@ -61,7 +61,7 @@ std::vector<const Unit*> units_of_bytes() {
   return units;
 }
 
-// Encoders set up differently from their host: each choice of each option.
+// Messages about encoders that are set up differently from their host: each choice of each option.
 TEST(Diagnosis, ASettingThatWouldHelpIsNamedOnce) {
   std::set<std::string> named;
   for (const Unit* unit : units_of_bytes()) {
@@ -88,7 +88,7 @@ TEST(Diagnosis, ASettingThatWouldHelpIsNamedOnce) {
   EXPECT_GE(named.size(), 2u);
 }
 
-// A line with each kind of fault.
+// Messages about a line with each kind of fault.
 TEST(Diagnosis, AMessageSaysNothingTwice) {
   unsigned messages = 0;
   for (const Unit* unit : units_of_bytes()) {
@@ -140,7 +140,7 @@ std::string said_of(const Unit& unit, const Options& options, const WireFrame& r
   return error == Error::wrong_length ? sentence_for(unit, options, error, request.frame(), reply.frame()) : "";
 }
 
-// Truncates the good vectors of every unit.
+// Tests requests and replies of the unit's vectors without their last byte or bit.
 TEST(FrameWords, WrongLengthIsSaidOfTheFrameThatHasIt) {
   std::set<LinkKind> links;
   for (const Unit* const unit : all_units()) {

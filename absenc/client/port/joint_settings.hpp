@@ -9,11 +9,12 @@
 
 namespace absenc::client {
 
-/// Applies the setting if it is a joint setting; returns whether it is one. Throws UsageError.
+/// Applies the setting to `joint` if it is a joint setting; otherwise returns false. Throws UsageError for a wrong
+/// value.
 bool set_joint(Joint& joint, const OptionText& setting);
 
-/// Throws UsageError for a setting of linear encoders given to a rotary one, or the reverse, because it would be
-/// ignored.
+/// Checks that settings fit the kind of encoder. Throws UsageError for a setting of linear encoders given to a rotary
+/// one, or the reverse, because it would be ignored.
 void check_joint(std::span<const OptionText> settings, bool is_linear);
 
 }  // namespace absenc::client

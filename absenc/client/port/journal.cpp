@@ -53,7 +53,7 @@ std::string journal_path() {
   constexpr std::string_view name = "changes.tsv";
   if (const std::string folder = of_environment("STATE_DIRECTORY"); !folder.empty())
     return fmt::format("{}/{}", folder, name);
-  // The XDG Base Directory Specification requires to ignore a relative path.
+  // Ignores a relative path, as the XDG Base Directory Specification requires.
   const std::string state = of_environment("XDG_STATE_HOME");
   if (state.starts_with('/')) return fmt::format("{}/absenc/{}", state, name);
   const std::string home = of_environment("HOME");

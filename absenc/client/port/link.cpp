@@ -37,7 +37,8 @@ ExtraWires extra_wires(const EncoderAddress& uri) {
   return uri.unit->extra_wires == nullptr ? ExtraWires{} : uri.unit->extra_wires(uri.options);
 }
 
-// A port that did not exist when its address was parsed may be a pseudo-terminal.
+// Returns the settings of the serial line. A port that did not exist when its address was parsed may be a
+// pseudo-terminal, which needs no rate.
 LineSettings line_of_serial(const EncoderAddress& uri) {
   if (uri.line.rate != 0 || os::is_pseudo_terminal(uri.path)) return uri.line.with_some_rate();
   throw UsageError(
@@ -98,7 +99,7 @@ Link open_spi(const EncoderAddress& uri) {
 
 Link open_can(const EncoderAddress& uri) {
   Link link;
-  link.place = uri.path;  // absenc does not set the bit rate of the interface
+  link.place = uri.path;  // the text names no bit rate, because absenc does not set that of the interface
   take(link, std::make_shared<os::SocketCan>(uri.path, uri.line), uri);
   return link;
 }
@@ -116,8 +117,8 @@ Link open_slcan(const EncoderAddress& uri) {
   return link;
 }
 
-// After a loss the log continues in its file. A file that another link uses is created again, which fails. Called with
-// the lock of connect_link held.
+// Returns the CAN log file of a link. After a loss of the port its log continues in the same file; a file that another
+// link uses cannot be created again and throws. The caller must hold the lock of connect_link.
 std::shared_ptr<os::LineFile> log_file(const std::string& path) {
   static std::map<std::string, std::shared_ptr<os::LineFile>> files;
   std::shared_ptr<os::LineFile>& file = files[path];
@@ -125,7 +126,7 @@ std::shared_ptr<os::LineFile> log_file(const std::string& path) {
   return file;
 }
 
-// Inserts the CAN log in front of the port.
+// Puts the CAN log between the link and its port.
 void keep_log(Link& link, const EncoderAddress& uri) {
   const std::string name = uri.port_kind == PortKind::sim ? "sim" : std::filesystem::path(uri.path).filename().string();
   auto log = std::make_shared<CanLog>(*link.frames, link.owner, log_file(uri.log), name);
@@ -133,7 +134,7 @@ void keep_log(Link& link, const EncoderAddress& uri) {
   link.owner = std::move(log);
 }
 
-// Virtual time follows the clock, so that a moving shaft moves.
+// Opens a virtual encoder. Its virtual time follows the real clock, so that a moving shaft moves.
 Link open_sim(const EncoderAddress& uri) {
   Link link;
   link.place = "the virtual encoder";

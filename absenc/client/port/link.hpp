@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Opens the port of an address and owns it.
+// Opens the port of an address and owns the open port.
 #pragma once
 
 #include <functional>
@@ -13,21 +13,22 @@
 namespace absenc::client {
 
 struct Link {
-  std::unique_ptr<VirtualDevice> device;  // virtual encoder of sim:; must outlive the port
+  std::unique_ptr<VirtualDevice> device;  // virtual encoder of sim:, null for other ports; must outlive the port
   std::shared_ptr<void> owner;
-  Port<std::uint8_t>* bytes = nullptr;  // exactly one of bytes and frames is set
+  Port<std::uint8_t>* bytes = nullptr;  // the open port for bytes; either this or `frames` is set
   Port<CanFrame>* frames = nullptr;
-  Time latency{};                  // latency between this computer and the line
+  Time latency{};                  // delay that the connection between this computer and the line adds to a reply
   Time character{};                // duration of a character on the line; 0: unknown, or bytes take no time
-  std::string place;               // the place in words, "/dev/ttyUSB0 at 2500000 baud"
-  std::vector<std::string> notes;  // hints on how to improve the port
+  std::string place;               // port in words, "/dev/ttyUSB0 at 2500000 baud"
+  std::vector<std::string> notes;  // hints on how to improve the settings of the port
 };
 
-/// Opens the port of the address. Throws os::Failure, UsageError.
+/// Opens the port of the address and returns it. Throws os::Failure, UsageError.
 [[nodiscard]] Link open_link(const EncoderAddress& uri);
-/// Opens a serial port or a TCP connection for reading only; `bytes` is set. Throws os::Failure, UsageError.
+/// Opens a serial port or a TCP connection for reading only, and returns it with `bytes` set. Throws os::Failure,
+/// UsageError.
 [[nodiscard]] Link open_receiving(const EncoderAddress& uri);
-/// A replacement for open_link, used by tests.
+/// A function that replaces open_link, used by tests.
 using OpenLink = std::function<Link(const EncoderAddress&)>;
 
 }  // namespace absenc::client

@@ -19,7 +19,8 @@ namespace {
 
 using Names = std::vector<std::string_view>;
 
-constexpr std::string_view rate_name = "rate_hz";  // a setting for `serve` among the settings of an encoder
+// name of the setting for `serve` that may stand among the settings of an encoder
+constexpr std::string_view rate_name = "rate_hz";
 
 void add_options(Names& names, const Unit& unit) {
   for (const Option& option : unit.options) names.push_back(option.name);
@@ -61,7 +62,7 @@ void check_bus(const FileSection& bus) {
   if (bus.find("port") == nullptr) refuse(bus.place, fmt::format("the bus {} has no port", bus.name));
 }
 
-// A valid name has no ':' and is not a protocol.
+// Refuses a name that is a protocol, is empty, begins with '-', or has ':', '/' or '?'.
 void check_name(const FileSection& encoder) {
   if (encoder.name == "sim" || find_unit(encoder.name) != nullptr) {
     refuse(encoder.place, fmt::format("\"{}\" is a protocol: give the encoder another name", encoder.name));
@@ -106,7 +107,7 @@ void NamedEncoders::check_encoder(const FileSection& encoder) const {
 
 namespace {
 
-// Returns the settings of `from` that `over` does not have.
+// Returns the settings of `from` whose names are not in `over`.
 std::vector<FileSetting> not_overridden(const FileSection& from, const std::vector<FileSetting>& over) {
   std::vector<FileSetting> settings;
   std::copy_if(

@@ -13,29 +13,30 @@
 namespace absenc::client {
 
 struct NamedEncoder {
-  std::string address;                // its address, "tformat:/dev/ttyUSB0"
-  std::string place;                  // position in the file of its port, for errors
-  std::vector<FileSetting> settings;  // its own settings, and those of its bus that it does not override
-  std::vector<FileSetting> defaults;  // defaults of the file, used where they apply
-  bool has_company = false;           // whether other encoders are on its bus
+  std::string address;  // address without settings, "tformat:/dev/ttyUSB0"
+  std::string place;    // position of the encoder's port in the file, for errors
+  // settings of the encoder itself, and settings of its bus that it does not override
+  std::vector<FileSetting> settings;
+  std::vector<FileSetting> defaults;  // settings of the section [defaults], used where they apply
+  bool has_company = false;           // whether other encoders are on the same bus
   double rate_hz = 0;                 // readings per second for `serve`; 0: not in the file
 };
 
-/// The encoders of a checked file, which is read once for all of them.
+/// The encoders of an absenc.toml that was checked, and is read only once for all encoders.
 class NamedEncoders {
  public:
-  /// Checks all names of settings, protocols and buses, used or not, so that a misspelt name is always reported. Values
-  /// are checked when they are used, because they may depend on more than the file: the model behind `?`, a motion
-  /// file. Throws UsageError, which names the position in the file.
+  /// Takes the content of a file and checks all names of settings, protocols and buses, used or not, so that a misspelt
+  /// name is always reported. Values are checked when they are used, because they may depend on more than the file: the
+  /// model behind `?`, a motion file. Throws UsageError, which names the position in the file.
   explicit NamedEncoders(SettingsFile file);
   NamedEncoders(NamedEncoders&&) noexcept = default;
   NamedEncoders& operator=(NamedEncoders&&) noexcept = default;
-  NamedEncoders(const NamedEncoders&) = delete;  // the maps refer to strings of the file
+  NamedEncoders(const NamedEncoders&) = delete;  // not copied, because the maps refer to strings of `file_`
   NamedEncoders& operator=(const NamedEncoders&) = delete;
   ~NamedEncoders() = default;
 
   [[nodiscard]] const SettingsFile& file() const { return file_; }
-  /// Returns the encoder of this name. Throws UsageError, which names the nearest.
+  /// Returns the encoder of this name. Throws UsageError, which names the nearest name, if there is none.
   [[nodiscard]] NamedEncoder require(std::string_view name) const;
 
  private:
@@ -46,13 +47,13 @@ class NamedEncoders {
   SettingsFile file_;
   SectionsByName buses_;
   SectionsByName encoders_;
-  std::unordered_map<std::string_view, std::size_t> on_bus_;  // number of encoders on each bus
+  std::unordered_map<std::string_view, std::size_t> on_bus_;  // number of encoders on each bus, by the bus's name
 };
 
-/// Reads absenc.toml. Throws UsageError, also if there is no file; `purpose` then says why one is needed.
+/// Reads and checks absenc.toml. Throws UsageError, also if there is no file; then `purpose` states why one is needed.
 [[nodiscard]] NamedEncoders require_names(std::string_view purpose);
 
-/// Runs `work` and puts `place` before the text of a UsageError.
+/// Runs `work` and returns its result. If `work` throws a UsageError, throws one whose text begins with `place`.
 template <class Work>
 auto at(const std::string& place, const Work& work) {
   try {

@@ -12,20 +12,20 @@
 namespace absenc::client {
 
 struct FoundPort {
-  std::string path{};       // path or name: "/dev/ttyUSB0", "can0", "/dev/spidev0.0"
-  std::string_view kind{};  // "serial", "can" or "spi"
-  os::ListedPort serial{};  // details of a serial port
+  std::string path{};       // path or name of the port: "/dev/ttyUSB0", "can0", "/dev/spidev0.0"
+  std::string_view kind{};  // kind of the port: "serial", "can" or "spi"
+  os::ListedPort serial{};  // details of a serial port; empty for other kinds
 
-  /// Returns the next command, "absenc identify /dev/ttyUSB0"; "" for a port that may not be opened, is in use, or is a
-  /// mobile modem.
+  /// Returns the command that the user can run next, "absenc identify /dev/ttyUSB0"; "" for a port that may not be
+  /// opened, is in use, or belongs to a mobile modem.
   [[nodiscard]] std::string next_command() const;
 };
 
-/// Returns all ports without opening any, because that would reset some boards.
+/// Returns all ports of this computer without opening any, because opening would reset some boards.
 [[nodiscard]] std::vector<FoundPort> ports();
 
-/// Returns {"port","kind"}; for a serial port also "lasting_name","maker","adapter","serial_number","chip","driver",
-/// "latency_timer_ms","highest_rate","may_open","refusal","in_use_by". Unknown values are null.
+/// Converts the port to {"port","kind"}; for a serial port also "lasting_name","maker","adapter","serial_number",
+/// "chip","driver","latency_timer_ms","highest_rate","may_open","refusal","in_use_by". Unknown values are null.
 [[nodiscard]] Json to_json(const FoundPort& port);
 
 }  // namespace absenc::client

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs the commands of a unit on a port and stores each exchange as it was on the line. Readings, doctor, conform and
-// identify use it. The port is its only clock.
+// Runs the commands of a unit on a port and stores each exchange as it was on the line, for readings, doctor, conform
+// and identify. All times are those of the port's clock.
 #pragma once
 
 #include <algorithm>
@@ -21,33 +21,35 @@
 
 namespace absenc::client {
 
-/// Result of a command that was run once, with its last exchange.
+/// Result of running a command once, with its last exchange.
 struct Attempted {
   Error error = Error::none;
-  std::string detail{};                  // description of the error by the unit
-  std::string advice{};                  // advice of the unit; "": none
-  Time began{};                          // start of the command, on the port's clock
-  capture::ObservedExchange exchange{};  // last exchange, without echo
-  std::vector<std::uint8_t> raw{};       // all received bytes, including the echo
-  bool heard = false;                    // anything was received, even only an echo
-  bool answered = false;                 // something other than an echo was received
-  std::uint64_t unanswered = 0;          // number of requests without reply, not counting the last request
-  std::uint64_t discarded = 0;  // damaged frames of a stream since the previous result; `error` may report one of them
-  Time answered_after{};        // time from the end of the request to the beginning of the reply
-  Time limit{};                 // limit of `answered_after`, from protocol and connection; 0: none
-  Time after{};                 // time from the end of the request to the end of the reply
-  Time allowed{};               // greatest `after` that the protocol and the characters of the reply allow
+  std::string detail{};                  // the unit's description of the error
+  std::string advice{};                  // the unit's advice on the error; "": it has none
+  Time began{};                          // time at which the command began, by the port's clock
+  capture::ObservedExchange exchange{};  // last request and its reply, without echo
+  std::vector<std::uint8_t> raw{};       // all bytes received in the last exchange, including the echo
+  bool heard = false;                    // whether anything was received after the last request, even only an echo
+  bool answered = false;                 // whether something other than an echo was received
+  std::uint64_t unanswered = 0;          // number of earlier requests without reply; the last request is not counted
+  // number of damaged frames of a stream since the previous result; `error` may report one of them
+  std::uint64_t discarded = 0;
+  Time answered_after{};  // time from the end of the request to the beginning of the reply
+  Time limit{};           // limit of `answered_after` by protocol and connection; 0: there is no limit
+  Time after{};           // time from the end of the request to the end of the reply
+  Time allowed{};         // greatest `after` that protocol and length of the reply allow
   std::optional<Reading> reading{};
-  std::optional<std::int64_t> counter{};  // value of the first field that counts replies
+  // value of the reply's first field that counts replies; nothing if it has none
+  std::optional<std::int64_t> counter{};
   const FieldInfo* counter_field = nullptr;
-  bool possible = true;  // false: the unit cannot run the command with these options
+  bool possible = true;  // whether the unit can run the command with these options
 
-  /// Returns whether the reply began after its limit.
+  /// Returns whether the reply began after its time limit.
   [[nodiscard]] bool is_late() const { return answered && limit > Time{} && answered_after > limit; }
 };
 
-/// Returns a request and its reply, without echo. `clocks` is the number of clocks of a clocked link. Of several
-/// received CAN frames the last one is the reply; earlier ones were for other nodes.
+/// Returns a request and its reply, without echo, as an exchange. `clocks` is the number of clocks of a clocked link.
+/// The last of several received CAN frames is the reply; earlier ones were for other nodes.
 template <class Item>
 [[nodiscard]] capture::ObservedExchange heard_exchange(std::span<const Item> request, std::span<const Item> reply,
                                                        std::size_t clocks) {
@@ -67,7 +69,7 @@ template <class Item>
   return heard_exchange<Item>(line.request, line.reply(), line.clocks);
 }
 
-/// Stores the counter of replies from the fields that a command reports.
+/// Stores the first counter of replies among the fields that a command reports.
 class CounterSink final : public FieldSink {
  public:
   explicit CounterSink(Attempted& attempt) : attempt_(attempt) {}
@@ -82,14 +84,14 @@ class CounterSink final : public FieldSink {
   Attempted& attempt_;
 };
 
-/// Limits of a series of runs of one command.
+/// Limits of a series of runs of the same command.
 struct Series {
   std::size_t count = 0;
-  Time limit = never;                       // duration of the series
-  Time patience = std::chrono::seconds(2);  // time since the last good reply
-  std::size_t most_silent = 8;              // runs without any received byte after which the series ends
-  Time least{};                             // shortest time before `most_silent` ends the series
-  std::size_t most_bad = 24;                // runs without a good reply after which the series ends
+  Time limit = never;                       // longest duration of the series
+  Time patience = std::chrono::seconds(2);  // longest time without a good reply
+  std::size_t most_silent = 8;              // number of runs without any received byte after which the series ends
+  Time least{};                             // shortest time before `most_silent` can end the series
+  std::size_t most_bad = 24;                // number of runs without a good reply after which the series ends
 };
 
 template <class Item>
@@ -97,7 +99,7 @@ class Runner {
  public:
   static constexpr bool is_can = std::is_same_v<Item, CanFrame>;
 
-  /// `attempts` is how often a command that may be repeated is run.
+  /// Takes the encoder's address, and how often the session runs a command that may be repeated.
   explicit Runner(const EncoderAddress& address, unsigned attempts = 1)
       : unit_(*address.unit),
         options_(address.options),
@@ -112,23 +114,23 @@ class Runner {
   Runner(const Runner&) = delete;
   Runner& operator=(const Runner&) = delete;
 
-  /// Uses `port` from now on. `latency` is the latency of the connection to the line.
+  /// Uses `port` from now on. `latency` is the delay that the connection to the line adds.
   void attach(Port<Item>& port, Time latency = {}) {
     port_.attach(port);
     latency_ = latency;
   }
 
-  // ---- Hooks of `run` and `once`. An exception of a hook ends the conversation.
+  // ---- Hooks of `run` and `once`; empty: not called. An exception of a hook ends the conversation.
 
-  std::function<void(std::vector<Item>& request)> edit{};     // called with each request before it is sent
-  std::function<void(Step<Item>& step, Time now)> on_step{};  // called with each step of the conversation
-  // called with each event for the conversation, without echo
+  std::function<void(std::vector<Item>& request)> edit{};     // changes each request before it is sent
+  std::function<void(Step<Item>& step, Time now)> on_step{};  // sees, and may change, each step of the conversation
+  // sees each event of the conversation, without echo
   std::function<void(const Event<Item>& event)> on_event{};
-  std::function<void(const LineExchange<Item>& exchange)> on_exchange{};  // called with each finished exchange
+  std::function<void(const LineExchange<Item>& exchange)> on_exchange{};  // sees each exchange when it has ended
 
   // ---- Commands
 
-  /// Starts a new session, which forgets earlier requests: it neither waits for their replies nor discards them.
+  /// Starts a new session, which forgets earlier requests: it neither waits for their replies nor discards these.
   void start_again(unsigned attempts = 1) {
     if (session_) {
       echo_ = session_->echo().mode();
@@ -144,10 +146,11 @@ class Runner {
     session_->set_options(options);
   }
 
-  /// Calls `use(session)`, which runs one command and returns its conversation.
+  /// Calls `use(session)`, which runs one command and returns its conversation, and returns that conversation; null if
+  /// the unit cannot run the command.
   template <class Use>
   const Conversation<Item>* converse(const Use& use) {
-    // the last command sent no request, so the received bytes belong to it
+    // if no request was sent since then, received bytes belong to the command before
     if (requests_before_ == port_.requests) port_.last.clear();
     requests_before_ = port_.requests;
     received_before_ = port_.last.received.size();
@@ -164,12 +167,12 @@ class Runner {
     answered_ = ended != nullptr && ended->error() == Error::none ? port_.last.received.size() : 0;
     return ended;
   }
-  /// Runs one command to its end; returns null if the unit cannot run it. A streaming conversation continues to its
-  /// next result.
+  /// Runs one command to its end and returns its conversation; null if the unit cannot run it. A streaming conversation
+  /// continues to its next result.
   const Conversation<Item>* run(const Command& command, Arguments arguments = {}) {
     return converse([&](host::Session<Item>& session) { return session.next(command, arguments); });
   }
-  /// Runs one command to its end and returns its result and its last exchange.
+  /// Runs one command to its end and returns its result, with the last exchange.
   Attempted once(const Command& command, Arguments arguments = {}) {
     const std::uint64_t discarded = session_->counters().discarded;
     Attempted one;
@@ -194,12 +197,13 @@ class Runner {
     return one;
   }
 
-  /// Calls `attempt()`, which returns an Attempted, again and again. Ends early if no reply or no good reply comes.
+  /// Calls `attempt()` again and again and adds the results, of type Attempted, to `into`. Ends at the limits of
+  /// `series`.
   template <class Attempt>
   void repeat(const Series& series, const Attempt& attempt, std::vector<Attempted>& into) {
     const Time begin = port_.now();
     const Time end = series.limit == never ? never : begin + series.limit;
-    // The deadline ends an attempt on a line that is never silent.
+    // Sets a deadline for attempts on a line that is never silent.
     const Time outer = port_.deadline;
     const Time latest = end == never ? never : begin + 2 * series.limit;
     port_.deadline = std::min(outer, latest);
@@ -231,7 +235,8 @@ class Runner {
 
   // ---- Listening without a request
 
-  /// Listens for `time` and adds received items to the last exchange. `on_items(items)` returns whether to continue.
+  /// Listens for `time` and adds received items to the last exchange. `on_items(items)` returns false to stop
+  /// listening.
   template <class OnItems>
   void listen(Time time, const OnItems& on_items) {
     const Step<Item> step{.at = port_.now() + time};
@@ -244,7 +249,7 @@ class Runner {
   void listen(Time time) {
     listen(time, [](std::span<const Item>) { return true; });
   }
-  /// Waits until nothing was received for `quiet`, at most for `longest`. Returns whether anything was received.
+  /// Waits until nothing has been received for `quiet`, at most for `longest`. Returns whether anything was received.
   bool settle(Time quiet, Time longest) {
     bool heard = false;
     const Time end = port_.now() + longest;
@@ -258,27 +263,27 @@ class Runner {
     return heard;
   }
 
-  // ---- Observations
+  // ---- Observations of the line
 
-  /// Returns the last exchange with everything that was received since.
+  /// Returns the last exchange, with everything that was received since its request.
   [[nodiscard]] const LineExchange<Item>& last() const { return port_.last; }
-  /// Returns the number of late replies: those that began after their limit, or answered an earlier request than the
-  /// last one.
+  /// Returns the number of late replies: replies that began after their time limit, or that answered an earlier request
+  /// than the last one.
   [[nodiscard]] std::uint64_t late() const {
     const std::uint64_t seen = late_ + (lateness_of(last()) != Time{} ? 1 : 0);
     return std::max(seen, late_before_ + session_->counters().late);
   }
-  /// Returns the longest time between a request and its late reply; 0: no reply was late.
+  /// Returns the longest time between a request and its late reply; 0 if no reply was late.
   [[nodiscard]] Time lateness() const { return std::max({lateness_, lateness_of(last()), session_->lateness()}); }
 
   /// Returns the number of good replies with further bytes after them that no request explains; 0 on a CAN bus.
   [[nodiscard]] std::uint64_t overfull() const { return overfull_; }
-  /// Returns the greatest number of items after such a good reply.
+  /// Returns the greatest number of further items that followed a good reply.
   [[nodiscard]] std::size_t most_behind() const { return most_behind_; }
-  /// Returns all items that were received in the last such exchange.
+  /// Returns all items of the last exchange in which a good reply was followed by further items.
   [[nodiscard]] std::span<const Item> overfull_example() const { return overfull_example_; }
 
-  /// Copies the last exchange into `one`, which is its result.
+  /// Copies the last exchange into `one`, which is the result of the last command.
   void keep_exchange(Attempted& one) const {
     const LineExchange<Item>& line = last();
     const bool asked = requests_before_ != port_.requests;
@@ -298,7 +303,7 @@ class Runner {
     if constexpr (!is_can) one.raw.assign(received.begin(), received.end());
   }
 
-  /// Returns the duration of a character on the line; 0: the line carries no characters.
+  /// Returns the duration of a character on the line; 0 if the line carries no characters.
   [[nodiscard]] Time character() const { return character_; }
   [[nodiscard]] WatchedPort<Item>& port() { return port_; }
   [[nodiscard]] const WatchedPort<Item>& port() const { return port_; }
@@ -335,7 +340,7 @@ class Runner {
     std::vector<Item> request_;
   };
 
-  // Stores the frame of this result, because the bytes of a stream may hold several frames, each with a result.
+  // Stores the frame of this result only: the bytes of a stream may hold several frames, each with a result.
   static void keep_frame(Attempted& one, const Conversation<Item>& ended) {
     one.heard = one.answered = one.error != Error::timeout;
     if constexpr (!is_can) {
@@ -359,17 +364,18 @@ class Runner {
     open_ = true;
     opened_at_ = port_.requests;
   }
-  // Reports the open exchange. If a hook threw an exception before the request was sent, the last exchange is an
-  // earlier one that was reported already.
+  // Passes the open exchange to `on_exchange`. If a hook threw an exception before the request was sent, the last
+  // exchange is an earlier one, which was passed already.
   void close_exchange() {
     if (std::exchange(open_, false) && opened_at_ != port_.requests && on_exchange) on_exchange(last());
   }
-  // Stores the length of the echo. Takes the maximum, because a new session has not seen the echo of the last exchange.
+  // Stores the length of the echo in the last exchange. A new session has not seen that echo, so the greater length
+  // counts.
   void keep_echo() {
     if constexpr (!is_can) port_.last.echo = std::max(port_.last.echo, session_->echo().echoed());
   }
-  // Returns how long after the request a late reply began; 0 if it was not late. On a CAN bus the frame may be from
-  // another node.
+  // Returns the time between request and reply if the reply was late; otherwise 0. Returns 0 on CAN, where the frame
+  // may be from another node.
   [[nodiscard]] Time lateness_of(const LineExchange<Item>& exchange) const {
     if (is_can || exchange.answer == Time{} || exchange.reply().empty()) return {};
     const Time after = exchange.answered_after(character_);
@@ -379,21 +385,22 @@ class Runner {
   const Unit& unit_;
   Options options_;
   host::EchoMode echo_;
-  Time character_{};  // duration of a character; 0: the line carries no characters
+  Time character_{};  // duration of a character; 0 if the line carries no characters
   Time latency_{};
   WatchedPort<Item> port_;
   std::unique_ptr<std::byte[]> storage_;
   Filter filter_;
   std::optional<host::Session<Item>> session_;
-  bool open_ = false;                  // the last exchange was not reported to `on_exchange` yet
-  std::uint64_t opened_at_ = 0;        // number of requests before the open exchange
-  std::uint64_t requests_before_ = 0;  // number of requests before the present run
-  std::size_t received_before_ = 0;    // items received before the present run, for an older request
-  std::uint64_t unanswered_ = 0;       // requests without reply in the present run
-  std::uint64_t late_ = 0;             // late replies before the last exchange
-  std::uint64_t late_before_ = 0;      // late replies that earlier sessions discarded
+  bool open_ = false;                  // whether `on_exchange` has not received the last exchange yet
+  std::uint64_t opened_at_ = 0;        // number of requests that preceded the open exchange
+  std::uint64_t requests_before_ = 0;  // number of requests that preceded the present command
+  // number of items received before the present command, as a reply to an older request
+  std::size_t received_before_ = 0;
+  std::uint64_t unanswered_ = 0;   // number of requests without reply in the present command
+  std::uint64_t late_ = 0;         // number of late replies before the last exchange
+  std::uint64_t late_before_ = 0;  // number of late replies that earlier sessions discarded
   Time lateness_{};
-  std::size_t answered_ = 0;  // items received when the last exchange ended well; 0: it did not
+  std::size_t answered_ = 0;  // number of items that were received when the last exchange ended well; 0 if it failed
   std::uint64_t overfull_ = 0;
   std::size_t most_behind_ = 0;
   std::vector<Item> overfull_example_;

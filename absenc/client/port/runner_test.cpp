@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Runs exchanges in virtual time and checks how the runner classifies echo, late replies and damaged frames of a
-// stream, for readings, doctor, conform and identify alike.
+// stream. Readings, doctor, conform and identify depend on this.
 #include "absenc/client/port/runner.hpp"
 
 #include <fmt/format.h>
@@ -26,7 +26,7 @@ EncoderAddress with_faults(EncoderAddress address, std::vector<std::string> faul
   return address;
 }
 
-/// A runner with an encoder that sends bytes.
+/// A runner with a virtual encoder on a line of characters.
 struct Bench {
   explicit Bench(const std::string& text, const VirtualPort& way = {}, unsigned attempts = 1)
       : Bench(parse_address(text), way, attempts) {}
@@ -55,7 +55,7 @@ TEST(Runner, SilenceIsATimeoutInEveryUnit) {
 
 // ---- Echo
 
-// The unit's replies begin like its requests.
+// The replies of this unit begin with the same bytes as its requests.
 TEST(Runner, TakesTheEchoFromTheFirstExchangeOn) {
   for (const bool echo : {false, true}) {
     for (const char* const mode : {"auto", "on", "off"}) {
@@ -88,7 +88,7 @@ TEST(Runner, AReplyThatComesTwiceIsNotTakenForAnEcho) {
   EXPECT_EQ(one.exchange.reply.bytes, one.raw);
   EXPECT_EQ(one.raw.front(), 0x1A);
   for (int i = 0; i < 2; ++i) {
-    bench.runner.settle(1ms, 10ms);  // otherwise the reply would meet the next request
+    bench.runner.settle(1ms, 10ms);  // without this wait the reply would collide with the next request
     EXPECT_EQ(bench.once().error, Error::none);
   }
   EXPECT_EQ(bench.runner.session().echo().mode(), host::EchoMode::off);
@@ -128,7 +128,7 @@ TEST(Runner, AReplyThatBeginsAfterItsLimitIsLate) {
   EXPECT_LT(bench.runner.lateness(), 21ms);
 }
 
-// A host that waits for a quiet line before it repeats a request receives the late reply.
+// The host waits for a quiet line before it repeats a request, and receives the late reply in that time.
 TEST(Runner, CountsALateReplyThatComesBeforeTheNextRequest) {
   Bench bench(delayed(120us));
   for (int i = 0; i < 10; ++i) EXPECT_EQ(bench.once().error, Error::timeout);
@@ -146,7 +146,8 @@ TEST(Runner, ARequestThatIsRepeatedAtOnceIsUnanswered) {
 // ---- A line that is never silent
 
 TEST(Runner, EndsByTheClockOfItsPort) {
-  const EncoderAddress address = parse_address("sim:raa38");  // listens for a good frame for a second
+  // the unit needs a second to find that no good frame comes
+  const EncoderAddress address = parse_address("sim:raa38");
   auto port = std::make_shared<ScriptedPort<std::uint8_t>>();
   port->babble = {0x55, 0x12};
   Runner<std::uint8_t> runner(address);
@@ -166,7 +167,8 @@ TEST(Runner, EndsByTheClockOfItsPort) {
 
 // ---- Streams
 
-/// Returns an address at which the unit sends by itself; nothing if it never does, or if no virtual encoder does.
+/// Returns an address at which the unit's encoder sends unsolicited; nothing if there is none, or no such virtual
+/// encoder.
 std::optional<EncoderAddress> streaming(const Unit& unit) {
   if (unit.streams == nullptr) return {};
   std::vector<std::vector<OptionText>> settings{{}};
@@ -183,7 +185,7 @@ std::optional<EncoderAddress> streaming(const Unit& unit) {
       address.options = options;
       address.line = line_settings(unit, options);
       if (Bench(address).once().error == Error::none) return address;
-      // An encoder that cannot be polled must report damaged frames.
+      // If the encoder cannot be polled, damaged frames must be reported.
       for (const std::size_t index : capture::resolution_options(unit)) {
         address.options.values[index] = std::min<std::int64_t>(unit.options[index].maximum, 16);
       }
@@ -209,14 +211,16 @@ TEST_P(Streams, AGoodOneHasNoDamage) {
   EXPECT_EQ(bench.runner.session().counters().discarded, 0u);
 }
 
-// Synchronisation needs two adjacent good frames; a single good frame is discarded with the damaged ones.
+// Synchronisation with the stream needs two adjacent good frames; a single good frame is discarded with the damaged
+// ones.
 TEST_P(Streams, EachDamagedFrameIsCounted) {
   for (const char* const fault : {"corrupt=0.02", "corrupt=0.3", "truncate=0.1", "drop=0.1"}) {
     Bench bench(with_faults(address, {fault}));
     std::uint64_t discarded = 0;
     for (int i = 0; i < 500; ++i) discarded += bench.once().discarded;
     const std::uint64_t damaged = bench.link.device->damaged_replies().value();
-    // The last frames may still be in transit, and two truncated frames may be as long as one.
+    // The counts may differ by the last frames, which are still in transit, and by truncated frames, two of which may
+    // be as long as one.
     EXPECT_GE((discarded + 2) * 5, damaged * 4) << fault;
     EXPECT_LE(discarded, 4 * damaged) << fault;
     EXPECT_EQ(bench.runner.session().counters().discarded, discarded);
@@ -270,7 +274,7 @@ INSTANTIATE_TEST_SUITE_P(Units, Streams, ::testing::ValuesIn(all_units().begin()
                            return name;
                          });
 
-// ---- How long conform takes
+// ---- Duration of conform
 
 class ConformTime : public ::testing::TestWithParam<const Unit*> {};
 
@@ -304,7 +308,7 @@ TEST(ConformTime, OfALineThatIsNeverSilentEndsWithinTenSeconds) {
   }
 }
 
-// It took 107 s before the limit of time was checked.
+// Without a limit of time this test took 107 s.
 TEST(ConformTime, OfADamagedStreamEndsWithinTenSecondsOfOurs) {
   const Time begin = os::now();
   static_cast<void>(conform("sim:raa38?fault=corrupt=1"));

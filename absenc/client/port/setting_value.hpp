@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Values of settings behind an encoder. Each function throws UsageError, which says what the value must be.
+// Parses values of settings behind an encoder's address. Each function throws UsageError, which states what the value
+// must be.
 #pragma once
 
 #include <cstddef>
@@ -11,13 +12,13 @@
 
 namespace absenc::client {
 
-/// Returns a whole number within these limits.
+/// Returns the value as a whole number within these limits.
 [[nodiscard]] std::int64_t number_of(const OptionText& setting, std::int64_t minimum, std::int64_t maximum);
-/// Returns a number from -`most` to `most`, above 0 where `is_above_zero`.
+/// Returns the value as a number from -`most` to `most`; with `is_above_zero` above 0.
 [[nodiscard]] double real_of(const OptionText& setting, double most, bool is_above_zero);
-/// Returns "100", "12.5" or "50/3" as a number; both parts are above 0 and up to a million.
+/// Returns a ratio, "100", "12.5" or "50/3", as a number; both parts must be above 0 and at most a million.
 [[nodiscard]] double ratio_of(const OptionText& setting);
-/// Returns the index of one of the words.
+/// Returns the index of the word that equals the value.
 [[nodiscard]] std::size_t choice_of(const OptionText& setting, std::initializer_list<std::string_view> words);
 
 }  // namespace absenc::client

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The only file that includes toml++, which is slow to compile.
+// Reads absenc.toml. No other file includes toml++, which is slow to compile.
 #include "absenc/client/port/settings_file.hpp"
 
 #include <fmt/format.h>
@@ -18,7 +18,7 @@ namespace absenc::client {
 
 namespace {
 
-// Settings whose value must be a text, such as a name or a path; a number there is a mistake.
+// Settings whose value must be a text, such as a name or a path; a number is refused as a mistake.
 constexpr std::array<std::string_view, 4> text_only{"protocol", "model", "bus", "port"};
 
 constexpr const char* variable = "ABSENC_CONFIG";
@@ -42,7 +42,8 @@ std::string_view type_of(const toml::node& node) {
   }
 }
 
-// Sorts entries by their position, because a table is sorted by name and the first error must be reported first.
+// Returns the entries of a table in the order of the file, so that the first error is reported first. toml++ sorts them
+// by name.
 std::vector<std::pair<const toml::key*, const toml::node*>> in_file_order(const toml::table& table) {
   std::vector<std::pair<const toml::key*, const toml::node*>> entries;
   for (const auto& [key, node] : table) entries.emplace_back(&key, &node);
@@ -52,7 +53,7 @@ std::vector<std::pair<const toml::key*, const toml::node*>> in_file_order(const 
   return entries;
 }
 
-/// Reads one file.
+/// Converts one parsed file to its sections, and reports errors with their position.
 class SettingsFileReader {
  public:
   explicit SettingsFileReader(const std::string& path) : path_(path) {}
@@ -131,7 +132,8 @@ class SettingsFileReader {
   std::string path_;
 };
 
-// Returns the index of the last character of the string that begins at `at`, or of the text.
+// Returns the index of the last character of the string that begins at `at`; if the string does not end, the length of
+// the text.
 std::size_t end_of_string(std::string_view text, std::size_t at) {
   const char quote = text[at];
   const bool lines = text.substr(at).starts_with(std::string(3, quote));
@@ -141,18 +143,18 @@ std::size_t end_of_string(std::string_view text, std::size_t at) {
     } else if (!lines && (text[i] == quote || text[i] == '\n')) {
       return i;
     } else if (lines && text.substr(i).starts_with(std::string(3, quote))) {
-      return std::min(text.find_first_not_of(quote, i), i + 5) - 1;  // up to two more quotes may belong to the string
+      return std::min(text.find_first_not_of(quote, i), i + 5) - 1;  // up to two more quotes belong to the string
     }
   }
   return text.size();
 }
 
-// Refuses deep nesting, because the library recurses as deep as the file; absenc.toml needs only a list in
+// Refuses a file with deep nesting, because the library's recursion is as deep; absenc.toml needs only a list in
 // [encoder.NAME]. Throws UsageError.
 void check_depth(std::string_view text, const SettingsFileReader& reader) {
   constexpr std::size_t deepest = 16;
   std::size_t brackets = 0;
-  std::size_t dots = 0;  // number of dots in a dotted name
+  std::size_t dots = 0;  // number of dots in the present dotted name
   for (std::size_t at = 0; at < text.size(); ++at) {
     switch (text[at]) {
       case '#':
@@ -191,7 +193,7 @@ void check_depth(std::string_view text, const SettingsFileReader& reader) {
   }
 }
 
-// Returns the environment variable; "" if it is not set.
+// Returns the value of the environment variable; "" if it is not set.
 std::string environment(const char* name) {
   const char* value = std::getenv(name);
   return value == nullptr ? "" : value;
@@ -218,7 +220,7 @@ SettingsFile parse_settings_file(std::string_view text, const std::string& path)
 std::vector<std::string> settings_file_paths() {
   if (const std::string path = environment(variable); !path.empty()) return {path};
   std::vector<std::string> paths{"absenc.toml"};
-  // The XDG Base Directory Specification: what is not absolute is to be ignored.
+  // Ignores a relative path, as the XDG Base Directory Specification requires.
   std::string folder = environment("XDG_CONFIG_HOME");
   if (!folder.starts_with('/')) {
     const std::string home = environment("HOME");
@@ -235,10 +237,11 @@ std::optional<SettingsFile> load_settings_file() {
     std::error_code ignored;
     if (fs::symlink_status(path, ignored).type() != fs::file_type::not_found) {
       const fs::file_type type = fs::status(path, ignored).type();
-      if (type == fs::file_type::not_found || type == fs::file_type::none) {  // none: a link that leads to itself
+      if (type == fs::file_type::not_found || type == fs::file_type::none) {  // none: the link leads to itself
         throw UsageError(fmt::format("{} is a link that leads to no file: correct it or remove it", path));
       }
-      if (type == fs::file_type::fifo || type == fs::file_type::socket) {  // reading it might wait forever for a writer
+      // reading such a file might wait forever for a writer
+      if (type == fs::file_type::fifo || type == fs::file_type::socket) {
         throw UsageError(fmt::format("{} is no regular file: write the encoders' names into a file", path));
       }
       try {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads absenc.toml to data: the names of encoders and buses, with their settings. Only settings_file.cpp includes
+// Reads absenc.toml into data: the names of encoders and buses, with their settings. Only settings_file.cpp includes
 // toml++.
 #pragma once
 
@@ -10,42 +10,42 @@
 
 namespace absenc::client {
 
-/// A setting of the file; values are texts, as behind ? in an address.
+/// A setting of the file. Its values are texts, as behind ? in an address.
 struct FileSetting {
   std::string name;
-  std::vector<std::string> values;  // one value, or those of a list
-  std::string place;                // position of the name, "absenc.toml:3:1": file, line and column
+  std::vector<std::string> values;  // the value of the setting; several if it is a list
+  std::string place;                // position of the setting's name, "absenc.toml:3:1": file, line and column
   bool is_list = false;
 };
 
 struct FileSection {
   std::string name;
-  std::vector<FileSetting> settings;  // settings in the order of the file
+  std::vector<FileSetting> settings;  // settings of the section, in the order of the file
   std::string place;
 
-  /// Returns the setting of this name; null if it is missing.
+  /// Returns the setting of this name; null if the section does not have it.
   [[nodiscard]] const FileSetting* find(std::string_view setting) const;
 };
 
 struct SettingsFile {
   std::string path;
-  FileSection defaults;               // the section [defaults]
-  std::vector<FileSection> buses;     // the sections [bus.NAME]
-  std::vector<FileSection> encoders;  // the sections [encoder.NAME]
-  std::vector<FileSection> services;  // the sections [serve.NAME]
+  FileSection defaults;               // content of the section [defaults]
+  std::vector<FileSection> buses;     // the sections [bus.NAME], in the order of the file
+  std::vector<FileSection> encoders;  // the sections [encoder.NAME], in the order of the file
+  std::vector<FileSection> services;  // the sections [serve.NAME], in the order of the file
 };
 
-/// Reads a file and checks syntax, sections and types, but not the settings in the sections. Throws UsageError, which
-/// begins with the position in the file.
+/// Parses the text of a file and returns its sections. Checks syntax, sections and types, but not the settings in the
+/// sections. Throws UsageError, whose text begins with the position in the file.
 [[nodiscard]] SettingsFile parse_settings_file(std::string_view text, const std::string& path);
 
-/// Returns the paths where absenc.toml is searched, in this order: only the file of ABSENC_CONFIG if that is set;
-/// otherwise the working directory and the user's configuration directory.
+/// Returns the paths where absenc.toml is searched, in order of priority: only the file of ABSENC_CONFIG if that is
+/// set; otherwise the working directory and the user's configuration directory.
 [[nodiscard]] std::vector<std::string> settings_file_paths();
 
-/// Reads the first existing file; returns nothing if there is none. Throws UsageError, also if the file of
-/// ABSENC_CONFIG is missing, or if an existing file cannot be read, is a broken link, or a FIFO: such a file is never
-/// skipped.
+/// Reads the first absenc.toml that exists; returns nothing if there is none. Throws UsageError, also if the file of
+/// ABSENC_CONFIG is missing, or if an existing file cannot be read, is a broken link, or is a FIFO: such a file is
+/// never skipped.
 [[nodiscard]] std::optional<SettingsFile> load_settings_file();
 
 }  // namespace absenc::client

@@ -15,14 +15,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Resolves udev's links to the device.
+// Returns the device file to which a link of udev leads.
 fs::path device(const std::string& path) {
   std::error_code error;
   const fs::path canonical = fs::weakly_canonical(path, error);
   return error ? fs::path(path) : canonical;
 }
 
-// Returns a key that is equal for encoders at the same place; "" if the place cannot be shared.
+// Returns a key that is equal for encoders on the same port; "" if the port cannot be shared.
 std::string place_key(const EncoderAddress& one) {
   const std::string_view place = port_kind_names[static_cast<std::size_t>(one.port_kind)];
   switch (one.port_kind) {
@@ -55,7 +55,7 @@ struct Opened {
   std::weak_ptr<SharedLink> link;
 };
 
-/// All open links.
+/// All open links of this process, with their addresses.
 struct Registry {
   std::mutex mutex;
   std::vector<Opened> opened;
@@ -76,7 +76,7 @@ bool SharedLink::lost() const {
 void SharedLink::lose(const os::Failure& failure) {
   const std::lock_guard lock(mutex_);
   loss_ = {failure.kind(), failure.what()};
-  link_.owner.reset();  // releases the port first, because an exclusive port can be opened only once
+  link_.owner.reset();  // closes the port at once, because an exclusive port can be opened only once
 }
 
 bool share_line(const EncoderAddress& one, const EncoderAddress& other) {
@@ -99,7 +99,6 @@ bool share_line(const EncoderAddress& one, const EncoderAddress& other) {
   return true;
 }
 
-// Opens under the lock, so that encoders that reconnect at the same time open one port.
 void require_different(std::span<const EncoderAddress> encoders, std::span<const std::string> names) {
   std::unordered_map<std::string, std::vector<std::size_t>> at_place;
   for (std::size_t i = 0; i < encoders.size(); ++i) {

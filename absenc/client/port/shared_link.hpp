@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shares one open port between all encoders on a line, which take turns.
+// Shares one open port between all encoders on a line, whose conversations take turns.
 #pragma once
 
 #include <condition_variable>
@@ -18,8 +18,8 @@
 
 namespace absenc::client {
 
-/// A fair lock, granted in the order of requests. With a mutex the thread that has just released it would often get it
-/// again, and the others would starve.
+/// A fair lock, granted in the order of requests. With a mutex, the thread that has just released it would often get it
+/// again, and the other threads would starve.
 class Turns {
  public:
   void lock() {
@@ -42,14 +42,14 @@ class Turns {
   std::uint64_t current_ = 0;
 };
 
-/// An open port whose users take turns: each conversation has the line exclusively. Each encoder has its own thread,
-/// session and statistics, and a silent one only delays the others by its timeout.
+/// An open port that several encoders share: only one conversation uses the line at a time. Each encoder has its own
+/// thread, session and statistics, and a silent encoder delays the others only by its timeout.
 class SharedLink {
  public:
   explicit SharedLink(Link link) : link_(std::move(link)) {}
 
-  /// Runs one conversation with exclusive use of the line. If it loses the port, the port is closed and every other
-  /// user gets the os::Failure at its next turn.
+  /// Runs `work`, one conversation, with exclusive use of the line, and returns its result. If the port is lost
+  /// meanwhile, it is closed, and every other user gets the os::Failure at its next turn.
   template <class Work>
   auto take_turn(const Work& work) {
     const std::lock_guard turn(turns_);
@@ -62,12 +62,12 @@ class SharedLink {
     }
   }
 
-  /// Returns whether the port was lost, so that a new link is needed.
+  /// Returns whether the port was lost, so that users need a new link.
   [[nodiscard]] bool lost() const;
 
   [[nodiscard]] const Link& link() const { return link_; }
 
-  /// The state of late replies on this line; only used during a turn.
+  /// Returns the state of late replies on this line. Only a conversation that has the line may use it.
   template <class Item>
   [[nodiscard]] host::ReplyGuard<Item>& guard() {
     if constexpr (std::is_same_v<Item, CanFrame>) {
@@ -84,23 +84,24 @@ class SharedLink {
   host::ReplyGuard<std::uint8_t> byte_guard_;
   host::ReplyGuard<CanFrame> frame_guard_;
   Turns turns_;
-  // Stores the data of the exception, because threads must not share an exception object.
+  // The data of the exception that reported the loss, because threads must not share an exception object.
   struct Loss {
     os::Failure::Kind kind;
     std::string sentence;
   };
-  mutable std::mutex mutex_;  // guards the loss, which users without a turn read
+  mutable std::mutex mutex_;  // guards `loss_`, which other threads read without a turn
   std::optional<Loss> loss_;
 };
 
-/// Returns whether both encoders are on one line. Throws UsageError if they are, but need different settings of it.
+/// Returns whether both encoders are on the same line. Throws UsageError if they are, but need different settings of
+/// the line.
 [[nodiscard]] bool share_line(const EncoderAddress& one, const EncoderAddress& other);
 
-/// Checks encoders that are read at the same time. Throws UsageError if two are the same encoder or cannot share a
+/// Checks that encoders can be read at the same time. Throws UsageError if two are the same encoder, or cannot share a
 /// line.
 void require_different(std::span<const EncoderAddress> encoders, std::span<const std::string> names);
 
-/// Returns the link to this encoder: an open one of the same line if there is one, otherwise a new one. Throws
+/// Returns a link to the encoder: the open link of the same line if there is one, otherwise a new one. Throws
 /// os::Failure, UsageError.
 [[nodiscard]] std::shared_ptr<SharedLink> connect_link(const EncoderAddress& uri, const OpenLink& open = open_link);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual encoder by the user's settings: shaft, starting position, alarms and faults, and the unit's device.
+// A virtual encoder, made from the user's settings: shaft, starting position, alarms and faults, and the unit's device.
 #pragma once
 
 #include <cstddef>
@@ -18,59 +18,60 @@
 namespace absenc::client {
 
 struct DeviceSettings {
-  std::optional<std::int64_t> singleturn;  // counts at the start
-  std::optional<std::int64_t> multiturn;   // revolutions at the start
+  std::optional<std::int64_t> singleturn;  // position within the turn at the start, in counts
+  std::optional<std::int64_t> multiturn;   // number of turns at the start
   std::string motion = "still";
-  std::vector<std::string> conditions;  // NAME=VALUE, set before power-on
-  std::vector<std::string> alarms;      // raised from the start
-  std::vector<std::string> faults;      // KIND=RATE
-  bool faults_may_come = false;         // faults may be switched on later
-  std::uint64_t seed = 1;               // seed of the faults
+  std::vector<std::string> conditions;  // conditions, each as NAME=VALUE, set before power-on
+  std::vector<std::string> alarms;      // names of alarms that are raised from the start
+  std::vector<std::string> faults;      // faults to inject, each as KIND=RATE
+  bool faults_may_come = false;         // whether faults may be switched on later
+  std::uint64_t seed = 1;               // seed of the random faults
   Time delay = sim::FaultRates{}.delay;
-  bool real_power_on = false;  // power-on takes the document's start-up time
+  bool real_power_on = false;  // whether power-on takes the start-up time of the document
 };
 
-/// Parses a fault such as `corrupt=0.01`. Throws UsageError, which names the kinds and the range of a rate.
+/// Parses a fault such as `corrupt=0.01`. Throws UsageError, which names the kinds of faults and the range of a rate.
 [[nodiscard]] sim::FaultRate require_fault(std::string_view text);
 
-/// A virtual encoder, which has no power until `power_on`.
+/// A virtual encoder, which is switched off until `power_on`.
 class VirtualDevice {
  public:
-  /// Makes the device. Throws UsageError for settings that the unit cannot have.
+  /// Makes the encoder. Throws UsageError for settings that the unit cannot have.
   VirtualDevice(const Unit& unit, const Options& options, const DeviceSettings& settings);
   VirtualDevice(const VirtualDevice&) = delete;
   VirtualDevice& operator=(const VirtualDevice&) = delete;
 
-  /// Sets the conditions, switches the power on, raises the alarms, and starts the motion of the shaft at `now`.
+  /// Sets the conditions, switches the encoder on, raises the alarms, and starts the motion of the shaft at `now`.
   void power_on(Time now);
 
-  // ---- Changes while the encoder runs, only from the thread that runs its machine.
+  // ---- The following functions may only be called by the thread that runs the encoder's machine.
 
-  /// Raises the alarms of the settings again.
   [[nodiscard]] const Options& options() const { return options_; }
   [[nodiscard]] bool is_on() const { return is_on_; }
-  /// Switches the power on; does nothing if it is on. `real`: with the document's start-up time.
+  /// Switches the encoder on; does nothing if it is on. With `real` it needs the start-up time of the document.
   void switch_on(Time now, bool real);
   void switch_off(Time now);
-  /// Raises or lowers alarms, given as bits of the unit's alarms.
+  /// Raise or lower alarms, given as bits of the unit's alarms.
   void raise_alarms(std::uint32_t bits);
   void lower_alarms(std::uint32_t bits);
-  /// Sets a condition. `index` is its index among the unit's conditions; `value` must be within its range.
+  /// Sets a condition at the time `now`. `index` is its index among the unit's conditions; `value` must be within its
+  /// range.
   void set_condition(std::size_t index, std::int64_t value, Time now);
   [[nodiscard]] std::int64_t condition(std::size_t index) const { return conditions_[index]; }
 
-  /// Sets the observer of broken rules, which must outlive the device; null: none.
+  /// Sets the object that is told how often rules are checked and broken, which must outlive the device; null: none.
   void watch_rules(RuleWatch* watch);
 
-  /// Sets the fault rates from the next reply on. Requires `faults_may_come`, or faults at the start.
+  /// Sets the rates of all faults, from the next reply on. Requires `faults_may_come`, or faults at the start.
   void set_faults(const sim::FaultRates& rates);
   [[nodiscard]] const sim::FaultRates& fault_rates() const { return rates_; }
 
   [[nodiscard]] const Any<Device>& device() const { return device_; }
-  /// Returns the machine on the line: the device, or the device with its faults. Exactly one pointer is set.
+  /// Return the machine on the line, the device or the device with its faults, for bytes or frames; null for the other
+  /// kind.
   [[nodiscard]] Machine<std::uint8_t>* bytes() const;
   [[nodiscard]] Machine<CanFrame>* frames() const;
-  /// Returns the counts of injected faults; null if faults were never enabled.
+  /// Returns how often each fault was injected; null if faults were never enabled.
   [[nodiscard]] const sim::FaultCounts* faults() const;
   /// Returns the number of replies with at least one fault; nothing for CAN, or if faults were never enabled.
   [[nodiscard]] std::optional<std::uint64_t> damaged_replies() const;
@@ -88,7 +89,7 @@ class VirtualDevice {
   sim::FaultRates rates_;
   bool had_faults_;
   std::vector<std::int64_t> conditions_;
-  std::uint32_t alarms_ = 0;  // alarms that are raised at the start
+  std::uint32_t alarms_ = 0;  // bits of the alarms that are raised at the start
   bool real_power_on_;
   bool is_on_ = false;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A Link in virtual time for tests, with any unit's virtual encoder or another machine.
+// Links in virtual time for tests, with any unit's virtual encoder or another machine.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,8 @@
 
 namespace absenc::client {
 
-/// A clock for ports that are opened one after the other, as in `identify`. It advances only while a port waits.
+/// A virtual clock for ports that are opened one after the other, as in `identify`. It advances only while a port
+/// waits.
 struct VirtualClock {
   [[nodiscard]] sim::RealTime real_time() {
     return {.now = [this] { return time; }, .sleep_until = [this](Time until) { time = std::max(time, until); }};
@@ -25,13 +26,15 @@ struct VirtualClock {
 
 /// The properties of the port between the host and the virtual encoder.
 struct VirtualPort {
-  bool echo = false;                      // the adapter echoes
-  std::optional<std::uint64_t> pauses{};  // seed of random delays before each request; none: no delays
+  bool echo = false;                      // whether the adapter echoes requests
+  std::optional<std::uint64_t> pauses{};  // seed of random delays before each request; nothing: no delays
   std::optional<sim::RoughRates>
-      rough{};                    // use a line of whole frames, which is faster and can have faults; without echo
-  std::uint64_t seed = 1;         // seed of the faults
-  VirtualClock* clock = nullptr;  // the clock; null: time begins with the link and jumps from event to event
-  std::uint32_t rate = 0;         // rate of the host's end; 0: the encoder's
+      // use a line that carries whole frames, which is faster and can have faults, but has no echo; nothing: a line of
+      // bits
+      rough{};
+  std::uint64_t seed = 1;         // seed of the faults of `rough`
+  VirtualClock* clock = nullptr;  // clock of the port; null: time begins with the link and jumps from event to event
+  std::uint32_t rate = 0;         // rate of the host's end in bits per second; 0: that of the encoder
 };
 
 /// A port that delays each request by a random time.
@@ -42,7 +45,8 @@ class UnevenPort final : public Port<Item> {
   Time now() override { return port_->now(); }
   void begin(const Step<Item>& step) override {
     Step<Item> later = step;
-    // Does not delay SPI and clocked lines, or requests inside a procedure, because pauses have a meaning there.
+    // Delays no transfers of SPI and clocked lines, and no requests inside a procedure, because pauses have a meaning
+    // there.
     if (step.kind == Step<Item>::Kind::transfer && step.at <= port_->now()) {
       later.at = port_->now() + Time(std::uniform_int_distribution<std::int64_t>(0, 400'000)(random_));
     }
@@ -65,7 +69,7 @@ void take_port(Link& link, std::shared_ptr<AnyPort> port) {
   link.owner = std::move(port);
 }
 
-/// Returns a link to `device` in place of the encoder of this address. `device` must outlive the link.
+/// Connects `link` to `device` in place of the encoder of this address. `device` must outlive the link.
 template <class Item>
 void put_on_line(Link& link, const EncoderAddress& encoder, Machine<Item>& device, const VirtualPort& way = {}) {
   const LinkKind kind = encoder.unit->link;

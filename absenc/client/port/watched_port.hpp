@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Wraps a port: records the last exchange as it was on the line, and ends waits that take too long.
+// A port that stores the last exchange as it was on the line, and ends waits that take too long.
 #pragma once
 
 #include <algorithm>
@@ -21,13 +21,13 @@ template <class Item>
 struct LineExchange {
   std::vector<Item> request{};
   std::vector<Item> received{};  // received items, including the adapter's echo
-  std::size_t echo = 0;          // number of items of `received` that are echo
-  std::size_t clocks = 0;        // number of clocks, on a clocked line
+  std::size_t echo = 0;          // number of items at the beginning of `received` that are echo
+  std::size_t clocks = 0;        // number of clocks of the transfer; only on a clocked line
   Time answer{};                 // timeout for the beginning of a reply; 0: no reply is expected
-  Time sent_at{};                // end of the request
-  Time sent_late{};              // uncertainty of `sent_at`: the request may have ended this much earlier
-  Time received_at{};            // time of the end of the last received item
-  /// The number of items of `received` at a time.
+  Time sent_at{};                // time at which the request ended
+  Time sent_late{};              // uncertainty of `sent_at`: the request may have ended earlier by up to this time
+  Time received_at{};            // time at which the last received item ended
+  /// How many items of `received` had arrived at a time.
   struct Mark {
     Time at{};
     std::size_t items = 0;
@@ -37,14 +37,14 @@ struct LineExchange {
   [[nodiscard]] std::span<const Item> reply() const {
     return std::span<const Item>(received).subspan(std::min(echo, received.size()));
   }
-  /// Returns the time from the end of the request to the first character of the reply; 0 without a reply. `character`
-  /// is the duration of a character, 0 for frames.
+  /// Returns the time from the end of the request to the beginning of the reply's first character; 0 without a reply.
+  /// `character` is the duration of a character, 0 for frames.
   [[nodiscard]] Time answered_after(Time character) const {
     const auto first = std::find_if(marks.begin(), marks.end(), [this](const Mark& one) { return one.items > echo; });
     if (first == marks.end()) return {};
     return first->at - sent_at - character * static_cast<std::int64_t>(first->items - echo);
   }
-  /// Clears the record without releasing memory.
+  /// Clears the exchange without releasing memory.
   void clear() {
     request.clear();
     received.clear();
@@ -54,10 +54,11 @@ struct LineExchange {
   }
 };
 
-/// Thrown when a wait reaches the deadline.
+/// Thrown when a wait reaches the port's deadline.
 struct OutOfTime {};
 
-/// Wraps a port. After Ctrl-C, a conversation that must restore the encoder first may finish.
+/// A port around another port, which stores the exchanges and ends waits. After Ctrl-C, a conversation that must
+/// restore the encoder first may finish.
 template <class Item>
 class WatchedPort final : public Port<Item> {
  public:
@@ -66,8 +67,7 @@ class WatchedPort final : public Port<Item> {
     port_ = &port;
     rate_ = 0;
   }
-  /// Called before a conversation: restores the encoder's rate, because an aborted conversation may have left another
-  /// rate.
+  /// Restores the encoder's rate before a conversation, because an aborted conversation may have left another rate.
   void return_to(std::uint32_t rate) {
     if (rate_ != 0 && rate_ != rate) begin({.kind = Step<Item>::Kind::configure, .rate = rate});
   }
@@ -110,15 +110,17 @@ class WatchedPort final : public Port<Item> {
     return event;
   }
 
-  /// Returns whether the conversation was asked to end early since the last call.
+  /// Returns whether a conversation was asked to end early since the last call of this function.
   [[nodiscard]] bool take_aborted() { return std::exchange(aborted_, false); }
 
   std::function<bool()>
-      over;  // ends all waiting when it returns true; if it throws os::Interrupted, the conversation is asked to end
-  std::function<bool()> abort;  // asks the conversation to end early; returns whether it ends by itself
-  Time deadline = never;        // time of the port's clock; a wait that reaches it throws OutOfTime
+      // polled during each wait: true ends it with os::Ended; if os::Interrupted is thrown, the conversation is asked
+      // to end early
+      over;
+  std::function<bool()> abort;  // asks the conversation to end early; returns false if it cannot end by itself
+  Time deadline = never;        // time by the port's clock; a wait that reaches it throws OutOfTime
   LineExchange<Item> last;
-  Time nothing_until{};  // time when the last wait ended without received items
+  Time nothing_until{};  // time at which the last wait ended without a received item
   std::uint64_t requests = 0;
   std::uint64_t items_sent = 0;
   std::uint64_t items_received = 0;
@@ -137,7 +139,8 @@ class WatchedPort final : public Port<Item> {
       }
     }
   }
-  // Does not read the clock between a step and its wait, because the time of the step could pass in between.
+  // Uses the time read last instead of reading the clock: the time of the step could pass between the step and its
+  // wait.
   [[nodiscard]] Step<Item> bounded(const Step<Item>& step) const {
     if (deadline == never) return step;
     if (deadline <= looked_at_) throw OutOfTime{};
@@ -148,8 +151,8 @@ class WatchedPort final : public Port<Item> {
 
   static constexpr std::size_t most_kept = 1024;
   Port<Item>* port_ = nullptr;
-  Time looked_at_{};        // last time read from the clock
-  std::uint32_t rate_ = 0;  // rate that a conversation set; 0: none
+  Time looked_at_{};        // time that was read last from the port's clock
+  std::uint32_t rate_ = 0;  // rate that a conversation set, in bits per second; 0: it set none
   bool aborted_ = false;
 };
 

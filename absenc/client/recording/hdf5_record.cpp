@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Records rows as HDF5. Rows wait up to a quarter of a second and are written by a separate thread, so that neither the
-// library nor the disk delays a reading.
+// Records rows as HDF5. Rows wait up to a quarter of a second and are written by a thread of their own, so that neither
+// the HDF5 library nor the disk delays a reading.
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
@@ -31,7 +31,7 @@ Hdf5Attributes attributes_of(const RecordHeader& header) {
           {"part", header.part}};
 }
 
-// Creates the file with its columns, so that it can already be opened.
+// Makes the file visible with its columns, so that it can already be opened, and returns its size.
 std::uint64_t appear(os::BlockFile& file) {
   file.appear();
   return file.size();
@@ -105,7 +105,7 @@ class Hdf5Record final : public RecordFile {
         }
         commit();
       }
-    } catch (...) {  // rethrown by the next call of append
+    } catch (...) {  // the next call of `append` throws the exception again
       const std::lock_guard lock(mutex_);
       failure_ = std::current_exception();
       changed_.notify_all();
@@ -134,22 +134,22 @@ class Hdf5Record final : public RecordFile {
   }
 
   os::BlockFile file_;
-  Hdf5Table table_;  // used by the thread only
+  Hdf5Table table_;  // used only by the writing thread
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;
   Hdf5Rows rows_;        // rows that wait to be written
-  RecordCounts counts_;  // counts of the waiting rows
-  RecordCounts taken_;   // counts of the rows that are being written
+  RecordCounts counts_;  // counts of the rows that wait to be written
+  RecordCounts taken_;   // counts of the rows that are being written now
   RecordCounts committed_;
   std::uint64_t size_;
-  // sync waits for a commit that began after its call.
+  // Numbers of syncs: a sync waits for a commit that began after its call.
   std::uint64_t asked_ = 0;
   std::uint64_t serving_ = 0;
   std::uint64_t served_ = 0;
   bool ending_ = false;
-  bool is_last_ = false;  // the rows that are being written are the last
+  bool is_last_ = false;  // whether the rows that are being written are the last of the file
   std::exception_ptr failure_;
-  std::jthread thread_;  // last member: it uses all others
+  std::jthread thread_;  // last member, because the thread uses all other members
 };
 
 }  // namespace

@@ -12,7 +12,7 @@ namespace absenc::client {
 namespace {
 
 struct DriverFile {
-  H5FD_t common;  // first member: the library casts a pointer to it to a pointer to the whole struct
+  H5FD_t common;  // first member: the HDF5 library casts a pointer to `common` to a pointer to the whole struct
   Hdf5Store* store;
 };
 
@@ -28,7 +28,7 @@ herr_t close_file(H5FD_t* file) {
   return 0;
 }
 
-// Declares no features: otherwise the library combines blocks of several types.
+// Reports no features of the driver: otherwise the HDF5 library combines blocks of several types.
 herr_t query(const H5FD_t*, unsigned long* features) {
   *features = 0;
   return 0;
@@ -74,7 +74,7 @@ const H5FD_class_t& driver_class() {
     made.get_eof = allocated;
     made.read = read;
     made.write = write;
-    // Each type of block is allocated separately.
+    // The driver allocates each type of block separately.
     const H5FD_mem_t types[] = H5FD_FLMAP_DICHOTOMY;
     std::copy(std::begin(types), std::end(types), std::begin(made.fl_map));
     return made;
@@ -82,7 +82,8 @@ const H5FD_class_t& driver_class() {
   return driver;
 }
 
-constexpr std::size_t level_of_node = 5;  // offset of the level in a B-tree node of version 1: "TREE", type, level
+// offset of the level in a B-tree node of version 1, which begins with "TREE", type and level
+constexpr std::size_t level_of_node = 5;
 
 }  // namespace
 
@@ -93,7 +94,8 @@ void Hdf5Store::attach(hid_t access) {
 }
 
 void Hdf5Store::write(H5FD_mem_t type, std::uint64_t at, Bytes bytes) {
-  // The library writes whole objects, so two blocks are either equal or one is inside the other.
+  // Finds a stored block by its offset. The HDF5 library writes whole objects, so two blocks are either equal or one is
+  // inside the other.
   auto next = blocks_.upper_bound(at);
   if (next != blocks_.begin()) {
     auto& [begin, block] = *std::prev(next);
@@ -121,9 +123,9 @@ void Hdf5Store::read(std::uint64_t at, MutableBytes bytes) {
   }
 }
 
-// A block is written after the blocks that it points to. An exception is the B-tree: the upper node is written first.
-// After a split it points to both halves, and a reader does not search the old node for the moved half. Object headers,
-// which hold the number of rows, are written last.
+// Returns the order in which blocks are written: a block comes after the blocks that it points to. An exception is the
+// B-tree, whose upper node comes first: after a split it points to both halves, and a reader does not search the old
+// node for the moved half. Object headers, which hold the number of rows, come last.
 int Hdf5Store::rank(const StoredBlock& block) {
   constexpr int last = 1000;
   switch (block.type) {
@@ -143,7 +145,7 @@ int Hdf5Store::rank(const StoredBlock& block) {
 void Hdf5Store::commit() {
   using Entry = std::pair<const std::uint64_t, StoredBlock>;
   std::vector<const Entry*> again;
-  // New blocks are invisible to readers until the remaining blocks are written.
+  // Writes new blocks first: readers cannot see them until the remaining blocks are written.
   for (const Entry& one : blocks_) {
     if (one.first < committed_end_) {
       again.push_back(&one);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Stores an HDF5 file so that it can be opened after a crash at any point. Collects the writes of the HDF5 library;
-// `commit` writes them in an order in which the file is consistent after every single write.
+// Stores an HDF5 file so that it can be opened after a crash at any point. The store collects the writes of the HDF5
+// library; `commit` writes them in an order in which the file is consistent after every single write.
 #pragma once
 
 #include <hdf5.h>
@@ -23,17 +23,18 @@ class Hdf5Store {
   };
   explicit Hdf5Store(Disk disk) : disk_(std::move(disk)) {}
 
-  /// Sets `access`, a property list for H5Fcreate, to use this store. The store must outlive the file.
+  /// Sets this store as the driver in `access`, a property list for H5Fcreate. The store must outlive the file.
   void attach(hid_t access);
 
-  /// Throws the exceptions of `disk`. The data committed before then remains intact, and nothing more can be committed.
+  /// Writes the collected blocks to the disk. Throws the exceptions of `disk`; then the data committed before remains
+  /// intact, and nothing more can be committed.
   void commit();
 
-  // Called by the HDF5 driver:
+  // Functions for the HDF5 driver:
   void write(H5FD_mem_t type, std::uint64_t at, Bytes bytes);
   void read(std::uint64_t at, MutableBytes bytes);
 
-  std::uint64_t end = 0;  // end of the space that the library has allocated
+  std::uint64_t end = 0;  // end of the space that the HDF5 library has allocated, as an offset in the file
 
  private:
   struct StoredBlock {

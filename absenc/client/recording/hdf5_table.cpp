@@ -13,10 +13,11 @@ namespace absenc::client {
 namespace {
 
 constexpr hsize_t rows_of_a_chunk = 1024;
-constexpr hsize_t page = 4096;          // bytes; a write inside one page is atomic even if the process is killed
-constexpr std::size_t text_bytes = 48;  // longer than the name of any error
+// alignment in the file, in bytes: a write inside one page is atomic even if the process is killed
+constexpr hsize_t page = 4096;
+constexpr std::size_t text_bytes = 48;  // length of text columns in bytes, which is longer than the name of any error
 
-// Debian's HDF5 library is not thread-safe.
+// Lock for all calls of the HDF5 library, because Debian's is not thread-safe.
 std::mutex& library() {
   static std::mutex mutex;
   return mutex;
@@ -26,7 +27,7 @@ void require(herr_t result) {
   if (result < 0) throw Failure("HDF5 could not go on writing: record to a name that ends in .csv");
 }
 
-/// Owns an HDF5 identifier and releases it.
+/// Owner of an HDF5 identifier, which it releases.
 class Handle {
  public:
   using Release = herr_t (*)(hid_t);
@@ -34,7 +35,7 @@ class Handle {
   ~Handle() { release_(id_); }
   Handle(const Handle&) = delete;
   Handle& operator=(const Handle&) = delete;
-  operator hid_t() const { return id_; }  // converts implicitly, as HDF5 functions take hid_t
+  operator hid_t() const { return id_; }  // converts implicitly, because HDF5 functions take hid_t
 
  private:
   hid_t id_;
@@ -71,7 +72,8 @@ using Elements = std::vector<std::uint8_t>;
 
 template <class T>
 void append(Elements& elements, T value) {
-  const auto* const bytes = reinterpret_cast<const std::uint8_t*>(&value);  // all hosts of Debian are little endian
+  // the file is little endian, as are all hosts of Debian
+  const auto* const bytes = reinterpret_cast<const std::uint8_t*>(&value);
   elements.insert(elements.end(), bytes, bytes + sizeof value);
 }
 
@@ -82,7 +84,7 @@ void append_text(Elements& elements, std::string_view text) {
   elements.resize(end);
 }
 
-// Returns the value that stands for a missing one.
+// Appends the element that a column of this type has for a missing value.
 void append_missing(Elements& elements, ColumnType type) {
   switch (type) {
     case ColumnType::int64:
@@ -166,10 +168,11 @@ void Hdf5Rows::clear() {
 Hdf5Table::Hdf5Table(Hdf5Store::Disk disk, std::span<const Column> columns, const Hdf5Attributes& attributes)
     : store_(std::move(disk)) {
   const std::lock_guard lock(library());
-  require(H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr));  // absenc reports errors itself
+  // the library must print no errors, because absenc reports them itself
+  require(H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr));
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   store_.attach(access);
-  // Uses the oldest format: it has no checksums over several blocks, and every reader supports it.
+  // Selects the oldest format of HDF5: it has no checksums over several blocks, and every reader supports it.
   require(H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18));
   require(H5Pset_meta_block_size(access, 0));
   require(H5Pset_alignment(access, 1, page));
@@ -186,7 +189,8 @@ Hdf5Table::Hdf5Table(Hdf5Store::Disk disk, std::span<const Column> columns, cons
     make(column);
     names += (names.empty() ? "" : ",") + std::string(column.name);
   }
-  put_attribute(file_, "columns", names);  // in the order of columns, which the oldest format does not store
+  // names of the columns in their order, which the oldest format does not store
+  put_attribute(file_, "columns", names);
   require(H5Fflush(file_, H5F_SCOPE_GLOBAL));
   store_.commit();
 }
@@ -194,7 +198,8 @@ Hdf5Table::Hdf5Table(Hdf5Store::Disk disk, std::span<const Column> columns, cons
 Hdf5Table::~Hdf5Table() {
   const std::lock_guard lock(library());
   for (const hid_t dataset : datasets_) H5Dclose(dataset);
-  if (file_ >= 0) H5Fclose(file_);  // the library's last writes are not committed; the file is complete without them
+  // the library's last writes are not committed, and the file is complete without them
+  if (file_ >= 0) H5Fclose(file_);
 }
 
 void Hdf5Table::make(const Column& column) {

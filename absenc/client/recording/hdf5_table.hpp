@@ -15,7 +15,7 @@
 
 namespace absenc::client {
 
-/// Elements of several rows, column by column, in the file's format, without details.
+/// Rows that are collected column by column, in the format of the file. Columns with `is_detail` are left out.
 class Hdf5Rows {
  public:
   explicit Hdf5Rows(std::span<const Column> columns);
@@ -26,7 +26,7 @@ class Hdf5Rows {
 
  private:
   friend class Hdf5Table;
-  std::vector<std::size_t> columns_;  // indexes of the columns in a row
+  std::vector<std::size_t> columns_;  // index in the row of each stored column
   std::vector<ColumnType> types_;
   std::vector<std::vector<std::uint8_t>> elements_;
   std::uint64_t count_ = 0;
@@ -34,22 +34,24 @@ class Hdf5Rows {
 
 using Hdf5Attributes = std::vector<std::pair<std::string, std::variant<std::string, double, std::uint64_t>>>;
 
-/// Value of the attribute `rows` while the file is being written, and forever if the writer was killed.
+/// Value of the attribute `rows` while the file is being written; it stays if the writer is killed.
 constexpr std::uint64_t hdf5_not_ended = UINT64_MAX;
 
 class Hdf5Table {
  public:
-  /// Creates the datasets. The file has `attributes`, and `columns` with the column names. Each column has `unit`,
-  /// `meaning`, and `missing_value`, which stands for a missing value (NaN for reals). Throws Failure and the
-  /// exceptions of `disk`.
+  /// Creates the file with a dataset for each column. The file has `attributes`, and `columns` with the column names.
+  /// Each dataset has `unit`, `meaning`, and `missing_value`, the element of a missing value (NaN for reals). Throws
+  /// Failure and the exceptions of `disk`.
   Hdf5Table(Hdf5Store::Disk disk, std::span<const Column> columns, const Hdf5Attributes& attributes);
   ~Hdf5Table();
   Hdf5Table(const Hdf5Table&) = delete;
   Hdf5Table& operator=(const Hdf5Table&) = delete;
 
-  /// Writes rows to the file. Throws as the constructor; the rows written before then remain in the file.
+  /// Writes rows to the file. Throws Failure and the exceptions of `disk`; then the rows written before remain in the
+  /// file.
   void commit(const Hdf5Rows& rows);
-  /// Sets the attribute `rows` of the file, which was `hdf5_not_ended`. Throws as `commit`.
+  /// Writes the number of rows into the attribute `rows`, which was `hdf5_not_ended`. Throws Failure and the exceptions
+  /// of `disk`.
   void finish();
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// If the process is killed between any two writes, the file can be opened and holds the rows committed before.
+// If the process is killed between any two writes, the file must open and hold the rows committed before.
 #include "absenc/client/recording/hdf5_table.hpp"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ constexpr std::array<Column, 3> columns{{{"time_s", "s", ColumnType::real, "seco
 
 struct Write {
   std::uint64_t at;
-  std::vector<std::uint8_t> bytes;  // bytes to write; empty: the file grows to `at`
+  std::vector<std::uint8_t> bytes;  // bytes that are written at `at`; empty: the file grows to `at`
 };
 
 struct Bench {
@@ -60,7 +60,7 @@ Hdf5Rows rows_from(std::int64_t first, std::int64_t count) {
   return rows;
 }
 
-/// Returns the number of rows of a dataset if all are as written; -1 if it cannot be opened or has other values.
+/// Returns the number of rows of a dataset; -1 if the dataset cannot be opened or has other values than those written.
 template <class T>
 std::int64_t whole_rows(const fs::path& path, const char* name, hid_t type, T (*expected)(std::int64_t)) {
   const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
@@ -112,7 +112,7 @@ TEST(Hdf5Table, EveryBeginningOfACommitIsAWholeFile) {
   EXPECT_GT(states, 200u);
 }
 
-// If the disk is full at any write, the rows committed before remain.
+// If the disk is full at any write, the rows committed before must remain.
 TEST(Hdf5Table, AWriteThatFailsLosesOnlyItsCommit) {
   for (int failing = 0;; ++failing) {
     ASSERT_LT(failing, 1000);
@@ -141,7 +141,7 @@ TEST(Hdf5Table, AWriteThatFailsLosesOnlyItsCommit) {
     EXPECT_GE(rows, 900) << failing;
     if (failed) continue;
     EXPECT_EQ(rows, 5900) << failing;
-    return;  // no write failed any more
+    return;  // all writes succeeded, so every write has been tested as the failing one
   }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One file of a recording in any format.
+// One file of a recording, in any of its formats.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace absenc::client {
 
-/// The header of a file.
+/// The data in the header of each file of a recording.
 struct RecordHeader {
   std::string encoder;
   std::string protocol;
@@ -26,34 +26,35 @@ struct RecordHeader {
   std::uint64_t part = 1;
 };
 
-/// All members throw os::Failure for errors of the disk, with `lost` if the file was removed or replaced.
+/// A file of a recording that is being written. All members throw os::Failure for errors of the disk, with kind `lost`
+/// if the file was removed or replaced.
 class RecordFile {
  public:
   virtual ~RecordFile() = default;
 
-  /// Appends a row. It is in the file within a second.
+  /// Appends a row, which is in the file within a second, with its counts.
   virtual void append(const Row& row, const RecordCounts& counts) = 0;
-  /// Waits until all rows are in the file and on the disk.
+  /// Waits until all appended rows are in the file and on the disk.
   virtual void sync() = 0;
-  /// Writes the number of rows into the file, so that a reader knows that none is missing, and syncs. Nothing may be
-  /// appended afterwards.
+  /// Writes the number of rows into the file, so that a reader knows that none is missing, and waits for the disk.
+  /// Nothing may be appended afterwards.
   virtual void finish() = 0;
   virtual void require_there() const = 0;
   [[nodiscard]] virtual std::uint64_t size() const = 0;
-  /// Returns the counts of the rows in the file.
+  /// Returns the counts of the rows that are in the file.
   [[nodiscard]] virtual RecordCounts counts() const = 0;
 };
 
 enum class RecordForm : std::uint8_t { csv, json_lines, hdf5 };
 
-/// Returns the format by the ending of the file name. Throws UsageError.
+/// Returns the format that the ending of the file name selects. Throws UsageError.
 [[nodiscard]] RecordForm record_form(const std::string& path);
 
-/// Creates the file, which must not exist, with its header. `columns` must outlive it.
+/// Creates a file, which must not exist, with its header. `columns` must outlive the result.
 [[nodiscard]] std::unique_ptr<RecordFile> make_record_file(const std::string& path, std::span<const Column> columns,
                                                            const RecordHeader& header);
 
-// Implementations of the formats:
+// Creates a file in one of the formats:
 [[nodiscard]] std::unique_ptr<RecordFile> make_text_file(const std::string& path, RecordForm form,
                                                          std::span<const Column> columns, const RecordHeader& header);
 [[nodiscard]] std::unique_ptr<RecordFile> make_hdf5_file(const std::string& path, std::span<const Column> columns,

@@ -57,19 +57,19 @@ struct Recording::Parts {
 
   RecordingSettings settings_;
   Encoder& encoder_;
-  Time start_;  // start of the recording, by os::now
+  Time start_;  // time at which the recording began, by os::now
   SampleRows rows_;
-  std::string started_;  // `start_` as date and time
+  std::string started_;  // date and time at which the recording began, as text
   std::unique_ptr<RecordFile> file_;
   unsigned part_ = 0;
   Time part_start_{};
-  std::uint64_t finished_bytes_ = 0;  // in the files before `file_`
-  RecordCounts finished_;             // counts of the files before `file_`
-  std::uint64_t offered_ = 0;         // readings, of which `RecordingSettings::every` leaves some out
-  std::uint64_t taken_ = 0;           // readings that were written
-  std::uint64_t gap_ = 0;             // missed readings that are not written yet
+  std::uint64_t finished_bytes_ = 0;  // size of all files before `file_`, in bytes
+  RecordCounts finished_;             // counts of all files before `file_`
+  std::uint64_t offered_ = 0;         // number of readings, including those that `RecordingSettings::every` leaves out
+  std::uint64_t taken_ = 0;           // number of readings that were written
+  std::uint64_t gap_ = 0;             // number of missed readings for which no row was written yet
   Time gap_at_{};
-  std::uint32_t alarms_ = 0;  // alarms of the previous reading
+  std::uint32_t alarms_ = 0;  // alarms of the reading before
   std::uint32_t alarms_reported_ = 0;
 };
 
@@ -79,7 +79,7 @@ Recording::Parts::Parts(const RecordingSettings& settings, Encoder& encoder)
       start_(os::now()),
       rows_(encoder.unit(), encoder.options(), start_, SampleRows::With::motion, encoder.joint()),
       started_(date_and_time()) {
-  static_cast<void>(record_form(settings.path));  // checks the ending of the name before the folder is read
+  static_cast<void>(record_form(settings.path));  // refuses a wrong ending of the name before the folder is read
   if (settings_.part_bytes || settings_.part_time) refuse_parts_of_another_recording();
   open_part();
 }
@@ -98,7 +98,7 @@ bool Recording::Parts::run(const std::function<void(const Sample&)>& on_written)
   Sample sample;
   const auto note_missed = [&] {
     const std::uint64_t missed = pace.take_missed();
-    // While the port is lost, the row of the loss replaces rows of missed readings.
+    // While the port is lost, no rows for missed readings are written: the row of the loss covers them.
     const bool was_there = sample.kind == Sample::Kind::reading || sample.kind == Sample::Kind::failed;
     if (was_there) miss(missed);
   };
@@ -116,7 +116,7 @@ bool Recording::Parts::run(const std::function<void(const Sample&)>& on_written)
   } catch (const os::Interrupted&) {
   } catch (const Cancelled&) {
   }
-  if (!has_all) pace.leave_out(end);  // the end may be reached while a reading is taken
+  if (!has_all) pace.leave_out(end);  // `end` may be reached while a reading is taken
   note_missed();
   write_gap();
   file_->finish();
@@ -130,12 +130,12 @@ std::string Recording::Parts::part_path(unsigned part) const {
   return path.parent_path() / name;
 }
 
-// Refuses to start if later parts of an older recording exist, because this one would reach their names.
+// Refuses to start if parts of an older recording of this name exist: this recording might reach their names.
 void Recording::Parts::refuse_parts_of_another_recording() const {
   const fs::path path(settings_.path);
   const std::string begin = path.stem().string() + "-";
   const std::string ending = path.extension();
-  std::error_code error;  // an unreadable folder is reported when the file is created
+  std::error_code error;  // ignored: an unreadable folder is reported when the file is created
   for (const fs::directory_entry& entry :
        fs::directory_iterator(path.has_parent_path() ? path.parent_path() : ".", error)) {
     const std::string name = entry.path().filename();
@@ -170,7 +170,8 @@ RecordHeader Recording::Parts::header() const {
           .part = part_};
 }
 
-// Keeps every Nth reading, every change of an alarm, and all failures except repeated waiting.
+// Returns whether the sample is written: every Nth reading, every change of an alarm, and all failures and events
+// except repeated waiting for the port.
 bool Recording::Parts::wanted(const Sample& sample) {
   if (sample.kind == Sample::Kind::absent) return false;
   if (sample.kind != Sample::Kind::reading) return true;

@@ -45,7 +45,8 @@ TEST(ClientRecording, EndsByCancelWhileItWaits) {
   Encoder encoder = open("sim:tformat");
   Recording recording({.path = own_path("record") + ".jsonl", .encoder = "motor", .rate_hz = 1e-3}, encoder);
   std::thread other;
-  recording.run([&](const Sample&) { other = std::thread([&] { encoder.cancel(); }); });  // ends the wait of 1000 s
+  // cancels the wait of 1000 s for the next reading
+  recording.run([&](const Sample&) { other = std::thread([&] { encoder.cancel(); }); });
   other.join();
   EXPECT_EQ(lines_of(recording.names()).size(), 3U);
   std::filesystem::remove(recording.names());

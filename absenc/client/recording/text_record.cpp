@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Records rows as CSV or JSON lines and writes each line to the file at once.
+// Records rows as CSV or JSON lines; each line is written to the file at once.
 #include <fmt/format.h>
 
 #include "absenc/client/recording/record_file.hpp"

@@ -17,12 +17,13 @@ using namespace std::chrono_literals;
 Receiver::Receiver(const EncoderAddress& uri) : link_(open_receiving(uri)), place_(link_.place) {}
 
 Receiver::Receiver() : place_("standard input") {
-  link_.latency = 20ms;  // a pipe between two programs, which a busy computer delays
+  link_.latency = 20ms;  // a busy computer delays a pipe between two programs
 }
 
 Receiver::~Receiver() { cancel(); }
 
-// Programs and adapters may delay a part of a frame for their latency, a busy computer for much longer.
+// Half a second more than twice the latency: programs and adapters may delay a part of a frame for their latency, a
+// busy computer for much longer.
 Time Receiver::quiet() const { return 500ms + 2 * link_.latency; }
 
 void Receiver::start(Time end) {
@@ -71,7 +72,7 @@ std::optional<Received> Receiver::next(Time deadline) {
   return first;
 }
 
-// ---- In the thread that receives
+// ---- Functions of the receiving thread
 
 void Receiver::receive() {
   const os::CancelCheck cancel_check(is_over_);
@@ -90,7 +91,8 @@ void Receiver::receive() {
   }
 }
 
-// The port checks for bytes once more before it reports the timeout: a thread that did not run has not seen silence.
+// Receives bytes, and reports silence. The port checks for bytes once more before it reports the timeout, because a
+// thread that did not run has not seen silence.
 void Receiver::receive_from_port() {
   Time quiet_at = link_.bytes->now() + quiet();
   for (;;) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Receives the bytes of a port in a thread of its own, because its reader may be slow. Nothing is ever sent.
+// Receives the bytes of a port in a thread of its own, because the caller may be slow. Never sends anything.
 #pragma once
 
 #include <condition_variable>
@@ -20,17 +20,17 @@
 
 namespace absenc::client {
 
-/// Bytes that arrived at one time, or the report that none arrived.
+/// Bytes that arrived at one time, or the report that no byte arrived.
 struct Received {
   Time at{};
-  std::vector<std::uint8_t> bytes{};  // empty: no byte has arrived for `Receiver::quiet`
+  std::vector<std::uint8_t> bytes{};  // received bytes; empty: no byte has arrived for the time `Receiver::quiet`
 };
 
 class Receiver {
  public:
   enum class ReceiveEnd : std::uint8_t { none, input, time, interrupted, lost };
 
-  /// Opens the port of the address. Throws os::Failure, UsageError.
+  /// Opens the port of the address for receiving. Throws os::Failure, UsageError.
   explicit Receiver(const EncoderAddress& uri);
   /// Receives raw bytes from standard input.
   Receiver();
@@ -38,30 +38,30 @@ class Receiver {
   Receiver(const Receiver&) = delete;
   Receiver& operator=(const Receiver&) = delete;
 
-  /// Starts receiving, until `end`. Called once.
+  /// Starts the receiving thread, which ends at the time `end`. Called once.
   void start(Time end = never);
-  /// Returns the next bytes in order; nothing at the end, or if `deadline` is reached first.
+  /// Waits for bytes and returns them in their order; nothing if receiving has ended, or when `deadline` is reached.
   [[nodiscard]] std::optional<Received> next(Time deadline = never);
   /// Makes `next` return nothing from now on. May be called from any thread.
   void cancel();
 
-  /// Returns why the port was lost; `none` while it is open.
+  /// Returns why receiving ended; `none` while it continues.
   [[nodiscard]] ReceiveEnd end() const;
-  /// Returns in words why the port was lost.
+  /// Returns a sentence about the loss of the port; "" if it was not lost.
   [[nodiscard]] std::string problem() const;
-  /// Returns the number of dropped bytes. Bytes are dropped if the reader is too slow for too long.
+  /// Returns the number of dropped bytes. Bytes are dropped if the caller does not take them for too long.
   [[nodiscard]] std::uint64_t dropped() const;
 
-  /// Returns the place as "/dev/ttyUSB0 at 2500000 baud".
+  /// Returns the port in words, "/dev/ttyUSB0 at 2500000 baud".
   [[nodiscard]] const std::string& place() const { return place_; }
   [[nodiscard]] const std::vector<std::string>& notes() const { return link_.notes; }
-  /// The greatest delay of a byte on its way to this program.
+  /// Returns the greatest delay of a byte on its way to this program.
   [[nodiscard]] Time latency() const { return link_.latency; }
-  /// A silence of this length occurs neither in a frame nor before a reply.
+  /// Returns a time of silence that occurs neither inside a frame nor before a reply.
   [[nodiscard]] Time quiet() const;
 
  private:
-  static constexpr std::size_t most_waiting = 64 << 20;  // limit of waiting bytes
+  static constexpr std::size_t most_waiting = 64 << 20;  // limit of the bytes that wait for the caller
 
   void receive();
   void receive_from_port();
@@ -73,7 +73,7 @@ class Receiver {
   std::string place_;
   Time end_time_ = never;
 
-  mutable std::mutex mutex_;  // guards the members down to the thread
+  mutable std::mutex mutex_;  // guards all following members except the thread
   std::condition_variable changed_;
   std::deque<Received> waiting_;
   std::size_t waiting_size_ = 0;
@@ -83,7 +83,7 @@ class Receiver {
   bool cancelled_ = false;
 
   std::function<bool()> is_over_;
-  std::jthread thread_;  // last member: it uses all others
+  std::jthread thread_;  // last member, because the thread uses all other members
 };
 
 }  // namespace absenc::client

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures how often a host sends each kind of request, by arrival times.
+// Measures how often a host sends each kind of request, from the arrival times of the requests.
 #pragma once
 
 #include <algorithm>
@@ -18,14 +18,14 @@ namespace absenc::client {
 class RequestRates final : public capture::AnnotationSink {
  public:
   struct RequestKind {
-    std::string name{};                 // name of the protocol's command; "": no command sends such a request
+    std::string name{};                 // name of the command that sends such requests; "": no command of the unit does
     std::vector<std::uint8_t> first{};  // the first request of this kind
     std::uint64_t count = 0;
-    std::uint64_t errors = 0;  // requests without a good reply
+    std::uint64_t errors = 0;  // number of requests without a good reply
     capture::Tick begin = 0;   // tick of the first request
     capture::Tick last = 0;    // tick of the last request
 
-    /// Returns requests per second; 0 for fewer than two requests.
+    /// Returns the number of requests per second; 0 for fewer than two requests.
     [[nodiscard]] double per_second() const {
       return count > 1 && last > begin
                  ? static_cast<double>(count - 1) * static_cast<double>(arrival_ticks_per_second) /
@@ -56,7 +56,8 @@ class RequestRates final : public capture::AnnotationSink {
     kind.errors += annotation.error != Error::none ? 1 : 0;
   }
 
-  /// Returns the kinds, the most frequent first. A damaged request is a kind of its own while there is room.
+  /// Returns the kinds of requests, the most frequent first. A damaged request is a kind of its own as long as there
+  /// are fewer than `most_kinds`.
   [[nodiscard]] std::vector<RequestKind> kinds() const {
     std::vector<RequestKind> all = kinds_;
     std::stable_sort(all.begin(), all.end(),
@@ -65,15 +66,17 @@ class RequestRates final : public capture::AnnotationSink {
   }
 
  private:
-  static constexpr std::size_t most_kinds = 64;  // further kinds are counted as the last one
+  // limit of the number of kinds; requests of further kinds are counted with the last one
+  static constexpr std::size_t most_kinds = 64;
 
   struct SampleRequest {
     std::string_view command;
     std::vector<std::uint8_t> bytes;
-    bool varies;  // the command has arguments
+    bool varies;  // whether the command has arguments, which change its request
   };
 
-  // Requests of a command with arguments have the same beginning and the same length.
+  // Returns the command of a request; "" if there is none. Requests of a command with arguments begin with the same
+  // byte and have the same length.
   [[nodiscard]] std::string_view command_of(Bytes request) const {
     for (const SampleRequest& one : samples_) {
       if (std::equal(one.bytes.begin(), one.bytes.end(), request.begin(), request.end())) return one.command;

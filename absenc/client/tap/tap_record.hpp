@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Records all received bytes in a file that `decode` reads: one line for each frame, with its arrival time.
+// Writes all received bytes to a file that `decode` reads: one line for each frame, with its arrival time.
 #pragma once
 
 #include <fmt/format.h>
@@ -14,10 +14,11 @@
 
 namespace absenc::client {
 
-/// Writes the annotations of the annotator, which contain each received byte. Their times are arrival ticks.
+/// Writes annotations to a file. The annotations of the annotator contain each received byte; their times are arrival
+/// ticks.
 class TapRecord final : public capture::AnnotationSink {
  public:
-  /// Creates the file. Throws os::Failure: `in_use` if it already exists.
+  /// Creates the file. Throws os::Failure, with kind `in_use` if the file already exists.
   TapRecord(const std::string& path, const std::string& title) : file_(path) {
     lines_ = fmt::format(
         "# {}\n# seconds since its beginning, when the last byte of a frame had arrived at the computer; then the "
@@ -38,7 +39,8 @@ class TapRecord final : public capture::AnnotationSink {
   [[nodiscard]] const std::string& path() const { return file_.path(); }
 
  private:
-  // Gives each frame a time of its own, because `decode` joins lines of the same time to one frame.
+  // Adds a line for a frame. Each frame gets a time of its own, because `decode` joins lines of the same time to one
+  // frame.
   void add(capture::Tick at, Bytes bytes) {
     if (bytes.empty()) return;
     last_ = std::max(at, last_ + 1);

@@ -27,10 +27,11 @@ using namespace std::chrono_literals;
 
 namespace {
 
-constexpr std::size_t first_search = 64;     // bytes before the first search; each further search has twice as many
-constexpr std::size_t last_search = 8192;    // bytes; more do not improve the search
-constexpr std::size_t most_at_other = 2048;  // bytes to try at a rate that may be wrong
-constexpr Time patience_at_rate = 2s;        // time to wait for bytes before the next rate is tried
+// number of bytes before the first search; each further search waits for twice as many
+constexpr std::size_t first_search = 64;
+constexpr std::size_t last_search = 8192;    // number of bytes after which further bytes do not improve the search
+constexpr std::size_t most_at_other = 2048;  // number of bytes to try at a rate that may be wrong
+constexpr Time patience_at_rate = 2s;  // time for which bytes are awaited at one rate before the next rate is tried
 constexpr std::size_t enough_to_settle = 600;
 constexpr Time time_to_settle = 1s;
 
@@ -38,7 +39,7 @@ bool is_asynchronous(const Unit& unit) {
   return unit.link == LinkKind::half_duplex || unit.link == LinkKind::full_duplex;
 }
 
-// Arrival times do not allow to measure the response time of an encoder, so it is not printed.
+// Removes the response time of each annotation: arrival times are too coarse to measure it.
 struct Untimed final : capture::AnnotationSink {
   Untimed(TapRecord* of_run, capture::AnnotationSink& next) : record(of_run), sink(next) {}
   void put(const capture::Annotation& annotation) override {
@@ -77,7 +78,7 @@ struct TapRun::Sinks {
 
 TapRun::TapRun(std::string_view place, TapChoices choices) : choices_(std::move(choices)) {
   if (choices_.duration > Time{}) end_time_ = os::now() + choices_.duration;
-  // Accepts "tformat:/dev/ttyUSB0", as in other verbs.
+  // Accepts a protocol before the port, "tformat:/dev/ttyUSB0", as other verbs of absenc do.
   const std::string_view first = place.substr(0, place.find(':'));
   if (choices_.protocol.empty() && first.size() < place.size() && find_unit(first) != nullptr) {
     choices_.protocol = first;
@@ -147,7 +148,7 @@ std::vector<TapRun::LineToTry> TapRun::lines_to_try() {
                               one.settings.stop_bits == address.line.stop_bits);
       });
       if (!known) lines.push_back({address.line, std::move(address)});
-    } catch (const UsageError& error) {  // the port cannot have this rate
+    } catch (const UsageError& error) {  // skips units whose rate the port cannot have
       if (!refusal) refusal = error;
     }
   }
@@ -156,7 +157,7 @@ std::vector<TapRun::LineToTry> TapRun::lines_to_try() {
 }
 
 void TapRun::open(const LineToTry& line) {
-  receiver_.reset();  // closes the port first, because it is locked
+  receiver_.reset();  // closes the port before it is opened again, because an open port is locked
   receiver_ = line.address ? std::make_unique<Receiver>(*line.address) : std::make_unique<Receiver>();
   receiver_->start(end_time_);
   collected_.clear();
@@ -165,7 +166,7 @@ void TapRun::open(const LineToTry& line) {
 
 void TapRun::cancel() { receiver_->cancel(); }
 
-// ---- Whose frames they are
+// ---- Identification of the protocol
 
 std::optional<Received> TapRun::collect(Time deadline) {
   std::optional<Received> received = receiver_->next(deadline);
@@ -254,7 +255,7 @@ bool TapRun::search(const std::function<void(const std::string&)>& progress) {
   return true;
 }
 
-// ---- Exchanges
+// ---- Exchanges of the identified protocol
 
 void TapRun::begin(capture::AnnotationSink& sink) {
   const auto gap = std::max<capture::Tick>(1, arrival_tick(receiver_->latency()));

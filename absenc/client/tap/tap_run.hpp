@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Listens on a line: receives bytes, identifies the protocol if none was given, and passes on exchanges.
+// Listens on a line: receives bytes, identifies the protocol if none was given, and passes the exchanges to a sink.
 #pragma once
 
 #include <cstdint>
@@ -23,37 +23,37 @@ namespace absenc::client {
 
 struct TapOutcome {
   Receiver::ReceiveEnd end = Receiver::ReceiveEnd::none;
-  std::string problem{};      // why the port was lost
+  std::string problem{};      // sentence about the loss of the port; "": it was not lost
   std::uint64_t bytes = 0;    // number of received bytes
-  std::uint64_t dropped = 0;  // number of bytes received but dropped before decoding
+  std::uint64_t dropped = 0;  // number of received bytes that were dropped before decoding
 };
 
 class TapRun {
  public:
-  /// Opens `place`, a port without its protocol, with settings behind ?: "/dev/ttyUSB0?baud=115200", "tcp:HOST:PORT";
-  /// "-" is standard input. Throws UsageError, os::Failure.
+  /// Opens `place`: a port without its protocol, with settings behind ?, "/dev/ttyUSB0?baud=115200" or "tcp:HOST:PORT";
+  /// or "-" for standard input. Throws UsageError, os::Failure.
   TapRun(std::string_view place, TapChoices choices);
   ~TapRun();
 
   /// Waits for enough bytes to identify the protocol and its options. Returns false if no byte arrived or no protocol
-  /// explains the bytes. If the protocol was given, only finds missing options. Called before `run`.
+  /// explains the bytes. If the protocol was given, only determines missing options. Must be called before `begin`.
   bool settle(const std::function<void(const std::string&)>& progress);
-  /// Starts decoding into `sink`, which must outlive the object. Called once.
+  /// Starts decoding: exchanges are passed to `sink`, which must outlive the object. Called once.
   void begin(capture::AnnotationSink& sink);
-  /// Waits until bytes arrive or `Receiver::quiet` elapses, and passes on the complete exchanges. Returns false at the
-  /// end. Throws os::Failure of the record, and the exceptions of the sink.
+  /// Waits until bytes arrive or the time `Receiver::quiet` elapses, and passes the complete exchanges to the sink.
+  /// Returns false when receiving has ended. Throws os::Failure of the record file, and the exceptions of the sink.
   bool advance();
-  /// Returns the outcome after the end.
+  /// Returns what was received and why receiving ended; call it after `advance` returned false.
   [[nodiscard]] TapOutcome outcome() const;
-  /// Makes `advance` end. May be called from any thread after `settle`.
+  /// Makes `advance` return false. May be called from any thread after `settle`.
   void cancel();
 
   [[nodiscard]] bool is_protocol_given() const { return !choices_.protocol.empty(); }
-  /// Valid after `settle`.
+  /// Returns the unit of the protocol; valid after `settle`.
   [[nodiscard]] const Unit& unit() const { return *unit_; }
   [[nodiscard]] const Options& options() const { return options_; }
   [[nodiscard]] const Receiver& receiver() const { return *receiver_; }
-  /// Returns the candidates if no protocol was given, the likeliest first.
+  /// Returns the candidates for the protocol, the likeliest first; empty if the protocol was given.
   [[nodiscard]] const std::vector<Candidate>& candidates() const { return candidates_; }
   [[nodiscard]] std::uint64_t received_bytes() const { return bytes_; }
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
@@ -62,7 +62,7 @@ class TapRun {
   struct Sinks;
   struct LineToTry {
     LineSettings settings;
-    std::optional<EncoderAddress> address;  // address of the port; nothing: standard input
+    std::optional<EncoderAddress> address;  // address of the port with these settings; nothing: standard input
   };
 
   [[nodiscard]] std::vector<LineToTry> lines_to_try();
@@ -83,8 +83,8 @@ class TapRun {
   std::vector<LineToTry> lines_;
   std::unique_ptr<Receiver> receiver_;
   std::unique_ptr<TapRecord> record_;
-  std::deque<Received> collected_;  // bytes received before the protocol was identified
-  std::optional<Time> first_at_;    // arrival time of the first byte
+  std::deque<Received> collected_;  // bytes that were received before the protocol was identified
+  std::optional<Time> first_at_;    // arrival time of the first byte; nothing: no byte has arrived
   capture::Tick now_ = 0;
   std::unique_ptr<Sinks> sinks_;
   std::uint64_t bytes_ = 0;

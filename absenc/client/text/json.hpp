@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A JSON value to be printed on one line. Only json.cpp includes nlohmann-json, which is slow to compile.
+// A JSON value that is printed on one line. Only json.cpp includes nlohmann-json, which is slow to compile.
 #pragma once
 
 #include <concepts>
@@ -13,7 +13,7 @@ namespace absenc::client {
 
 class Json {
  public:
-  /// Makes a null.
+  /// Makes a JSON null.
   Json();
   Json(bool value);
   Json(std::int64_t value);
@@ -26,7 +26,7 @@ class Json {
   Json(const std::string& text) : Json(std::string_view(text)) {}
   [[nodiscard]] static Json object();
   [[nodiscard]] static Json array();
-  /// Returns an array of `make(item)` for each item.
+  /// Returns a JSON array of the values `make(item)`, one for each item.
   template <class All, class Make>
   [[nodiscard]] static Json list(const All& all, const Make& make) {
     Json made = array();
@@ -43,13 +43,14 @@ class Json {
   Json& operator=(Json other) noexcept;
   ~Json();
 
-  /// Objects keep the order in which names were set. Setting a name again replaces its value.
+  /// Sets a member of a JSON object. Members keep the order in which they were first set; setting a name again replaces
+  /// its value.
   Json& set(std::string_view name, Json value);
   Json& append(Json value);
   [[nodiscard]] bool empty() const;
   [[nodiscard]] bool is_text() const;
 
-  /// Returns the JSON text on one line, without a line end. Bytes that are not UTF-8 become U+FFFD.
+  /// Returns the JSON value as text on one line, without a line end. Bytes that are not UTF-8 become U+FFFD.
   [[nodiscard]] std::string line() const;
 
  private:

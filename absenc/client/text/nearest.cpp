@@ -17,7 +17,7 @@ char folded(char c) {
   return c == '_' ? '-' : c;
 }
 
-// Returns the edit distance: insertions, deletions, replacements and swaps of neighbours.
+// Returns the edit distance of two names: insertions, deletions, replacements and swaps of neighbours.
 std::size_t distance(std::string_view from, std::string_view to) {
   std::vector<std::size_t> before(to.size() + 1), last(to.size() + 1), row(to.size() + 1);
   for (std::size_t j = 0; j <= to.size(); ++j) last[j] = j;
@@ -39,7 +39,8 @@ std::size_t distance(std::string_view from, std::string_view to) {
 
 std::string_view nearest(std::string_view written, std::span<const std::string_view> names) {
   std::string_view best;
-  std::size_t best_distance = written.size() / 3 + 2;  // at most a third of the letters plus one may be wrong
+  // a name is near if at most a third of the letters plus one is wrong
+  std::size_t best_distance = written.size() / 3 + 2;
   for (const std::string_view name : names) {
     const bool begins = written.size() >= 3 && name.starts_with(written);
     const std::size_t away = begins ? 1 : distance(written, name);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Suggests the name that the user most likely meant by an unknown one.
+// Suggests the name that the user most likely meant when a name is unknown.
 #pragma once
 
 #include <span>
@@ -8,10 +8,11 @@
 
 namespace absenc::client {
 
-/// Returns the name nearest to `written` by edit distance, ignoring case; "" if none is near.
+/// Returns the name nearest to `written` by edit distance, without regard to case; "" if none is near.
 [[nodiscard]] std::string_view nearest(std::string_view written, std::span<const std::string_view> names);
 
-/// Returns "; did you mean X?" if a name is near, otherwise "; known are: A, B, C"; "" without names.
+/// Returns the end of an error message: "; did you mean X?" if a name is near, otherwise "; known are: A, B, C"; "" if
+/// there are no names.
 [[nodiscard]] std::string suggestion(std::string_view written, std::span<const std::string_view> names);
 
 }  // namespace absenc::client

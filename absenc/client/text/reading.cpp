@@ -14,7 +14,7 @@ std::uint32_t flag_mask(const FieldInfo& field) {
   return static_cast<std::uint32_t>(low_mask(static_cast<unsigned>(field.flags.size())));
 }
 
-// Columns of every reading.
+// The columns that every reading has, whatever the unit.
 std::uint32_t required(const FieldInfo& field) {
   std::uint32_t mask = 0;
   for (std::size_t i = 0; i < field.flags.size(); ++i) {
@@ -68,7 +68,8 @@ Reading checked(Reading reading, bool confirmed) {
   if (confirmed || !reading.ready || !reading.singleturn_valid()) return reading;
   reading.singleturn_valid_bits = 0;
   reading.singleturn_known = false;
-  if (reading.multiturn_valid) reading.multiturn_known = false;  // otherwise the encoder has reported invalid turns
+  // invalid turns stay invalid, because the encoder has reported that
+  if (reading.multiturn_valid) reading.multiturn_known = false;
   reading.multiturn_valid = false;
   return reading;
 }

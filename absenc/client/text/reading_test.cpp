@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks the three states of alarms and validity in values, rows, CSV and JSON.
+// Checks that values, rows, CSV and JSON show the three states of alarms and of validity.
 #include "absenc/client/reading.hpp"
 
 #include <gtest/gtest.h>
@@ -124,7 +124,7 @@ TEST(ClientReading, AnswersTellInvalidFromUnknown) {
   EXPECT_EQ(sink.answer["turns"], Value(Unknown{}));
 }
 
-// An unconfirmed position has unknown validity, but turns that the encoder reports invalid are invalid.
+// The position is unconfirmed, so its validity is unknown; turns that the encoder reports as invalid stay invalid.
 TEST(ClientReading, AnUnconfirmedPositionIsUnknown) {
   const Reading unconfirmed = checked(reading(0, 5), false);
   EXPECT_EQ(unconfirmed.singleturn_validity(), Validity::unknown);

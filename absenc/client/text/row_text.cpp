@@ -36,7 +36,7 @@ struct Cell {
     fmt::format_to(std::back_inserter(line), fmt::runtime(format.empty() ? "{}" : format), value);
   }
   void operator()(const std::string& text) const { append_quoted(line, text); }
-  // An empty cell means that alarms are not reported.
+  // Prints "none" if no flag is raised: an empty cell means that flags were not reported.
   void operator()(const Flags& flags) const {
     const std::string names = to_text(Value(flags));
     append_quoted(line, names.empty() ? "none" : names);

@@ -12,21 +12,22 @@
 
 namespace absenc::client {
 
-/// Returns the CSV line with the names of the columns, without details.
+/// Returns the names of the columns as a CSV line, without columns that are details.
 [[nodiscard]] std::string csv_header(std::span<const Column> columns);
-/// Returns the CSV line of the values, without a line end. A missing or invalid value is empty.
+/// Returns the values of the row as a CSV line, without a line end. A missing or invalid value is empty.
 void append_csv(std::string& text, const Row& row);
 [[nodiscard]] std::string to_csv(const Row& row);
 
-/// Returns {"name":"over_heat","meaning":...,"action":...}.
+/// Returns a flag as a JSON object: {"name":"over_heat","meaning":...,"action":...}.
 [[nodiscard]] Json flag_to_json(const FlagInfo* flag);
-/// Returns ["over_heat","battery_alarm"].
+/// Returns the names of the flags in `bits` as a JSON array: ["over_heat","battery_alarm"].
 [[nodiscard]] Json flags_to_json(const FieldInfo& field, std::uint64_t bits);
 [[nodiscard]] Json to_json(const Value& value);
-/// Returns the row as a JSON object. A missing value is left out, an invalid one is null.
+/// Returns the row as a JSON object, with a member for each column. A missing value is left out, an invalid one is
+/// null.
 [[nodiscard]] Json to_json(const Row& row);
 
-/// Returns the value of an option: a number, the name of a choice, or a boolean.
+/// Returns the value of an option as JSON: a number, the name of a choice, or a boolean.
 [[nodiscard]] Json to_json(const Option& option, std::int64_t value);
 
 }  // namespace absenc::client

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads text files that people may edit: lines of "name: value" and of bytes; lines that begin with # are ignored.
+// Reads text files that people may edit: lines of "name: value" and lines of bytes. Lines that begin with # are
+// ignored.
 #pragma once
 
 #include <cstddef>
@@ -8,22 +9,22 @@
 
 namespace absenc::client {
 
-// First lines, which name the kind of file:
+// First lines of files, which name the kind of file:
 inline constexpr std::string_view memory_file_title = "absenc memory 1";  // memory of a virtual encoder
-inline constexpr std::string_view dump_title = "absenc dump 1";           // copy of an encoder's memory
+inline constexpr std::string_view dump_title = "absenc dump 1";           // dump: copy of the memory of an encoder
 
-/// Returns the content of a file. Throws Failure, whose text begins with `what` and the path, also for a file of more
-/// than 16 MiB.
+/// Returns the content of a file. Throws Failure, whose text begins with `what` and the path, if the file cannot be
+/// read or has more than 16 MiB.
 [[nodiscard]] std::string read_text_file(std::string_view what, const std::string& path);
 
-/// Returns the path at the end of a chain of symbolic links, whether the file exists or not.
+/// Returns the path at the end of a chain of symbolic links, even if that file does not exist.
 [[nodiscard]] std::string link_target(const std::string& path);
 
-/// Checks before long work that a file can be written to this path. Throws Failure if not; only a regular file may be
+/// Checks, before long work, that a file can be written to this path. Throws Failure if not: only a regular file may be
 /// replaced.
 void require_replaceable(const std::string& path);
 
-/// Iterates over the lines that are not ignored, without blanks at their end.
+/// Iterates over the lines of a text that are not ignored, without blanks at their end.
 class SignificantLines {
  public:
   explicit SignificantLines(std::string_view text) : rest_(text) {}
@@ -31,7 +32,7 @@ class SignificantLines {
   bool next();
 
   std::string_view line;
-  std::size_t number = 0;  // number of `line` in the file, from 1
+  std::size_t number = 0;  // number of `line` in the text, from 1; ignored lines are counted
 
  private:
   std::string_view rest_;

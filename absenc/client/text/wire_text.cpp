@@ -24,10 +24,10 @@ std::string shown(char c) {
   throw UsageError(fmt::format("{}: {} at position {} is not {}", what, shown(text[at]), at + 1, wanted));
 }
 
-// `from` is the index in `text` at which the bytes begin.
+// Parses bytes in hexadecimal, which begin at the index `from` of `text`.
 std::vector<std::uint8_t> parse_bytes(std::string_view what, std::string_view text, std::size_t from) {
   std::vector<std::uint8_t> bytes;
-  bool inside = false;  // inside a run of digits, in which 0x is an error
+  bool inside = false;  // whether the index is inside a run of digits, where 0x is an error
   for (std::size_t i = from; i < text.size();) {
     if (separates(text[i])) {
       inside = false;
@@ -99,14 +99,14 @@ void parse_bits(std::string_view what, std::string_view text, WireFrame& frame) 
   }
 }
 
-// A remote frame has a length but no data.
+// Leaves out the data of a remote frame, which has only a length.
 std::string can_text(const CanFrame& frame) {
   const std::string data =
       frame.remote ? fmt::format("R{}", frame.size) : fmt::format("{:02X}", fmt::join(frame.bytes(), ""));
   return fmt::format("{:0{}X}:{}", frame.id, frame.extended ? 8 : 3, data);
 }
 
-// Prints a space after every `group` bits; 0: no spaces.
+// Prints bits, with a space after every `group` bits; 0: no spaces.
 std::string bits_text(const Frame& frame, std::size_t group) {
   std::string text;
   for (std::size_t i = 0; i < frame.bits; ++i) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Parses and prints frames: bytes in hexadecimal, CAN frames as ID:DATA, clocked words as 0 and 1.
+// Parses and prints frames: bytes in hexadecimal, CAN frames as ID:DATA, words of clocked links as 0 and 1.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +13,7 @@
 
 namespace absenc::client {
 
-/// Limit of the number of bytes in a text.
+/// Greatest number of bytes that a text may have.
 inline constexpr std::size_t bytes_in_line = 16;
 
 /// A frame that owns its bytes.
@@ -22,20 +22,20 @@ struct WireFrame {
   std::size_t bits = 0;
   std::optional<CanFrame> can;
 
-  /// Returns a view of the frame, valid as long as this object.
+  /// Returns a view of the frame, which is valid as long as this object.
   [[nodiscard]] Frame frame() const;
 };
 
-/// Parses a frame. Bytes may be separated by spaces and commas and may begin with 0x. Throws UsageError, which begins
-/// with `what` and names the wrong character and its position (from 1).
+/// Parses a frame and returns it. Bytes may be separated by spaces and commas and may begin with 0x. Throws UsageError,
+/// whose text begins with `what` and names the wrong character and its position (from 1).
 [[nodiscard]] WireFrame parse_wire_text(LinkKind link, std::string_view what, std::string_view text);
 
-/// Returns a frame for people: "1A 00 2B", "1FF:022B", a remote frame "1FF:R8", a word "0001 1110".
+/// Returns a frame as people read it: "1A 00 2B", "1FF:022B", a remote frame "1FF:R8", a word "0001 1110".
 [[nodiscard]] std::string to_wire_text(LinkKind link, const Frame& frame);
-/// Returns a frame for programs, as in vectors.json: "1a002b", "1ff:022b", "00011110".
+/// Returns a frame as programs read it, as in vectors.json: "1a002b", "1ff:022b", "00011110".
 [[nodiscard]] std::string to_compact_wire_text(LinkKind link, const Frame& frame);
 
-/// Returns bytes as "1A 00 2B".
+/// Returns bytes in hexadecimal for people: "1A 00 2B".
 [[nodiscard]] std::string to_hex(Bytes bytes);
 
 }  // namespace absenc::client
