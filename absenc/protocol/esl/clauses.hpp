@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Demands of the document on encoder and host, with their paragraphs.
+// The clauses of the ESL document for encoders and hosts, with their paragraphs.
 #pragma once
 
 #include <array>
@@ -12,7 +12,8 @@ namespace absenc::esl {
 // ---- Requests that no host sends
 
 namespace request {
-// Writes a command frame with this control field, and its CRC if requests have one.
+// Writes a command frame with this control field into `request`, with its CRC if requests have one. Returns its length,
+// or buffer_too_small.
 inline Result<std::size_t> seal(const Profile& profile, std::uint8_t field, MutableBytes request) {
   const std::size_t size = request_length(profile, DataId::position);
   if (request.size() < size) return Error::buffer_too_small;
@@ -20,20 +21,20 @@ inline Result<std::size_t> seal(const Profile& profile, std::uint8_t field, Muta
   if (size > 1) request[1] = checksum8(profile.crc_bit_order, Bytes(request).first(1));
   return size;
 }
-// A request whose parity bit alone is wrong.
+// Writes a position request whose parity bit alone is wrong; returns its length.
 inline Result<std::size_t> wrong_parity(const Options& values, MutableBytes request) {
   const Profile profile = options.format(values);
   const std::uint8_t good = control_field(profile, profile.address, DataId::position);
   return seal(profile, static_cast<std::uint8_t>(good ^ 0x80U), request);
 }
-// A request with ID 3, which Table 3 does not list; its parity is right.
+// Writes a request with ID 3, which Table 3 does not list, and with the right parity; returns its length.
 inline Result<std::size_t> unknown_id(const Options& values, MutableBytes request) {
   const Profile profile = options.format(values);
   return seal(profile, control_field(profile, profile.address, DataId{3}), request);
 }
 }  // namespace request
 
-/// Alarms that command C clears, in both channels. Table 8: the others need more.
+/// Alarms that command C clears, in both channels (mask of Reading::alarms). The other alarms need more (Table 8).
 inline constexpr std::int64_t cleared_by_c = alarms::xc_error | alarms::xc_error << 8;
 
 /// Clauses of the document for the encoder.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual QS35: answers as the ESL document states, computes both channels independently, and lists the rules that
-// its host breaks. Several of them share a line.
+// A virtual QS35 encoder (ESL): answers as the document states, computes both channels independently, and records the
+// rules that its host breaks. Several such encoders can share a line.
 #pragma once
 
 #include <array>
@@ -12,10 +12,9 @@
 
 namespace absenc::esl {
 
-/// Conditions of the virtual encoder: its environment, and faults inside one channel, whose CRC is still right. Indexes
-/// of `conditions`.
+/// Indexes of `conditions`: the virtual encoder's environment, and faults inside one channel, whose CRC stays right.
 namespace condition {
-/// Index of a condition.
+/// Index of a condition in `conditions`.
 enum Index : std::size_t {
   supply_voltage,
   temperature,
@@ -23,7 +22,7 @@ enum Index : std::size_t {
   lissajous,
   id_d_clears_singleturn,
   redundant_offset,
-  ch1_stuck,  ///< channel 2's condition follows channel 1's
+  ch1_stuck,  ///< first of the conditions of one channel; for each, the index of channel 2 follows that of channel 1
   ch2_stuck,
   ch1_sequence,
   ch2_sequence,
@@ -36,7 +35,7 @@ enum Index : std::size_t {
 };
 }  // namespace condition
 
-/// Conditions of the virtual encoder.
+/// Conditions of the virtual encoder that users can set.
 inline constexpr std::array<Condition, 16> conditions{{
     {"supply_voltage", "mV", "as the encoder measures it: alarms below 2900 and above 3700 (Table 8)", 0, 6000, 3300},
     {"temperature", "degC", "inside the encoder; above 105 it warns (assumed: the document gives no limit)", -128, 127,
@@ -58,7 +57,7 @@ inline constexpr std::array<Condition, 16> conditions{{
     {"ch2_status_clear", "", "bits of SF of channel 2 that are stuck at 0", 0, 255, 0},
 }};
 
-/// The memory of the virtual encoder.
+/// Properties of the virtual encoder's paged memory.
 inline constexpr author::PagedMemory paged_memory{
     .areas = memory_map,
     .select_address = page_select_address,
@@ -74,7 +73,7 @@ inline constexpr author::PagedMemory paged_memory{
     .fetch_time_rule = "memory read again less than 200 us after the request before",
 };
 
-/// A virtual encoder.
+/// A virtual QS35 encoder with its two channels, alarms, memory and faults.
 class VirtualEncoder final : public author::PagedMemoryDevice {
  public:
   /// Constructs an encoder that is off until `power_on`. `shaft` must outlive it.
@@ -85,7 +84,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     for (std::size_t i = 0; i < conditions.size(); ++i) condition_[i] = static_cast<std::int32_t>(conditions[i].normal);
   }
   [[nodiscard]] MutableBytes memory() override { return memory_; }
-  /// Returns the byte of a page, or null if Table 11 does not list it.
+  /// Returns the stored memory byte at `address` of `page`; null if Table 11 does not list it.
   [[nodiscard]] std::uint8_t* stored(std::uint8_t page, std::uint8_t address) {
     const MemoryArea* const area = find_area(page, address);
     if (area == nullptr) return nullptr;
@@ -101,12 +100,12 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     latches_ |= static_cast<std::uint8_t>(bits & ~unsigned{alarms::voltage});
     forced_ |= static_cast<std::uint8_t>(bits & alarms::voltage);
   }
-  /// Ends the cause of alarms; latched alarms stay until a host clears them.
+  /// Ends the alarms `bits` and their cause, including latched alarms.
   void lower_alarms(std::uint32_t bits) override {
     latches_ &= static_cast<std::uint8_t>(~bits);
     forced_ &= static_cast<std::uint8_t>(~bits);
   }
-  /// Returns the reply to `id` at this time.
+  /// Returns the reply to a request with `id` at `now`, with all values of both channels.
   [[nodiscard]] Reply reply_to(DataId id, Time now) const {
     Reply reply{.id = id, .encoder_address = profile_.address};
     reply.one = channel_now(Channel::one, now);
@@ -120,20 +119,25 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     reply.temperature = static_cast<std::int8_t>(value_of(condition::temperature));
     return reply;
   }
-  /// It answers from power on; SF reports when it is ready.
+  /// Switches the encoder on at `now`. It answers at once; SF reports later that it is ready.
   void power_on(Time now, PowerOn kind) override {
     ready_at_ = kind == PowerOn::real ? now + start_up : now;
     Responder::power_on(now, kind);
   }
 
  private:
-  static constexpr std::int32_t overspeed_above = 10'000'000;  // 1/1000 rpm (Table 8)
-  static constexpr std::int32_t under_voltage_below = 2900;    // mV, typical
+  // 1/1000 rpm: the alarm overspeed is raised above this speed (Table 8).
+  static constexpr std::int32_t overspeed_above = 10'000'000;
+  // MV, typical: the alarm under_voltage is raised below this supply voltage.
+  static constexpr std::int32_t under_voltage_below = 2900;
   static constexpr std::int32_t over_voltage_above = 3700;
-  static constexpr std::int32_t standing_still = 1'000;  // 1/1000 rpm: trembling of a servo at rest
-  static constexpr std::int32_t warning_above = 105;     // degC; assumed, because the document states no limit
-  static constexpr Time start_up = 100ms;                // from power on to `ready`; the document states none
-  // The document: "typical 40 us"; less than this is surely too fast.
+  // 1/1000 rpm: a slower shaft is at rest, because a servo at rest trembles.
+  static constexpr std::int32_t standing_still = 1'000;
+  // DegC: SF warns above this temperature; assumed, because the document states no limit.
+  static constexpr std::int32_t warning_above = 105;
+  // Time from power on until SF reports `ready`; assumed, because the document states none.
+  static constexpr Time start_up = 100ms;
+  // Shortest time between two requests of a reset that is no violation. The document states "typical 40 us".
   static constexpr Time reset_interval_least = 35us;
 
   static constexpr std::string_view eight_rule = "reset not sent eight times in a row";
@@ -141,19 +145,19 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   static constexpr std::int32_t magnitude(std::int32_t value) { return value < 0 ? -value : value; }
   static constexpr std::uint32_t counts_of(std::int64_t position) { return static_cast<std::uint32_t>(position) >> 8; }
 
-  // After the EEPROM and the MTP: the zeros of the channels, 4 bytes each, little endian, and the turns subtracted from
-  // those of the shaft, 8 bytes.
+  // Offsets in `memory_`, after the bytes of EEPROM and MTP: the zeros of both channels (4 bytes each, little endian),
+  // and the turns that are subtracted from those of the shaft (8 bytes).
   static constexpr std::size_t zero_at = stored_bytes;
   static constexpr std::size_t turns_at = zero_at + 8;
 
   // ---- Requests
 
   [[nodiscard]] bool is_own(Bytes begin) const { return address_of(begin[0]) == profile_.address; }
-  // A request without a CRC cannot have a wrong one.
+  // Returns whether the CRC of a request is wrong; false for a request without a CRC.
   [[nodiscard]] bool has_wrong_checksum(Bytes request) const {
     return request.size() > 1 && !has_checksum8(profile_, request);
   }
-  // Returns whether a request for this encoder ends here.
+  // Returns whether the last bytes of `heard`, after its first byte, are a complete request for this encoder.
   [[nodiscard]] bool contains_own_request(Bytes heard) const {
     for (std::size_t begin = 1; begin < heard.size(); ++begin) {
       const Bytes rest = heard.subspan(begin);
@@ -162,9 +166,9 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     }
     return false;
   }
-  // The parity bit is ignored here: a wrong one is reported. "Else, it will continue to search for the next available
-  // logic of low state": the search continues after the first bytes of a request for another address, and after a wrong
-  // CRC.
+  // The parity bit is ignored here, because a wrong one is reported in the reply. Within the first bytes of a request
+  // for another address, and after a wrong CRC, the search for a request continues: "Else, it will continue to search
+  // for the next available logic of low state."
   [[nodiscard]] std::size_t request_size(Bytes begin) const override {
     const std::optional<DataId> id = data_id(begin[0]);
     if (!id) return 0;
@@ -191,7 +195,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
         is_memory_access(request->id) ? access_memory(*request, at) : reply_to(request->id, at);
     if (!made) return Answer::for_others;
     reply.append(encode_reply(profile_, *made));
-    if (is_reset(request->id)) count_reset(request->id, at);  // after the reply, which still shows the old state
+    // Counted after the reply is made, because it still shows the old state.
+    if (is_reset(request->id)) count_reset(request->id, at);
     return Answer::sent;
   }
   bool is_refused(Flaw flaw, Bytes heard) override {
@@ -204,12 +209,13 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   void refuse(Time at, ByteBuffer<64>& reply) override {
     report_bad_request(refused_field_, status::stop_error, at, reply);
   }
-  // Returns whether a wrong request is reported: Table 5 reports it in SF, the overview demands silence. A memory reply
-  // has no SF.
+  // Returns whether the encoder replies to a request with a wrong parity or stop bit: Table 5 demands a report in SF,
+  // the overview demands silence. A memory reply has no SF.
   [[nodiscard]] bool is_reported(std::uint8_t field) const {
     return profile_.bad_request == BadRequest::report && !is_memory_access(*data_id(field));
   }
-  // CF is echoed as received.
+  // Makes the reply that reports a wrong request in SF, and echoes its CF as received. Returns whether there is such a
+  // reply.
   Answer report_bad_request(std::uint8_t field, std::uint8_t status_bit, Time at, ByteBuffer<64>& reply) {
     if (!is_reported(field)) return Answer::for_others;
     const DataId id = *data_id(field);
@@ -219,7 +225,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     reply.append(encode_reply(profile_, report, field));
     return Answer::sent;
   }
-  // A request that was sent too fast does not count for the reset, but it was sent.
+  // Ends a sequence of reset requests, and checks that eight were sent. `resets_sent_` counts all requests, `in_a_row_`
+  // only those that were not sent too fast.
   void end_resets() {
     if (resets_sent_ > 0 && resets_sent_ < reset_requests) note(false, eight_rule);
     resets_sent_ = 0;
@@ -242,7 +249,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
       for (std::uint8_t& counter : counters_) ++counter;
     }
   }
-  // An address that does not exist gets no answer, because the document defines none.
+  // Executes a memory request and returns the reply; nothing for an address that does not exist, because the document
+  // defines no answer to it.
   std::optional<Reply> access_memory(const Request& request, Time at) {
     if (!expect(profile_.bus != sharing_yes, "memory access with several encoders on the line", at))
       return std::nullopt;
@@ -278,7 +286,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     }
     const std::uint16_t turns_before = turns(at);
     if (id == DataId::zero || value_of(condition::id_d_clears_singleturn) != 0) {
-      // Each channel stores its own measurement as its zero.
+      // Each channel stores the position that it measures as its zero.
       for (const std::size_t to : {zero_at, zero_at + 4}) {
         store_little_endian(MutableBytes(memory_).subspan(to, 4), counts_of(shaft_->at(at).position));
       }
@@ -294,13 +302,13 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     const std::size_t at = channel == Channel::one ? zero_at : zero_at + 4;
     return static_cast<std::uint32_t>(load_little_endian(Bytes(memory_).subspan(at, 4)));
   }
-  // Each channel measures the shaft itself and has its own zero.
+  // Returns the position within the turn that a channel measures; each channel has a zero of its own.
   [[nodiscard]] std::uint32_t singleturn(Channel channel, Time now) const {
     const std::int32_t stuck = value_of(condition::ch1_stuck, channel);
     const std::uint32_t seen = counts_of(shaft_->at(now).position) - zero(channel);
     return (stuck >= 0 ? static_cast<std::uint32_t>(stuck) : seen) & 0xFFFFFF;
   }
-  // The turns change where the position, counted from the zero, wraps.
+  // Returns the turns of the shaft since the zero of channel 1, so that they change where the position wraps.
   [[nodiscard]] std::uint64_t shaft_turns(Time now) const {
     return static_cast<std::uint64_t>((shaft_->at(now).position - (std::int64_t{zero(Channel::one)} << 8)) >> 32);
   }
@@ -351,11 +359,12 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     counters_.fill(0);
   }
   void stopped(Time) override {
-    latches_ &= alarms::turns_wrong;  // other alarms end with the power, these with an ID C
+    // Alarms about turns survive power off, and end with an ID C; all others end with the power.
+    latches_ &= alarms::turns_wrong;
     turns_cleared_ = false;
     in_a_row_ = resets_sent_ = 0;
   }
-  // Channel 2's condition follows channel 1's.
+  // Returns the value of a condition. For channel 2 `index` is that of channel 1's condition, which precedes it.
   [[nodiscard]] std::int32_t value_of(std::size_t index, Channel channel = Channel::one) const {
     return condition_[index + (channel == Channel::two ? 1 : 0)];
   }
@@ -364,19 +373,19 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   const Shaft* shaft_;
   std::array<std::int32_t, conditions.size()> condition_{};
   std::array<std::uint8_t, turns_at + 8> memory_{};
-  std::array<std::uint8_t, register_bytes> registers_{};  // lost at power off
+  std::array<std::uint8_t, register_bytes> registers_{};  // bytes of the register areas, lost at power off
 
   Time ready_at_{};
   std::uint8_t latches_ = 0;
-  std::uint8_t forced_ = 0;     // voltage alarms that tests and users raised
-  bool turns_cleared_ = false;  // an ID D was executed: an ID C may clear multiturn_error
+  std::uint8_t forced_ = 0;     // voltage alarms that `raise_alarms` raised
+  bool turns_cleared_ = false;  // an ID D was executed, so an ID C can clear multiturn_error
   std::array<std::uint8_t, 2> counters_{};
 
   DataId last_id_{};
-  unsigned in_a_row_ = 0;           // consecutive requests with `last_id_`
-  unsigned resets_sent_ = 0;        // resets sent with `last_id_`
-  std::uint8_t refused_field_ = 0;  // CF of a damaged request
-  std::uint8_t others_field_ = 0;   // CF of the last request: the reply to it begins with the same byte
+  unsigned in_a_row_ = 0;     // number of consecutive requests with `last_id_`
+  unsigned resets_sent_ = 0;  // number of consecutive reset requests with `last_id_`, including those sent too fast
+  std::uint8_t refused_field_ = 0;  // CF of the last damaged request that is refused
+  std::uint8_t others_field_ = 0;   // CF of the last request; the reply of another encoder begins with the same byte
   Time last_reset_{};
 };
 

@@ -11,7 +11,7 @@
 
 namespace absenc::esl {
 
-/// Flags of SF (Table 5).
+/// Descriptions of the bits of SF, the status field of replies (Table 5), from bit 0 on.
 inline constexpr std::array<FlagInfo, 8> status_flags{{
     {"parity_error", "the encoder received the request with a wrong parity bit and did not execute it",
      "send the same request again; if it stays, set parity_scope"},
@@ -28,7 +28,7 @@ inline constexpr std::array<FlagInfo, 8> status_flags{{
     {"forced_test_passed", "the forced test has passed", ""},
 }};
 
-/// Flags of ALM (Tables 7 and 8).
+/// Descriptions of the bits of ALM, the alarms of a channel (Tables 7 and 8), from bit 0 on.
 inline constexpr std::array<FlagInfo, 8> alarm_flags{{
     {"xc_error", "the turn counter missed five times in a row: turns may be wrong",
      "return to the origin, then `absenc clear-alarms`, and check the turns"},
@@ -47,10 +47,10 @@ inline constexpr std::array<FlagInfo, 8> alarm_flags{{
      "check that no more than 5 V are at the connector; it clears with the voltage, or the encoder is damaged"},
 }};
 
-/// Values of a frame, or of a procedure's result. An optional has a value if the frame carries it.
+/// Values of the fields of a frame, or of a procedure's result. A member without a value is not in the frame.
 struct Shown {
   constexpr Shown() = default;
-  /// Shows a request.
+  /// Takes the values of a request.
   constexpr Shown(const Profile& profile, const Request& request)
       : data_id(request.id),
         control_field(esl::control_field(profile, request.encoder_address, request.id)),
@@ -58,7 +58,7 @@ struct Shown {
     if (is_memory_access(request.id)) memory_address = request.memory_address;
     if (request.id == DataId::write_memory) value = request.value;
   }
-  /// Shows a reply.
+  /// Takes the values of a reply.
   constexpr explicit Shown(const Reply& one) { show(one); }
 
   /// Adds the values of a reply.
@@ -72,27 +72,29 @@ struct Shown {
     value = one.value;
   }
 
-  std::optional<DataId> data_id{};                 ///< Data id of request or reply.
-  std::optional<std::uint8_t> control_field{};     ///< CF: encoder address, data id, parity.
-  std::optional<std::uint8_t> encoder_address{};   ///< Address of the encoder on the line (EAD).
-  std::optional<Reply> reply{};                    ///< The reply, whose id decides which parts it has.
-  std::optional<bool> clash{};                     ///< Whether every answer at this address is damaged.
-  std::optional<std::string_view> trouble{};       ///< Error of an answer that was complete.
+  std::optional<DataId> data_id{};              ///< Data ID of the request or reply.
+  std::optional<std::uint8_t> control_field{};  ///< Control field (CF) of a request: encoder address, data ID, parity.
+  std::optional<std::uint8_t> encoder_address{};  ///< Address of the encoder on the line (EAD).
+  std::optional<Reply> reply{};                   ///< The reply; its data ID decides which values it has.
+  std::optional<bool> clash{};  ///< Whether every reply at the address of this record of a scan is damaged.
+  std::optional<std::string_view> trouble{};       ///< Sentence about the error of a complete reply in a scan.
   std::optional<std::uint8_t> page{};              ///< Page of a memory access.
   std::optional<std::uint8_t> memory_address{};    ///< Address of a memory access (ADF).
   std::optional<std::uint8_t> busy{};              ///< 1: the memory is busy, and the request was not executed.
-  std::optional<std::uint8_t> value{};             ///< Byte in memory (EDF).
-  std::optional<Bytes> data{};                     ///< Bytes in memory from `memory_address` on.
+  std::optional<std::uint8_t> value{};             ///< Value of the memory byte (EDF).
+  std::optional<Bytes> data{};                     ///< Values of several memory bytes, from `memory_address` on.
   std::optional<bool> written{};                   ///< Whether the byte was written; false: it had the value already.
   std::optional<bool> led_error{};                 ///< Whether the LED current is out of range.
   std::optional<bool> lissajous_error{};           ///< Whether the signals of the disc are out of range.
   std::optional<std::uint32_t> safe_singleturn{};  ///< Safe position within the turn, in counts.
-  std::optional<std::uint8_t> page_left{};         ///< Page that is left selected although the page before is unknown.
-  bool has_turns = true;                           ///< false: ABM is no part of the position
+  /// Page that a procedure leaves selected because it could not select the page from before again.
+  std::optional<std::uint8_t> page_left{};
+  bool has_turns = true;  ///< false: the turns (ABM) of the reply are not shown
 };
 
 namespace detail {
-// Returns a member of the reply, if its id carries this part in this channel.
+// Returns the member of the reply that `part` carries in this channel; nothing if the reply's data ID does not have the
+// part.
 template <Channel channel, unsigned part, auto member>
 constexpr auto in(const Shown& all) {
   const Reply reply = all.reply.value_or(Reply{});
@@ -107,7 +109,7 @@ constexpr auto in(const Shown& all) {
 constexpr std::optional<std::uint16_t> turns_in(const Shown& all) {
   return all.has_turns ? in<Channel::one, part::multiturn, &Reply::multiturn>(all) : std::nullopt;
 }
-// Returns bits of ENID, which is the same in both channels.
+// Returns the bits `mask` of ENID, shifted right by `shift`. ENID is the same in both channels.
 template <unsigned shift, unsigned mask>
 constexpr std::optional<unsigned> of_encoder_id(const Shown& all) {
   const auto id = in<Channel::one, part::encoder_id, &ChannelReply::encoder_id>(all);
@@ -115,7 +117,7 @@ constexpr std::optional<unsigned> of_encoder_id(const Shown& all) {
 }
 }  // namespace detail
 
-/// Fields of requests and replies.
+/// Table of the fields of requests, replies and results.
 inline constexpr auto fields = [] {
   using author::field;
   using detail::in;
@@ -165,12 +167,13 @@ inline constexpr auto fields = [] {
 }();
 
 namespace detail {
-// Returns the bits of the field in this part, whose first byte is `here`.
+// Returns the bits of a reply that carry `field` in one part of a channel; none if this part does not. `here`: index of
+// the part's first byte.
 template <Channel channel, unsigned id>
 constexpr BitRanges place_in_part(const Profile& profile, std::size_t here, const FieldInfo& field) {
   using author::bits_of;
   const auto is = [&field](const FieldInfo* one) { return one == &field; };
-  // RS: its lowest bit is in the second byte, the others are in the first.
+  // Returns the bits of the redundant position RS: its lowest bit is in the second byte, the others are in the first.
   const auto redundant = [here](RedundantBit low) {
     BitRanges ranges = bits_of(here + 1, low == RedundantBit::b7 ? 7 : 0, 1);
     ranges.push_back({8 * here, 8});
@@ -242,7 +245,7 @@ constexpr BitRanges place_in(const Profile& profile, unsigned parts, std::size_t
 }
 }  // namespace detail
 
-/// Returns the bits of a field in a valid reply that carries it.
+/// Returns the bits of a valid reply that carry `field`; none if the field has no fixed place.
 [[nodiscard]] constexpr BitRanges place_of(const Profile& profile, Bytes reply, const FieldInfo& field) {
   if (&field == fields.of<&Shown::encoder_address>()) return author::bits_of(0, 0, 3);
   if (&field == fields.of<&Shown::data_id>()) return author::bits_of(0, 3, 4);

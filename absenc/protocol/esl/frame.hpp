@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// QS35 ESL frames (RS-485, 10 Mbps, 8N1, LSB first): their parts, and encoding them. reply.hpp decodes them. Table
-// numbers are those of the ESL Protocol Specification, rev 1.5; README.md draws the frames.
+// Frames of the QS35's ESL protocol (RS-485, 10 Mbps, 8N1, LSB first): their parts and how they are encoded. reply.hpp
+// decodes them. Table numbers are those of the ESL Protocol Specification, rev 1.5; README.md draws the frames.
 #pragma once
 
 #include <array>
@@ -17,38 +17,44 @@
 
 namespace absenc::esl {
 
-/// Bits of SF in the order of the document (Table 5); `status_order` gives their order on the wire.
+/// Bits of SF, the status field of a channel, in the order of the document (Table 5). The option `status_order` gives
+/// their order on the wire.
 namespace status {
-inline constexpr std::uint8_t parity_error = 0x01;                   ///< Status: parity error.
-inline constexpr std::uint8_t stop_error = 0x02;                     ///< Status: stop error.
-inline constexpr std::uint8_t safety_error = 0x04;                   ///< Status: safety error.
-inline constexpr std::uint8_t non_safety_error = 0x08;               ///< Status: non safety error.
-inline constexpr std::uint8_t temperature_warning = 0x10;            ///< Status: temperature warning.
-inline constexpr std::uint8_t channel_2 = 0x20;                      ///< Status: channel 2.
-inline constexpr std::uint8_t ready = 0x40;                          ///< Status: ready.
-inline constexpr std::uint8_t forced_test_passed = 0x80;             ///< Status: forced test passed.
-inline constexpr std::uint8_t rejected = parity_error | stop_error;  ///< Status: rejected.
+/// The request was received with a wrong parity bit and not executed.
+inline constexpr std::uint8_t parity_error = 0x01;
+inline constexpr std::uint8_t stop_error = 0x02;  ///< the request was received with a wrong stop bit and not executed
+/// An error of single-turn position, memory, voltage or LED: the position is not safe.
+inline constexpr std::uint8_t safety_error = 0x04;
+inline constexpr std::uint8_t non_safety_error = 0x08;     ///< an error of turns, Lissajous signals or speed
+inline constexpr std::uint8_t temperature_warning = 0x10;  ///< the encoder is too warm
+inline constexpr std::uint8_t channel_2 = 0x20;  ///< set in the status of channel 2, clear in that of channel 1
+inline constexpr std::uint8_t ready = 0x40;      ///< the encoder has started
+inline constexpr std::uint8_t forced_test_passed = 0x80;  ///< the forced test has passed
+/// Mask of the bits that show that the encoder refused the request.
+inline constexpr std::uint8_t rejected = parity_error | stop_error;
 }  // namespace status
 
-/// Bits of ALM (Table 7).
+/// Bits of ALM, the alarms of a channel (Table 7).
 namespace alarms {
-inline constexpr std::uint8_t xc_error = 0x01;                           ///< Alarm: xc error.
-inline constexpr std::uint8_t multiturn_error = 0x02;                    ///< Alarm: multiturn error.
-inline constexpr std::uint8_t led_or_lissajous_error = 0x04;             ///< Alarm: led or lissajous error.
-inline constexpr std::uint8_t overspeed = 0x08;                          ///< Alarm: overspeed.
-inline constexpr std::uint8_t memory_error = 0x10;                       ///< Alarm: memory error.
-inline constexpr std::uint8_t singleturn_error = 0x20;                   ///< Alarm: singleturn error.
-inline constexpr std::uint8_t under_voltage = 0x40;                      ///< Alarm: under voltage.
-inline constexpr std::uint8_t over_voltage = 0x80;                       ///< Alarm: over voltage.
-inline constexpr std::uint8_t voltage = under_voltage | over_voltage;    ///< Alarm: voltage.
-inline constexpr std::uint8_t turns_wrong = xc_error | multiturn_error;  ///< Alarm: turns wrong.
-/// Alarms with which the position within the turn is not used, because it is not safe.
+inline constexpr std::uint8_t xc_error = 0x01;         ///< the turn counter missed five times in a row
+inline constexpr std::uint8_t multiturn_error = 0x02;  ///< the turn counter was found wrong
+/// The LED current or the signals of the disc are out of range.
+inline constexpr std::uint8_t led_or_lissajous_error = 0x04;
+inline constexpr std::uint8_t overspeed = 0x08;                        ///< the shaft turned faster than 10 000 rpm
+inline constexpr std::uint8_t memory_error = 0x10;                     ///< the encoder could not load its settings
+inline constexpr std::uint8_t singleturn_error = 0x20;                 ///< the position within the turn was found wrong
+inline constexpr std::uint8_t under_voltage = 0x40;                    ///< the inner supply is below 2.9 V
+inline constexpr std::uint8_t over_voltage = 0x80;                     ///< the inner supply is above 3.7 V
+inline constexpr std::uint8_t voltage = under_voltage | over_voltage;  ///< mask of the voltage alarms
+/// Mask of the alarms that make the turns invalid.
+inline constexpr std::uint8_t turns_wrong = xc_error | multiturn_error;
+/// Mask of the alarms that make the position within the turn unsafe, so that it is not used.
 inline constexpr std::uint8_t unsafe = led_or_lissajous_error | memory_error | singleturn_error | voltage;
 }  // namespace alarms
 
-inline constexpr unsigned singleturn_bits = 24;     ///< Bits of the position.
-inline constexpr unsigned multiturn_bits = 16;      ///< Bits of the turns.
-inline constexpr unsigned redundant_bits = 9;       ///< Bits of the redundant position.
+inline constexpr unsigned singleturn_bits = 24;     ///< number of bits of the position within the turn (ABS)
+inline constexpr unsigned multiturn_bits = 16;      ///< number of bits of the turns (ABM)
+inline constexpr unsigned redundant_bits = 9;       ///< number of bits of the redundant position of channel 2 (RS)
 inline constexpr std::size_t request_capacity = 4;  ///< Length of the longest request in bytes.
 inline constexpr std::size_t reply_capacity = 18;   ///< Length of the longest reply in bytes.
 /// Bytes of a request.
@@ -58,20 +64,24 @@ using ReplyBytes = ByteBuffer<reply_capacity>;
 
 // ---- Checksums. The document prints the polynomials in Koopman notation: 16'hAC9A is normal 5935, 8'h97 is 2F.
 
-/// Channel of the encoder.
+/// One of the two channels of the encoder, which measure the position independently.
 enum class Channel : std::uint8_t { one, two };
 
-inline constexpr CrcParameters crc16_lsb{16, 0x5935, 0, true, true, 0};    ///< CRC of 16 bits, lowest bit first.
-inline constexpr CrcParameters crc16_msb{16, 0x5935, 0, false, false, 0};  ///< CRC of 16 bits, highest bit first.
-inline constexpr CrcParameters crc8_lsb{8, 0x2F, 0, true, true, 0};        ///< CRC of 8 bits, lowest bit first.
-inline constexpr CrcParameters crc8_msb{8, 0x2F, 0, false, false, 0};      ///< CRC of 8 bits, highest bit first.
+/// Parameters of the 16-bit CRC if each byte enters LSB first.
+inline constexpr CrcParameters crc16_lsb{16, 0x5935, 0, true, true, 0};
+/// Parameters of the 16-bit CRC if each byte enters MSB first.
+inline constexpr CrcParameters crc16_msb{16, 0x5935, 0, false, false, 0};
+/// Parameters of the 8-bit CRC if each byte enters LSB first.
+inline constexpr CrcParameters crc8_lsb{8, 0x2F, 0, true, true, 0};
+/// Parameters of the 8-bit CRC if each byte enters MSB first.
+inline constexpr CrcParameters crc8_msb{8, 0x2F, 0, false, false, 0};
 
-/// Returns the value of the CRC register before the first byte.
+/// Returns the start value of the 16-bit CRC of a channel.
 [[nodiscard]] constexpr std::uint16_t initial_value(Channel channel) { return channel == Channel::two ? 0xFFFF : 0; }
 
 namespace detail {
-// Computes the CRC of 16-bit words. One 00 byte is appended to an odd number of bytes. `swapped`: the second byte of
-// each pair enters the CRC first.
+// Returns the 16-bit CRC of `bytes`, taken as 16-bit words; one 00 byte is appended to an odd number of bytes.
+// `swapped`: the second byte of each word enters the CRC first.
 template <CrcParameters parameters>
 constexpr std::uint16_t crc_of_pairs(Channel channel, Bytes bytes, bool swapped) {
   Crc<parameters, CrcTable::nibble> crc(initial_value(channel));
@@ -84,19 +94,19 @@ constexpr std::uint16_t crc_of_pairs(Channel channel, Bytes bytes, bool swapped)
 }
 }  // namespace detail
 
-/// Returns the CRC of 16 bits.
+/// Returns the 16-bit CRC of a channel's bytes, computed in this bit order.
 [[nodiscard]] constexpr std::uint16_t checksum16(CrcBitOrder order, Channel channel, Bytes bytes) {
   return order == CrcBitOrder::lsb ? detail::crc_of_pairs<crc16_lsb>(channel, bytes, false)
                                    : detail::crc_of_pairs<crc16_msb>(channel, bytes, order == CrcBitOrder::word);
 }
 
-/// Returns the CRC of 8 bits.
+/// Returns the 8-bit CRC of `bytes`, computed in this bit order.
 [[nodiscard]] constexpr std::uint8_t checksum8(CrcBitOrder order, Bytes bytes) {
   return order == CrcBitOrder::lsb ? Crc<crc8_lsb, CrcTable::nibble>::of(bytes)
                                    : Crc<crc8_msb, CrcTable::nibble>::of(bytes);
 }
 
-/// Returns whether the first of the two CRC bytes of this channel is the low one.
+/// Returns whether the low byte of this channel's 16-bit CRC is sent first.
 [[nodiscard]] constexpr bool low_byte_first(CrcByteOrder order, Channel channel) {
   if (order == CrcByteOrder::table12) return channel == Channel::one;
   return order == CrcByteOrder::low;
@@ -104,47 +114,51 @@ constexpr std::uint16_t crc_of_pairs(Channel channel, Bytes bytes, bool swapped)
 
 // ---- Tables 3 and 12 as data: the command ids, and the parts of each channel of their replies
 
-/// Data ID codes of Table 3; 6 is in Tables 6 and 12.
+/// Data ID: code of a request's kind, with the values of Table 3; ID 6 is in Tables 6 and 12 only.
 enum class DataId : std::uint8_t {
-  position = 1,          ///< safety
-  singleturn = 2,        ///< safety
-  position_short = 4,    ///< non-safety
-  singleturn_short = 5,  ///< non-safety
-  calibration = 6,       ///< non-safety
-  encoder_id = 8,  ///< never eight times in a row: that is "dynamic addressing", which the document does not describe
+  position = 1,          ///< safety reply, with both channels
+  singleturn = 2,        ///< safety reply, with both channels
+  position_short = 4,    ///< non-safety reply
+  singleturn_short = 5,  ///< non-safety reply
+  calibration = 6,       ///< non-safety reply
+  /// Must never be sent eight times in a row, which is "dynamic addressing", not described in the document.
+  encoder_id = 8,
   temperature = 9,
   alarms = 0xA,
-  zero = 0xB,             ///< sent eight times
-  clear_alarms = 0xC,     ///< sent eight times
-  reset_multiturn = 0xD,  ///< sent eight times
+  zero = 0xB,             ///< eight consecutive requests make a reset
+  clear_alarms = 0xC,     ///< eight consecutive requests make a reset
+  reset_multiturn = 0xD,  ///< eight consecutive requests make a reset
   read_memory = 0xE,
   write_memory = 0xF,
 };
 
-/// The parts between CF and CRC.
+/// The values that a channel of a reply can carry between CF and CRC, one bit each, so that they form sets.
 namespace part {
-inline constexpr unsigned status = 0x0001;                 ///< Status (SF).
-inline constexpr unsigned alarms = 0x0002;                 ///< Alarms (ALM).
-inline constexpr unsigned singleturn = 0x0004;             ///< Position within the turn (ABS).
-inline constexpr unsigned multiturn = 0x0008;              ///< Turns (ABM).
-inline constexpr unsigned encoder_id = 0x0010;             ///< Encoder id (ENID).
-inline constexpr unsigned temperature = 0x0020;            ///< Temperature (TEMP).
-inline constexpr unsigned sequence = 0x0040;               ///< Sequence counter of channel 1 (SC1).
-inline constexpr unsigned zero_sequence = 0x0080;          ///< {0, SC2}.
-inline constexpr unsigned redundant_sequence = 0x0100;     ///< RS0 {RS1, SC2}.
-inline constexpr unsigned redundant_alone = 0x0200;        ///< RS0 RS1 of ID C.
-inline constexpr unsigned redundant_calibration = 0x0400;  ///< RS0 RS1 of ID 6.
-inline constexpr unsigned memory_address = 0x0800;         ///< Memory address and busy bit (ADF).
-inline constexpr unsigned value = 0x1000;                  ///< Byte in memory (EDF).
-/// Any redundant position.
+inline constexpr unsigned status = 0x0001;         ///< Status (SF).
+inline constexpr unsigned alarms = 0x0002;         ///< Alarms (ALM).
+inline constexpr unsigned singleturn = 0x0004;     ///< Position within the turn (ABS).
+inline constexpr unsigned multiturn = 0x0008;      ///< Turns (ABM).
+inline constexpr unsigned encoder_id = 0x0010;     ///< Encoder id (ENID).
+inline constexpr unsigned temperature = 0x0020;    ///< Temperature (TEMP).
+inline constexpr unsigned sequence = 0x0040;       ///< Sequence counter of channel 1 (SC1).
+inline constexpr unsigned zero_sequence = 0x0080;  ///< Sequence counter of channel 2 in a byte of its own: 0 and SC2.
+/// Redundant position and sequence counter of channel 2 in two bytes: RS0, then RS1 with SC2.
+inline constexpr unsigned redundant_sequence = 0x0100;
+/// Redundant position in two bytes, RS0 and RS1, in replies to ID C.
+inline constexpr unsigned redundant_alone = 0x0200;
+/// Redundant position in two bytes, RS0 and RS1, in replies to ID 6.
+inline constexpr unsigned redundant_calibration = 0x0400;
+inline constexpr unsigned memory_address = 0x0800;  ///< Memory address and busy bit (ADF).
+inline constexpr unsigned value = 0x1000;           ///< Byte in memory (EDF).
+/// Set of the parts that carry a redundant position.
 inline constexpr unsigned redundant = redundant_sequence | redundant_alone | redundant_calibration;
 }  // namespace part
 
-/// A part with its length on the wire.
+/// A part of a reply, with its length on the wire.
 template <unsigned part_id, std::size_t part_size>
 struct WirePart {
-  static constexpr unsigned id = part_id;         ///< The part, one of namespace `part`.
-  static constexpr std::size_t size = part_size;  ///< Length in bytes.
+  static constexpr unsigned id = part_id;         ///< Identifier of the part: a constant of the namespace `part`.
+  static constexpr std::size_t size = part_size;  ///< Length of the part in bytes.
 };
 
 namespace detail {
@@ -169,17 +183,17 @@ using WireOrder =
                  WirePart<part::memory_address, 1>, WirePart<part::value, 1>>;
 }  // namespace detail
 
-/// Calls `visit(WirePart<...>{}, byte)` for each of `parts`, in the order of the wire. `control_field`: index of CF;
-/// `byte`: index of the part's first byte. Returns the index after the last part.
+/// Calls `visit(part, byte)` for each part in the set `parts`, in the order of the wire. `part` is a WirePart, and
+/// `byte` the index of its first byte; `control_field`: index of CF. Returns the index after the last part.
 template <class Visit>
 constexpr std::size_t walk_parts(unsigned parts, std::size_t control_field, const Visit& visit) {
   return detail::WireOrder::walk(parts, control_field + 1, visit);
 }
 
-/// The parts of a reply, in their order on the line.
+/// Layout of the replies to one data ID: the parts and lengths of each channel.
 struct Layout {
   constexpr Layout() = default;
-  /// Sets length of the checksum and parts of each channel.
+  /// Constructs a layout from the length of each channel's CRC in bytes and the parts of each channel.
   constexpr Layout(std::uint8_t crc, unsigned parts_one, unsigned parts_two = 0)
       : one(static_cast<std::uint16_t>(parts_one)),
         two(static_cast<std::uint16_t>(parts_two)),
@@ -187,16 +201,16 @@ struct Layout {
         length_one(length(crc, parts_one)),
         length_two(has_two() ? length(crc, parts_two) : std::uint8_t{0}) {}
 
-  /// Returns whether the reply has channel 2.
+  /// Returns whether the replies have channel 2.
   [[nodiscard]] constexpr bool has_two() const { return two != 0; }
-  /// Returns whether the reply has one of these parts.
+  /// Returns whether a channel has a part in the set `any_of`.
   [[nodiscard]] constexpr bool has(unsigned any_of) const { return ((one | two) & any_of) != 0; }
 
-  std::uint16_t one = 0;        ///< Parts of channel 1.
-  std::uint16_t two = 0;        ///< Parts of channel 2; 0: none.
-  std::uint8_t crc_bytes = 1;   ///< Length of the checksum in bytes.
-  std::uint8_t length_one = 0;  ///< length in bytes with CF and CRC
-  std::uint8_t length_two = 0;  ///< Length of the part of channel 2 in bytes.
+  std::uint16_t one = 0;        ///< Set of the parts of channel 1.
+  std::uint16_t two = 0;        ///< Set of the parts of channel 2; 0: the replies have no channel 2.
+  std::uint8_t crc_bytes = 1;   ///< Length of the CRC of a channel in bytes, 1 or 2.
+  std::uint8_t length_one = 0;  ///< length of channel 1 in bytes, with CF and CRC
+  std::uint8_t length_two = 0;  ///< length of channel 2 in bytes, with CF and CRC; 0: none
 
  private:
   static constexpr std::uint8_t length(unsigned crc, unsigned parts) {
@@ -205,7 +219,7 @@ struct Layout {
 };
 
 namespace detail {
-// Layouts by id; empty for an id that does not exist.
+// Layouts of replies by data ID; empty for an ID that does not exist.
 inline constexpr std::array<Layout, 16> layouts = [] {
   using part::status, part::alarms, part::singleturn, part::multiturn, part::encoder_id, part::temperature;
   using part::sequence, part::zero_sequence, part::redundant_sequence, part::redundant_alone;
@@ -227,98 +241,103 @@ inline constexpr std::array<Layout, 16> layouts = [] {
 }();
 }  // namespace detail
 
-/// Returns the layout of replies to a request.
+/// Returns the layout of replies to this data ID.
 [[nodiscard]] constexpr const Layout& layout_of(DataId id) { return detail::layouts[static_cast<std::size_t>(id)]; }
 
-/// Returns the id of a control field, whatever its parity; nothing for one that the tables do not list.
+/// Returns the data ID in a control field, whatever its parity; nothing for an ID that the tables do not list.
 [[nodiscard]] constexpr std::optional<DataId> data_id(std::uint8_t field) {
   const std::uint8_t id = (field >> 3) & 0xF;
   if (detail::layouts[id].length_one == 0) return std::nullopt;
   return static_cast<DataId>(id);
 }
 
-/// Returns whether a request reads or writes the memory.
+/// Returns whether requests with this data ID read or write the memory.
 [[nodiscard]] constexpr bool is_memory_access(DataId id) {
   return id == DataId::read_memory || id == DataId::write_memory;
 }
-/// Returns whether a request is one of those that reset.
+/// Returns whether eight requests with this data ID reset something: the zero, alarms, or the turns.
 [[nodiscard]] constexpr bool is_reset(DataId id) {
   return id == DataId::zero || id == DataId::clear_alarms || id == DataId::reset_multiturn;
 }
-/// Returns whether a request is for a safety position.
+/// Returns whether replies to this data ID can make a safe position: IDs 1 and 2.
 [[nodiscard]] constexpr bool is_safety_position(DataId id) {
   return id == DataId::position || id == DataId::singleturn;
 }
-/// Returns the id of the position with all that the encoder measures.
+/// Returns the data ID whose reply has everything that the encoder measures: position, and turns if it counts them.
 [[nodiscard]] constexpr DataId position_id(const Profile& profile) {
   return profile.turns ? DataId::position : DataId::singleturn;
 }
-/// Returns whether replies to this id carry the sequence counter (and count it, with sequence_step=safety).
+/// Returns whether replies to this data ID carry the sequence counter. With sequence_step=safety these replies are what
+/// it counts.
 [[nodiscard]] constexpr bool has_sequence(DataId id) { return layout_of(id).crc_bytes == 2; }
 
-/// Returns the length of a reply in bytes.
+/// Returns the length in bytes of replies to this data ID, with both channels.
 [[nodiscard]] constexpr std::size_t reply_length(DataId id) {
   return std::size_t{layout_of(id).length_one} + layout_of(id).length_two;
 }
-/// Returns the length of a request in bytes.
+/// Returns the length in bytes of requests with this data ID.
 [[nodiscard]] constexpr std::size_t request_length(const Profile& profile, DataId id) {
   if (id == DataId::write_memory) return 4;
   if (id == DataId::read_memory) return 3;
   return profile.request_crc ? 2 : 1;
 }
 
-/// Returns CF: EAD, the id, and a parity bit that makes the number of ones odd.
+/// Returns CF, the control field of a request: encoder address, data ID, and a parity bit that makes the number of ones
+/// odd.
 [[nodiscard]] constexpr std::uint8_t control_field(const Profile& profile, unsigned address, DataId data) {
   const auto id = static_cast<unsigned>(data);
   const unsigned covered = profile.parity_scope == ParityScope::all ? address << 4 | id : id;
   return static_cast<std::uint8_t>((address & 7) | id << 3 | (odd_parity(covered) ? 0 : 0x80));
 }
-/// Returns ENID: b7 a safety encoder, b6..5 bytes of the turns, b4..0 bits of the turn.
+/// Returns ENID, the encoder id of this profile: b7 a safety encoder, b6..5 number of bytes of the turns, b4..0 number
+/// of bits of the position within the turn.
 [[nodiscard]] constexpr std::uint8_t encoder_id(const Profile& profile) {
   constexpr unsigned safety = 0x80;
   const unsigned turn_bytes = profile.turns ? multiturn_bits / 8 : 0;
   return static_cast<std::uint8_t>(safety | turn_bytes << 5 | singleturn_bits);
 }
-/// Returns the address in a control field.
+/// Returns the encoder address in a control field.
 [[nodiscard]] constexpr std::uint8_t address_of(std::uint8_t field) { return field & 7; }
 
-/// A request of the protocol.
+/// A request of ESL.
 struct Request {
   DataId id = DataId::position;      ///< Data ID of the request.
-  std::uint8_t encoder_address = 0;  ///< address 0 to 7
-  std::uint8_t memory_address = 0;   ///< memory access: address 0 to 7F
-  std::uint8_t value = 0;            ///< write_memory: byte to be written
+  std::uint8_t encoder_address = 0;  ///< address of the encoder on the line, 0 to 7
+  std::uint8_t memory_address = 0;   ///< data IDs of memory access: address of the byte, 0 to 7F
+  std::uint8_t value = 0;            ///< data ID write_memory: byte to be written
 };
 
-/// The parts of a reply in one channel.
+/// The values that each channel of a reply has for itself; those that the data ID does not carry are 0.
 struct ChannelReply {
-  std::uint8_t status = 0;      ///< bits in the order of the document
-  std::uint8_t alarms = 0;      ///< Alarms of the channel.
-  std::uint8_t sequence = 0;    ///< 8 bits in channel 1, 7 in channel 2
-  std::uint8_t encoder_id = 0;  ///< Encoder identifier.
+  std::uint8_t status = 0;      ///< status (SF): bits of the namespace `status`, in the order of the document
+  std::uint8_t alarms = 0;      ///< Alarms of the channel (ALM): bits of the namespace `alarms`.
+  std::uint8_t sequence = 0;    ///< sequence counter: 8 bits in channel 1 (SC1), 7 bits in channel 2 (SC2)
+  std::uint8_t encoder_id = 0;  ///< Encoder id (ENID).
 };
 
-/// The fields of a reply; those that its id does not carry are 0.
+/// A decoded reply; members that its data ID does not carry are 0.
 struct Reply {
   DataId id = DataId::position;                   ///< Data ID of the reply.
-  std::uint8_t encoder_address = 0;               ///< Address of the encoder on its line.
-  ChannelReply one{};                             ///< Channel 1.
-  ChannelReply two{.status = status::channel_2};  ///< Channel 2.
-  std::uint32_t singleturn = 0;                   ///< Position in counts.
-  std::uint16_t multiturn = 0;                    ///< Turns.
-  std::uint16_t redundant = 0;                    ///< 9 bits; with ID 6 16 bits if the profile says so
-  std::int8_t temperature = 0;                    ///< signed, which is assumed
-  std::uint8_t memory_address = 0;                ///< Address of the memory byte.
-  bool busy = false;                              ///< Whether the memory is busy.
-  std::uint8_t value = 0;                         ///< Value of the memory byte.
-  bool unused_bits = false;                       ///< decoded: a bit that must be 0 was set
+  std::uint8_t encoder_address = 0;               ///< Address of the encoder on the line (EAD), 0 to 7.
+  ChannelReply one{};                             ///< Values of channel 1.
+  ChannelReply two{.status = status::channel_2};  ///< Values of channel 2.
+  std::uint32_t singleturn = 0;                   ///< Position within the turn, in counts (ABS).
+  std::uint16_t multiturn = 0;                    ///< Number of turns (ABM).
+  /// Redundant position of channel 2 (RS): 9 bits, with ID 6 16 bits if `id6_rs` is bits_16.
+  std::uint16_t redundant = 0;
+  std::int8_t temperature = 0;      ///< temperature in degC; that it is signed is assumed
+  std::uint8_t memory_address = 0;  ///< Address of the memory byte (ADF).
+  bool busy = false;                ///< Whether the memory is busy, so that the request was not executed.
+  std::uint8_t value = 0;           ///< Value of the memory byte (EDF).
+  bool unused_bits = false;         ///< in a decoded reply: a bit that must be 0 was set
 };
 
 // ---- Bits whose place the document leaves open
 
 namespace detail {
 
-// In T-format DD is in b0..3, EA in b4..5, CA in b6..7.
+// Converts SF from the order of the document to that of the wire. In T-format order DD is in b0..3, EA in b4..5, CA in
+// b6..7.
 [[nodiscard]] constexpr std::uint8_t status_to_wire(const Profile& profile, std::uint8_t value) {
   if (profile.status_order == FieldOrder::document) return value;
   return static_cast<std::uint8_t>(value >> 4 | (value & 0x0C) << 2 | (value & 0x03) << 6);
@@ -328,7 +347,7 @@ namespace detail {
   return static_cast<std::uint8_t>(value << 4 | (value >> 2 & 0x0C) | value >> 6);
 }
 
-// Moves b7 of a byte to b0 if `at_b0`: {busy, ADF}, {RS1, SC2}, {0, SC2}, or RS1 alone.
+// Moves b7 of a byte to b0 if `at_b0`. Such bytes are {busy, ADF}, {RS1, SC2}, {0, SC2}, and RS1 alone.
 [[nodiscard]] constexpr std::uint8_t to_wire(bool at_b0, unsigned byte) {
   return std::rotl(static_cast<std::uint8_t>(byte), at_b0 ? 1 : 0);
 }
@@ -338,7 +357,7 @@ namespace detail {
 
 // ---- Encoding
 
-/// Returns the request as it is sent.
+/// Returns the bytes of a request.
 [[nodiscard]] constexpr RequestBytes encode_request(const Profile& profile, const Request& request) {
   RequestBytes bytes;
   bytes.push_back(control_field(profile, request.encoder_address, request.id));
@@ -352,11 +371,11 @@ namespace detail {
 
 namespace detail {
 
-// Returns the bytes of one part, the first on the wire lowest.
+// Returns the bytes of one part as a number whose lowest byte is sent first.
 template <unsigned id>
 constexpr std::uint32_t part_to_wire(const Profile& profile, const Reply& reply, const ChannelReply& channel) {
   const unsigned counter = channel.sequence & 0x7Fu;
-  // RS in two bytes: its upper bits, then {RS1, SC2}.
+  // Returns the two bytes of the redundant position RS: its upper bits, then its lowest bit RS1 with SC2.
   const auto redundant = [&reply](RedundantBit order, unsigned sequence) {
     const unsigned second = to_wire(order == RedundantBit::b0, (reply.redundant & 1u) << 7 | sequence);
     return reply.redundant >> 1 | second << 8;
@@ -410,7 +429,8 @@ constexpr void encode_channel(const Profile& profile, const Reply& reply, std::u
 
 }  // namespace detail
 
-/// Encodes a reply with this control field, which is that of the request, even with a wrong parity bit.
+/// Returns the bytes of a reply with the control field `field`, which echoes that of the request, even a wrong parity
+/// bit.
 [[nodiscard]] constexpr ReplyBytes encode_reply(const Profile& profile, const Reply& reply, std::uint8_t field) {
   ReplyBytes bytes;
   detail::encode_channel(profile, reply, field, Channel::one, bytes);
@@ -418,7 +438,7 @@ constexpr void encode_channel(const Profile& profile, const Reply& reply, std::u
   return bytes;
 }
 
-/// Returns the reply as it is sent.
+/// Returns the bytes of a reply, whose control field has the right parity.
 [[nodiscard]] constexpr ReplyBytes encode_reply(const Profile& profile, const Reply& reply) {
   return encode_reply(profile, reply, control_field(profile, reply.encoder_address, reply.id));
 }

@@ -12,18 +12,19 @@ using author::Procedure;
 
 namespace {
 
-constexpr unsigned attempts = 3;  // attempts of reads and page selects: resets, writes and ID 8 are never repeated
+// How often reads and page selects are sent until a valid reply; resets, writes and ID 8 are never repeated.
+constexpr unsigned attempts = 3;
 constexpr unsigned safe_attempts = 6;
 
 Request request_of(const Dialog& dialog, DataId id) { return {id, dialog.format().address}; }
 
-// Stores the reply of the last exchange, with its times.
+// Stores the last valid reply, and its reading with times, in `found`.
 void show_last(const Dialog& dialog, ProcedureResult& found) {
   found.show(dialog.last());
   found.reading = dialog.last_reading();
 }
 
-// Writes "24 bits and turns", or "20 bits and no turns, not a safety encoder".
+// Appends a description of an ENID: "24 bits and turns", or "20 bits and no turns, not a safety encoder".
 void describe(Sentence& words, std::uint8_t id) {
   const std::array<char, 2> bits{static_cast<char>('0' + (id & 0x1F) / 10), static_cast<char>('0' + (id & 0x1F) % 10)};
   words.add({bits.data(), bits.size()}).add(" bits and ").add((id >> 5 & 3) != 0 ? "turns" : "no turns");
@@ -49,7 +50,7 @@ Procedure read_encoder_id(Dialog& dialog, ProcedureResult& found) {
 
 Procedure read_safely(Dialog& dialog, SafePositionResult& found) {
   SafetyMonitor monitor(dialog.format());
-  found.has_turns = false;  // a safe position has none
+  found.has_turns = false;  // a safe position has no turns, because only channel 1 has them
   for (;;) {
     SafetyVerdict verdict{.failed = Check::sequence_unknown};
     for (unsigned i = 0; i < safe_attempts && verdict.failed == Check::sequence_unknown; ++i) {
@@ -73,13 +74,14 @@ Procedure read_safely(Dialog& dialog, SafePositionResult& found) {
 
 namespace {
 
-// Returns the pause between two of the eight resets: 40 us from start to start; a slow line takes longer.
+// Returns the pause between the last reply and the next of the eight reset requests: 40 us from start to start; a slow
+// line takes longer.
 Time pause_between_resets(const Dialog& dialog, DataId id) {
   const Time duration = line_settings.character() * static_cast<std::int64_t>(request_length(dialog.format(), id));
   return dialog.sent_at() - duration + reset_interval - dialog.received_at();
 }
 
-// Names the alarms that remain after an ID C, and what clears them (Table 8).
+// Appends the names of the alarms that remain after an ID C, and what clears them (Table 8). Returns the text.
 std::string_view what_remains(Sentence& words, unsigned remaining) {
   constexpr unsigned until_power_off =
       alarms::led_or_lissajous_error | alarms::overspeed | alarms::memory_error | alarms::singleturn_error;
@@ -93,7 +95,7 @@ std::string_view what_remains(Sentence& words, unsigned remaining) {
   return words.view();
 }
 
-// Returns which part of the reset failed; no detail: none did.
+// Returns what the reset with the data ID `id` failed to do, as the reply `now` shows; empty if it did everything.
 Explanation failed_part(Sentence& words, DataId id, const Reply& before, const Reply& now) {
   const unsigned remaining = now.one.alarms | now.two.alarms;
   if (id == DataId::clear_alarms) {
@@ -128,13 +130,13 @@ Procedure reset(Dialog& dialog, ProcedureResult& found, DataId id) {
   for (unsigned i = 0; i < reset_requests; ++i) {
     const Time pause = i == 0 ? Time{} : pause_between_resets(dialog, id);
     const Result<Reply> reply = co_await dialog.attempt(request_of(dialog, id)).changes().after(pause);
-    // If the last reply is lost, the reset may have been executed: reading shows it.
+    // If the eighth reply is lost, the reset may have been executed: the reading after it shows that.
     if (reply || i + 1 == reset_requests) continue;
     co_return {reply.error(),
                "one of the eight requests was not answered well, so the encoder has most likely done nothing: read the "
                "position before you try again"};
   }
-  // B writes the zero to the EEPROM; D may do so, too.
+  // ID B writes the zero to the EEPROM; ID D may do so, too.
   const Time pause = id == DataId::clear_alarms ? reset_interval : eeprom_write_pause;
   const Reply now = co_await dialog.ask(look).repeated(attempts).after(pause).or_say(
       "all eight requests were sent, but whether the encoder obeyed could not be read");
@@ -148,12 +150,13 @@ Procedure reset(Dialog& dialog, ProcedureResult& found, DataId id) {
 
 namespace {
 
-constexpr Time busy_limit = 2 * page_time;  // the document states no maximum
+// Longest wait for a busy memory; assumed, because the document states no maximum.
+constexpr Time busy_limit = 2 * page_time;
 
 constexpr std::string_view unknown_area = "Table 11 lists no such page and address; nothing was sent";
 
-// Repeats a request until the memory is ready. `after_busy`: the temporary register may hold a byte that another host
-// requested, which only a busy reply excludes.
+// Repeats a memory request until the encoder executes it, and returns the reply or the error. `after_busy`: the reply
+// must follow a busy one, because the temporary register may hold a byte that another host requested.
 author::Part<Result<Reply>> when_ready(Dialog& dialog, const Request& request, bool after_busy = false) {
   const bool writes = request.id == DataId::write_memory && !selects_page(request);
   return author::until_ready<Protocol>(dialog, request,
@@ -169,7 +172,8 @@ author::Outcome failure(Error error, std::string_view words, Time hold) {
   return {error, words, {}, hold};
 }
 
-// Selects a page and waits until it is ready. `words`: detail of the error if the procedure ends here.
+// Selects a page, waits until it is ready, and returns it. Otherwise the procedure ends; `words` is the detail of the
+// error.
 author::Part<std::uint8_t> turn_to(Dialog& dialog, std::uint8_t page, std::string_view words) {
   const Request request{DataId::write_memory, dialog.format().address, page_select_address, page};
   const Result<Reply> reply = co_await when_ready(dialog, request);
@@ -252,7 +256,9 @@ Procedure select_page(Dialog& dialog, ProcedureResult& found, Arguments argument
 
 namespace {
 
-// Finds the cause in SF. A bit that another raised alarm sets as well is ambiguous, unless the other bit is clear.
+// Finds in SF whether the LED or the Lissajous signals raise led_or_lissajous_error, and stores it in `found`. Returns
+// whether at least one cause is found. A bit of SF that another raised alarm sets too is ambiguous, unless the other
+// bit is clear.
 bool find_cause_in_status(ProcedureResult& found, const Reply& reply) {
   constexpr unsigned other_safety = alarms::unsafe & ~unsigned{alarms::led_or_lissajous_error};
   constexpr unsigned other_non_safety = alarms::turns_wrong | alarms::overspeed;
@@ -290,7 +296,8 @@ Procedure read_error_info(Dialog& dialog, ProcedureResult& found) {
   if (known && before->value == register_page) co_return done;
   found.page_left = register_page;
   if (!known) co_return done;
-  // The result is known by now. Reading the page back shows what the next user of the encoder finds.
+  // The result is complete. Selecting the page from before must be verified, because the next user of the encoder finds
+  // what is selected.
   const Request restore{DataId::write_memory, dialog.format().address, page_select_address, before->value};
   const Result<Reply> restored = co_await when_ready(dialog, restore);
   if (restored.error() == Error::busy) co_return failure(Error::busy, {}, page_time);

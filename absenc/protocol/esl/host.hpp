@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of ESL: procedures with several exchanges. author::ReadPosition<Protocol> reads a single position.
-// README.md describes the procedures.
+// Host side of ESL: procedures with several exchanges, which README.md describes. The template author::ReadPosition,
+// with the Protocol of reply.hpp, reads a single position.
 #pragma once
 
 #include <array>
@@ -11,65 +11,71 @@
 
 namespace absenc::esl {
 
-/// Dialog of procedures.
+/// The conversation through which ESL procedures send requests.
 using Dialog = author::DialogOf<Protocol>;
 
-/// Result of a procedure.
+/// Result of an ESL procedure: the values of its fields, its reading, and the data to which they refer.
 struct ProcedureResult : Shown {
-  Reading reading{};                     ///< The position.
-  ByteBuffer<last_address + 1> bytes{};  ///< bytes of `data`
-  Sentence words{};                      ///< detail of the error
+  Reading reading{};                     ///< Position and turns of the last reply that had them.
+  ByteBuffer<last_address + 1> bytes{};  ///< memory bytes to which the field `data` refers
+  Sentence words{};                      ///< text of the error's detail
 };
 
-/// Reads ID 8 after an ID 5, so that eight of these procedures in a row do not send eight IDs 8 in a row. Error:
-/// unexpected_reply (another encoder than the options state).
+/// Reads the encoder id by an ID 8 after an ID 5, so that eight runs of this procedure do not send eight consecutive
+/// IDs 8. Errors: unexpected_reply (another encoder than the options state), or that of an exchange.
 author::Procedure read_encoder_id(Dialog& dialog, ProcedureResult& found);
 
-/// Result of a safety reading: each emit is one.
+/// Result of `read_safely`: a safe position. Each step `emit` delivers one.
 struct SafePositionResult : ProcedureResult {
-  static constexpr bool streams = true;  ///< The command streams.
+  static constexpr bool streams = true;  ///< Marks that the procedure delivers results without end.
 };
-/// Reads safe positions without end: IDs 1 and 2 until the monitor trusts the line, which takes two exchanges without
-/// errors, then one exchange each, so that the sequence counter is compared from reading to reading. Errors: those of
-/// the check that failed.
+/// Reads safe positions without end. It sends IDs 1 and 2 until the monitor trusts the line, which takes two exchanges
+/// without errors, then one request for each position, so that the sequence counter is compared from reading to
+/// reading. Errors: that of the failed check, or of an exchange.
 author::Procedure read_safely(Dialog& dialog, SafePositionResult& found);
 
-/// Sends IDs B (single-turn zero here), C (clear alarms) and D (turns): makes sure that the shaft stands still, sends
-/// eight requests, and verifies the result. Errors: invalid_argument (the shaft turns, the encoder is not ready),
-/// cross_check_failed (the encoder did not execute it; the detail names what remains), or that of an exchange.
+/// Resets by the data ID B (single-turn zero here), C (alarms) or D (turns): makes sure that the shaft stands still,
+/// sends eight requests, and verifies the result. Errors: invalid_argument (the encoder is not ready, or its position
+/// is invalid), not_still (the shaft turns), cross_check_failed (the encoder did not execute it; the detail names what
+/// remains), or that of an exchange.
 author::Procedure reset(Dialog& dialog, ProcedureResult& found, DataId id);
 
 // ---- Memory (Tables 9 to 11, Figures 14 and 15); only with one encoder on the line
 
-/// Reads bytes. Arguments: address, page, count. Errors: invalid_argument (not in Table 11), busy.
+/// Reads bytes of the memory. Arguments: address, page, count. Errors: invalid_argument (a byte is not in Table 11),
+/// busy, or that of an exchange.
 author::Procedure read_memory(Dialog& dialog, ProcedureResult& found, Arguments arguments);
 
-/// Reads a byte, writes it if it differs, waits, and reads it back. Arguments: address, value, page, force. Errors:
-/// invalid_argument (not in Table 11, or protected and without force), busy, cross_check_failed (another value was read
-/// back).
+/// Reads a byte of the memory, writes it if it differs, waits, and reads it back. Arguments: address, value, page,
+/// force. Errors: invalid_argument (not in Table 11, or protected and without force), busy, cross_check_failed (another
+/// value was read back), or that of an exchange.
 author::Procedure write_memory(Dialog& dialog, ProcedureResult& found, Arguments arguments);
 
-/// Selects a page, for users who send memory requests themselves. Arguments: page.
+/// Selects a memory page and leaves it selected, for users who send memory requests themselves. Arguments: page.
+/// Errors: invalid_argument (not in Table 11), busy, cross_check_failed (another page is selected), or that of an
+/// exchange.
 author::Procedure select_page(Dialog& dialog, ProcedureResult& found, Arguments arguments);
 
-/// Finds whether the LED or the Lissajous signals raise led_or_lissajous_error: reads page 8 address 1A, then selects
-/// the page before again; with several encoders on the line, reads SF (Table 5). Error: unsupported (other alarms raise
-/// the same bits of SF).
+/// Finds whether the LED or the Lissajous signals raise led_or_lissajous_error: reads address 1A of page 8, then
+/// selects the page from before again. With several encoders on the line it reads SF instead (Table 5). Errors:
+/// unsupported (other alarms raise the same bits of SF), busy, or that of an exchange.
 author::Procedure read_error_info(Dialog& dialog, ProcedureResult& found);
 
 // ---- Several encoders on one line
 
-inline constexpr unsigned most_encoders = 8;  ///< an address has 3 bits
+inline constexpr unsigned most_encoders = 8;  ///< most encoders on a line, because an address has 3 bits
 
-/// Addresses at which encoders answered.
+/// Result of `scan`: what was received at each address.
 struct Nodes {
-  std::array<std::optional<Reply>, most_encoders> answers{};  ///< last valid reply of each address
-  std::array<bool, most_encoders> disturbed{};                ///< Whether replies of an address were disturbed.
-  std::array<Check, most_encoders> troubles{};                ///< error of a complete but invalid answer
+  std::array<std::optional<Reply>, most_encoders> answers{};  ///< valid reply of each address; nothing: there was none
+  std::array<bool, most_encoders> disturbed{};                ///< Whether every reply of an address was damaged.
+  /// Check that a complete but invalid reply of each address failed; `passed`: there was none.
+  std::array<Check, most_encoders> troubles{};
 };
-/// Requests ID 5 at every address, never ID 8: eight of these in a row are "dynamic addressing". An answer that is
-/// damaged every time comes from two encoders with one address, or from a bad line. A complete answer comes from one
-/// encoder, even if it refuses or differs from the drawing. Error: timeout if no address answers.
+/// Finds the encoders on the line: sends ID 5 to every address, never ID 8, because eight consecutive IDs 8 are
+/// "dynamic addressing". A reply that is damaged every time comes from two encoders with one address, or from a bad
+/// line. A complete reply comes from one encoder, even if it refuses or differs from the drawing. Errors: timeout (no
+/// address answers), or that of a line that is never silent.
 author::Procedure scan(Dialog& dialog, Nodes& found);
 
 }  // namespace absenc::esl

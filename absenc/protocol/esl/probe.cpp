@@ -23,7 +23,7 @@ constexpr std::size_t combinations = [] {
   return product;
 }();
 
-// Returns the n-th profile; number 0 has all defaults.
+// Returns profile number `number` of all combinations of open options; number 0 has all defaults.
 Profile nth_profile(const Profile& base, std::size_t number) {
   Profile profile = base;
   for (std::size_t i = 0; i < open_options; ++i) {
@@ -41,7 +41,7 @@ Profile with_other_parity(Profile profile) {
   return profile;
 }
 
-// The request of a capture, as far as its bytes show it under this profile.
+// The request of a capture, decoded as far as a profile permits.
 struct SentRequest {
   Request request{};
   bool parity_wrong = false;
@@ -62,8 +62,8 @@ SentRequest request_in(const Profile& profile, const Capture& capture) {
           .accepted = good || capture.request.empty()};
 }
 
-// Returns the check that fails under this profile. An encoder answers only requests that it accepts, and reports a
-// wrong parity bit only if there is one.
+// Returns the check of a captured exchange that fails under this profile; `passed` if the profile explains it. An
+// encoder answers only requests that it accepts, and reports a wrong parity bit only if there is one.
 Check explain(const Profile& profile, const Capture& capture) {
   if (capture.reply.empty()) return Check::passed;
   const SentRequest asked = request_in(profile, capture);
@@ -73,7 +73,7 @@ Check explain(const Profile& profile, const Capture& capture) {
   const Check check = check_reply(as_sent, asked.request, capture.reply, reply);
   if (!asked.parity_wrong) return check;
   if (check == Check::parity_reported) {
-    // All other parts of the reply must be right.
+    // Apart from the reported error, all parts of the reply must be right.
     reply.one.status &= static_cast<std::uint8_t>(~status::rejected);
     reply.two.status &= static_cast<std::uint8_t>(~status::rejected);
     return detail::check_content(as_sent, layout_of(reply.id), reply);
@@ -81,12 +81,14 @@ Check explain(const Profile& profile, const Capture& capture) {
   return check == Check::passed && !is_memory_access(asked.request.id) ? Check::request_not_accepted : check;
 }
 
-// How far a profile explains the captures: the first capture that it does not explain, then the check.
+// How far a profile explains the captures: index of the first capture that it does not explain, and the check that
+// failed.
 struct Progress {
   std::size_t capture = 0;
   Check failed = Check::passed;
 
-  // A profile under which the encoder would not have answered at all explains least.
+  // Returns how much of the failed capture is explained. A profile under which the encoder would not have answered
+  // explains least.
   [[nodiscard]] int rank() const { return failed == Check::request_not_accepted ? 0 : static_cast<int>(failed); }
   [[nodiscard]] bool fits() const { return failed == Check::passed; }
   [[nodiscard]] bool better_than(const Progress& other) const {
@@ -104,20 +106,22 @@ Progress progress_of(const Profile& profile, std::span<const Capture> captures) 
   return {};
 }
 
-// By the index of the option and of its value: how far the best profile with this value explains the captures.
+// For each value of an option: how far the best profile with this value explains the captures. Reached has one for each
+// option.
 using ReachedByValue = std::array<Progress, most_choices>;
 using Reached = std::array<ReachedByValue, open_options>;
 
-// Compares each step of the counter with the replies as `best` decodes them.
+// Compares each value of the option sequence_step with the counters in the replies, which `best` decodes: stores in
+// `values` which ones fit, and the first fitting value in `best`.
 void judge_sequence(Profile& best, std::span<const Capture> captures, ReachedByValue& values) {
   values.fill({});
   bool known = false;
   std::uint8_t last = 0;
-  std::uint8_t safety = 0;   // replies with a counter since the last counter
-  std::uint8_t request = 0;  // requests since the last counter
+  std::uint8_t safety = 0;   // number of replies with a counter since the last received counter
+  std::uint8_t request = 0;  // number of requests since the last received counter
   for (std::size_t i = 0; i < captures.size(); ++i) {
     ++request;
-    if (captures[i].reply.empty()) {  // unknown whether the encoder counted the request
+    if (captures[i].reply.empty()) {  // it is unknown whether the encoder counted the request
       known = false;
       continue;
     }
@@ -164,7 +168,8 @@ bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sin
   Profile best = nth_profile(base, 0);
   bool any = false;
   Reached reached;
-  for (auto& option : reached) option.fill({0, Check::request_not_accepted});  // explains least
+  // The value that every profile exceeds or equals.
+  for (auto& option : reached) option.fill({0, Check::request_not_accepted});
   for (std::size_t number = 0; number < combinations; ++number) {
     const Profile profile = nth_profile(base, number);
     const Progress progress = progress_of(profile, captures);
@@ -175,7 +180,7 @@ bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sin
       if (progress.better_than(so_far)) so_far = progress;
     }
   }
-  // sequence_step does not change single frames.
+  // The option sequence_step does not change single frames, so sequences of replies must decide it.
   auto& sequence = reached[option_sequence_step];
   sequence.fill(sequence[static_cast<std::size_t>(best.sequence_step)]);
   if (any) judge_sequence(best, captures, sequence);
@@ -186,7 +191,8 @@ bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sin
 
 namespace {
 
-// Returns whether the request's parity bit alone is wrong: the other scope must give another one.
+// Returns whether the encoder reports a parity error that the other parity_scope explains, because it gives another
+// parity bit.
 bool parity_is_it(const Profile& profile, const Capture& capture) {
   const SentRequest asked = request_in(profile, capture);
   Reply reply;
@@ -194,7 +200,7 @@ bool parity_is_it(const Profile& profile, const Capture& capture) {
          request_in(with_other_parity(profile), capture).parity_wrong;
 }
 
-// The values of all options that change replies.
+// All values of the options that change replies.
 constexpr auto changes = [] {
   Buffer<OptionValue, most_choices * open_options> all;
   for (std::size_t option = 0; option < open_options; ++option) {
@@ -214,7 +220,7 @@ Profile changed(Profile profile, const OptionValue& change) {
 
 }  // namespace
 
-// The host sent the request under the profile in use, so only the reply is evidence.
+// Only the reply is evidence, because the host encoded the request with the profile in use.
 Buffer<OptionValue, 2> find_change(const Profile& profile, Bytes reply) {
   const Capture capture{.reply = reply};
   Buffer<OptionValue, 2> found;

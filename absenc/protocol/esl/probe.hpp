@@ -9,13 +9,13 @@
 
 namespace absenc::esl {
 
-/// As Unit::probe. Without a request, the reply's own control field gives the request; an empty reply proves nothing.
-/// To judge sequence_step the captures must be consecutive: nothing else may have been sent to the encoder between
-/// them.
+/// Finds the options that fit all captures, as Unit::probe. If a capture has no request, the control field of the reply
+/// gives it; a capture without a reply proves nothing. To judge sequence_step the captures must be consecutive: nothing
+/// else may have been sent to the encoder between them.
 bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sink);
 
-/// Returns changes of one or two options of `profile` that make an invalid reply valid; none if there are no such
-/// changes.
+/// Returns new values of one or two options of `profile` with which an invalid reply is valid; empty if no such change
+/// is found, or if the reply is valid or empty.
 [[nodiscard]] Buffer<OptionValue, 2> find_change(const Profile& profile, Bytes reply);
 
 }  // namespace absenc::esl

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Options for everything that the QS35 document leaves open, and for address and checks of one encoder. README.md
-// states how hardware shows each alternative; probe.hpp finds them in captured frames.
+// Options of ESL: one for each property that the QS35 document leaves open, and those for the address and the checks of
+// an encoder. README.md states how hardware shows each alternative; probe.hpp finds them in captured frames.
 #pragma once
 
 #include <algorithm>
@@ -12,55 +12,62 @@
 
 namespace absenc::esl {
 
-/// Order of the bits in which a CRC is computed.
+/// Order in which bits enter a CRC.
 enum class CrcBitOrder : std::uint8_t {
-  lsb,   ///< each byte LSB first, as on the wire
-  msb,   ///< each byte MSB first
-  word,  ///< 16-bit words of two bytes, low byte first on the wire, MSB first into the CRC; the 8-bit CRC: as msb
+  lsb,  ///< bits enter the CRC byte by byte, LSB first, as on the wire
+  msb,  ///< bits enter the CRC byte by byte, MSB first
+  /// 16-bit words, whose low byte is first on the wire, enter the CRC MSB first; an 8-bit CRC is computed as with msb.
+  word,
 };
-/// Order of the bytes of a CRC.
+/// Order of the two bytes of a 16-bit CRC on the wire.
 enum class CrcByteOrder : std::uint8_t {
-  low,      ///< low byte first
-  high,     ///< high byte first
+  low,      ///< low byte first in both channels
+  high,     ///< high byte first in both channels
   table12,  ///< as in Table 12: channel 1 low byte first, channel 2 high byte first
 };
-/// The bit of the byte {RS1, ...} that holds the lowest bit of the redundant position.
+/// Bit of its byte in which RS1, the lowest bit of the redundant position, is sent.
 enum class RedundantBit : std::uint8_t { b7, b0 };
-/// When the sequence bit of a safety reply changes.
+/// How the sequence counters SC1 and SC2 move from reply to reply.
 enum class SequenceStep : std::uint8_t {
-  change,   ///< it differs from the last one
-  safety,   ///< it counts the replies to IDs 1, 2, 8 and B
-  request,  ///< it counts all requests
+  change,   ///< the counter differs from that of the reply before
+  safety,   ///< the counter counts the replies to IDs 1, 2, 8 and B
+  request,  ///< the counter counts all requests
 };
-/// The bits that the parity bit of CF covers.
+/// Bits that the parity bit of CF covers: only the data ID (command), or the encoder address too (all).
 enum class ParityScope : std::uint8_t { command, all };
-/// Order of the bits in SF, or in ADF: that of the QS35 document, or that of Tamagawa's T-format.
+/// Order of the bits in SF or ADF: that of the QS35 document, or that of Tamagawa's T-format.
 enum class FieldOrder : std::uint8_t { document, tformat };
-/// Bits of the redundant position of ID 6.
+/// Number of bits of the redundant position in replies to ID 6.
 enum class Id6Redundant : std::uint8_t { bits_16, bits_9 };
-/// Reaction of the virtual encoder to a request with a wrong parity or stop bit.
+/// Reaction of the virtual encoder to a request with a wrong parity or stop bit: it reports the error in SF, or is
+/// silent.
 enum class BadRequest : std::uint8_t { report, silent };
 
-/// Choices that the document leaves open.
+/// Properties of an encoder: those that the document leaves open, its address, and how strictly it is checked. Its
+/// members are the options of ESL.
 struct Profile {
-  CrcBitOrder crc_bit_order = CrcBitOrder::lsb;            ///< Order of the bits of a CRC.
-  CrcByteOrder crc16_byte_order = CrcByteOrder::low;       ///< Order of the bytes of a CRC of 16 bits.
-  RedundantBit rs1_sc2 = RedundantBit::b7;                 ///< Bit with redundant data of single-turn and channel 2.
-  SequenceStep sequence_step = SequenceStep::change;       ///< When the sequence bit changes.
-  ParityScope parity_scope = ParityScope::command;         ///< Which bits the parity covers.
-  FieldOrder status_order = FieldOrder::document;          ///< Order of the status fields.
-  FieldOrder memory_address_order = FieldOrder::document;  ///< Order of the memory address.
-  bool request_crc = true;                                 ///< false: only memory requests carry a CRC
-  RedundantBit idc_rs1 = RedundantBit::b7;                 ///< Bit with redundant data of ID C.
-  Id6Redundant id6_rs = Id6Redundant::bits_16;             ///< Redundant data of ID 6.
+  CrcBitOrder crc_bit_order = CrcBitOrder::lsb;       ///< Order in which bits enter the CRCs.
+  CrcByteOrder crc16_byte_order = CrcByteOrder::low;  ///< Order of the bytes of 16-bit CRCs.
+  RedundantBit rs1_sc2 = RedundantBit::b7;            ///< Place of RS1 in the byte that it shares with SC2.
+  SequenceStep sequence_step = SequenceStep::change;  ///< How the sequence counters move.
+  ParityScope parity_scope = ParityScope::command;    ///< Bits that the parity bit of CF covers.
+  FieldOrder status_order = FieldOrder::document;     ///< Order of the bits in SF.
+  /// Order of the bits in ADF, the memory address with the busy bit.
+  FieldOrder memory_address_order = FieldOrder::document;
+  bool request_crc = true;                      ///< whether every request has a CRC; false: only memory requests
+  RedundantBit idc_rs1 = RedundantBit::b7;      ///< Place of RS1 in its byte in replies to ID C.
+  Id6Redundant id6_rs = Id6Redundant::bits_16;  ///< Bits of the redundant position in replies to ID 6.
 
-  std::uint8_t address = 0;          ///< EAD, 0 to 7
-  bool turns = true;                 ///< false: a single-turn encoder
-  Sharing bus = sharing_automatic;   ///< yes: other encoders share the line, so memory cannot be accessed (Figure 18)
-  bool require_forced_test = false;  ///< a safe position needs it
-  /// Largest difference between RS and the top 9 bits of ABS, in 1/512 turn, 0 to 255.
+  std::uint8_t address = 0;  ///< address of the encoder on the line (EAD), 0 to 7
+  bool turns = true;         ///< whether the encoder counts turns; false: a single-turn encoder
+  /// Whether other encoders share the line; if so, memory cannot be accessed (Figure 18).
+  Sharing bus = sharing_automatic;
+  bool require_forced_test = false;  ///< whether a safe position requires forced_test_passed in both channels
+  /// Largest permitted difference between the redundant position RS and the top 9 bits of the position ABS, in 1/512
+  /// turn, 0 to 255.
   std::uint8_t redundant_tolerance = 1;
-  BadRequest bad_request = BadRequest::report;  ///< Reaction to a bad request.
+  /// Reaction of the virtual encoder to a request with a wrong parity or stop bit.
+  BadRequest bad_request = BadRequest::report;
 };
 
 namespace choices {
@@ -77,14 +84,15 @@ inline constexpr Names<2> bad_request{"report", "silent"};
 }  // namespace choices
 
 namespace detail {
-// An option that the document leaves open and that captured frames can show.
+// Returns the declaration of an option for a property that the document leaves open and that captured frames can show.
 template <auto member, class... Choices>
 constexpr auto open_option(std::string_view name, std::string_view meaning, const Choices&... choices) {
   return author::probeable(author::option<member>(name, meaning, choices...));
 }
 }  // namespace detail
 
-/// Options of ESL. Those that the document leaves open come first (EslProbe.OpenOptionsAreFirst).
+/// Table of the options of ESL. Those for properties that the document leaves open come first (test
+/// EslProbe.OpenOptionsAreFirst).
 inline constexpr auto options = author::OptionsOf{
     detail::open_option<&Profile::crc_bit_order>(
         "crc_bit_order", "which bit of a byte enters the CRC first; word: 16-bit words, MSB first",
@@ -128,13 +136,13 @@ inline constexpr auto options = author::OptionsOf{
         "bad_request", "what the virtual encoder does with a request whose parity or stop bit is wrong",
         choices::bad_request),
 };
-/// Number of options that the document leaves open.
+/// Number of options for properties that the document leaves open.
 inline constexpr std::size_t open_options = [] {
   std::size_t count = 0;
   while (options.infos[count].probeable) ++count;
   return count;
 }();
-/// Most choices that one of these options has.
+/// Greatest number of choices of an option for a property that the document leaves open.
 inline constexpr std::size_t most_choices = [] {
   std::size_t most = 0;
   for (std::size_t i = 0; i < open_options; ++i) most = std::max(most, options.infos[i].choices.size());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decodes ESL replies: all checks in their order, with their texts; the reading of a valid reply; and the Protocol for
-// author's engine.
+// Decodes ESL requests and replies: all checks in their order, with their texts; the reading of a valid reply; and
+// Protocol, the functions that the engine and virtual encoders of absenc/protocol/author require.
 #pragma once
 
 #include <array>
@@ -15,10 +15,11 @@
 
 namespace absenc::esl {
 
-/// The first check that failed. `passed` comes first, then the checks of a frame, then those of a safe position.
+/// The first check of a reply that failed. `passed` comes first, then the checks of every frame, then those of a safe
+/// position and of a probe.
 enum class Check : std::uint8_t {
   passed,
-  // checks of every frame
+  // Checks of every frame
   length,
   channel_2_missing,
   ch1_checksum,
@@ -40,7 +41,7 @@ enum class Check : std::uint8_t {
   sequences_differ,
   redundant_position,
   encoder_ids_differ,
-  // checks of a safe position
+  // Checks of a safe position
   not_a_safety_reply,
   ch1_not_ready,
   ch2_not_ready,
@@ -50,18 +51,18 @@ enum class Check : std::uint8_t {
   sequence_unknown,
   sequence_still,
   sequence_jumped,
-  // checks of a probe
+  // Check of a probe (probe.hpp)
   request_not_accepted,
 };
 
-/// Texts of a failed check.
+/// Error and texts that report a failed check.
 struct CheckText {
-  Error error;                ///< Error of the reply.
-  std::string_view sentence;  ///< The check, as a sentence.
-  std::string_view advice{};  ///< advice instead of the error's own
+  Error error;                ///< Error that the failed check gives.
+  std::string_view sentence;  ///< What is wrong with the reply, as a sentence.
+  std::string_view advice{};  ///< advice that replaces that of the error; "": the error's advice stands
 };
 
-/// Texts of the checks, indexed by the enumerator.
+/// Error and texts of each check, in the order of Check.
 inline constexpr std::array<CheckText, 32> check_texts{{
     {Error::none, ""},
     {Error::wrong_length, "the number of bytes is not that of this reply"},
@@ -99,21 +100,21 @@ inline constexpr std::array<CheckText, 32> check_texts{{
 }};
 static_assert(check_texts.size() == static_cast<std::size_t>(Check::request_not_accepted) + 1);
 
-/// Errors of the checks without their texts, so that firmware does not link the texts.
+/// Error of each check, in the order of Check. It is apart from the texts, so that firmware does not link them.
 inline constexpr std::array<Error, check_texts.size()> check_errors = [] {
   std::array<Error, check_texts.size()> errors{};
   for (std::size_t i = 0; i < errors.size(); ++i) errors[i] = check_texts[i].error;
   return errors;
 }();
 
-/// Returns the text of a check.
+/// Returns the error and texts of a failed check.
 [[nodiscard]] constexpr const CheckText& text_of(Check check) { return check_texts[static_cast<std::size_t>(check)]; }
-/// Returns the error of a check.
+/// Returns the error that a failed check gives; none for `passed`.
 [[nodiscard]] constexpr Error error_of(Check check) { return check_errors[static_cast<std::size_t>(check)]; }
 
 namespace detail {
-// Returns the content of a request of this id, or of a reply to it that echoes the request: unchecked, and for memory
-// only as far as its bytes go.
+// Returns the content of a request with this data ID, or of the request that a reply echoes, without checking it.
+// Address and value of a memory access are set only as far as there are bytes. `busy` is set if the busy bit is.
 constexpr Request split_request(const Profile& profile, DataId id, Bytes bytes, bool& busy) {
   Request request{id, address_of(bytes[0])};
   if (!is_memory_access(id) || bytes.size() < 3) return request;
@@ -125,13 +126,13 @@ constexpr Request split_request(const Profile& profile, DataId id, Bytes bytes, 
 }
 }  // namespace detail
 
-/// Returns whether the last byte is the 8-bit CRC of those before it.
+/// Returns whether the last of `bytes` is the 8-bit CRC of the bytes before it.
 [[nodiscard]] constexpr bool has_checksum8(const Profile& profile, Bytes bytes) {
   return checksum8(profile.crc_bit_order, bytes.first(bytes.size() - 1)) == bytes.back();
 }
 
-/// Decodes a request. Errors: wrong_length; unsupported (an id that Table 3 does not list); bad_checksum (parity or
-/// CRC); out_of_range (the busy bit is 0 in requests).
+/// Decodes a request. Errors: wrong_length; unsupported (an ID that Table 3 does not list); bad_checksum (parity or
+/// CRC); out_of_range (the busy bit is set, which is 0 in requests).
 [[nodiscard]] constexpr Result<Request> decode_request(const Profile& profile, Bytes bytes) {
   if (bytes.empty()) return Error::wrong_length;
   const std::optional<DataId> id = data_id(bytes[0]);
@@ -146,7 +147,8 @@ constexpr Request split_request(const Profile& profile, DataId id, Bytes bytes, 
 
 namespace detail {
 
-// Decodes RS from two bytes; its lowest bit is in the second byte, whose other bits are returned.
+// Decodes the redundant position RS from two bytes into `reply`. Its lowest bit is in the second byte, whose other
+// seven bits are returned.
 constexpr std::uint8_t split_redundant(RedundantBit order, Bytes bytes, Reply& reply) {
   const std::uint8_t second = from_wire(order == RedundantBit::b0, bytes[1]);
   reply.redundant = static_cast<std::uint16_t>(bytes[0] << 1 | second >> 7);
@@ -208,7 +210,7 @@ constexpr Check check_checksums(const Profile& profile, const Layout& layout, By
   if (two.empty()) return Check::both_checksums;
   if (one_holds) return Check::ch2_checksum;
   if (two_holds) return Check::ch1_checksum;
-  // If both CRCs fail, channel 2 may come before channel 1.
+  // If both CRCs fail, channel 2 may have been sent before channel 1.
   const Bytes all(one.data(), one.size() + two.size());
   const bool swapped = checksum_holds(profile, layout.crc_bytes, Channel::two, all.first(two.size())) &&
                        checksum_holds(profile, layout.crc_bytes, Channel::one, all.subspan(two.size()));
@@ -223,7 +225,7 @@ constexpr Check check_echo(std::uint8_t asked, std::uint8_t one, std::uint8_t tw
 
 constexpr Check check_memory(const Request& request, const Reply& reply) {
   if (reply.memory_address != request.memory_address) return Check::other_memory_address;
-  // Table 10: a busy encoder answers 00; an accepted write echoes its value.
+  // Table 10: a busy encoder replies with the value 00; an accepted write echoes its value.
   if (reply.busy) return reply.value == 0 ? Check::passed : Check::busy_with_data;
   return reply.id == DataId::write_memory && reply.value != request.value ? Check::other_value : Check::passed;
 }
@@ -249,7 +251,8 @@ constexpr Check check_content(const Profile& profile, const Layout& layout, cons
 }  // namespace detail
 
 namespace detail {
-// `asked`: the control field of the request, even with a wrong parity bit.
+// Checks and decodes a reply. `asked`: control field of the request, even if its parity bit is wrong. Returns the first
+// check that failed.
 constexpr Check check_reply_to(const Profile& profile, const Request& request, std::uint8_t asked, Bytes bytes,
                                Reply& reply) {
   const Layout& layout = layout_of(request.id);
@@ -272,15 +275,17 @@ constexpr Check check_reply_to(const Profile& profile, const Request& request, s
 }
 }  // namespace detail
 
-/// Checks a reply in this order: length, checksums, echo, refusal, fixed bits, range, cross checks. `reply` is filled
-/// once the checksums are right; use it only if the result is `passed`. A busy memory reply passes.
+/// Checks a reply in this order: length, checksums, echo, refusal, fixed bits, range, cross checks. Returns the first
+/// check that failed. `reply` gets the content once the checksums are right; use it only if the result is `passed`. A
+/// busy memory reply passes.
 [[nodiscard]] constexpr Check check_reply(const Profile& profile, const Request& request, Bytes bytes, Reply& reply) {
   const std::uint8_t asked = control_field(profile, request.encoder_address, request.id);
   return detail::check_reply_to(profile, request, asked, bytes, reply);
 }
 
-/// Returns the refusal in a reply to a request whose parity bit alone is wrong; `passed` if the request or the reply is
-/// something else. Without the request its bytes are taken from the reply, which echoes them.
+/// Returns the refusal (parity_reported or stop_reported) in a reply to a request whose parity bit alone is wrong;
+/// `passed` if the request or the reply is something else. If `request` is empty, its bytes are taken from the reply,
+/// which echoes them.
 [[nodiscard]] constexpr Check check_refusal(const Profile& profile, Bytes request, Bytes bytes) {
   if (bytes.empty()) return Check::passed;
   const Bytes sent = request.empty() ? bytes : request;
@@ -295,7 +300,7 @@ constexpr Check check_reply_to(const Profile& profile, const Request& request, s
   return error_of(check) == Error::request_rejected ? check : Check::passed;
 }
 
-/// Returns the reply with all checks done, or the first error.
+/// Checks and decodes a reply. Returns the reply, or the error of the first failed check.
 [[nodiscard]] constexpr Result<Reply> decode_reply(const Profile& profile, const Request& request, Bytes bytes) {
   Result<Reply> result;
   const Error error = error_of(check_reply(profile, request, bytes, *result));
@@ -304,8 +309,8 @@ constexpr Check check_reply_to(const Profile& profile, const Request& request, s
 }
 
 namespace detail {
-// Returns the alarms of a channel with which the position within the turn is not used. SF distinguishes LED and
-// Lissajous: a Lissajous error is a non-safety error (Table 5), and the position stays valid.
+// Returns the alarms of a channel that make the position within the turn unsafe. LED and Lissajous errors share an
+// alarm bit, which SF distinguishes: a Lissajous error is a non-safety error (Table 5), and the position stays valid.
 constexpr unsigned unsafe_alarms(const ChannelReply& channel) {
   constexpr std::uint8_t errors = status::safety_error | status::non_safety_error;
   const bool lissajous = (channel.status & errors) == status::non_safety_error;
@@ -313,9 +318,9 @@ constexpr unsigned unsafe_alarms(const ChannelReply& channel) {
 }
 }  // namespace detail
 
-/// Returns the position in a valid reply with its validity; the flags of channel 2 are above those of channel 1. IDs 4,
-/// 5 and 6 carry no alarms, so SF alone decides, which does not show whether a non-safety error concerns the turns.
-/// This is not a safe position (safety.hpp).
+/// Returns the position and turns of a valid reply to `id` with their validity; in status and alarms the flags of
+/// channel 2 are above those of channel 1. Replies to IDs 4, 5 and 6 carry no alarms, so SF alone decides, which does
+/// not show whether a non-safety error concerns the turns. This is not a safe position (safety.hpp).
 [[nodiscard]] constexpr Reading to_reading(DataId id, const Reply& reply) {
   const Layout& layout = layout_of(id);
   const std::uint8_t second = layout.has_two() ? reply.two.status : reply.one.status;
@@ -344,17 +349,18 @@ constexpr unsigned unsafe_alarms(const ChannelReply& channel) {
   }
   return reading;
 }
-/// Returns the reading of a reply.
+/// Returns the position and turns of a valid reply with their validity, by the data ID in the reply.
 [[nodiscard]] constexpr Reading to_reading(const Reply& reply) { return to_reading(reply.id, reply); }
 
 // ---- Protocol, for author's engine
 
-/// Returns whether a request selects a page of the memory.
+/// Returns whether a request selects a memory page.
 [[nodiscard]] constexpr bool selects_page(const Request& request) {
   return request.id == DataId::write_memory && request.memory_address == page_select_address;
 }
 
-/// The protocol, as author layers use it: frames, lengths and times.
+/// The functions of ESL that the engine and virtual encoders of absenc/protocol/author require (dialog.hpp,
+/// device.hpp).
 struct Protocol {
   /// Format of the encoder: the values of its options.
   using Format = Profile;
@@ -364,45 +370,48 @@ struct Protocol {
   using Reply = esl::Reply;
   static constexpr std::size_t longest_reply = reply_capacity;  ///< Greatest length of a reply in bytes.
 
-  /// Returns how long a host waits for replies.
+  /// Returns the time limits and the pause of a host.
   static constexpr author::HostTimes host_times(const Profile&) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit, .pause = request_pause};
   }
-  /// After a page change without a valid reply, or while an EEPROM byte is being fetched, the encoder is busy: neither
-  /// a repetition nor the next request may be sent.
+  /// Returns the pauses of a request: none is repeated here. After a page change without a valid reply, or while an
+  /// EEPROM byte is being fetched, the encoder is busy, and neither a repetition nor the next request may be sent.
   static constexpr author::Manner manner(const Profile&, const Request& request) {
     const Time busy = selects_page(request) ? page_time : is_memory_access(request.id) ? eeprom_read_pause : Time{};
     return {.pause = busy, .hold = busy};
   }
-  /// Returns the length of the request that begins with `begin`, in bytes; 0 if that is no request.
+  /// Returns the length in bytes of the request that begins with the bytes `begin`; 0 if no request with right parity
+  /// does.
   static constexpr std::size_t request_size(const Profile& profile, Bytes begin) {
     const std::optional<DataId> id = data_id(begin[0]);
     if (!id || begin[0] != control_field(profile, address_of(begin[0]), *id)) return 0;
     return request_length(profile, *id);
   }
-  /// Returns the length of the reply to `request`, in bytes.
+  /// Returns the length in bytes of the reply to `request`.
   static constexpr std::size_t reply_size(const Profile&, const Request& request) { return reply_length(request.id); }
-  static constexpr auto encode = encode_request;               ///< Returns the request as it is sent.
-  static constexpr auto decode_request = esl::decode_request;  ///< Returns the request, or why it is none.
-  static constexpr auto decode = decode_reply;  ///< Returns the reply with all checks done, or the first error.
-  /// Returns the position of a reply.
+  static constexpr auto encode = encode_request;  ///< returns the bytes of a request
+  /// Decodes a request; returns it or the error of the first failed check.
+  static constexpr auto decode_request = esl::decode_request;
+  /// Checks and decodes a reply. Returns the reply, or the error of the first failed check.
+  static constexpr auto decode = decode_reply;
+  /// Returns the position and turns of a valid reply; without turns if the profile has none.
   static constexpr Reading reading(const Profile& profile, const Request& request, const Reply& reply) {
-    // By the request's id, which may be known when the program is written.
+    // The ID of the request is used, because it may be known at compile time.
     Reading reading = to_reading(request.id, reply);
     if (!profile.turns) reading.multiturn_bits = 0;
     if (!profile.turns) reading.multiturn_valid = false;
     return reading;
   }
-  /// Returns the length of the reply in bytes, as far as its first bytes show it; 0: unknown.
+  /// Returns the length in bytes of the reply to `request`, which does not depend on the received bytes.
   static constexpr std::size_t expected(const Profile& profile, const Request& request, Bytes) {
     return reply_size(profile, request);
   }
-  /// Returns whether a reply with this error is complete, so that no more bytes are awaited.
+  /// Returns false: after any error of a reply more bytes may follow.
   static constexpr bool is_whole(const Profile&, Error) { return false; }
-  static constexpr auto latched = latch_time;  ///< Returns when the encoder latched the position.
+  static constexpr auto latched = latch_time;  ///< returns when the encoder latches the position of a reply
 };
 
-/// Reads a position with profile and request known when the program is written: `static constexpr Profile
+/// Conversation that reads a position with a profile and a request that are constants: `static constexpr Profile
 /// profile{...};` and `static constexpr Request request{...};`.
 template <const Profile& profile, const Request& request>
 using ReadKnownPosition = author::ReadKnownPosition<Protocol, profile, request>;

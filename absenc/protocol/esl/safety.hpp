@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Positions that passed every check that a reader of IDs 1 and 2 can make. This is not a certified safety function:
-// README.md lists what the checks cannot detect.
+// Safe positions: those that passed every check that a reader of IDs 1 and 2 can make. This is not a certified safety
+// function: README.md lists what the checks cannot detect.
 #pragma once
 
 #include <optional>
@@ -11,14 +11,16 @@ namespace absenc::esl {
 
 class SafetyMonitor;
 
-/// A safe position, which only a SafetyMonitor constructs. It has no turns, because only channel 1 has them.
+/// A position that passed all checks of a SafetyMonitor; only that class constructs it. It has no turns, because only
+/// channel 1 has them.
 class SafePosition {
  public:
-  /// Returns counts, 0 to 2^24 - 1. Channel 2 confirms the top 9 bits, within the profile's tolerance.
+  /// Returns the position within the turn in counts, 0 to 2^24 - 1. Channel 2 confirms the top 9 bits, within the
+  /// profile's tolerance.
   [[nodiscard]] constexpr std::uint32_t singleturn() const { return singleturn_; }
-  /// Returns the address of the encoder.
+  /// Returns the address of the encoder on its line, 0 to 7.
   [[nodiscard]] constexpr std::uint8_t encoder_address() const { return encoder_address_; }
-  /// Returns when the encoder latched the position.
+  /// Returns the time at which the encoder latched the position.
   [[nodiscard]] constexpr Time latched() const { return latched_; }
 
  private:
@@ -31,29 +33,31 @@ class SafePosition {
   Time latched_;
 };
 
-/// Verdict on a safety reply.
+/// Result of judging a reply: a safe position, or the check that failed.
 struct SafetyVerdict {
-  std::optional<SafePosition> position{};  ///< set when `failed` is Check::passed
-  Check failed = Check::passed;            ///< The check that failed.
+  std::optional<SafePosition> position{};  ///< safe position; nothing unless `failed` is Check::passed
+  Check failed = Check::passed;            ///< First check that failed; Check::passed: none.
 };
 
-/// Judges the consecutive replies of one encoder from their bytes.
+/// Decides from the bytes of consecutive replies of one encoder which positions are safe.
 ///
-/// The sequence counter proves something only against an earlier reply. After the start, and after any error, the first
-/// valid reply therefore gives no safe position, and the next one must answer the other of the two IDs (`next_id`): a
-/// line that delivers each reply one cycle late is detected by the wrong echo.
+/// The sequence counter proves something only when compared with an earlier reply. After the start, and after any
+/// error, the first valid reply therefore gives no safe position, and the next request must have the other of IDs 1 and
+/// 2 (`next_id`): a line that delivers each reply one cycle late is then detected by the wrong echo.
 class SafetyMonitor {
  public:
-  /// Judges replies of this profile.
+  /// Constructs a monitor for an encoder of this profile.
   constexpr explicit SafetyMonitor(const Profile& profile) : profile_(profile) {}
 
-  /// Returns the id of the next request; `wanted` once the monitor trusts the line.
+  /// Returns the data ID that the next request must have: `wanted` once the monitor trusts the line, until then IDs 1
+  /// and 2 in turn.
   [[nodiscard]] constexpr DataId next_id(DataId wanted = DataId::position) const {
     if (trust_ == Trust::full) return wanted;
     return last_id_ == DataId::position ? DataId::singleturn : DataId::position;
   }
 
-  /// Judges a reply. `sent_at`, the end of the request, gives the time of the position.
+  /// Checks the reply `bytes` to `request`, and returns a safe position or the check that failed. `sent_at`: end of the
+  /// request, from which the time of the position follows.
   constexpr SafetyVerdict judge(const Request& request, Bytes bytes, Time sent_at) {
     Reply reply;
     Check check = check_reply(profile_, request, bytes, reply);
@@ -68,13 +72,14 @@ class SafetyMonitor {
     return {.position = SafePosition(reply, latch_time(profile_, sent_at))};
   }
 
-  /// Notes that a request was sent without a reply.
+  /// Notes that `request` got no reply. The monitor no longer trusts the line then.
   constexpr void missed(const Request& request) {
     trust_ = Trust::none;
     last_id_ = request.id;
   }
 
-  /// Notes that this encoder answered another request than IDs 1 and 2.
+  /// Notes that this encoder answered a request with another data ID than 1 and 2, which may have moved its sequence
+  /// counter.
   constexpr void other_exchange(DataId id) {
     if (profile_.sequence_step == SequenceStep::request || has_sequence(id)) ++step_;
   }
@@ -114,7 +119,7 @@ class SafetyMonitor {
   DataId last_id_ = DataId::position;
   DataId baseline_id_ = DataId::position;
   std::uint8_t last_sequence_ = 0;
-  std::uint8_t step_ = 1;  // how far the counter must move until the next reply
+  std::uint8_t step_ = 1;  // how far the sequence counter must have moved at the next judged reply
 };
 
 }  // namespace absenc::esl

@@ -60,7 +60,8 @@ constexpr std::string_view no_turns(const Profile& profile) {
 
 // ---- Errors
 
-// Without the request the reply's own control field gives it; the address of a memory access is that of the reply.
+// Returns the request of an exchange. If `request` is empty, the control field of the reply gives it; address and value
+// of a memory access are those of the reply.
 constexpr Result<Request> request_behind(const Profile& profile, Bytes request, Bytes reply) {
   if (!request.empty()) return decode_request(profile, request);
   const auto id = data_id(reply[0]);
@@ -69,7 +70,7 @@ constexpr Result<Request> request_behind(const Profile& profile, Bytes request, 
   return detail::split_request(profile, *id, reply, busy);
 }
 
-// Returns the check behind `error`; `passed` if the error is not one of the frame.
+// Returns the failed check of a reply that gave `error`; `passed` if no check of the reply gives this error.
 Check check_of(const Profile& profile, Error error, Bytes request, Bytes reply) {
   if (reply.empty()) return Check::passed;
   if (const Check refusal = check_refusal(profile, request, reply); refusal != Check::passed) return refusal;
@@ -110,7 +111,7 @@ void put_nodes(FieldSink& sink, const Profile&, const Nodes& nodes) {
     if (reply) sink.put_reading(to_reading(*reply));
   }
 }
-// Explains the last exchange, and names a profile under which its reply would be valid.
+// Writes an explanation of the failed last exchange of `host`, and a profile under which its reply would be valid.
 void tell(Sentence& words, const HostOf<Protocol>& host) {
   const Profile& profile = host.format();
   const Bytes request = host.exchange().sent;
@@ -216,7 +217,8 @@ BitRanges bits_in(const Options& values, Frame, Frame reply, const FieldInfo& fi
 constexpr std::size_t size_of_reply(const Profile& profile, Bytes begin) {
   return Protocol::request_size(profile, begin) == 0 ? 0 : reply_length(*data_id(begin[0]));
 }
-// The encoder answers a request with a wrong parity bit, too.
+// Returns the refusal with which the encoder answers a request with a wrong parity bit; otherwise `error`, the error of
+// the request.
 constexpr Error answer_to_bad(const Profile& profile, Bytes request, Error error, Bytes reply) {
   const Check refusal = check_refusal(profile, request, reply);
   return refusal == Check::passed ? error : error_of(refusal);

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The unit of ESL, for the neutral layers.
+// The protocol unit of ESL (QS35), for the layers that know no protocol.
 #pragma once
 
 #include "absenc/protocol/unit.hpp"
 
 namespace absenc::esl {
 
-extern constinit const Unit unit;  ///< The unit.
+extern constinit const Unit unit;  ///< Descriptor of ESL.
 
 }  // namespace absenc::esl

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// ESL frames with their sources. Each is decoded at compile time, so a wrong frame does not build.
+// Test vectors of ESL: frames with their sources and decoded fields. Each is decoded at compile time, so a wrong vector
+// does not compile.
 #pragma once
 
 #include <array>
@@ -9,7 +10,7 @@
 namespace absenc::esl {
 
 // clang-format off
-/// Frames with their meaning, from documents.
+/// Test vectors of ESL, from the document or derived from it.
 inline constexpr std::array vectors{
     author::VectorText{"esl-001", "request ID1 EAD0", "derived", "", "0875", "", "data_id=1 control_field=8 encoder_address=0"},
     author::VectorText{"esl-002", "ID1 nominal", "derived", "", "0875", "084000efcdab34125646b3086000abd6cd84", "data_id=1 encoder_address=0 ch1_status=0x40 singleturn=11259375 multiturn=4660 ch1_alarms=0x00 ch1_sequence=86 ch2_status=0x60 ch2_alarms=0x00 redundant_singleturn=343 ch2_sequence=86"},
