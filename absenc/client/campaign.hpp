@@ -27,7 +27,7 @@ struct LineFault {
 
 /// Settings of a campaign: the virtual encoder, the number of exchanges, and the faults with their rates.
 struct CampaignChoices {
-  std::string model{};                 ///< Name of a model of the unit; empty: its first.
+  std::string model{};                 ///< Name of a model of the unit; empty: its first model.
   std::vector<std::string> options{};  ///< Options of the unit, as "address=3".
   /// Faults with their rates from 0 to 1, as "bit=0.001"; others have rate 0. Empty: the default rates of all faults.
   std::vector<std::string> faults{};
@@ -36,7 +36,7 @@ struct CampaignChoices {
   /// Speed of the shaft in revolutions per minute (mm/s for linear encoders), with positions confirmed as `absenc read`
   /// does. Without a value the shaft moves to another place before every reading and positions are not confirmed.
   std::optional<double> rpm{};
-  /// Maximum speed that the host assumes, in revolutions per minute or mm/s; 0: that of the model, or the usual one.
+  /// Maximum speed that the host assumes, in revolutions per minute or mm/s; 0: limit of the model, or the default.
   std::uint32_t maximum_rpm = 0;
 };
 
@@ -54,7 +54,7 @@ struct CheckWorth {
 
 /// Shares of confirmed and of wrong positions, in a campaign with a turning shaft.
 struct Guarded {
-  Share confirmed{};  ///< Share of readings that were confirmed.
+  Share confirmed{};  ///< Share of readings whose position a second reading confirmed.
   /// Share of confirmed readings whose position the shaft did not have when the encoder measured it.
   Share wrong{};
   Share alone{};  ///< Share of wrong positions, confirmed or not, among the readings that passed every frame check.

@@ -22,7 +22,7 @@ enum class ChangeState : std::uint8_t {
   unknown,    ///< the request was sent, but no good reply came: the change may be done or not
 };
 
-/// Returns "not_sent", "confirmed", "refused" or "unknown"; "" for `none`.
+/// Returns the state as a word: "not_sent", "confirmed", "refused" or "unknown"; "" for `none`.
 [[nodiscard]] std::string_view word_of(ChangeState state);
 
 /// State of a change of the encoder, with advice for the user.

@@ -42,25 +42,26 @@ struct DecodeChoices {
 /// unanswered or clears alarms. Without such a reply, alarms and the position that depends on them are `Unknown`.
 class Decoded {
  public:
-  /// Type of the items.
+  /// Type of the values in the range.
   using value_type = Row;
-  /// Iterator of the range.
+  /// Iterator over the range.
   using Iterator = InputIterator<Decoded>;
 
   /// Opens the file `path`, like `decode`.
   Decoded(const std::string& path, std::string_view protocol, const DecodeChoices& choices);
-  /// Moves the decoder; the other one may only be destroyed or assigned to.
+  /// Moves the decoder; afterwards the other object may only be destroyed or assigned to.
   Decoded(Decoded&&) noexcept;
-  /// Moves the decoder; the other one may only be destroyed or assigned to.
+  /// Moves the decoder; afterwards the other object may only be destroyed or assigned to.
   Decoded& operator=(Decoded&&) noexcept;
-  /// Ends the threads, also in the middle of the file.
+  /// Ends the decoding threads, even in the middle of the file.
   ~Decoded();
 
-  /// Waits for the first row; call it once. Throws UsageError or Failure, as every later step does.
+  /// Waits for the first row and returns an iterator to it; call it once. Throws UsageError or Failure, as every later
+  /// step does.
   [[nodiscard]] Iterator begin();
   /// Returns the end of the range, for comparison with an iterator.
   [[nodiscard]] static Iterator::End end() { return {}; }
-  /// Returns the row at the iterator, or null at the end. It is valid until `advance`.
+  /// Returns the present row, or null at the end of the range. The row is valid until `advance`.
   [[nodiscard]] const Row* current() const { return row_; }
   /// Moves to the next row, and waits until it is decoded.
   void advance();

@@ -147,7 +147,7 @@ struct Examination {
 
 /// Limits of the diagnosis, and its callbacks.
 struct DoctorChoices {
-  std::size_t readings = 100'000;        ///< Greatest number of readings.
+  std::size_t readings = 100'000;        ///< Greatest number of readings to take.
   Time limit = std::chrono::seconds(3);  ///< Time limit of the readings while the shaft is as it is.
   Time turning{};                        ///< Time of further readings while the user turns the shaft by hand; 0: none.
   std::function<void(const std::string& what)> progress{};  ///< Called with the step that begins, as a phrase.
@@ -157,7 +157,7 @@ struct DoctorChoices {
 
 /// Returns the severity as a word: "note", "warning" or "fault".
 [[nodiscard]] std::string_view name_of(Severity severity);
-/// Returns the identifier of the kind, as "only_echo".
+/// Returns the identifier of a kind of finding, as "only_echo".
 [[nodiscard]] std::string_view id_of(FindingKind finding_kind);
 
 /// Diagnoses an encoder from the port upwards, by readings, and returns the result. Never writes to the encoder. `text`

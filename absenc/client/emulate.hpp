@@ -48,9 +48,9 @@ class Emulation {
  public:
   /// Starts the virtual encoder, as `emulate` does.
   Emulation(std::string_view text, const EmulateChoices& choices);
-  /// Moves the emulation; the other one may only be destroyed or assigned to.
+  /// Moves the emulation; afterwards the other object may only be destroyed or assigned to.
   Emulation(Emulation&&) noexcept;
-  /// Moves the emulation; the other one may only be destroyed or assigned to.
+  /// Moves the emulation; afterwards the other object may only be destroyed or assigned to.
   Emulation& operator=(Emulation&&) noexcept;
   ~Emulation();
 
@@ -71,7 +71,7 @@ class Emulation {
   void power_off();
   /// Switches the virtual encoder on. With `real` it needs the start-up time of the document before it replies.
   void power_on(bool real = false);
-  /// Raises an alarm by its name in the unit. Throws UsageError, which suggests the nearest name.
+  /// Raises an alarm by its name in the unit. Throws UsageError for an unknown name, with the nearest one.
   void raise_alarm(std::string_view name);
   /// Ends the cause of an alarm. An alarm that the encoder latches stays until a host clears it. Throws UsageError.
   void lower_alarm(std::string_view name);

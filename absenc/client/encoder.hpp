@@ -104,9 +104,9 @@ class Encoder {
   /// Connection and state of an encoder, for the library itself only.
   struct Parts;
 
-  /// Moves the encoder; the other one may only be destroyed or assigned to.
+  /// Moves the encoder; afterwards the other object may only be destroyed or assigned to.
   Encoder(Encoder&&) noexcept;
-  /// Moves the encoder; the other one may only be destroyed or assigned to.
+  /// Moves the encoder; afterwards the other object may only be destroyed or assigned to.
   Encoder& operator=(Encoder&&) noexcept;
   ~Encoder();
 
@@ -208,16 +208,16 @@ class Encoder {
 /// An input range of samples at equal distances in time, without drift. Samples whose time has passed are left out.
 class Samples {
  public:
-  /// Type of the items.
+  /// Type of the values in the range.
   using value_type = Sample;
-  /// Iterator of the range.
+  /// Iterator over the range.
   using Iterator = InputIterator<Samples>;
 
   /// Takes samples of `encoder`, which must outlive this object.
   Samples(Encoder& encoder, const SampleChoices& choices);
-  /// Moves the samples; the other object may only be destroyed or assigned to.
+  /// Moves the samples; afterwards the other object may only be destroyed or assigned to.
   Samples(Samples&&) noexcept;
-  /// Moves the samples; the other object may only be destroyed or assigned to.
+  /// Moves the samples; afterwards the other object may only be destroyed or assigned to.
   Samples& operator=(Samples&&) noexcept;
   ~Samples();
 
@@ -225,7 +225,7 @@ class Samples {
   [[nodiscard]] Iterator begin();
   /// Returns the end of the range, for comparison with an iterator.
   [[nodiscard]] static Iterator::End end() { return {}; }
-  /// Returns the sample at the iterator, or null at the end. It is valid until `advance`.
+  /// Returns the present sample, or null at the end of the range. The sample is valid until `advance`.
   [[nodiscard]] const Sample* current() const;
   /// Waits for the next sample and takes it.
   void advance();

@@ -119,7 +119,7 @@ class MemoryChange {
   [[nodiscard]] const MemoryImage& wanted() const { return wanted_; }
   /// Returns the bytes that `look` read at the wanted addresses.
   [[nodiscard]] const MemoryImage& found() const { return found_; }
-  /// Returns the bytes that differ, with their wanted values.
+  /// Returns the bytes that differed when `look` read them, with their wanted values.
   [[nodiscard]] const MemoryImage& differing() const { return differing_; }
   /// Returns the bytes that were written and verified.
   [[nodiscard]] const MemoryImage& written() const { return written_; }

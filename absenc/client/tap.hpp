@@ -31,26 +31,27 @@ struct TapChoices {
 /// of an encoder, so `turnaround_us` is empty.
 class Tap {
  public:
-  /// Type of the items.
+  /// Type of the values in the range.
   using value_type = Row;
-  /// Iterator of the range.
+  /// Iterator over the range.
   using Iterator = InputIterator<Tap>;
 
   /// Opens `place` and waits until protocol and options are known. `place` is a port with its settings
   /// ("/dev/ttyUSB0?baud=115200", "tcp:HOST:PORT"), or "-" for raw bytes from standard input. Writes nothing to a
   /// serial port. Throws os::Failure, UsageError, and Failure if no protocol explains the received bytes.
   explicit Tap(const std::string& place, const TapChoices& choices = {});
-  /// Moves the tap; the other one may only be destroyed or assigned to.
+  /// Moves the tap; afterwards the other object may only be destroyed or assigned to.
   Tap(Tap&&) noexcept;
-  /// Moves the tap; the other one may only be destroyed or assigned to.
+  /// Moves the tap; afterwards the other object may only be destroyed or assigned to.
   Tap& operator=(Tap&&) noexcept;
   ~Tap();
 
-  /// Waits for the first row; call it once. Throws os::Failure or Failure, as every later step does.
+  /// Waits for the first row and returns an iterator to it; call it once. Throws os::Failure or Failure, as every later
+  /// step does.
   [[nodiscard]] Iterator begin();
   /// Returns the end of the range, for comparison with an iterator.
   [[nodiscard]] static Iterator::End end() { return {}; }
-  /// Returns the row at the iterator, or null at the end. It is valid until `advance`.
+  /// Returns the present row, or null at the end of the range. The row is valid until `advance`.
   [[nodiscard]] const Row* current() const { return row_; }
   /// Waits until the next row is complete.
   void advance();

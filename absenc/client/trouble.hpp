@@ -32,7 +32,7 @@ struct Trouble {
 /// A failed exchange that was stored for later inspection.
 struct BadExchangeText {
   Error error = Error::none;  ///< Kind of the error.
-  Time at{};                  ///< Time of the exchange, on the clock of the readings.
+  Time at{};                  ///< Time of the exchange, by the same clock as the times of readings.
   std::string sent{};         ///< Bytes or frames that were sent, as text.
   std::string received{};     ///< Bytes or frames that were received, as text; "": none were received.
 };

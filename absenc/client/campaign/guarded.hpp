@@ -7,8 +7,8 @@
 
 namespace absenc::client {
 
-/// Reads a turning shaft until `exchanges` are done. Counts readings, exchanges and failures in `result`, and returns
-/// the shares of confirmed and wrong positions.
+/// Reads a turning shaft until `choices.exchanges` exchanges are done. Counts readings, exchanges and failures in
+/// `result`, and returns the shares of confirmed and wrong positions.
 [[nodiscard]] Guarded read_guarded(const Unit& unit, const Options& options, const Rates& rates,
                                    const CampaignChoices& choices, CampaignResult& result);
 

@@ -325,7 +325,7 @@ void check_ends(const EncoderAddress& address) {
   const std::string settings = whole.settings();
   // Ignores the write counter of an encoder, which cannot be restored.
   const bool counts = whole.memory() != before;
-  // In long runs each step has only one of the three kinds of end.
+  // In tests with many steps, each step is tested with only one of the three kinds of end.
   const unsigned kinds = steps < 1000 ? 3 : 1;
   const unsigned stride = 10 / test_cases(10);
   for (unsigned i = 0; i < steps * kinds; i += stride) {

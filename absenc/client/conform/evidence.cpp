@@ -21,8 +21,8 @@ std::size_t bits_of(const ObservedFrame& frame) {
   return frame.bits != 0 ? frame.bits : frame.bytes.size() * 8;
 }
 
-// Flips the bit `bit` of the frame. On clocked links bit 0 is the most significant bit of the first byte, otherwise the
-// least significant.
+// Flips the bit `bit` of the frame. In each byte bits are numbered from the most significant on clocked links,
+// otherwise from the least significant.
 void flip(ObservedFrame& frame, std::size_t bit) {
   std::uint8_t& byte = frame.can ? frame.can->data[bit / 8] : frame.bytes[bit / 8];
   byte = static_cast<std::uint8_t>(byte ^ (frame.bits != 0 ? 0x80U >> bit % 8 : 1U << bit % 8));

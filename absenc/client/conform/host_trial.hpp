@@ -54,7 +54,7 @@ class HostTrial {
   const Unit& unit_;
   std::size_t answers_;
   Phase phase_ = Phase::good;
-  std::uint64_t phase_begin_ = 0;  // value of `counted` when the phase began
+  std::uint64_t phase_begin_ = 0;  // result of `counted` when the present phase began
   std::uint64_t refused_ = 0;  // number of requests received while the fault `damaged_request` damages every request
   TrialCounts seen_{};
   // rule counts from the times in which all replies were good and no earlier fault can affect the host

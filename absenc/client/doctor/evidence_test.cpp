@@ -39,7 +39,7 @@ TEST(Doctor, AShaftThatFollowsTheHandGivesNoFinding) {
               IsEmpty());
   const auto less_than_a_turn = [](std::size_t i) {
     return i * 600;
-  };  // 200 readings: 120 000 of the 131 072 counts of a turn
+  };  // 200 readings cover 120 000 of the 131 072 counts of a turn
   EXPECT_THAT(ids(judged(turned_by_hand(less_than_a_turn, [](std::size_t) { return 3; }))), IsEmpty());
 }
 

@@ -64,7 +64,7 @@ TEST_P(HealthyEncoder, IsNeverCalledIll) {
     try {
       usual = parse_address(fmt::format("sim:{}{}{}", unit.id, mode.empty() ? "" : "?", mode));
       if (examined(*usual, 1).good == 0) continue;  // the virtual encoder cannot be read with these options
-    } catch (const std::exception&) {               // the options exclude each other
+    } catch (const std::exception&) {               // these options exclude each other
       continue;
     }
     ++modes;

@@ -27,7 +27,7 @@ constexpr Time brief_patience = 150ms;
 constexpr Time long_patience = 5s;     // time without a reply for scans at the end, if nothing was found
 constexpr std::size_t busy_line = 32;  // number of bytes received while listening from which on no requests are sent
 constexpr std::size_t most_introduced = 4;  // number of candidates of one encoder that are asked for their identity
-constexpr double beyond_doubt = -3;         // log10 of the chance below which no further rates are tried
+constexpr double beyond_doubt = -3;         // log10 of a candidate's chance; below it no further rates are tried
 constexpr std::array<std::uint32_t, 10> common_rates{9600,    19'200,  38'400,    57'600,    115'200,
                                                      230'400, 460'800, 1'000'000, 2'500'000, 5'000'000};
 

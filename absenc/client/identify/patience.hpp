@@ -32,7 +32,7 @@ class Patience {
     if (event.kind == Kind::sent) asked_ = true;
     if (event.kind == Kind::sent || event.kind == Kind::received) quiet_since_ = event.at;
   }
-  /// Takes each step of the conversation.
+  /// Takes each step of the conversation, and the time at which it begins.
   void see(const Step<Item>& step, Time now) {
     using Kind = typename Step<Item>::Kind;
     if (step.kind == Kind::transfer) asked_ = answered_ = false;

@@ -112,7 +112,7 @@ struct EncoderAddress {
   std::string written;  // address as the user wrote it, with all settings: "elbow?baud=57600"
 };
 
-/// Returns the speed limit of the encoder: the user's, or else the one of host::speed_limit.
+/// Returns the speed limit of the encoder: the limit that the user set, otherwise that of host::speed_limit.
 [[nodiscard]] host::SpeedLimit speed_limit(const EncoderAddress& uri);
 
 /// Returns the port with its settings, as `absenc identify` takes it, if the text names a port of this computer or of

@@ -133,7 +133,7 @@ std::vector<std::string> words_of(std::string_view text) {
   return {std::istream_iterator<std::string>(in), {}};
 }
 
-// Returns the message for a frame of wrong length; "" for other errors.
+// Returns the message about an exchange whose error is a wrong length; "" if it has another error or none.
 std::string said_of(const Unit& unit, const Options& options, const WireFrame& request, const WireFrame& reply) {
   NoFields ignored;
   const Error error = unit.decode(options, request.frame(), reply.frame(), ignored);

@@ -140,7 +140,7 @@ class Runner {
     session_.emplace(unit_, options_, port_, std::span(storage_.get(), unit_.host_storage), echo_, attempts);
     session_->set_filter(&filter_);
   }
-  /// Sets the options, from the next command on.
+  /// Sets the options of the encoder, which apply from the next command on.
   void set_options(const Options& options) {
     options_ = options;
     session_->set_options(options);
@@ -391,7 +391,7 @@ class Runner {
   std::unique_ptr<std::byte[]> storage_;
   Filter filter_;
   std::optional<host::Session<Item>> session_;
-  bool open_ = false;                  // whether `on_exchange` has not received the last exchange yet
+  bool open_ = false;                  // whether the last exchange must still be passed to `on_exchange`
   std::uint64_t opened_at_ = 0;        // number of requests that preceded the open exchange
   std::uint64_t requests_before_ = 0;  // number of requests that preceded the present command
   // number of items received before the present command, as a reply to an older request

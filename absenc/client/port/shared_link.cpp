@@ -118,6 +118,7 @@ void require_different(std::span<const EncoderAddress> encoders, std::span<const
   }
 }
 
+// Opens the port under the lock, so that encoders that reconnect at the same time open a shared port only once.
 std::shared_ptr<SharedLink> connect_link(const EncoderAddress& uri, const OpenLink& open) {
   Registry& all = registry();
   const std::lock_guard lock(all.mutex);

@@ -42,7 +42,7 @@ class Receiver {
   void start(Time end = never);
   /// Waits for bytes and returns them in their order; nothing if receiving has ended, or when `deadline` is reached.
   [[nodiscard]] std::optional<Received> next(Time deadline = never);
-  /// Makes `next` return nothing from now on. May be called from any thread.
+  /// Ends receiving: `next` returns nothing from now on. May be called from any thread.
   void cancel();
 
   /// Returns why receiving ended; `none` while it continues.

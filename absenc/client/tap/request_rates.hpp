@@ -19,7 +19,7 @@ class RequestRates final : public capture::AnnotationSink {
  public:
   struct RequestKind {
     std::string name{};                 // name of the command that sends such requests; "": no command of the unit does
-    std::vector<std::uint8_t> first{};  // the first request of this kind
+    std::vector<std::uint8_t> first{};  // bytes of the first request of this kind
     std::uint64_t count = 0;
     std::uint64_t errors = 0;  // number of requests without a good reply
     capture::Tick begin = 0;   // tick of the first request
