@@ -104,7 +104,7 @@ void ChangeTester::test_one(const Clause& clause, ClauseResult& result) {
 // ---- Clauses about the memory
 
 void ChangeTester::test_byte(const Clause& clause, ClauseResult& result) {
-  if (!clause.setting.empty()) save_setting(clause);  // reading the memory changes this setting
+  if (!clause.setting.empty()) save_setting(clause);  // saves this setting, because reading the memory changes it
   const std::int64_t written = save_byte(clause.page, clause.address) ^ 0xFF;
   const Saved& byte = saved_.back();
   byte.write(written);

@@ -63,7 +63,8 @@ class Examiner {
     runner_.repeat({.count = count, .limit = limit, .patience = never, .least = longest_gap}, attempt, into);
   }
 
-  /// Runs another reading command and passes the fields of its reply to `sink`. Throws the exceptions of the port.
+  /// Runs a command that is no reading of the position, such as a scan, and passes the fields of its reply to `sink`.
+  /// Throws the exceptions of the port.
   void report(const Command& command, Arguments arguments, FieldSink& sink) {
     const Conversation<Item>* conversation = runner_.run(command, arguments);
     if (conversation != nullptr && conversation->error() == Error::none) conversation->report(sink);
