@@ -83,7 +83,7 @@ struct CampaignResult {
   double seconds = 0;  ///< Processor time that the whole campaign used, in seconds.
 };
 
-/// Runs a campaign on one core. Throws UsageError for an unknown protocol, model, option or fault.
+/// Runs a campaign on one core. Throws UsageError for unknown names and for rates outside 0 to 1.
 [[nodiscard]] CampaignResult campaign(std::string_view protocol, const CampaignChoices& choices = {});
 
 }  // namespace absenc::client

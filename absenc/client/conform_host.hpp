@@ -15,7 +15,7 @@ namespace absenc::client {
 
 /// Length of a conformance test of a host, and its callbacks.
 struct ConformHostChoices {
-  std::size_t answers = 100;  ///< Number of good replies that the host must get before the test ends, at least 2.
+  std::size_t answers = 100;  ///< Number of good replies before and after the faults together, at least 2.
   Time patience = std::chrono::seconds(10);       ///< The test ends when the host sends nothing for this long.
   std::function<void(const Emulation&)> ready{};  ///< Called with the running emulation when the host can connect.
   /// Polled during the test; once it returns true, the test ends and the host is judged. Empty: never.
