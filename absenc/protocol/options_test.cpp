@@ -87,14 +87,14 @@ TEST(Options, SharedLineSetsOption) {
   };
   bus({});
   bus({{"bus", "true"}});
-  bus({{"bus", "false"}});  // an explicit value has priority
+  bus({{"bus", "false"}});  // a value that the user gave has priority over `tell_shared`
 }
 
 TEST(Options, InvalidWordIsReportedWithItsPlace) {
   const Resolved wrong = resolve(ssi::unit, {}, {{"word", "position:12 eror:1"}});
   EXPECT_EQ(wrong.error.kind, OptionError::Kind::bad_word);
   EXPECT_EQ(wrong.error.word.at, 12u);
-  // A value of the word must not have the name of a field of the protocol.
+  // A value in a word format must not have the name of a field of the protocol.
   const Resolved hiding = resolve(biss::unit, {}, {{"word", "position:12 crc=value:3"}});
   EXPECT_EQ(hiding.error.kind, OptionError::Kind::bad_word);
   EXPECT_EQ(hiding.error.word.at, 12u);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Parses any text as a word format: an error points into the text, and a parsed format can decode and encode.
+// Fuzz test: parses any text as a word format. An error must point into the text, and a parsed format must decode and
+// encode words.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -14,7 +15,7 @@ void require(bool condition) {
   if (!condition) std::abort();
 }
 
-// Checks that encoding a decoded word gives the same bits, apart from skipped bits and the parity.
+// Checks that encoding a decoded word gives the same bits again, apart from skipped bits and the parity.
 void decode_and_encode(const WordFormat& format, Bytes bits) {
   const BitView view{bits, bits.size() * 8};
   const Result<Word> word = decode_word(format, view);

@@ -81,14 +81,14 @@ Result<Word> decode(const WordFormat& format, Bytes bytes, std::size_t bits) {
 }
 
 TEST(Word, DecodesWhatEachFieldMeans) {
-  // multiturn 5, position 0x1A, nError 0, warning 1, two skipped bits, value 6
+  // Word with multiturn 5, position 0x1A, nError 0, warning 1, two skipped bits, value 6
   constexpr std::array<std::uint8_t, 2> bytes{0b01011010, 0b01111100};
   constexpr WordFormat format = "multiturn:4 position:5 error:1! warning:1! skip:2 name=value:3!"_word;
   const Result<Word> word = decode(format, bytes, 16);
   ASSERT_TRUE(word);
   EXPECT_EQ(word->multiturn, 5u);
   EXPECT_EQ(word->position, 0b10100u);
-  EXPECT_FALSE(word->error);  // the bit is 1, and active low
+  EXPECT_FALSE(word->error);  // the error bit is 1 and active low, so it reports no error
   EXPECT_FALSE(word->warning);
   EXPECT_EQ(word->values[5], 0b011u);
   EXPECT_EQ(decode(format, bytes, 15).error(), Error::wrong_length);

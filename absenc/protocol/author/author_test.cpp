@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The engine and its coroutines, with a protocol of one byte: the reply is the request with its high bit set.
+// Tests of the engine and of procedures, with a protocol of one byte: the reply is the request with its high bit set.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -138,16 +138,18 @@ TEST(Procedures, ContinueAfterEachReply) {
   Case<two_questions> good(echo);
   EXPECT_EQ(good.host.error(), Error::none);
   EXPECT_EQ(good.host.found().sum, 0x81u + 0x82u);
-  EXPECT_EQ(good.bench.sent[1] - good.bench.sent[0], 10ms + 10us);  // after the last received character
+  // The pause of 10 ms begins after the last received character.
+  EXPECT_EQ(good.bench.sent[1] - good.bench.sent[0], 10ms + 10us);
 }
 
 TEST(Procedures, EndWithoutAValidReply) {
   Case<two_questions> bad([](std::uint8_t request, unsigned n) { return request == 2 ? Wire{} : echo(request, n); });
   EXPECT_EQ(bad.host.error(), Error::timeout);
   EXPECT_EQ(bad.host.detail(), "the second");
-  ASSERT_EQ(bad.bench.sent.size(), 4u);                               // three attempts, each after its pause
-  EXPECT_EQ(bad.bench.sent[3] - bad.bench.sent[2], 1ms + 2ms - 1ms);  // the silence is part of the pause
-  EXPECT_EQ(bad.bench.now, bad.bench.sent[3] + 5ms);                  // after the hold time
+  ASSERT_EQ(bad.bench.sent.size(), 4u);  // the first request once, and the second three times
+  // The silence that shows the missing reply is part of the pause.
+  EXPECT_EQ(bad.bench.sent[3] - bad.bench.sent[2], 1ms + 2ms - 1ms);
+  EXPECT_EQ(bad.bench.now, bad.bench.sent[3] + 5ms);  // the conversation ends after the hold time of 5 ms
 }
 
 TEST(Procedures, DamagedCharactersAreNoTimeout) {
@@ -167,12 +169,13 @@ TEST(Procedures, RepeatAfterDamageWhenTheLineIsSilent) {
 TEST(Procedures, RefusalEndsTheExchangeAtOnce) {
   Case<two_questions> refused([](std::uint8_t, unsigned) { return Wire{0xFF}; });
   EXPECT_EQ(refused.host.error(), Error::busy);
-  EXPECT_EQ(refused.bench.sent[1] - refused.bench.sent[0], 10us + 2ms);  // a refusal is followed by no silence
+  // After a refusal the engine does not wait for silence.
+  EXPECT_EQ(refused.bench.sent[1] - refused.bench.sent[0], 10us + 2ms);
 }
 
 TEST(Engine, WeakChecksumNeedsSilence) {
   const auto longer = [](std::uint8_t request, unsigned) { return Wire{static_cast<std::uint8_t>(request | 0x80), 0}; };
-  EXPECT_EQ(Case<two_questions>(longer).host.error(), Error::none);  // bytes after a complete reply are dropped
+  EXPECT_EQ(Case<two_questions>(longer).host.error(), Error::none);  // bytes after a complete reply are ignored
   EXPECT_EQ(Case<two_questions>(longer, {.ends_by_silence = true}).host.error(), Error::wrong_length);
   EXPECT_EQ(Case<two_questions>(echo, {.ends_by_silence = true}).host.error(), Error::none);
 }
@@ -180,13 +183,13 @@ TEST(Engine, WeakChecksumNeedsSilence) {
 TEST(Engine, TheLineIsSilentBeforeEachRequest) {
   Case<two_questions> good(echo, {.silence = 20ms});
   EXPECT_EQ(good.bench.sent[0], 20ms);
-  EXPECT_EQ(good.bench.sent[1] - good.bench.sent[0], 20ms + 10us);  // the longer of the two times
+  EXPECT_EQ(good.bench.sent[1] - good.bench.sent[0], 20ms + 10us);  // the longer of pause and silence decides
 }
 
 Procedure attempts(ToyDialog& dialog, Found& found) {
   const Result<std::uint8_t> first = co_await dialog.attempt(1).once();
   if (first) co_return {Error::invalid_argument};
-  co_await dialog.ask(0x7F);  // is not answered
+  co_await dialog.ask(0x7F);  // the encoder does not answer the request 7F
   dialog.emit();
   dialog.set_rate(9600, Toy::host_times(dialog.format()));
   const std::uint8_t last = co_await dialog.ask(3);
@@ -215,7 +218,7 @@ Part<unsigned> deeper(ToyDialog& dialog, unsigned depth) {
 }
 
 Procedure many_parts(ToyDialog& dialog, Found& found, Arguments arguments) {
-  for (int i = 0; i < 500; ++i) {  // more parts than the storage could hold at once
+  for (int i = 0; i < 500; ++i) {  // more parts in turn than the storage could hold at once
     const unsigned sum = co_await deeper(dialog, static_cast<unsigned>(arguments[0]));
     found.sum = sum;
   }
@@ -242,11 +245,11 @@ TEST(Procedures, StopFromAnyDepth) {
 TEST(Procedures, ReportStorageThatIsTooSmall) {
   const std::array<std::int64_t, 1> depth{12};
   const std::size_t needed = Case<many_parts>(echo, {}, depth).host.frames_size();
-  // Too many parts in each other.
+  // The storage is too small for so many nested parts.
   EXPECT_EQ(Case<many_parts>(echo, {}, depth, needed).host.error(), Error::out_of_range);
-  // Too small for a part.
+  // The storage is too small for a part.
   EXPECT_EQ(Case<many_parts>(echo, {}, depth, needed - 1).host.error(), Error::buffer_too_small);
-  // Too small for the procedure.
+  // The storage is too small for the procedure.
   EXPECT_EQ(Case<many_parts>(echo, {}, depth, 16).host.error(), Error::buffer_too_small);
 }
 
@@ -388,11 +391,11 @@ TEST(Text, RealNumbersHaveAPoint) {
   for (const std::string_view none : {"", "12", "1.2.3", "1.5x"}) EXPECT_FALSE(to_real(none, number)) << none;
 }
 
-// 0.02 degrees in the time between two readings are 0.33 rpm.
+// 0.02 degrees in the 10 ms between two readings are 0.33 rpm.
 TEST(Standstill, ShowsAThirdOfARevolutionAMinute) { EXPECT_EQ(standstill_millidegrees * (1s / between_looks), 2000); }
 
 static_assert(is_near(0, 1, 14) && is_near(16383, 0, 14) && !is_near(0, 2, 14));
-static_assert(is_near(0, 466, 23) && !is_near(0, 467, 23));  // 0.02 degrees
+static_assert(is_near(0, 466, 23) && !is_near(0, 467, 23));  // 466 counts of 23 bits are 0.02 degrees
 
 }  // namespace
 }  // namespace absenc::author

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The engine and the device of clocked lines, with a counter as protocol: the first byte is the number of bytes that
-// follow.
+// Tests of the engine and the device of clocked lines, with a counter as protocol: the first byte of a transfer is the
+// number of bytes that follow.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -32,7 +32,7 @@ struct Toy {
   static Reading reading(const Format&, const Reply& reply) { return {.singleturn = reply, .singleturn_bits = 8}; }
 };
 
-/// A host whose second transfer has as many bytes as the first byte states.
+/// A host whose second transfer has as many bytes as the first byte of the first transfer states.
 class Host final : public ClockedHostOf<Toy> {
  public:
   explicit Host(const Toy::Format& format) : ClockedHostOf(format) {}
@@ -48,7 +48,7 @@ class Host final : public ClockedHostOf<Toy> {
   }
 };
 
-/// Feeds the `transfers` in turn, each 100 us long. Returns the host's steps as text.
+/// Feeds the host with `transfers`, each 100 us long. Returns the host's steps as text.
 std::string run(Host& host, const std::vector<std::vector<std::uint8_t>>& transfers) {
   std::string log;
   Time now = 1ms;
@@ -72,7 +72,7 @@ std::string run(Host& host, const std::vector<std::vector<std::uint8_t>>& transf
 TEST(ClockedEngine, ClocksAfterTheRest) {
   Host host({});
   EXPECT_EQ(host.reading(), nullptr);
-  EXPECT_EQ(run(host, {{0, 7, 7, 7}}), "8 at 1030 done");  // bytes beyond the clocks are dropped
+  EXPECT_EQ(run(host, {{0, 7, 7, 7}}), "8 at 1030 done");  // received bytes beyond the number of clocks are ignored
   EXPECT_EQ(host.error(), Error::none);
   ASSERT_NE(host.reading(), nullptr);
   EXPECT_EQ(host.reading()->latched, 1030us);
@@ -92,7 +92,8 @@ TEST(ClockedEngine, LineThatStaysLowIsNoPosition) {
   };
   EXPECT_EQ(error_of(0, false), Error::none);
   EXPECT_EQ(error_of(0, true), Error::line_stuck);
-  EXPECT_EQ(error_of(0x01, true), Error::none);  // the line is low because it was clocked early, and its bits change
+  // A line that was low before the first clock is not stuck if its bits change.
+  EXPECT_EQ(error_of(0x01, true), Error::none);
 }
 
 TEST(ClockedEngine, KnownRateGivesTheBeginOfATransfer) {
@@ -121,7 +122,7 @@ TEST(ClockedEngine, EndsIfStorageIsTooSmall) {
   EXPECT_EQ(few.reading(), nullptr);
   EXPECT_EQ(few.exchange().received.size(), 2u);
 
-  Host many({.first_clocks = 25});  // the storage holds whole bytes
+  Host many({.first_clocks = 25});  // 25 clocks need four bytes of storage
   EXPECT_EQ(run(many, {}), "done");
   EXPECT_EQ(many.error(), Error::invalid_argument);
   Host silent({.first_clocks = 24});
@@ -162,7 +163,7 @@ TEST(ClockedDevice, DrivesOnceForEachSelectionWhileItIsOn) {
   EXPECT_FALSE(device.next(1ms).kind == ByteStep::Kind::transfer);
   EXPECT_EQ(clocked(2ms, 0), 0u);
   EXPECT_EQ(clocked(2ms, 8), 1u);
-  EXPECT_EQ(clocked(2ms, 8), 1u);  // its own clocks
+  EXPECT_EQ(clocked(2ms, 8), 1u);  // a second `sent` event after one selection is ignored
   EXPECT_TRUE(select(3ms));
   device.power_off(3ms);
   EXPECT_EQ(clocked(4ms, 8), 1u);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Each member of a Declaration reaches the Unit. tests/unit_declaration_test.py shows that a misspelt member does not
-// compile.
+// Tests that each member of a Declaration reaches the Unit. tests/unit_declaration_test.py shows that a misspelt member
+// does not compile.
 #include "absenc/protocol/author/declaration.hpp"
 
 #include <gtest/gtest.h>
@@ -287,7 +287,7 @@ TEST(Declaration, SizesReplies) {
   EXPECT_EQ(end.size, 9u);
 }
 
-// A declaration with a `decode` of its own says nothing about its requests.
+// In a declaration with a `decode` of its own, nothing is known about requests.
 TEST(Declaration, DecodesByItself) {
   NoFields sink;
   constexpr Unit made = Descriptor<decoding>::make();

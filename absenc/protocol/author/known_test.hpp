@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For the tests of units: a reader of a format known when the program is written reads as any other reader.
+// For the tests of units: checks that a reader whose format is known at compile time behaves like any other reader.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -11,8 +11,8 @@
 
 namespace absenc::author::testing {
 
-/// Returns what a conversation sends, when it ends, and its result, for a `reply` that is delivered in one piece or
-/// byte by byte and followed by silence.
+/// Returns as text the request of a conversation, the time of its end and its result, for a `reply` that is delivered
+/// in one piece or byte by byte and followed by silence.
 template <class Reader>
 std::vector<std::vector<std::uint8_t>> talk(Reader& reader, const std::vector<std::uint8_t>& reply, bool whole) {
   using Kind = Event<std::uint8_t>::Kind;
@@ -37,7 +37,7 @@ std::vector<std::vector<std::uint8_t>> talk(Reader& reader, const std::vector<st
   return sent;
 }
 
-/// Checks a valid reply, the reply with each of its bits wrong, and each incomplete reply.
+/// Compares both readers for a valid reply, for the reply with each of its bits wrong, and for each incomplete reply.
 template <class P, const typename P::Format& format, const typename P::Request& request>
 void expect_known_as_any(const std::vector<std::uint8_t>& good) {
   std::vector<std::vector<std::uint8_t>> replies{good};

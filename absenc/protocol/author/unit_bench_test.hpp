@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// For the tests of units on lines of characters: the virtual encoder and the unit's commands on one line in virtual
-// time.
+// For the tests of units on lines of characters: a bench that connects the virtual encoder with the unit's commands on
+// a line in virtual time.
 #pragma once
 
 #include <functional>
@@ -55,7 +55,7 @@ struct RunResult : FieldSink {
   Time received_at{};
   bool finished = false;
   unsigned emits = 0;
-  std::uint64_t frames = 0;  // number of frames that the encoder answered
+  std::uint64_t frames = 0;  // number of requests that the encoder answered
   Time took{};
 };
 
@@ -72,7 +72,7 @@ inline Options options_of(const Unit& unit, std::string_view text) {
   return options;
 }
 
-/// Returns the options of a format whose members they are.
+/// Returns the option values of a format.
 template <class Declared, class Format>
 requires requires(const Declared& declared) { declared.infos; }
 Options options_of(const Declared& declared, const Format& format) {
@@ -81,7 +81,7 @@ Options options_of(const Declared& declared, const Format& format) {
   return options;
 }
 
-/// Rules that a virtual encoder reports as broken, in order.
+/// Returns the rules that a virtual encoder reports as broken, in order of time.
 struct BrokenRules final : RuleWatch {
   void looked(std::string_view rule, bool kept) override {
     if (!kept) rules.emplace_back(rule);
@@ -89,7 +89,7 @@ struct BrokenRules final : RuleWatch {
   std::vector<std::string> rules;
 };
 
-/// A conversation for a command of a unit; trailing arguments may be left out.
+/// A conversation for a command of a unit, with its storage; trailing arguments may be left out.
 template <class Item>
 class Talk {
  public:
@@ -109,10 +109,11 @@ class Talk {
   Conversation<Item>* made_ = nullptr;
 };
 
-/// Changes the n-th frame (from 0) that is received or sent. A sent frame without bytes is lost.
+/// Function that changes frame number n (from 0) that the encoder receives or sends. A sent frame without bytes is
+/// lost.
 using Tamper = std::function<void(unsigned nth, Wire& bytes)>;
 
-/// Changes the frames that the encoder receives and sends; by default none.
+/// Functions that change the frames that the encoder receives and sends; by default none is changed.
 class Tampered final : public Machine<std::uint8_t> {
  public:
   explicit Tampered(Machine<std::uint8_t>& encoder) : encoder_(encoder) {}
@@ -135,7 +136,7 @@ class Tampered final : public Machine<std::uint8_t> {
       replies_.tamper(replies_.count++, out_);
       step.out = out_;
       if (!out_.empty()) return step;
-      encoder_.feed({.kind = Event<std::uint8_t>::Kind::sent, .at = now});  // the frame is lost
+      encoder_.feed({.kind = Event<std::uint8_t>::Kind::sent, .at = now});  // the encoder's frame is lost on the line
     }
   }
 
@@ -150,7 +151,7 @@ class Tampered final : public Machine<std::uint8_t> {
   Wire out_;
 };
 
-/// A line with one host at a time, and silence without one.
+/// A line in virtual time with a virtual encoder and at most one host; without a host it is silent.
 struct HostedLine : sim::Line<std::uint8_t> {
   HostedLine(LinkKind kind, const LineSettings& settings) : Line(kind, settings) {}
 
@@ -158,7 +159,7 @@ struct HostedLine : sim::Line<std::uint8_t> {
     if (node) return replace(*node, host);
     node = attach(sim::NodeRole::host, host, [this] { return !on_emit || on_emit(); });
   }
-  /// Runs a host and returns whether it came to its end.
+  /// Runs a host, and returns whether its conversation ended.
   bool converse(Machine<std::uint8_t>& host) {
     put_on(host);
     const bool ended = run(*node, now() + 60s);
@@ -209,13 +210,13 @@ struct UnitBench {
     told.took = line.now() - begin;
     return told;
   }
-  /// Runs a conversation that streams; `go_on()` is called for each result and returns whether to continue.
+  /// Runs a conversation that streams. `go_on()` is called for each result, and returns whether to continue.
   void listen(Conversation<std::uint8_t>& conversation, const std::function<bool()>& go_on) {
     line.on_emit = go_on;
     line.converse(conversation);
     line.on_emit = {};
   }
-  /// Sends these bytes at once. Returns the host, which has all bytes received until the line is silent.
+  /// Sends these bytes at once. Returns the host, which has stored all bytes received until the line was silent.
   sim::testing::RawHost raw(Wire request, Time answer = 50ms, Time gap = 5ms) {
     sim::testing::RawHost host(std::move(request), answer, gap, line.now());
     line.converse(host);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: virtual QS35 encoders and a host on one line in virtual time.
+// For the tests of ESL: virtual QS35 encoders and a host on one line in virtual time.
 #pragma once
 
 #include "absenc/protocol/author/unit_bench_test.hpp"
@@ -29,7 +29,7 @@ struct RawHost final : sim::testing::RawHost {
 
 inline Options options_of(const Profile& profile) { return author::testing::options_of(options, profile); }
 
-/// One encoder on a line of its own.
+/// One virtual encoder, alone on its line.
 struct Bench : author::testing::UnitBench<24> {
   explicit Bench(const Profile& bench_profile = {}, Tamper tamper = {})
       : UnitBench(esl::unit, options_of(bench_profile)), profile(bench_profile) {

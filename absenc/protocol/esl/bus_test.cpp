@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Several encoders on one line.
+// Tests of several ESL encoders on one line.
 #include <gtest/gtest.h>
 
 #include <memory>
@@ -72,7 +72,7 @@ TEST(EslBus, ScanFindsEncodersAndDamagedAnswers) {
         EXPECT_EQ(encoder->violation_count(), 0u);
       }
       EXPECT_EQ(encoder->answer_count(),
-                clashes.empty() || encoder == bus.encoders[0] ? 1u : 3u);  // ID 5 is sent, never ID 8
+                clashes.empty() || encoder == bus.encoders[0] ? 1u : 3u);  // a scan sends ID 5, never ID 8
     }
   }
 }

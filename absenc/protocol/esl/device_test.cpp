@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The virtual QS35 against its document, with requests written as bytes.
+// Tests of the virtual QS35 against its document, with requests written as bytes.
 #include "absenc/protocol/esl/device.hpp"
 
 #include <gtest/gtest.h>
@@ -38,7 +38,7 @@ TEST(EslDevice, AnswersTwoMicrosecondsAfterTheRequest) {
   EXPECT_EQ(host.reply.size(), 18u);
 }
 
-// Only IDs 1, 2, 8 and B count, unless the profile says that every request counts.
+// The sequence counters count IDs 1, 2, 8 and B only, unless the profile states that every request is counted.
 TEST(EslDevice, SequenceCounters) {
   Bench bench;
   EXPECT_EQ(bench.read(DataId::position).one.sequence, 1);
@@ -57,13 +57,13 @@ TEST(EslDevice, SequenceCounters) {
 
 TEST(EslDevice, AnswersOnlyItsOwnValidRequests) {
   Bench bench;
-  EXPECT_TRUE(bench.raw(wire(hex<"0874">)).empty());               // wrong CRC
-  EXPECT_TRUE(bench.raw(wire_of({DataId::position, 3})).empty());  // another address
-  EXPECT_TRUE(bench.raw(wire(hex<"18">)).empty());                 // unknown id
-  EXPECT_TRUE(bench.raw(wire(hex<"08">)).empty());                 // incomplete
-  EXPECT_EQ(bench.raw(wire(hex<"0875">)).size(), 18u);             // the next request is answered
+  EXPECT_TRUE(bench.raw(wire(hex<"0874">)).empty());               // request with a wrong CRC
+  EXPECT_TRUE(bench.raw(wire_of({DataId::position, 3})).empty());  // request to another address
+  EXPECT_TRUE(bench.raw(wire(hex<"18">)).empty());                 // request with an unknown ID
+  EXPECT_TRUE(bench.raw(wire(hex<"08">)).empty());                 // incomplete request
+  EXPECT_EQ(bench.raw(wire(hex<"0875">)).size(), 18u);             // the request after the faulty ones is answered
   EXPECT_TRUE(bench.raw(memory_write(page_select_address, 7)).empty());
-  EXPECT_TRUE(bench.raw(memory_read(0x30)).empty());  // page 8 ends at 2F
+  EXPECT_TRUE(bench.raw(memory_read(0x30)).empty());  // the addresses of page 8 end at 2F
   EXPECT_EQ(bench.encoder.answer_count(), 1u);
 }
 
@@ -80,7 +80,7 @@ TEST(EslDevice, FindsRequestAfterOtherBytes) {
   }
 }
 
-// The bytes look like a request, but are part of another encoder's reply.
+// The bytes would be a request, but are part of another encoder's reply.
 TEST(EslDevice, FindsNoRequestInAnotherEncodersReply) {
   Bench bench;
   const Wire reply = wire({.id = DataId::position_short,
@@ -113,7 +113,7 @@ TEST(EslDevice, ReportsWrongParityBitByProfile) {
   }
 }
 
-// A virtual encoder without a line: the test feeds its events.
+// A virtual encoder without a line: the test feeds the events itself.
 struct Alone {
   using LinkEvent = Event<std::uint8_t>::Kind;
   Alone() { encoder.power_on(Time{}, PowerOn::skip); }
@@ -151,7 +151,7 @@ TEST(EslDevice, AnyPauseEndsReplyOfAbsentEncoder) {
   EXPECT_EQ(alone.encoder.next(10us).kind, waits);
 }
 
-// The eighth reset after a bad request counts as the first of eight.
+// After a bad request the count of reset requests begins again.
 TEST(EslDevice, BadRequestRestartsTheCount) {
   for (const auto kind : {Alone::LinkEvent::received, Alone::LinkEvent::line_error}) {
     Alone alone;
@@ -215,7 +215,7 @@ TEST(EslDevice, ReadsRegistersAtOnceAndEepromInTwoSteps) {
   EXPECT_EQ(bench.raw(memory_read(5)), memory_reply(memory_read(5), true, 0));
   bench.pass(200us);
   EXPECT_EQ(bench.raw(memory_read(5)), memory_reply(memory_read(5), false, 0x77));
-  EXPECT_EQ(*bench.encoder.stored(0, 6), 0);  // the write was not executed
+  EXPECT_EQ(*bench.encoder.stored(0, 6), 0);  // the memory byte is still 0, because the write was not executed
   EXPECT_EQ(bench.encoder.memory_version(), 1u);
   EXPECT_EQ(bench.violations(), 0u);
   bench.raw(memory_read(7));
@@ -224,7 +224,8 @@ TEST(EslDevice, ReadsRegistersAtOnceAndEepromInTwoSteps) {
   ASSERT_EQ(bench.violations(), 1u);
   EXPECT_EQ(bench.encoder.violations()[0].rule, "memory read again less than 200 us after the request before");
   bench.pass(eeprom_read_time);
-  EXPECT_EQ(bench.raw(memory_read(5)), memory_reply(memory_read(5), true, 0));  // another byte was fetched
+  // Busy, because another byte was fetched before.
+  EXPECT_EQ(bench.raw(memory_read(5)), memory_reply(memory_read(5), true, 0));
 }
 
 TEST(EslDevice, PageChangeTakes18Milliseconds) {
@@ -298,7 +299,7 @@ TEST(EslDevice, MemorySurvivesPowerOffAndRegistersDoNot) {
   EXPECT_EQ(*bench.encoder.stored(6, 0x0B), 0x33);
 }
 
-// Every byte of Table 11 has storage of its own.
+// Every memory byte of Table 11 is stored separately.
 TEST(EslDevice, EachAddressHasItsOwnByte) {
   Bench bench;
   std::map<std::uint8_t*, int> seen;
@@ -346,7 +347,7 @@ TEST(EslDevice, AlarmsAreClearedAsInTable8) {
   }
 }
 
-// Table 8: "perform MT counter reset and all error clear": a reset before the error does not count.
+// Table 8: "perform MT counter reset and all error clear". A counter reset before the error occurred does not help.
 TEST(EslDevice, ClearsMultiturnErrorOnlyAfterItsTurnReset) {
   Bench bench;
   reset(bench, DataId::reset_multiturn);
@@ -356,7 +357,8 @@ TEST(EslDevice, ClearsMultiturnErrorOnlyAfterItsTurnReset) {
   EXPECT_EQ(bench.read().one.alarms, alarms::multiturn_error);
   reset(bench, DataId::reset_multiturn);
   bench.pass(10ms);
-  bench.encoder.raise_alarms(alarms::multiturn_error);  // the alarm is raised already
+  // Multiturn_error is raised already, so raising it again changes nothing.
+  bench.encoder.raise_alarms(alarms::multiturn_error);
   reset(bench, DataId::clear_alarms);
   EXPECT_EQ(bench.read().one.alarms, 0);
 }
@@ -405,7 +407,7 @@ TEST(EslDevice, OtherOrTooFastRequestRestartsTheCount) {
   bench.raw(Request{DataId::temperature});
   reset(bench, DataId::zero, 1);
   EXPECT_EQ(bench.read().singleturn, 1'000'000u);
-  for (unsigned i = 0; i < 8; ++i) bench.raw(Request{DataId::zero});  // 23 us apart
+  for (unsigned i = 0; i < 8; ++i) bench.raw(Request{DataId::zero});  // these eight requests are 23 us apart, too fast
   EXPECT_EQ(bench.read().singleturn, 1'000'000u);
   EXPECT_GT(bench.violations(), 0u);
   reset(bench, DataId::zero);

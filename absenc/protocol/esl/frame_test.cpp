@@ -24,7 +24,7 @@ constexpr std::array all_ids{DataId::position,         DataId::singleturn,      
 
 constexpr std::array<std::uint8_t, 9> check_input{'1', '2', '3', '4', '5', '6', '7', '8', '9'};
 
-// Returns all profiles that change frames.
+// Returns all profiles that differ in the frames.
 std::vector<Profile> all_profiles() {
   std::vector<Profile> profiles{Profile{}};
   for (std::size_t option = 0; option < open_options; ++option) {
@@ -41,7 +41,7 @@ std::vector<Profile> all_profiles() {
   return profiles;
 }
 
-// Returns a reply with all parts that the id can carry.
+// Returns a reply with values in all parts that its data ID carries.
 Reply sample(DataId id, const Profile& profile = {}) {
   Reply reply{.id = id,
               .encoder_address = 3,
@@ -97,7 +97,7 @@ TEST(EslFrame, EveryFieldWithEitherParityScope) {
   }
 }
 
-// Table 5 in both orders; in T-format DD, EA and CA follow from b0 up.
+// Bits of SF in both orders (Table 5): in T-format order DD, EA and CA follow from b0 up.
 TEST(EslFrame, StatusBitsInBothOrders) {
   const Profile tformat{.status_order = FieldOrder::tformat};
   const std::array<std::pair<std::uint8_t, std::uint8_t>, 8> places{{{status::temperature_warning, 0x01},
@@ -204,12 +204,12 @@ TEST(EslFrame, ValidityOfEachPart) {
   EXPECT_TRUE(to_reading(short_reply).multiturn_valid);
   short_reply.one.status = status::ready | status::non_safety_error;
   EXPECT_TRUE(to_reading(short_reply).singleturn_valid());
-  // The cause may also be Lissajous or overspeed.
+  // The cause of a non-safety error may also be Lissajous or overspeed.
   EXPECT_EQ(to_reading(short_reply).multiturn_validity(), Validity::unknown);
   EXPECT_EQ(to_reading({.id = DataId::temperature}).singleturn_bits, 0u);
 }
 
-// Every reply has SF, only some have ALM, in each of their channels.
+// Every data reply has SF, only some have ALM, in each of their channels.
 TEST(EslFrame, RepliesReportTheFlagsThatTheyCarry) {
   struct Row {
     DataId id;
@@ -241,7 +241,7 @@ TEST(EslFrame, LedAndLissajousErrorsCountForEveryId) {
       EXPECT_NE(to_reading(reply).multiturn_validity(), Validity::invalid) << static_cast<int>(id);
     }
   }
-  // The alarm is in the other channel, or both alarms are raised at once.
+  // The alarm bit is in the other channel than the non-safety error, or LED and Lissajous errors are raised at once.
   Reply reply = sample(DataId::position);
   reply.one = {.status = status::ready | status::non_safety_error};
   reply.two = {.status = status::channel_2 | status::ready, .alarms = alarms::led_or_lissajous_error};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The unit's commands with the virtual QS35 in virtual time.
+// Tests of the unit's commands with the virtual QS35 in virtual time.
 #include "absenc/protocol/esl/host.hpp"
 
 #include <gtest/gtest.h>
@@ -27,7 +27,8 @@ TEST(EslHost, ReadsTheSafetyPositionInTheTimeOfTheWire) {
   EXPECT_EQ(read.reading->singleturn, 0xABCDEFu);
   EXPECT_EQ(read.reading->multiturn, 4660u);
   EXPECT_TRUE(read.reading->singleturn_valid() && read.reading->multiturn_valid && read.reading->ready);
-  EXPECT_EQ(read.reading->latched, request_pause + 1us + 4300ns);  // CF ends after one character
+  // The position is finished 4.3 us after CF, which ends after one character.
+  EXPECT_EQ(read.reading->latched, request_pause + 1us + 4300ns);
   EXPECT_EQ(read.reading->received, request_pause + 22us);
   EXPECT_EQ(read.numbers.at("redundant_singleturn"), 0xABCDEF >> 15);
 }
@@ -37,7 +38,7 @@ TEST(EslHost, Id8IsNeverSentEightTimesInARow) {
   for (unsigned i = 0; i < 20; ++i) EXPECT_EQ(bench.run("encoder-id").error, Error::none);
   EXPECT_EQ(bench.violations(), 0u);
   for (unsigned i = 0; i < 8; ++i) bench.raw(Request{DataId::encoder_id});
-  ASSERT_EQ(bench.violations(), 1u);  // the virtual encoder checks the rule
+  ASSERT_EQ(bench.violations(), 1u);  // the virtual encoder reports the broken rule
 }
 
 // "If there is no Start Bit after the End Bit of the last frame": at least one bit is between two frame sets.
@@ -124,7 +125,7 @@ TEST(EslHost, TurnsFromSingleTurnEncoderAreAnError) {
 
 // ---- Safe positions
 
-// One exchange each, after two have shown that the counter moves.
+// Each safe position takes one exchange, after two have shown that the sequence counter moves.
 TEST(EslHost, SafePositionsFollowEachOther) {
   Bench bench;
   const testing::Talk made(unit, testing::options_of({}), "safe-position");
@@ -146,7 +147,7 @@ TEST(EslHost, DetectsStoppedSequenceCounter) {
   unsigned safe = 0;
   bench.line.on_emit = [&] {
     if (++safe == 10) {
-      bench.condition(condition::ch1_sequence, 11);  // counter of the last reply
+      bench.condition(condition::ch1_sequence, 11);  // sequence counter of channel 1 stuck at that of the last reply
       bench.condition(condition::ch2_sequence, 11);
     }
     return safe < 20;
@@ -191,7 +192,7 @@ TEST(EslHost, SilenceIsATimeout) {
   EXPECT_TRUE(bench.run("memory-read", {0}).says("(Figure 18)"));
 }
 
-// Each error has its own name and sentence.
+// Each failed check has an error and a sentence.
 TEST(EslHost, ExplainsInvalidReplies) {
   struct Row {
     const char* sentence;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The memory commands with the virtual QS35 in virtual time.
+// Tests of the memory commands with the virtual QS35 in virtual time.
 #include <gtest/gtest.h>
 
 #include "absenc/protocol/esl/bench_test.hpp"
@@ -21,7 +21,7 @@ TEST(EslMemory, WritesMemoryOnlyIfItDiffersAndReadsItBack) {
   const RunResult first = bench.run(write, {0x7E, 0x5A, 0});
   EXPECT_EQ(first.error, Error::none) << first.detail;
   EXPECT_EQ(first.numbers.at("written"), 1);
-  EXPECT_EQ(bench.encoder.answer_count(), 6u);  // page select, two reads, the write, and two reads after it
+  EXPECT_EQ(bench.encoder.answer_count(), 6u);  // replies to: page select, two reads, the write, and two reads after it
   EXPECT_EQ(*bench.encoder.stored(0, 0x7E), 0x5A);
   const RunResult same = bench.run(write, {0x7E, 0x5A, 0});
   EXPECT_EQ(same.error, Error::none);
@@ -71,7 +71,7 @@ TEST(EslMemory, RestoresThePageBefore) {
     EXPECT_EQ(bench.violations(), 0u);
   }
   // The encoder does not report the selected page (requested three times), or does not report at the end that the page
-  // before is selected again.
+  // from before is selected again.
   for (const auto& [first, last] : {std::pair{1u, 3u}, std::pair{5u, 5u}}) {
     Bench bench({}, [first = first, last = last](unsigned index, Wire& reply) {
       if (index < first || index > last) return;
@@ -130,7 +130,7 @@ TEST(EslMemory, IgnoresEepromByteWithoutABusyReplyBefore) {
   EXPECT_EQ(bytes.numbers.at("value"), 0x78);
 }
 
-// Replies of a write: page select, two reads, write, two reads.
+// The command memory-write gets these replies: page select, two reads, write, two reads.
 TEST(EslMemory, WriteErrors) {
   struct Row {
     unsigned index;
@@ -144,7 +144,8 @@ TEST(EslMemory, WriteErrors) {
     reply = wire({.id = DataId::read_memory, .memory_address = 10, .value = 0x32});
   };
   for (const Row& row : {Row{0, Error::none, "", 1, cut}, Row{2, Error::none, "", 1, cut},
-                         Row{3, Error::none, "", 1, cut},  // judged by reading back, never repeated
+                         // A lost reply to the write: reading back decides, and the write is never repeated.
+                         Row{3, Error::none, "", 1, cut},
                          Row{5, Error::cross_check_failed, "reading back gave another value", 1, other}}) {
     Bench bench({}, [&row](unsigned index, Wire& reply) {
       if (index == row.index) row.tamper(index, reply);
@@ -182,7 +183,7 @@ TEST(EslMemory, DistinguishesLedAndLissajous) {
   }
 }
 
-// SF shows the cause if no other alarm raises the same bit.
+// SF shows the cause of led_or_lissajous_error if no other alarm sets the same bit.
 TEST(EslMemory, DistinguishesLedAndLissajousOnABusByStatus) {
   constexpr int open = -1;
   struct Row {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Evidence of captured replies about the profile of their encoder.
+// Tests of the evidence that captured replies give about the profile of their encoder.
 #include "absenc/protocol/esl/probe.hpp"
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ struct Taken {
   Wire reply;
 };
 
-// Returns a capture of these requests to an encoder of this profile.
+// Returns a capture of these requests to a virtual encoder of this profile, with its replies.
 std::vector<Taken> captured(const Profile& profile, const std::vector<Request>& requests) {
   testing::Bench bench(profile);
   bench.shaft.put(77, 0xABCDEF);
@@ -34,7 +34,7 @@ struct Evidence {
   std::size_t capture = 0;
   std::string why;
 };
-// The evidence about each value of each option, and the remaining profile.
+// Result of a probe: the evidence about each value of each option, and the profile found.
 struct Probed final : EvidenceSink {
   explicit Probed(const std::vector<Taken>& taken, bool with_requests = true) {
     std::vector<Capture> captures;
@@ -60,12 +60,13 @@ const std::vector<Request> everything{{DataId::position},    {DataId::temperatur
                                       {DataId::position},    {DataId::clear_alarms},
                                       {DataId::calibration}, {DataId::write_memory, 0, page_select_address, 8}};
 
-// Each value of each option is found, and is the only one left, if the frames carry it.
+// Each value of each option is found, and is the only possible one, if the frames show it.
 TEST(EslProbe, EveryValueIsFound) {
   for (std::size_t option = 0; option < open_options; ++option) {
     const std::string_view name = options.infos[option].name;
     for (std::size_t value = 0; value < options.infos[option].choices.size(); ++value) {
-      if (name == "sequence_step" && value == 0) continue;  // change: the other values are special cases of it
+      // Value `change` is never the only one, because the other values are special cases of it.
+      if (name == "sequence_step" && value == 0) continue;
       Profile profile{.address = 1};
       options.put(profile, option, static_cast<std::int64_t>(value));
       Probed result(captured(profile, everything));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Resets of alarms, turns and zero, with the virtual QS35 in virtual time.
+// Tests of the resets of alarms, turns and zero, with the virtual QS35 in virtual time.
 #include <gtest/gtest.h>
 
 #include <tuple>
@@ -32,14 +32,15 @@ TEST(EslReset, Resets) {
   EXPECT_EQ(after.reading->multiturn, 0u);
   EXPECT_EQ(after.reading->singleturn, 0u);
   EXPECT_EQ(bench.violations(), 0u);
-  // The zero survives power off, in both channels.
+  // The zeros of both channels survive power off.
   bench.restart();
   EXPECT_EQ(bench.read().singleturn, 0u);
   EXPECT_EQ(bench.read().redundant, 0u);
   EXPECT_EQ(bench.read().multiturn, 0u);
 }
 
-// 10 ms between the positions, 40 us between the eight requests from start to start, then the EEPROM's write time.
+// A reset takes 10 ms between the positions, 40 us from start to start of the eight requests, and then the EEPROM's
+// write time.
 TEST(EslReset, ResetKeepsItsTimes) {
   for (const auto& [command, id, last] :
        {std::tuple{"zero", DataId::zero, Time(7ms)}, std::tuple{"reset-multiturn", DataId::reset_multiturn, Time(7ms)},
@@ -120,7 +121,7 @@ TEST(EslReset, SendsNoResetToTurningOrStartingEncoder) {
   EXPECT_TRUE(zero.says("not ready"));
 }
 
-// The zero would be wrong for ever, because it is in the EEPROM.
+// A zero set while the position is invalid would be wrong for ever, because it is in the EEPROM.
 TEST(EslReset, SendsNoZeroAtInvalidPosition) {
   Bench bench;
   bench.shaft.put(7, 1'000'000);

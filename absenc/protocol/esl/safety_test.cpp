@@ -113,7 +113,7 @@ TEST(EslSafety, EveryCheckHasAName) {
     const SafetyVerdict verdict = pair.next();
     EXPECT_EQ(verdict.failed, row.failed) << text_of(verdict.failed).sentence << " / " << text_of(row.failed).sentence;
     EXPECT_FALSE(verdict.position.has_value());
-    // After an error one valid reply is not enough.
+    // After an error one valid reply is not enough for a safe position.
     pair.heal();
     EXPECT_EQ(pair.next().failed, Check::sequence_unknown);
     EXPECT_EQ(pair.next().failed, Check::passed);
@@ -137,7 +137,7 @@ TEST(EslSafety, OtherRepliesAreCountedAsTheProfileSays) {
       pair.monitor.other_exchange(other);
       EXPECT_EQ(pair.next().failed, Check::passed) << static_cast<int>(step) << " " << static_cast<int>(other);
     }
-    pair.reply_to(DataId::position);  // this reply is lost
+    pair.reply_to(DataId::position);  // the encoder sends a reply that the host does not receive
     EXPECT_EQ(pair.next().failed, step == SequenceStep::change ? Check::passed : Check::sequence_jumped);
   }
   EXPECT_EQ(Monitored().judge(DataId::singleturn_short, {}).failed, Check::length);
@@ -161,7 +161,7 @@ unsigned accepted_with(condition::Index index, std::int64_t value, unsigned exch
 }
 
 TEST(EslSafetyCampaign, StuckCountersAndPositionsOfOneChannel) {
-  constexpr unsigned each = 600;  // more exchanges than the counters take to wrap
+  constexpr unsigned each = 600;  // number of exchanges: more than the counters take to wrap
   for (const bool second : {false, true}) {
     const auto of_it = [second](condition::Index first) {
       return static_cast<condition::Index>(first + (second ? 1 : 0));
@@ -178,7 +178,8 @@ TEST(EslSafetyCampaign, StuckCountersAndPositionsOfOneChannel) {
     unsigned tried = 0;
     unsigned near = 0;
     off = 0;
-    for (std::uint32_t stuck = 0; stuck < 0x1000000; stuck += 0x4001, ++tried) {  // every 9-bit position twice
+    // Each 9-bit position of channel 2 occurs twice.
+    for (std::uint32_t stuck = 0; stuck < 0x1000000; stuck += 0x4001, ++tried) {
       const bool is_near = std::abs(wrapped_difference(stuck >> 15, 0x123456 >> 15, 9)) <= 1;
       (is_near ? near : accepted) += accepted_with(of_it(condition::ch1_stuck), stuck, 4, off);
     }
@@ -210,17 +211,17 @@ constexpr std::array<StuckField, 14> stuck_fields{{
     {"CF1", 0, 0xFF},
     {"SF1", 1, seen_status},
     {"ALM1", 2, alarms::unsafe},
-    {"ABS0", 3, 0},  // below the resolution of channel 2
-    {"ABS1", 4, 0},  // its top bit is the lowest of RS, which is within the tolerance
+    {"ABS0", 3, 0},  // undetected: these bits are below the resolution of channel 2
+    {"ABS1", 4, 0},  // the top bit of this byte is the lowest of RS, and undetected because it is within the tolerance
     {"ABS2", 5, 0xFF},
-    {"ABM0", 6, 0},  // no part of a safe position
+    {"ABM0", 6, 0},  // undetected: turns are no part of a safe position
     {"ABM1", 7, 0},
-    {"SC1", 8, 0x7F},  // SC2 has seven bits
+    {"SC1", 8, 0x7F},  // the top bit is undetected, because SC2 has seven bits
     {"CF2", 11, 0xFF},
     {"SF2", 12, seen_status},
     {"ALM2", 13, alarms::unsafe},
     {"RS0", 14, 0xFF},
-    {"RS1, SC2", 15, 0x7F},  // RS1 is within the tolerance
+    {"RS1, SC2", 15, 0x7F},  // RS1 is undetected, because it is within the tolerance
 }};
 
 // Returns the reply with one bit stuck and the CRC of its channel right.
@@ -322,7 +323,7 @@ TEST(EslSafetyCampaign, SmallErrorsAndSwapsOfAnId1Reply) {
   EXPECT_EQ(cut, 0u);
 }
 
-// Replies of the past: the last one repeated, one of `age` replies ago, and a line that delays replies.
+// Faults that deliver old replies: the last one repeated, one of `age` replies ago, and a line that delays replies.
 TEST(EslSafetyCampaign, ReplaysAndDelays) {
   for (const SequenceStep step : {SequenceStep::change, SequenceStep::safety}) {
     std::printf("sequence_step=%s:\n", step == SequenceStep::change ? "change" : "safety");
@@ -353,7 +354,7 @@ TEST(EslSafetyCampaign, ReplaysAndDelays) {
     print(step == SequenceStep::change ? "an older reply once (cannot be seen)" : "an older reply once", 990, older);
     EXPECT_EQ(older, step == SequenceStep::change ? 990u : 0u);
 
-    // From a certain moment on every reply is one cycle late; the first cycle has none.
+    // From one cycle on, every reply is delivered one cycle late, so the first of these cycles has no reply.
     unsigned late = 0;
     pair.trust();
     Wire held = pair.reply_to(pair.monitor.next_id());

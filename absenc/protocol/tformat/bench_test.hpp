@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: a virtual Smart-Abs and a host on one line in virtual time.
+// For the tests of the T-format: a virtual Smart-Abs and a host on one line in virtual time.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -29,7 +29,8 @@ struct RawHost final : sim::testing::RawHost {
   explicit RawHost(Wire request, Time at = {}) : sim::testing::RawHost(std::move(request), 100us, 12us, at) {}
 };
 
-/// Replaces the replies `from` to `to` by refusals.
+/// Returns a fault that replaces the replies from number `from` on, and before number `to`, by refusals with the status
+/// `alarm`.
 inline Tamper refuse(unsigned from, unsigned to, std::uint8_t alarm) {
   return [=](unsigned index, Wire& reply) {
     if (index >= from && index < to) reply = wire(Reply{.status = alarm, .encoder_id = 0x11});
@@ -38,7 +39,7 @@ inline Tamper refuse(unsigned from, unsigned to, std::uint8_t alarm) {
 
 struct Bench : author::testing::UnitBench<17> {
   explicit Bench(Tamper tamper = {}) : UnitBench(tformat::unit, "") { tampered.replies(std::move(tamper)); }
-  /// Runs a conversation to its end and returns it.
+  /// Runs the conversation of a command to its end and returns it.
   template <std::derived_from<Machine<std::uint8_t>> Host>
   Host& run(Host& host) {
     EXPECT_TRUE(line.converse(host));
@@ -53,7 +54,7 @@ struct Bench : author::testing::UnitBench<17> {
   VirtualEncoder& encoder = static_cast<VirtualEncoder&>(device);
 };
 
-/// Sends the requests of a reset, 40 us apart.
+/// Sends `times` requests of a reset, 40 us apart, and checks that each is answered.
 inline void reset(Bench& bench, DataId id, unsigned times = reset_requests) {
   for (unsigned i = 0; i < times; ++i) {
     EXPECT_EQ(bench.raw({control_field(id)}).size(), 6u);

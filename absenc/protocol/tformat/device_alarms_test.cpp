@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Alarms of the virtual Smart-Abs (6.5), its battery and its power.
+// Tests of the virtual Smart-Abs: alarms (6.5), battery and power.
 #include <gtest/gtest.h>
 
 #include "absenc/protocol/tformat/bench_test.hpp"
@@ -49,11 +49,11 @@ TEST(TformatDevice, FullAbsoluteStatusClearsBelow100Rpm) {
   bench.encoder.power_on(bench.line.now(), PowerOn::skip);
   const Reply fast = bench.everything();
   EXPECT_EQ(fast.alarms, alarms::full_absolute_status);
-  EXPECT_EQ(fast.singleturn & 0xFFF, 0u);  // only the top 5 bits are valid
+  EXPECT_EQ(fast.singleturn & 0xFFF, 0u);  // only the top 5 bits of the position are valid, the others are 0
   bench.shaft.spin(99, bench.line.now());
   EXPECT_EQ(bench.everything().alarms, 0);
   bench.shaft.spin(3000, bench.line.now());
-  EXPECT_EQ(bench.everything().alarms, 0);  // full_absolute_status arises at power on only
+  EXPECT_EQ(bench.everything().alarms, 0);  // full_absolute_status is raised at power on only
 }
 
 TEST(TformatDevice, BatteryFlags) {
@@ -64,8 +64,9 @@ TEST(TformatDevice, BatteryFlags) {
   bench.condition(battery_voltage, 3600);
   EXPECT_EQ(bench.everything().alarms, 0);  // battery_alarm is not latched
   bench.condition(battery_voltage, 2600);
-  bench.encoder.power_on(bench.line.now(), PowerOn::skip);      // the encoder is on already
-  EXPECT_EQ(bench.everything().alarms, alarms::battery_alarm);  // battery_error arises only while the power is off
+  bench.encoder.power_on(bench.line.now(), PowerOn::skip);  // the encoder is on already
+  // Battery_error is raised only for a failure while the power is off.
+  EXPECT_EQ(bench.everything().alarms, alarms::battery_alarm);
   bench.restart();
   const Reply lost = bench.everything();
   EXPECT_EQ(lost.alarms, alarms::battery_alarm | alarms::battery_error);
@@ -160,7 +161,7 @@ TEST(TformatDevice, OverSpeedArisesWhileTheBatteryCounts) {
   bench.encoder.power_on(bench.line.now(), PowerOn::skip);
   const Reply reply = bench.encoder.everything(bench.line.now());
   EXPECT_EQ(reply.alarms & alarms::over_speed, alarms::over_speed);
-  EXPECT_EQ(reply.multiturn, (bench.shaft.at(bench.line.now()).position >> 32) - 1);  // one turn is missing
+  EXPECT_EQ(reply.multiturn, (bench.shaft.at(bench.line.now()).position >> 32) - 1);  // the counter misses one turn
 }
 
 // 5.4.2: for the first five seconds without power the counter follows a faster jolt.
@@ -194,7 +195,7 @@ TEST(TformatDevice, IsSilentWhileItStarts) {
     Bench bench;
     bench.condition(battery_voltage, battery ? 3600 : 0);
     bench.restart(PowerOn::real);
-    const Time start = battery ? 1s : 1500ms;  // 5.4
+    const Time start = battery ? 1s : 1500ms;  // start-up time (5.4)
     testing::RawHost early({0x1A}, start - 1ms);
     EXPECT_TRUE(bench.run(early).reply.empty());
     testing::RawHost late({0x1A}, start);

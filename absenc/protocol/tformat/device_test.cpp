@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The virtual Smart-Abs against the paragraphs of its specification, with requests written as bytes.
+// Tests of the virtual Smart-Abs against the paragraphs of its specification, with requests written as bytes.
 #include "absenc/protocol/tformat/device.hpp"
 
 #include <gtest/gtest.h>
@@ -35,14 +35,15 @@ TEST(TformatDevice, CountsRoundTheTurnAndBelowZero) {
   const Reply reply = bench.everything();
   EXPECT_EQ(reply.singleturn, 0x1FFFFu);
   EXPECT_EQ(reply.multiturn, 0xFFFFu);
-  EXPECT_EQ(reply.alarms, alarms::counter_overflow);  // the counter started at 0
+  // Counter_overflow: the turn counter started at 0 and went below it.
+  EXPECT_EQ(reply.alarms, alarms::counter_overflow);
 
   testing::TestShaft below_zero;
   below_zero.put(-1, 0);
   VirtualEncoder encoder({}, below_zero);
   encoder.power_on(Time{}, PowerOn::skip);
   EXPECT_EQ(encoder.everything(Time{}).multiturn, 0xFFFFu);
-  EXPECT_EQ(encoder.everything(Time{}).alarms, 0);  // the counter started at this value
+  EXPECT_EQ(encoder.everything(Time{}).alarms, 0);  // no counter_overflow: the turn counter started at this value
 }
 
 // ---- Abnormal requests (8.4, 9.4)
@@ -51,14 +52,14 @@ TEST(TformatDevice, AnswersAbnormalRequestsLikeId3) {
   Bench bench;
   const Wire plain = wire(Reply{.encoder_id = 0x11});
   const Wire parity = wire(Reply{.status = status::parity_error, .encoder_id = 0x11});
-  EXPECT_EQ(bench.raw({0x9A}), parity);                          // wrong parity of ID 3
-  EXPECT_EQ(bench.raw({control_field(0x4)}), plain);             // unknown id
-  EXPECT_EQ(bench.raw({0xEA, 0x01, 0xEC}), plain);               // wrong CRC
-  EXPECT_EQ(bench.raw({0xEA, 0x01}), plain);                     // incomplete
-  EXPECT_EQ(bench.raw({0x32, 0x81, 0x00, 0x32 ^ 0x81}), plain);  // busy bit in a request
-  EXPECT_EQ(bench.raw({0x00}), Wire{});                          // wrong sync code: no answer
-  EXPECT_EQ(bench.raw({0x00, 0x1A}), plain);                     // the next start is found
-  EXPECT_EQ(memory_write(bench, 127, 6), plain);                 // closed page
+  EXPECT_EQ(bench.raw({0x9A}), parity);                          // request with ID 3 and a wrong parity bit
+  EXPECT_EQ(bench.raw({control_field(0x4)}), plain);             // request with an unknown ID
+  EXPECT_EQ(bench.raw({0xEA, 0x01, 0xEC}), plain);               // request with a wrong CRC
+  EXPECT_EQ(bench.raw({0xEA, 0x01}), plain);                     // incomplete request
+  EXPECT_EQ(bench.raw({0x32, 0x81, 0x00, 0x32 ^ 0x81}), plain);  // request with the busy bit
+  EXPECT_EQ(bench.raw({0x00}), Wire{});           // request with a wrong sync code, which is not answered
+  EXPECT_EQ(bench.raw({0x00, 0x1A}), plain);      // the request 1A after a wrong byte is found
+  EXPECT_EQ(memory_write(bench, 127, 6), plain);  // page 6 is closed
   EXPECT_EQ(memory_write(bench, 127, 7), wire(hex<"327F074A">));
   bench.pass(memory_time);
   EXPECT_EQ(memory_read(bench, 3), plain);  // page 7 is closed except for addresses 4 and 5
@@ -121,7 +122,7 @@ TEST(TformatDevice, IsBusyFor18MillisecondsAfterAWrite) {
   // The write during the busy time was not executed.
   EXPECT_EQ(memory_read(bench, 6), wire(Reply{.id = DataId::read_memory, .address = 6}));
   EXPECT_EQ(bench.encoder.writes(), 1u);
-  EXPECT_EQ(bench.violations(), 0u);  // asking a writing encoder whether it is ready is permitted
+  EXPECT_EQ(bench.violations(), 0u);  // a host may send read requests while the encoder writes
 }
 
 TEST(TformatDevice, PagesAreSeparateAndChangingThemTakesTime) {
@@ -132,7 +133,7 @@ TEST(TformatDevice, PagesAreSeparateAndChangingThemTakesTime) {
     memory_write(bench, 126, static_cast<std::uint8_t>(0xA0 + page));
     bench.pass(memory_time);
   }
-  EXPECT_EQ(bench.encoder.writes(), 6u);  // page changes do not write the EEPROM
+  EXPECT_EQ(bench.encoder.writes(), 6u);  // the count of EEPROM writes excludes page changes
   memory_write(bench, 127, 2);
   memory_read(bench, 126);
   ASSERT_EQ(bench.violations(), 1u);
@@ -152,7 +153,7 @@ TEST(TformatDevice, TenRequestsMakeAReset) {
   bench.shaft.put(7, 1000);
   bench.encoder.raise_alarms(alarms::over_heat | alarms::counter_overflow);
   reset(bench, DataId::clear_alarms, 9);
-  EXPECT_NE(bench.everything().alarms, 0);  // this read restarts the count
+  EXPECT_NE(bench.everything().alarms, 0);  // a read restarts the count of reset requests
   reset(bench, DataId::clear_alarms, 9);
   EXPECT_NE(bench.raw({0xBA})[1] & status::alarm, 0);  // the tenth reply still shows the old alarms
   bench.pass(40us);
@@ -271,7 +272,7 @@ TEST(TformatDevice, RequestDuringTransmissionIsAViolation) {
   }
 }
 
-// Bytes in two writes: the second may arrive while the first is answered, or afterwards.
+// The host sends its bytes in two writes: the second may arrive while the first is answered, or afterwards.
 TEST(TformatDevice, DetectsRequestsWithoutPauseInAnyPieces) {
   testing::TestShaft shaft;
   const Wire one{0x1A};
@@ -308,7 +309,7 @@ TEST(TformatDevice, HostThatNeverWaitsIsNotExcused) {
   EXPECT_EQ(ask(thrice), 0u);
   EXPECT_EQ(ask(thrice), 2u);
   EXPECT_EQ(ask(thrice), 4u);
-  // A host that waited in between is excused again.
+  // A host that waited between its requests is excused again.
   EXPECT_EQ(ask(once), 4u);
   EXPECT_EQ(ask(thrice), 4u);
 }

@@ -88,7 +88,7 @@ TEST(TformatFrame, RefusalDiffersFromWrongLength) {
   EXPECT_EQ(decode_reply({}, {DataId::singleturn}, damaged).error(), Error::bad_checksum);
 }
 
-// Table 5, 9.1.
+// Replies to memory requests (Table 5, 9.1).
 TEST(TformatFrame, MemoryReplyMatchesItsRequest) {
   const Request write{DataId::write_memory, 5, 7};
   const auto answered = [&write](std::uint8_t address, bool busy, std::uint8_t value, bool strict = true) {
@@ -105,11 +105,11 @@ TEST(TformatFrame, MemoryReplyMatchesItsRequest) {
 
 TEST(TformatFrame, RefusesInvalidRequests) {
   EXPECT_EQ(decode_request({}).error(), Error::wrong_length);
-  EXPECT_EQ(decode_request(hex<"328100B3">).error(), Error::out_of_range);  // the busy bit is set
+  EXPECT_EQ(decode_request(hex<"328100B3">).error(), Error::out_of_range);  // request with the busy bit
   EXPECT_TRUE(decode_request(hex<"32010033">));
 }
 
-// Paragraph 6.5: which alarm makes which part of a reading invalid.
+// Each alarm makes the parts of a reading invalid that paragraph 6.5 states.
 TEST(TformatFrame, ValidityOfEachPart) {
   struct Row {
     std::uint8_t almc;
@@ -147,7 +147,8 @@ TEST(TformatFrame, PartialRepliesLeaveValidityUnknown) {
   EXPECT_EQ(to_reading({}, alarmed, 0).multiturn_validity(), Validity::unknown);
 }
 
-// SF reports only that one of four alarms is raised; one that a reply to ID 3 has reported explains it.
+// SF reports only that one of four alarms is raised; if a reply to ID 3 has reported one of the four, that alarm
+// explains it.
 TEST(TformatFrame, KnownAlarmExplainsStatus) {
   const Reply turns{.id = DataId::multiturn, .status = status::alarm, .multiturn = 5};
   for (const std::uint8_t harmless : {alarms::over_heat, alarms::battery_alarm}) {
@@ -158,7 +159,7 @@ TEST(TformatFrame, KnownAlarmExplainsStatus) {
   EXPECT_EQ(to_reading({}, turns, alarms::battery_error).multiturn_validity(), Validity::invalid);
 }
 
-// 6.3.2: SF has counting_error, and one bit for four other alarms.
+// SF has a bit for counting_error, and one bit for four other alarms (6.3.2).
 TEST(TformatFrame, StatusReportsPartOfTheAlarms) {
   constexpr std::uint8_t in_status = alarms::counting_error | alarms::shown_in_status;
   struct Row {
@@ -182,7 +183,7 @@ TEST(TformatFrame, StatusReportsPartOfTheAlarms) {
   EXPECT_EQ(to_reading({}, {.id = DataId::read_memory}).status_reported, 0u);
 }
 
-// 2 (1): a missing battery sets `alarm` of SF for ever.
+// Without a battery the bit `alarm` of SF is always set (2 (1)).
 TEST(TformatFrame, WithoutBatteryStatusLeavesFourAlarmsUnknown) {
   constexpr Format format{.battery = false};
   const auto whole = [&](std::uint8_t more) {
@@ -202,7 +203,7 @@ TEST(TformatFrame, WithoutBatteryStatusLeavesFourAlarmsUnknown) {
   EXPECT_EQ(remembered(part, whole(0)).alarms_reported, whole(0).alarms_reported);
 }
 
-// Alarms known after each of several replies, as in a capture.
+// Checks the alarms that are known after each of several replies, as in a capture.
 TEST(TformatFrame, LaterRepliesCompleteWhatEarlierOnesReported) {
   const auto part = [](std::uint8_t sf) { return to_reading({}, {.id = DataId::singleturn, .status = sf}); };
   const auto whole = [](std::uint8_t almc) {

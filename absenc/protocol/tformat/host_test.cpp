@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Positions and explained refusals, with the virtual Smart-Abs in virtual time.
+// Tests of readings and of explained refusals, with the virtual Smart-Abs in virtual time.
 #include "absenc/protocol/tformat/host.hpp"
 
 #include <gtest/gtest.h>
@@ -63,14 +63,14 @@ TEST(TformatHost, ReadsPartsWithTheirAlarms) {
   ReadPosition first({}, DataId::singleturn);
   EXPECT_EQ(bench.run(first).reading()->singleturn, 0x12345u);
   EXPECT_TRUE(first.reading()->singleturn_valid());
-  EXPECT_EQ(bench.encoder.answer_count(), 2u);  // preceded by an ID 3
+  EXPECT_EQ(bench.encoder.answer_count(), 2u);  // the reading with ID 0 or 1 is preceded by one with ID 3
   ReadPosition turns({}, DataId::multiturn, 0);
   EXPECT_EQ(bench.run(turns).reading()->multiturn, 4660u);
   EXPECT_EQ(bench.encoder.answer_count(), 3u);
   bench.encoder.raise_alarms(alarms::multiturn_error);
   ReadPosition alarmed({}, DataId::multiturn, 0);
   bench.run(alarmed);
-  EXPECT_EQ(bench.encoder.answer_count(), 5u);  // followed by an ID 3
+  EXPECT_EQ(bench.encoder.answer_count(), 5u);  // the reading is followed by one with ID 3
   EXPECT_FALSE(alarmed.reading()->multiturn_valid);
   EXPECT_EQ(alarmed.reading()->alarms, alarms::multiturn_error);
   const auto id = bench.run("encoder-id");
@@ -137,13 +137,14 @@ TEST(TformatHost, GuessesRequestsAndRefusesInvalidOnes) {
   };
   const Wire good = testing::wire(Reply{.id = DataId::everything, .encoder_id = 0x11});
   EXPECT_EQ(error({}, good), Error::none);
-  EXPECT_EQ(error({}, {0x22, 0, 0, 0, 0, 0x22}), Error::unexpected_reply);  // an id that Table 1 does not list
+  // Reply with an ID that Table 1 does not list.
+  EXPECT_EQ(error({}, {0x22, 0, 0, 0, 0, 0x22}), Error::unexpected_reply);
   EXPECT_EQ(error({0x9A}, good), Error::request_rejected);
   EXPECT_EQ(error({0x9A}, Wire(good.begin(), good.end() - 1)), Error::bad_checksum);
 }
 
 TEST(TformatHost, ProceduresRepeatRefusedRequests) {
-  Bench bench(refuse(2, 3, status::parity_error));  // the read after the page select
+  Bench bench(refuse(2, 3, status::parity_error));  // reply 2, to the memory read after the page select, is a refusal
   const auto read = bench.run("temperature");
   EXPECT_EQ(read.error, Error::none);
   EXPECT_EQ(read.numbers, (Numbers{{"temperature_c", 35}}));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Commands with several steps, with the virtual Smart-Abs in virtual time.
+// Tests of commands with several steps, with the virtual Smart-Abs in virtual time.
 #include <gtest/gtest.h>
 
 #include "absenc/protocol/tformat/bench_test.hpp"
@@ -35,22 +35,22 @@ TEST(TformatProcedures, RestoresThePageBefore) {
 }
 
 TEST(TformatProcedures, ReportsPageThatStaysSelected) {
-  // An encoder that refuses to report the selected page, as it does for a closed address (9.4).
+  // The encoder refuses to report the selected page, as it does for a closed address (9.4).
   Bench refusing(refuse(0, 3, 0));
   EXPECT_EQ(refusing.run("temperature").numbers, (Numbers{{"temperature_c", 35}, {"page_left", 7}}));
-  // An encoder that reports a page that does not exist.
+  // The encoder reports a page that does not exist.
   Bench odd([](unsigned index, Wire& reply) {
     if (index == 0) reply = wire(Reply{.id = DataId::read_memory, .address = page_select_address, .value = 9});
   });
   EXPECT_EQ(odd.run("temperature").numbers, (Numbers{{"temperature_c", 35}, {"page_left", 7}}));
   EXPECT_EQ(odd.encoder.answer_count(), 3u);
-  // An encoder that reports another page in the end than the one that was selected again.
+  // The encoder reports another page at the end than the one that was selected again.
   Bench other([](unsigned index, Wire& reply) {
     if (index == 4) reply = wire(Reply{.id = DataId::read_memory, .address = page_select_address, .value = 3});
   });
   EXPECT_EQ(other.run("temperature").numbers, (Numbers{{"temperature_c", 35}, {"page_left", 7}}));
   struct Row {
-    unsigned lost;  // replies are lost from this one on: page, page select, temperature, page select, page
+    unsigned lost;  // number of the first lost reply: page, page select, temperature, page select, page
     Error error;
     bool left;
   };
@@ -63,7 +63,7 @@ TEST(TformatProcedures, ReportsPageThatStaysSelected) {
     EXPECT_EQ(lost.error, row.error) << row.lost;
     EXPECT_EQ(lost.says("page 7 may be left selected"), row.error != Error::none) << lost.detail;
     EXPECT_EQ(lost.numbers.contains("page_left"), row.left && row.error == Error::none) << row.lost;
-    // A page change that may still be going on is over when the next request is sent.
+    // A page change that may still be in progress is over when the next request is sent.
     const Wire answer = bench.raw({0xEA, 0x7F, 0x95});
     EXPECT_EQ(bench.violations(), 0u) << row.lost;
   }
@@ -138,7 +138,7 @@ TEST(TformatProcedures, RefusesClosedMemoryBeforeSending) {
   EXPECT_EQ(bench.encoder.answer_count(), 0u);
 }
 
-// Replies: page select, read, write, page select, read.
+// The command memory-write gets these replies: page select, read, write, page select, read.
 TEST(TformatProcedures, VerifiesWritesByReadingBackAndNeverRepeatsThem) {
   struct Row {
     const char* what;
@@ -210,7 +210,7 @@ TEST(TformatProcedures, WaitsForABusyEncoder) {
   }
   Bench writing(busy(2, 99));
   EXPECT_EQ(writing.run("memory-write", {1, 1, 0}).error, Error::busy);
-  EXPECT_LE(writing.line.now(), 95ms);  // nothing else is tried
+  EXPECT_LE(writing.line.now(), 95ms);  // after a busy timeout no other request is sent
 }
 
 // ---- Resets
