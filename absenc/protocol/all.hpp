@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The one list of protocol units, over which the command, the capture decoder and the generic tests iterate.
+// The list of all protocol units, over which the command line tool, the capture decoder and the generic tests iterate.
 #pragma once
 
 #include <span>

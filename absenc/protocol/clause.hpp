@@ -49,7 +49,7 @@ enum class Demand : std::uint8_t {
   restarts  ///< after `command` the encoder is silent at first; `value` ms later it reports the position from before
 };
 
-/// Returns whether a demand is about a change of the encoder.
+/// Returns whether testing a clause of this kind changes the encoder.
 [[nodiscard]] constexpr bool changes_encoder(Demand demand) { return demand >= Demand::byte_written; }
 /// Returns whether testing a clause of this kind may lose a value of the encoder for good: a position, turns, an alarm.
 [[nodiscard]] constexpr bool loses(Demand demand) { return demand >= Demand::zero; }
@@ -92,7 +92,7 @@ struct Clause {
   std::string_view id;         ///< identifier, unique in its unit: "crc"
   std::string_view paragraph;  ///< paragraph of the unit's document
   std::string_view words;      ///< Demand of the document, in words.
-  Demand demand;               ///< Kind of the demand.
+  Demand demand;               ///< Kind of the clause, which selects its test.
   /// Options of encoders to which the clause applies: "carries=biss", "crc_width!=0"; empty: all.
   std::string_view needs{};
   Errors errors = 0;  ///< demand as_drawn: errors of replies that break the clause; 0: form_errors
@@ -112,7 +112,7 @@ struct Clause {
   std::string_view shown_with{};  ///< options of a virtual encoder that shows the case, if its defaults do not
 };
 
-/// Kind of a clause for hosts.
+/// Kind of a clause for hosts: the behaviour that the document demands.
 enum class HostDemand : std::uint8_t {
   asks,           ///< the encoder answers the host's requests
   after_silence,  ///< the host repeats its request if the encoder sends no reply
@@ -141,12 +141,12 @@ struct HostClause {
   std::string_view id;         ///< Identifier, unique within the unit.
   std::string_view paragraph;  ///< Paragraph of the document.
   std::string_view words;      ///< Demand of the document, in words.
-  HostDemand demand;           ///< Kind of the demand.
+  HostDemand demand;           ///< Kind of the clause, which selects its test.
   /// Name of the rule that the virtual encoder checks; the clause is untested until the encoder has checked this rule.
   std::string_view rule{};
   // Test hosts for this clause. The common test steps do not break it (two commands in a row, pauses left out, a
   // controller that is too fast, too early or in another mode), so it has hosts of its own.
-  std::array<HostScript, 2> breaks{};  ///< two hosts that break this clause and no other
+  std::array<HostScript, 2> breaks{};  ///< two scripted hosts that break this clause and no other
   HostScript keeps{};                  ///< a host that does the same as `breaks` and keeps this clause
   /// Options of the virtual encoder for the hosts `breaks` and `keeps`: "acquisition_us=20000".
   std::string_view options{};

@@ -29,18 +29,18 @@ inline constexpr std::string_view read_the_alarms = "`absenc alarms` names the c
 
 /// Description of a field, which is a named value in requests, replies or results.
 struct FieldInfo {
-  /// Type of the value.
+  /// Type of the field's value.
   enum class Kind : std::uint8_t {
     number,
     counts,  ///< unsigned number of up to 64 bits, stored in the 64 bits of FieldValue::number
     boolean,
     flags,  ///< number whose bit n is described by `flags[n]`
     real,
-    text,   ///< ASCII text
-    bytes,  ///< bytes, shown in hexadecimal
+    text,   ///< text of ASCII characters
+    bytes,  ///< several bytes, shown in hexadecimal
   };
   std::string_view name;              ///< Name of the field, in `snake_case`.
-  Kind kind;                          ///< Type of the value.
+  Kind kind;                          ///< Type of the field's value.
   std::string_view unit;              ///< unit of the value: "counts", "revolutions", "degC" ...; "" for a plain number
   std::string_view meaning;           ///< Meaning of the value, as a phrase.
   std::span<const FlagInfo> flags{};  ///< kind flags: descriptions of the bits, from bit 0 on

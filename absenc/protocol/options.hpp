@@ -47,7 +47,7 @@ struct Option {
 
 /// An option together with a value of it.
 struct OptionValue {
-  std::size_t option;  ///< index into the unit's options
+  std::size_t option;  ///< index of the option in Unit::options
   std::int64_t value;  ///< The value of the option.
 };
 

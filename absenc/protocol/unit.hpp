@@ -40,7 +40,7 @@ enum class Verb : std::uint8_t {
 /// Description of an argument of a command.
 struct Argument {
   std::string_view name;           ///< Name of the argument, as in `NAME=VALUE`.
-  std::string_view meaning;        ///< Meaning of the value, with its unit.
+  std::string_view meaning;        ///< Meaning of the number, with its unit, as a phrase.
   std::int64_t minimum;            ///< Lowest permitted value.
   std::int64_t maximum;            ///< Highest permitted value.
   std::int64_t default_value = 0;  ///< Value if the user does not give an argument that is not `required`.
@@ -86,7 +86,7 @@ struct MemoryArea {
   std::uint32_t write_life = 0;  ///< number of writes that the document permits; 0: the document states none
   /// Why memory_write needs its argument with the role force for this area; "": it does not need it.
   std::string_view protection{};
-  /// True: `write_life` counts the writes of all bytes together; false: the document does not state it.
+  /// Whether `write_life` counts the writes of all bytes together; false: the document does not state it.
   bool life_in_total = false;
   std::uint32_t pages = 1;  ///< number of pages, from `page` on, with such an area; an encoder may have fewer
 
@@ -112,7 +112,7 @@ struct Condition {
   std::string_view name;  ///< Name of the condition.
   /// Unit of the value, as in FieldInfo::unit; "" for a plain number, and for yes (1) or no (0).
   std::string_view unit;
-  std::string_view meaning;  ///< Meaning of the value, with its unit.
+  std::string_view meaning;  ///< Meaning of the number, with its unit, as a phrase.
   std::int64_t minimum;      ///< Lowest permitted value.
   std::int64_t maximum;      ///< Highest permitted value.
   std::int64_t normal;       ///< initial value: that of a healthy installation
@@ -157,8 +157,8 @@ struct Capture {
 
 /// Result of comparing captures with one value of one option: whether the captured encoder may have this value.
 struct OptionEvidence {
-  std::size_t option;    ///< index into the unit's options
-  std::int64_t value;    ///< Value of the option.
+  std::size_t option;    ///< index of the option in Unit::options
+  std::int64_t value;    ///< value of the option that the evidence is about
   bool possible;         ///< Whether an encoder with this value of the option may have sent the captured frames.
   std::size_t capture;   ///< if not `possible`: index of the first capture that contradicts the value
   std::string_view why;  ///< reason why the value is possible or not, a sentence
@@ -209,17 +209,17 @@ struct Follower {
   ~Follower() = default;
 };
 
-/// Direction of a frame.
+/// Direction of a frame: from the host (request) or from the encoder (reply).
 enum class Direction : std::uint8_t { request, reply };
 
-/// Where a frame ends in a sequence of bytes.
+/// Result of searching the end of the frame that begins with the first of several bytes.
 struct FrameEnd {
-  /// Whether a frame ends in a sequence of bytes.
+  /// Whether the bytes contain a complete frame, could do so, or cannot.
   enum class Kind : std::uint8_t {
     complete,            ///< the first `size` bytes are one frame
     incomplete,          ///< a frame may have begun; at least `size` bytes in all are needed to decide
     no_frame,            ///< no frame begins with the first byte
-  } kind;                ///< Whether the bytes contain a complete frame.
+  } kind;                ///< Whether the frame is complete.
   std::size_t size = 0;  ///< Length in bytes, as `kind` describes it; 0 for `no_frame`.
 };
 

@@ -42,7 +42,7 @@ class WordFieldName {
 
   /// Returns the name.
   constexpr operator std::string_view() const { return {text_.data(), size_}; }
-  /// Returns whether the names are equal.
+  /// Returns whether the name `left` equals the text `right`.
   friend constexpr bool operator==(const WordFieldName& left, std::string_view right) {
     return std::string_view(left) == right;
   }

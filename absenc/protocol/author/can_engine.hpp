@@ -21,9 +21,9 @@ struct CanHostTimes {
 /// that were complete before the request was sent are not delivered to the subclass, unless it calls `overhear`.
 class CanEngine : public Conversation<CanFrame> {
  public:
-  /// Takes an event of the port.
+  /// Handles an event that the port reports.
   void feed(const Event<CanFrame>& event) final;
-  /// Returns the next step of the port.
+  /// Returns the next step that the port must take.
   Step<CanFrame> next(Time now) final;
   /// Puts nothing, so that names and texts of fields are only linked where they are used. Reported (command.hpp) puts
   /// them.

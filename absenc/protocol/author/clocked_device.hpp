@@ -17,9 +17,9 @@ using DrivenBits = BitBuffer<512>;
 /// A virtual encoder on a clocked link; a subclass provides the bits.
 class ClockedDevice : public EncoderOn<std::uint8_t> {
  public:
-  /// Takes an event of the port.
+  /// Handles an event that the port reports.
   void feed(const Event<std::uint8_t>& event) final;
-  /// Returns the next step of the port.
+  /// Returns the next step that the port must take.
   Step<std::uint8_t> next(Time now) final;
   /// Switches the encoder off.
   void power_off(Time now) override;

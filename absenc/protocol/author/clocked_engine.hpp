@@ -22,9 +22,9 @@ struct ClockedHostTimes {
 /// too, because another host may have clocked just before.
 class ClockedEngine : public Conversation<std::uint8_t> {
  public:
-  /// Takes an event of the port.
+  /// Handles an event that the port reports.
   void feed(const Event<std::uint8_t>& event) final;
-  /// Returns the next step of the port.
+  /// Returns the next step that the port must take.
   Step<std::uint8_t> next(Time now) override;
   [[nodiscard]] Error error() const final { return error_; }
   /// Puts nothing, so that names and texts of fields are only linked where they are used. Reported (command.hpp) puts

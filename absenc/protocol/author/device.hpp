@@ -31,9 +31,9 @@ struct DeviceTimes {
 /// encoder from a protocol.
 class Responder : public EncoderOn<std::uint8_t> {
  public:
-  /// Takes an event of the port.
+  /// Handles an event that the port reports.
   void feed(const Event<std::uint8_t>& event) override;
-  /// Returns the next step of the port.
+  /// Returns the next step that the port must take.
   Step<std::uint8_t> next(Time now) override;
 
   /// Switches the encoder off.

@@ -46,9 +46,9 @@ struct Manner {
 /// can destroy the encoder's driver. A valid reply ends the exchange at once.
 class Engine : public Conversation<std::uint8_t> {
  public:
-  /// Takes an event of the port.
+  /// Handles an event that the port reports.
   void feed(const Event<std::uint8_t>& event) final;
-  /// Returns the next step of the port.
+  /// Returns the next step that the port must take.
   Step<std::uint8_t> next(Time now) final;
   [[nodiscard]] Error error() const final { return error_; }
   /// Puts nothing, so that names and texts of fields are only linked where they are used. Reported (command.hpp) puts

@@ -59,7 +59,7 @@ struct RunResult : FieldSink {
   Time took{};
 };
 
-/// Returns the options of a text "name=value name=value".
+/// Returns the option values that a text such as "name=value name=value" sets.
 inline Options options_of(const Unit& unit, std::string_view text) {
   std::vector<OptionText> settings;
   for_each_value(text, [&settings](std::string_view name, std::string_view value) {

@@ -20,31 +20,33 @@ namespace absenc::esl {
 /// Bits of SF, the status field of a channel, in the order of the document (Table 5). The option `status_order` gives
 /// their order on the wire.
 namespace status {
-/// The request was received with a wrong parity bit and not executed.
+/// Status bit: the request was received with a wrong parity bit and not executed.
 inline constexpr std::uint8_t parity_error = 0x01;
-inline constexpr std::uint8_t stop_error = 0x02;  ///< the request was received with a wrong stop bit and not executed
-/// An error of single-turn position, memory, voltage or LED: the position is not safe.
+/// Status bit: the request was received with a wrong stop bit and not executed.
+inline constexpr std::uint8_t stop_error = 0x02;
+/// Status bit: an error of single-turn position, memory, voltage or LED: the position is not safe.
 inline constexpr std::uint8_t safety_error = 0x04;
-inline constexpr std::uint8_t non_safety_error = 0x08;     ///< an error of turns, Lissajous signals or speed
-inline constexpr std::uint8_t temperature_warning = 0x10;  ///< the encoder is too warm
-inline constexpr std::uint8_t channel_2 = 0x20;  ///< set in the status of channel 2, clear in that of channel 1
-inline constexpr std::uint8_t ready = 0x40;      ///< the encoder has started
-inline constexpr std::uint8_t forced_test_passed = 0x80;  ///< the forced test has passed
+inline constexpr std::uint8_t non_safety_error = 0x08;  ///< status bit: an error of turns, Lissajous signals or speed
+inline constexpr std::uint8_t temperature_warning = 0x10;  ///< status bit: the encoder is too warm
+/// Status bit: set in the status of channel 2, clear in that of channel 1.
+inline constexpr std::uint8_t channel_2 = 0x20;
+inline constexpr std::uint8_t ready = 0x40;               ///< status bit: the encoder has started
+inline constexpr std::uint8_t forced_test_passed = 0x80;  ///< status bit: the forced test has passed
 /// Mask of the bits that show that the encoder refused the request.
 inline constexpr std::uint8_t rejected = parity_error | stop_error;
 }  // namespace status
 
 /// Bits of ALM, the alarms of a channel (Table 7).
 namespace alarms {
-inline constexpr std::uint8_t xc_error = 0x01;         ///< the turn counter missed five times in a row
-inline constexpr std::uint8_t multiturn_error = 0x02;  ///< the turn counter was found wrong
-/// The LED current or the signals of the disc are out of range.
+inline constexpr std::uint8_t xc_error = 0x01;         ///< alarm: the turn counter missed five times in a row
+inline constexpr std::uint8_t multiturn_error = 0x02;  ///< alarm: the turn counter was found wrong
+/// Alarm: the LED current or the signals of the disc are out of range.
 inline constexpr std::uint8_t led_or_lissajous_error = 0x04;
-inline constexpr std::uint8_t overspeed = 0x08;                        ///< the shaft turned faster than 10 000 rpm
-inline constexpr std::uint8_t memory_error = 0x10;                     ///< the encoder could not load its settings
-inline constexpr std::uint8_t singleturn_error = 0x20;                 ///< the position within the turn was found wrong
-inline constexpr std::uint8_t under_voltage = 0x40;                    ///< the inner supply is below 2.9 V
-inline constexpr std::uint8_t over_voltage = 0x80;                     ///< the inner supply is above 3.7 V
+inline constexpr std::uint8_t overspeed = 0x08;         ///< alarm: the shaft turned faster than 10 000 rpm
+inline constexpr std::uint8_t memory_error = 0x10;      ///< alarm: the encoder could not load its settings
+inline constexpr std::uint8_t singleturn_error = 0x20;  ///< alarm: the position within the turn was found wrong
+inline constexpr std::uint8_t under_voltage = 0x40;     ///< alarm: the inner supply is below 2.9 V
+inline constexpr std::uint8_t over_voltage = 0x80;      ///< alarm: the inner supply is above 3.7 V
 inline constexpr std::uint8_t voltage = under_voltage | over_voltage;  ///< mask of the voltage alarms
 /// Mask of the alarms that make the turns invalid.
 inline constexpr std::uint8_t turns_wrong = xc_error | multiturn_error;

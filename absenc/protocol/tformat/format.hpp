@@ -84,27 +84,32 @@ enum class DataId : std::uint8_t {
 
 /// Bits of SF, the status field of replies (6.3.2).
 namespace status {
-inline constexpr std::uint8_t information = 0x0F;     ///< mask of the four information bits, always 0
-inline constexpr std::uint8_t counting_error = 0x10;  ///< ea0: the encoder found the position within the turn wrong
-inline constexpr std::uint8_t alarm = 0x20;  ///< ea1: over-heat, multi-turn error, battery error or battery alarm
-inline constexpr std::uint8_t parity_error = 0x40;     ///< ca0: the request was received with a parity error
-inline constexpr std::uint8_t delimiter_error = 0x80;  ///< ca1: the request was received with a wrong stop bit
+inline constexpr std::uint8_t information = 0x0F;  ///< mask of the four information bits, always 0
+/// Status bit ea0: the encoder found the position within the turn wrong.
+inline constexpr std::uint8_t counting_error = 0x10;
+/// Status bit ea1: over-heat, multi-turn error, battery error or battery alarm.
+inline constexpr std::uint8_t alarm = 0x20;
+inline constexpr std::uint8_t parity_error = 0x40;  ///< status bit ca0: the request was received with a parity error
+/// Status bit ca1: the request was received with a wrong stop bit.
+inline constexpr std::uint8_t delimiter_error = 0x80;
 /// Mask of the bits that show that the encoder refused the request.
 inline constexpr std::uint8_t rejected = parity_error | delimiter_error;
 }  // namespace status
 
 /// Bits of ALMC, the alarms in a reply to data ID 3 (Table 3, 6.5).
 namespace alarms {
-inline constexpr std::uint8_t over_speed = 0x01;  ///< without power the shaft turned faster than the counter follows
-/// Switched on at 100 rpm or more: only the top 5 bits of the position are valid.
+/// Alarm: without power the shaft turned faster than the counter follows.
+inline constexpr std::uint8_t over_speed = 0x01;
+/// Alarm: switched on at 100 rpm or more: only the top 5 bits of the position are valid.
 inline constexpr std::uint8_t full_absolute_status = 0x02;
-inline constexpr std::uint8_t counting_error = 0x04;    ///< the position within the turn was found wrong
-inline constexpr std::uint8_t counter_overflow = 0x08;  ///< the turn counter wrapped around
-inline constexpr std::uint8_t over_heat = 0x10;         ///< the encoder is or was hotter than its threshold
-inline constexpr std::uint8_t multiturn_error = 0x20;   ///< a bit of the turn counter jumped, so the turns are wrong
-/// The battery was at 2.75 V or less without power, so the turns are lost.
+inline constexpr std::uint8_t counting_error = 0x04;    ///< alarm: the position within the turn was found wrong
+inline constexpr std::uint8_t counter_overflow = 0x08;  ///< alarm: the turn counter wrapped around
+inline constexpr std::uint8_t over_heat = 0x10;         ///< alarm: the encoder is or was hotter than its threshold
+/// Alarm: a bit of the turn counter jumped, so the turns are wrong.
+inline constexpr std::uint8_t multiturn_error = 0x20;
+/// Alarm: the battery was at 2.75 V or less without power, so the turns are lost.
 inline constexpr std::uint8_t battery_error = 0x40;
-inline constexpr std::uint8_t battery_alarm = 0x80;  ///< the battery is at 3.1 V or less
+inline constexpr std::uint8_t battery_alarm = 0x80;  ///< alarm: the battery is at 3.1 V or less
 /// Mask of the four alarms that SF reports together, with its one bit `status::alarm`.
 inline constexpr std::uint8_t shown_in_status = over_heat | multiturn_error | battery_error | battery_alarm;
 /// Mask of the alarms that make the turns invalid.
@@ -121,11 +126,11 @@ struct Format {
   unsigned singleturn_bits = 17;  ///< bits of the position within the turn, 1 to 24
   unsigned multiturn_bits = 16;   ///< bits of the turns, 0 to 24; 0: single-turn encoder
   int encoder_id = -1;            ///< ENID that every reply must carry, 0 to 255; -1: any
-  /// True: replies must also pass checks that an encoder that deviates from the specification fails.
+  /// Whether replies must also pass the checks that an encoder that deviates from the specification fails.
   bool strict = true;
   bool battery = true;  ///< whether a battery is connected; without one the turns are invalid (2 (1))
 
-  /// Returns the settings of the line.
+  /// Returns the settings of the RS-485 line.
   [[nodiscard]] static constexpr LineSettings line() { return line_settings; }
   /// Returns the number of bits of the turns; 0 without a battery, because the turns are invalid then.
   [[nodiscard]] constexpr unsigned turns_bits() const { return battery ? multiturn_bits : 0; }
