@@ -21,8 +21,8 @@ namespace absenc {
 template <std::size_t size>
 struct WordWith {
   static constexpr std::size_t capacity = size;  ///< Number of elements of `values`.
-  std::uint64_t position = 0;                    ///< Position in counts.
-  std::uint64_t multiturn = 0;                   ///< Turns.
+  std::uint64_t position = 0;                    ///< Position in counts: within the turn, or of a linear encoder.
+  std::uint64_t multiturn = 0;                   ///< Number of turns.
   bool error = false;                            ///< Whether the error bit reports an error.
   bool warning = false;                          ///< Whether the warning bit reports a warning.
   /// Values of fields with Meaning::value, by the index of the field in the format.
@@ -47,7 +47,7 @@ inline constexpr std::array<FlagInfo, 2> word_flags{{
 /// The values of a word that are shown as fields, except those with Meaning::value, whose names come from the word
 /// format.
 struct WordValues {
-  std::uint64_t multiturn;   ///< Turns.
+  std::uint64_t multiturn;   ///< Number of turns.
   std::uint64_t singleturn;  ///< Position within the turn, in counts.
   double angle;              ///< Position within the turn, in degrees.
   std::uint64_t position;    ///< Position of a linear encoder, in counts.
@@ -82,8 +82,8 @@ struct PlacedField {
   std::size_t index;  ///< Index of the field in the format.
   unsigned first;     ///< Index of the field's first bit in the word.
   Meaning meaning;    ///< Meaning of the field.
-  unsigned bits;      ///< Number of bits, 1 to 64.
-  bool active_low;    ///< Whether 0 means that a flag is set.
+  unsigned bits;      ///< Number of bits of the field, 1 to 64.
+  bool active_low;    ///< Whether the field is sent inverted, so that 0 means that a flag is set.
 };
 
 /// Gives the functions of a position word access to a format that is known at run time only. Known does the same for a
@@ -123,11 +123,12 @@ struct Known {
   /// The field `i` of the word, with its place as constants.
   template <std::size_t i>
   struct Field {
-    static constexpr std::size_t index = i;                          ///< Index of the field in the format.
-    static constexpr unsigned first = word.first_of(i);              ///< Index of the field's first bit in the word.
-    static constexpr Meaning meaning = word.fields()[i].meaning;     ///< Meaning of the field.
-    static constexpr unsigned bits = word.fields()[i].bits;          ///< Number of bits, 1 to 64.
-    static constexpr bool active_low = word.fields()[i].active_low;  ///< Whether 0 means that a flag is set.
+    static constexpr std::size_t index = i;                       ///< Index of the field in the format.
+    static constexpr unsigned first = word.first_of(i);           ///< Index of the field's first bit in the word.
+    static constexpr Meaning meaning = word.fields()[i].meaning;  ///< Meaning of the field.
+    static constexpr unsigned bits = word.fields()[i].bits;       ///< Number of bits of the field, 1 to 64.
+    /// Whether the field is sent inverted, so that 0 means that a flag is set.
+    static constexpr bool active_low = word.fields()[i].active_low;
   };
 
   /// Calls `use` with each field of the word in turn, until it returns false. Returns whether all calls returned true.
@@ -277,8 +278,8 @@ constexpr void put_word(FieldSink& sink, const WordFormat& format, const Word& w
 
 /// Numbers of bits of position and turns in a word, and which of the two comes first.
 struct PositionBits {
-  unsigned position;            ///< Bits of the position.
-  unsigned multiturn = 0;       ///< Bits of the turns; 0: none.
+  unsigned position;            ///< Number of bits of the position.
+  unsigned multiturn = 0;       ///< Number of bits of the turns; 0: none.
   bool multiturn_first = true;  ///< Whether the turns precede the position.
 };
 

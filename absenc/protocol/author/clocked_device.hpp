@@ -21,7 +21,7 @@ class ClockedDevice : public EncoderOn<std::uint8_t> {
   void feed(const Event<std::uint8_t>& event) final;
   /// Returns the next step that the port must take.
   Step<std::uint8_t> next(Time now) final;
-  /// Switches the encoder off.
+  /// Switches the encoder off at `now`.
   void power_off(Time now) override;
   [[nodiscard]] MutableBytes memory() override { return {}; }
 

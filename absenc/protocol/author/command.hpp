@@ -22,7 +22,7 @@ class Refusal final : public Conversation<Item> {
  public:
   /// Constructs a conversation that ends at once with `error`; `why` is the reason for people.
   explicit Refusal(Error error, std::string_view why) : error_(error), why_(why) {}
-  /// Ignores the event.
+  /// Ignores every event.
   void feed(const Event<Item>&) override {}
   /// Returns the step `done`.
   Step<Item> next(Time) override { return {.kind = Step<Item>::Kind::done}; }
@@ -57,13 +57,13 @@ using ItemOf = typename detail::ItemOf<P>::Item;
 /// link them. All conversations of the unit derive from `Host`.
 template <class P, class Host = Conversation<ItemOf<P>>>
 struct Report {
-  /// The protocol.
+  /// Class with the functions of the protocol.
   using Protocol = P;
   /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
-  /// A request of the protocol.
+  /// Type of the protocol's requests.
   using Request = typename P::Request;
-  /// A reply of the protocol.
+  /// Type of the protocol's replies.
   using Reply = typename P::Reply;
   /// Items that the line carries.
   using Items = std::span<const ItemOf<P>>;
@@ -91,7 +91,7 @@ template <class Subject, class T>
 struct Finding {
   /// The format, or the class of the conversation, that the functions get.
   using Of = Subject;
-  /// Type of the result.
+  /// Type of the procedure's result.
   using Found = T;
 
   /// Puts the fields of the result of a successful procedure into the sink.
@@ -203,7 +203,7 @@ template <class P>
 struct CommandOf {
   /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
-  /// A request of the protocol.
+  /// Type of the protocol's requests.
   using Request = typename P::Request;
 
   Command info;  ///< Description of the command.

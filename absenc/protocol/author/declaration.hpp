@@ -21,13 +21,13 @@ namespace absenc::author {
 /// from (format, shaft). `Host` is the Host of the Report.
 template <class P, class VirtualEncoder, class Host = Conversation<ItemOf<P>>>
 struct Declaration {
-  /// The protocol.
+  /// Class with the functions of the protocol.
   using Protocol = P;
   /// Type of the protocol's virtual encoder.
   using Encoder = VirtualEncoder;
   /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
-  /// A request of the protocol.
+  /// Type of the protocol's requests.
   using Request = typename P::Request;
 
   std::string_view id{};        ///< Identifier: the part of an address before the colon.

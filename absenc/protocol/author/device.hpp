@@ -36,7 +36,7 @@ class Responder : public EncoderOn<std::uint8_t> {
   /// Returns the next step that the port must take.
   Step<std::uint8_t> next(Time now) override;
 
-  /// Switches the encoder off.
+  /// Switches the encoder off at `now`.
   void power_off(Time now) override;
 
  protected:
@@ -129,9 +129,9 @@ class BusDevice : public Responder {
  public:
   /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
-  /// A request of the protocol.
+  /// Type of the protocol's requests.
   using Request = typename P::Request;
-  /// A reply of the protocol.
+  /// Type of the protocol's replies.
   using Reply = typename P::Reply;
 
   /// Constructs an encoder that is off until `power_on`. `shaft` must outlive it.

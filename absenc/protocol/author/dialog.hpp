@@ -38,9 +38,9 @@ class HostOf : public Engine {
  public:
   /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
-  /// A request of the protocol.
+  /// Type of the protocol's requests.
   using Request = typename P::Request;
-  /// A reply of the protocol.
+  /// Type of the protocol's replies.
   using Reply = typename P::Reply;
 
   /// Returns the format of the encoder.
@@ -120,9 +120,9 @@ class ReadPosition : public HostOf<P> {
 template <class P>
 class DialogOf : public HostOf<P>, public Routine {
  public:
-  /// A request of the protocol.
+  /// Type of the protocol's requests.
   using Request = typename P::Request;
-  /// A reply of the protocol.
+  /// Type of the protocol's replies.
   using Reply = typename P::Reply;
 
   /// A request that a procedure can await, after setting its properties. With `must` the procedure ends if there is no
@@ -221,7 +221,7 @@ class DialogOf : public HostOf<P>, public Routine {
   struct Heard {
     /// Received bytes, valid until the next await; empty, while not `over`: a damaged character was received.
     Bytes bytes{};
-    bool over = false;  ///< Whether the time of listening is over.
+    bool over = false;  ///< whether the time of `listen` is over
   };
   /// Returns an awaitable for the next bytes received while listening, or the end of the time of `listen`.
   [[nodiscard]] auto heard() {

@@ -67,7 +67,7 @@ class EncoderOn : public Device<Item> {
   }
   /// Returns the alarms that `raise_alarms` has raised.
   [[nodiscard]] std::uint32_t raised() const { return raised_; }
-  /// Notes that the memory changed.
+  /// Increments `memory_version`; to be called after each change of the memory.
   void change_memory() { ++memory_version_; }
   /// Counts an answered request.
   void count_answer() { ++answer_count_; }

@@ -116,7 +116,7 @@ class Engine : public Conversation<std::uint8_t> {
 
  private:
   enum class State : std::uint8_t {
-    receiving,  ///< the reply is awaited
+    receiving,  ///< state: the reply to the last request is awaited
     settling,   ///< the reply has an error: waits until the line is silent
     ready,      ///< the next request is to be sent, as soon as pauses permit
     sending,    ///< the request is being sent

@@ -14,7 +14,7 @@ template <class P, const typename P::Format& format, const typename P::Request& 
 struct Known {
   struct Format {};
   struct Request {};
-  /// A reply of the protocol.
+  /// Type of the protocol's replies.
   using Reply = typename P::Reply;
   static constexpr std::size_t longest_reply = P::longest_reply;  ///< Greatest length of a reply in bytes.
 

@@ -43,9 +43,9 @@ template <auto member>
 struct OptionOf {
   /// Format of the encoder: the values of its options.
   using Format = decltype(detail::format_of(member));
-  /// Type of the member.
+  /// Type of the format's member that the option sets.
   using Member = decltype(detail::member_of(member));
-  Option info;  ///< Description of the option.
+  Option info;  ///< Description of the option, without the member.
 
   /// Sets the member of `format` to `value`.
   static constexpr void put(Format& format, std::int64_t value) { format.*member = static_cast<Member>(value); }

@@ -20,7 +20,7 @@ namespace absenc::author {
 /// Tables of commands, models and vectors of the Declaration `declared`.
 template <const auto& declared>
 struct Tables {
-  /// The protocol.
+  /// Class with the functions of the protocol.
   using P = typename std::remove_cvref_t<decltype(declared)>::Protocol;
 
   /// Descriptions of the commands, numbered in their order.
@@ -70,7 +70,7 @@ struct Tables {
     for (const ModelText& text : declared.models) all.append(values_of(text));
     return all;
   }();
-  /// Descriptions of the models.
+  /// Descriptions of the models, whose values point into `model_values`.
   static constexpr auto models = [] {
     std::array<Model, declared.models.size()> made{};
     std::size_t first = 0;

@@ -29,11 +29,11 @@ template <const auto& declared>
 struct Descriptor {
   /// Type of the declaration.
   using Declared = std::remove_cvref_t<decltype(declared)>;
-  /// The protocol.
+  /// Class with the functions of the protocol.
   using P = typename Declared::Protocol;
   /// Format of the encoder: the values of its options.
   using Format = typename P::Format;
-  /// A request of the protocol.
+  /// Type of the protocol's requests.
   using Request = typename P::Request;
   /// Tables of commands, models and vectors of the declaration.
   using Made = Tables<declared>;

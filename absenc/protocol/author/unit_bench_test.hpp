@@ -26,7 +26,7 @@ using Numbers = std::map<std::string, std::int64_t>;
 
 inline Wire wire(Bytes bytes) { return {bytes.begin(), bytes.end()}; }
 
-/// Result and fields of a command. Real numbers are rounded and stored with the numbers.
+/// Result and fields of a command. Real numbers are rounded and stored with the integers.
 struct RunResult : FieldSink {
   void put(const FieldValue& value) override {
     const std::string name(value.info->name);

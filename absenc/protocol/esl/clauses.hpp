@@ -37,7 +37,7 @@ inline Result<std::size_t> unknown_id(const Options& values, MutableBytes reques
 /// Alarms that command C clears, in both channels (mask of Reading::alarms). The other alarms need more (Table 8).
 inline constexpr std::int64_t cleared_by_c = alarms::xc_error | alarms::xc_error << 8;
 
-/// Clauses of the document for the encoder.
+/// Clauses of the ESL document for encoders.
 inline constexpr auto clauses = std::array{
     Clause{"answer", "Figure 2", "a read request is answered", Demand::answered},
     Clause{"answer-time", "Figure 2",
@@ -134,7 +134,7 @@ inline constexpr std::array asked_and_written{select, HostStep{milliseconds(20),
                                               HostStep{milliseconds(20), "memory-write", byte_2}};
 }  // namespace script
 
-/// Clauses of the document for the host.
+/// Clauses of the ESL document for hosts.
 inline constexpr std::array<HostClause, 12> host_clauses{{
     {"asks", "Figure 2", "requests are as drawn", HostDemand::asks},
     {"silence", "Overview of Communication", "after no reply it asks again", HostDemand::after_silence},

@@ -118,40 +118,42 @@ constexpr std::uint16_t crc_of_pairs(Channel channel, Bytes bytes, bool swapped)
 
 /// Data ID: code of a request's kind, with the values of Table 3; ID 6 is in Tables 6 and 12 only.
 enum class DataId : std::uint8_t {
-  position = 1,          ///< safety reply, with both channels
-  singleturn = 2,        ///< safety reply, with both channels
-  position_short = 4,    ///< non-safety reply
-  singleturn_short = 5,  ///< non-safety reply
-  calibration = 6,       ///< non-safety reply
-  /// Must never be sent eight times in a row, which is "dynamic addressing", not described in the document.
+  position = 1,          ///< data ID whose reply can make a safe position; it has both channels
+  singleturn = 2,        ///< data ID whose reply can make a safe position; it has both channels
+  position_short = 4,    ///< data ID whose reply cannot make a safe position
+  singleturn_short = 5,  ///< data ID whose reply cannot make a safe position
+  calibration = 6,       ///< data ID whose reply cannot make a safe position
+  /// Data ID that must never be sent eight times in a row: that is "dynamic addressing", which the document does not
+  /// describe.
   encoder_id = 8,
   temperature = 9,
   alarms = 0xA,
-  zero = 0xB,             ///< eight consecutive requests make a reset
-  clear_alarms = 0xC,     ///< eight consecutive requests make a reset
-  reset_multiturn = 0xD,  ///< eight consecutive requests make a reset
+  zero = 0xB,             ///< data ID of which eight consecutive requests make a reset
+  clear_alarms = 0xC,     ///< data ID of which eight consecutive requests make a reset
+  reset_multiturn = 0xD,  ///< data ID of which eight consecutive requests make a reset
   read_memory = 0xE,
   write_memory = 0xF,
 };
 
 /// The values that a channel of a reply can carry between CF and CRC, one bit each, so that they form sets.
 namespace part {
-inline constexpr unsigned status = 0x0001;         ///< Status (SF).
-inline constexpr unsigned alarms = 0x0002;         ///< Alarms (ALM).
-inline constexpr unsigned singleturn = 0x0004;     ///< Position within the turn (ABS).
-inline constexpr unsigned multiturn = 0x0008;      ///< Turns (ABM).
-inline constexpr unsigned encoder_id = 0x0010;     ///< Encoder id (ENID).
-inline constexpr unsigned temperature = 0x0020;    ///< Temperature (TEMP).
-inline constexpr unsigned sequence = 0x0040;       ///< Sequence counter of channel 1 (SC1).
-inline constexpr unsigned zero_sequence = 0x0080;  ///< Sequence counter of channel 2 in a byte of its own: 0 and SC2.
-/// Redundant position and sequence counter of channel 2 in two bytes: RS0, then RS1 with SC2.
+inline constexpr unsigned status = 0x0001;       ///< Part: status (SF).
+inline constexpr unsigned alarms = 0x0002;       ///< Part: alarms (ALM).
+inline constexpr unsigned singleturn = 0x0004;   ///< Part: position within the turn (ABS).
+inline constexpr unsigned multiturn = 0x0008;    ///< Part: turns (ABM).
+inline constexpr unsigned encoder_id = 0x0010;   ///< Part: encoder id (ENID).
+inline constexpr unsigned temperature = 0x0020;  ///< Part: temperature (TEMP).
+inline constexpr unsigned sequence = 0x0040;     ///< Part: sequence counter of channel 1 (SC1).
+/// Part: sequence counter of channel 2 in a byte of its own, 0 and SC2.
+inline constexpr unsigned zero_sequence = 0x0080;
+/// Part: redundant position and sequence counter of channel 2 in two bytes, RS0, then RS1 with SC2.
 inline constexpr unsigned redundant_sequence = 0x0100;
-/// Redundant position in two bytes, RS0 and RS1, in replies to ID C.
+/// Part: redundant position in two bytes, RS0 and RS1, in replies to ID C.
 inline constexpr unsigned redundant_alone = 0x0200;
-/// Redundant position in two bytes, RS0 and RS1, in replies to ID 6.
+/// Part: redundant position in two bytes, RS0 and RS1, in replies to ID 6.
 inline constexpr unsigned redundant_calibration = 0x0400;
-inline constexpr unsigned memory_address = 0x0800;  ///< Memory address and busy bit (ADF).
-inline constexpr unsigned value = 0x1000;           ///< Byte in memory (EDF).
+inline constexpr unsigned memory_address = 0x0800;  ///< Part: memory address and busy bit (ADF).
+inline constexpr unsigned value = 0x1000;           ///< Part: value of the memory byte (EDF).
 /// Set of the parts that carry a redundant position.
 inline constexpr unsigned redundant = redundant_sequence | redundant_alone | redundant_calibration;
 }  // namespace part
@@ -314,7 +316,7 @@ struct ChannelReply {
   std::uint8_t status = 0;      ///< status (SF): bits of the namespace `status`, in the order of the document
   std::uint8_t alarms = 0;      ///< Alarms of the channel (ALM): bits of the namespace `alarms`.
   std::uint8_t sequence = 0;    ///< sequence counter: 8 bits in channel 1 (SC1), 7 bits in channel 2 (SC2)
-  std::uint8_t encoder_id = 0;  ///< Encoder id (ENID).
+  std::uint8_t encoder_id = 0;  ///< Part: encoder id (ENID).
 };
 
 /// A decoded reply; members that its data ID does not carry are 0.

@@ -364,9 +364,9 @@ constexpr unsigned unsafe_alarms(const ChannelReply& channel) {
 struct Protocol {
   /// Format of the encoder: the values of its options.
   using Format = Profile;
-  /// A request of the protocol.
+  /// Type of the protocol's requests.
   using Request = esl::Request;
-  /// A reply of the protocol.
+  /// Type of the protocol's replies.
   using Reply = esl::Reply;
   static constexpr std::size_t longest_reply = reply_capacity;  ///< Greatest length of a reply in bytes.
 

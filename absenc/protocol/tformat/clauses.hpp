@@ -13,7 +13,7 @@ namespace absenc::tformat {
 /// hot.
 inline constexpr std::int64_t latched_alarms = alarms::latched & ~alarms::over_heat;
 
-/// Clauses of the document for the encoder.
+/// Clauses of the T-format document for encoders.
 inline constexpr auto clauses = std::array{
     Clause{"answer", "6.2.1", "a readout request is answered", Demand::answered},
     Clause{"answer-time", "8.1",
@@ -139,7 +139,7 @@ inline constexpr std::array two_at_once{HostStep{{}, "1a 1a"}};
 inline constexpr std::array three_at_once{HostStep{{}, "1a 1a 1a"}};
 }  // namespace script
 
-/// Clauses of the document for the host.
+/// Clauses of the T-format document for hosts.
 inline constexpr std::array<HostClause, 11> host_clauses{{
     {"asks", "6.2", "requests are as drawn", HostDemand::asks},
     {"silence", "8.4 Table 5 (1)", "after no reply it asks again", HostDemand::after_silence},

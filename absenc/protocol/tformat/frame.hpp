@@ -374,9 +374,9 @@ constexpr unsigned reported_status(const Format& format, bool has_alarms) {
 struct Protocol {
   /// Format of the encoder: the values of its options.
   using Format = tformat::Format;
-  /// A request of the T-format.
+  /// Type of the protocol's requests.
   using Request = tformat::Request;
-  /// A reply of the protocol.
+  /// Type of the protocol's replies.
   using Reply = tformat::Reply;
   static constexpr std::size_t longest_reply = reply_capacity;  ///< Greatest length of a reply in bytes.
 
