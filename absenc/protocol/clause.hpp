@@ -133,7 +133,7 @@ struct HostStep {
   std::span<const std::int64_t> arguments{};  ///< arguments of the command; empty: each argument has its minimum
   unsigned times = 1;                         ///< how often the request is sent, each time after `pause`
 };
-/// The steps of such a host, in order: requests with the pauses before them.
+/// The steps of a scripted host that ignores replies, in order: requests with the pauses before them.
 using HostScript = std::span<const HostStep>;
 
 /// A demand of a document on the host.

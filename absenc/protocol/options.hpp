@@ -23,8 +23,7 @@ inline constexpr std::array<std::string_view, 2> boolean_choices{"false", "true"
 /// others do (`tell_shared`): from absenc.toml, an open link with several users, or a virtual line with several
 /// encoders.
 inline constexpr std::array<std::string_view, 3> sharing_choices{"auto", "true", "false"};
-/// Values of such an option, in the order of `sharing_choices`: unknown, other encoders share the line, the encoder is
-/// alone.
+/// Values of an option with `sharing_choices`: unknown, other encoders share the line, the encoder is alone.
 enum Sharing : std::int64_t { sharing_automatic, sharing_yes, sharing_no };
 
 /// Description of an option of a unit: a number in a range, or one of `choices` (the value is the index into it). With

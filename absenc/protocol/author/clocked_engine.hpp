@@ -64,7 +64,7 @@ class ClockedEngine : public Conversation<std::uint8_t> {
   ClockedHostTimes times_;
   MutableBytes storage_;
   std::size_t size_ = 0;
-  unsigned count_ = 0;  // clocks of the present transfer
+  unsigned count_ = 0;  // number of clocks of the present transfer
   State state_ = State::over;
   bool begun_ = false;
   bool hold_low_ = false;

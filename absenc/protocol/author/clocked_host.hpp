@@ -57,9 +57,9 @@ class ClockedHostOf : public ClockedEngine {
   [[nodiscard]] static constexpr bool is_alone() { return false; }
 
  protected:
-  /// Begins a transfer of one reading at once.
+  /// Constructs a host that begins a transfer of one reading at once.
   explicit ClockedHostOf(const Format& format) : ClockedHostOf(format, later) { ask(); }
-  /// Begins no transfer until the subclass does.
+  /// Constructs a host that begins no transfer until its subclass does.
   ClockedHostOf(const Format& format, Later) : ClockedEngine(P::host_times(format), storage_), format_(format) {}
   ~ClockedHostOf() = default;
 

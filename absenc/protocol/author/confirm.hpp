@@ -8,10 +8,11 @@
 
 namespace absenc::author {
 
-/// As ReadPosition, with these functions of the protocol besides:
+/// Conversation that reads a position, and requests a second reply if the first one does not prove it. The error is
+/// that of the exchange, or of comparing both replies. The protocol needs these functions besides those of dialog.hpp:
 ///
-///   static bool needs_another(const Format&, const Reply&);
-///   static Error agree(const Format&, const Reply& first, const Reply& second, Time between);   // or the error
+///   static bool needs_another(const Format&, const Reply&);   // whether this first reply proves nothing alone
+///   static Error agree(const Format&, const Reply& first, const Reply& second, Time between);
 template <class P>
 class ReadConfirmed : public HostOf<P> {
  public:

@@ -71,7 +71,7 @@ TEST(TformatDevice, BatteryFlags) {
   const Reply lost = bench.everything();
   EXPECT_EQ(lost.alarms, alarms::battery_alarm | alarms::battery_error);
   EXPECT_FALSE(to_reading({}, lost).multiturn_valid);
-  EXPECT_EQ(lost.multiturn, 0u);  // no battery counted the turns
+  EXPECT_EQ(lost.multiturn, 0u);  // the turns are lost, because no battery supplied the counter
   bench.condition(battery_voltage, 3600);
   reset(bench, DataId::reset_multiturn);
   EXPECT_EQ(bench.everything().alarms, 0);

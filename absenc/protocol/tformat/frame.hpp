@@ -206,7 +206,7 @@ namespace detail {
 
 [[nodiscard]] constexpr Error check_memory_reply(const Format& format, const Request& request, const Reply& reply) {
   if (reply.address != request.address) return Error::unexpected_reply;
-  // Table 5: a busy encoder replies with the value 00; an accepted write echoes its value.
+  // A busy encoder replies with the value 00; an accepted write echoes its value (Table 5).
   if (reply.busy) return format.strict && reply.value != 0 ? Error::unexpected_reply : Error::none;
   if (request.id == DataId::write_memory && reply.value != request.value) return Error::unexpected_reply;
   return Error::none;
