@@ -34,7 +34,7 @@ from typing import NamedTuple
 from cpp_source import CLOSING, OPENING, Source
 
 ASSIGNMENT = {"=", "+=", "-=", "*=", "/=", "%=", "&=", "|=", "^=", "<<=", ">>="}
-# Tokens that end an operand of `&&` or `||`.
+# Tokens that bound an operand of `&&` or `||` on either side, besides brackets and these operators.
 ENDS_OPERAND = {";", ",", "?", ":", "return", "co_return", "case", "else"} | ASSIGNMENT
 COARSE = {"never", "skip", "half", "twice", "zero", "ten"}
 ARITHMETIC = {"bit", "shift", "sign"}  # rules on arithmetic, of which at most one mutant is made for a line

@@ -35,7 +35,7 @@ enum class PositionState : std::uint8_t {
   none,         ///< the sample is not a reading, or its reading has no position
 };
 
-/// Returns the state in words, for people.
+/// Returns a sentence for people that says whether the position of a sample can be used, or why not.
 [[nodiscard]] std::string_view text_of(PositionState state);
 
 /// Result of one attempt to read: a reading, a failure, or an event of the port. Times are those of os::now.

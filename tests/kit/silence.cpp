@@ -6,7 +6,7 @@
 namespace absenc::kit {
 namespace {
 
-// Runs a command on a line without an encoder. It must end with a timeout error.
+// Runs a command on a line without an encoder. It must end, with a timeout error if it expects a reply.
 template <class Item>
 void meet_silence(const Unit& unit, const Configuration& configuration, const Command& command, Findings& findings) {
   std::vector<std::byte> storage(unit.host_storage);

@@ -16,14 +16,15 @@ import zlib
 TESTS = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 CACHE = os.path.join(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "absenc")
 
-# Programs of this computer that the initramfs contains, because the tests in it share modules with the other tests
-# (tests/command_support.py). The kernel is Debian's, so that no test depends on the running kernel, to which a
+# Why the machine is built this way: the initramfs contains the programs and the Python of this computer, because the
+# tests in it share modules with the other tests (tests/command_support.py). The kernel is Debian's, so that no test depends on the running kernel, to which a
 # container cannot add modules. QEMU emulates the processor (run.py): KVM is not available to every user.
 
 # Kernel modules for the tests. Modules that they depend on are added automatically, except those that the kernel itself
 # loads on demand: the functions of g_serial.
 MODULES = ["can", "can-raw", "vcan", "slcan", "fuse", "cuse", "dummy_hcd", "cdc-acm", "usb_f_acm", "usb_f_serial",
            "usb_f_obex", "g_serial"]
+# Programs of this computer that are copied into the initramfs.
 PROGRAMS = ["candump", "cangen", "cansend", "ip", "slcand", "spi-config", "spi-pipe"]
 TOOLS = ["apt-cache", "apt-get", "dpkg-deb", "tar", "xz", "modinfo", "ldd", "busybox", "cpio", "qemu-system-x86_64"]
 

@@ -61,7 +61,8 @@ class Watch {
   Watch(const Watch&) = delete;
   Watch& operator=(const Watch&) = delete;
 
-  /// Ends the thread within the time of one reading. The destructor does the same.
+  /// Ends the thread and waits for it: for the present reading, or for a running command, which is not aborted. The
+  /// destructor does the same.
   void stop();
 
   [[nodiscard]] Snapshot snapshot(bool details) const;

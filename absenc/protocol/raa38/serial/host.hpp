@@ -44,7 +44,8 @@ class Listen final : public Conversation<std::uint8_t> {
   [[nodiscard]] std::string_view advice() const override { return words_.advice; }
   [[nodiscard]] const Reading* reading() const override;
   void report(FieldSink& sink) const override;
-  /// Returns the bytes of the last frame.
+  /// Returns the last received frame, valid or damaged, and its time, with an empty request; no bytes after the stream
+  /// has ended.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const override;
 
   /// Returns the decoder that finds the frames in the stream.
