@@ -34,7 +34,7 @@ TEST(FirmwareGuide, ReadsPositionAndKeepsItWhenReplyIsMissing) {
     uart_byte_received(byte);
   }
   EXPECT_FALSE(encoder.carrier.is_busy());
-  EXPECT_EQ(encoder.read.error(), Error::none);
+  EXPECT_EQ(encoder.read->error(), Error::none);
   EXPECT_EQ(encoder.position, 0x12345u);
 
   control_cycle();
@@ -42,7 +42,7 @@ TEST(FirmwareGuide, ReadsPositionAndKeepsItWhenReplyIsMissing) {
   time_now += 1s;
   timer_tick();
   EXPECT_FALSE(encoder.carrier.is_busy());
-  EXPECT_EQ(encoder.read.error(), Error::timeout);
+  EXPECT_EQ(encoder.read->error(), Error::timeout);
   EXPECT_EQ(encoder.position, 0x12345u);
 }
 

@@ -2,6 +2,7 @@
 // A T-format encoder read from interrupts: the first lines of docs/firmware.md. tests/hookup_test.cpp runs them.
 #include <chrono>
 #include <cstdint>
+#include <optional>
 
 #include "absenc/host/carrier.hpp"
 #include "absenc/protocol/tformat/host.hpp"
@@ -13,22 +14,21 @@ void uart_send(Bytes bytes);  // yours: switches the RS-485 driver on, starts se
 
 struct Encoder {
   static constexpr tformat::Format format{.singleturn_bits = 17, .multiturn_bits = 16, .encoder_id = 0x11};
-  tformat::ReadPosition read{format};
+  std::optional<tformat::ReadPosition> read;
   host::Carrier<std::uint8_t, Encoder> carrier{*this, std::chrono::microseconds(4)};  // latency of one character
   std::uint64_t position = 0;  // counts, from the last good reading
 
   void begin(const ByteStep& step) { uart_send(step.out); }
   void result(bool finished) {
     if (!finished) return;
-    if (read.error() != Error::none) return;  // position stays as it was
-    if (read.reading()->singleturn_valid()) position = read.reading()->singleturn;
+    if (read->error() != Error::none) return;  // position stays as it was
+    if (read->reading()->singleturn_valid()) position = read->reading()->singleturn;
   }
 } encoder;
 
 void control_cycle() {  // from a timer: requests one position a cycle
   if (encoder.carrier.is_busy()) return;
-  encoder.read = tformat::ReadPosition{Encoder::format};
-  encoder.carrier.start(encoder.read, now());
+  encoder.carrier.start(encoder.read.emplace(Encoder::format), now());
 }
 void uart_byte_received(std::uint8_t byte) { encoder.carrier.received({&byte, 1}, now()); }
 void uart_transmission_complete() { encoder.carrier.sent(now()); }  // first switch the RS-485 driver off
