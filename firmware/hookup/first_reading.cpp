@@ -14,7 +14,10 @@ void uart_send(Bytes bytes);  // yours: switches the RS-485 driver on, starts se
 
 struct Encoder {
   static constexpr tformat::Format format{.singleturn_bits = 17, .multiturn_bits = 16, .encoder_id = 0x11};
-  std::optional<tformat::ReadPosition> read;
+  struct Read final : tformat::ReadPosition {
+    using ReadPosition::ReadPosition;
+  };
+  std::optional<Read> read;
   host::Carrier<std::uint8_t, Encoder> carrier{*this, std::chrono::microseconds(4)};  // latency of one character
   std::uint64_t position = 0;  // counts, from the last good reading
 
