@@ -21,7 +21,7 @@ struct RecordingSettings {
   std::string path;
   std::string encoder;   ///< Name of the encoder, as the header of the file shows it.
   double rate_hz = 100;  ///< Intended number of readings per second; 0: as many as possible.
-  /// Which readings are written: every Nth, and each whose alarms differ from the reading before.
+  /// Selects the readings to write: every Nth, and each whose alarms differ from the reading before.
   std::uint64_t every = 1;
   std::uint64_t count = 0;         ///< Number of written readings after which the recording ends; 0: no limit.
   std::optional<Time> duration{};  ///< Time after which the recording ends; without a value: no limit.

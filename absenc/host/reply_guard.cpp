@@ -364,8 +364,7 @@ void ReplyGuard<Item>::conclude_noise() {
 
 // ---- Delaying and listening
 
-// Returns whether the received items end with a reply to `request`. If the length of the reply is known, only the last
-// items are checked, because noise may precede the reply.
+// Drops received items, and counts those that are a late reply to an outstanding request.
 template <class Item>
 void ReplyGuard<Item>::drop_items(Items items, Time at) {
   if (phase_ == Phase::delaying) delaying_.received_at = at;
@@ -395,6 +394,8 @@ void ReplyGuard<Item>::drop_at_silence(Time at) {
   received_.clear();
 }
 
+// Returns whether the received items end with a reply to `request`. Only the last items are checked, because noise may
+// precede the reply; a reply of unknown length is found at silence.
 template <class Item>
 bool ReplyGuard<Item>::ends_with_reply(Items request, std::size_t expect) const {
   const std::size_t size = is_can ? 1 : expect;

@@ -13,11 +13,11 @@ SOURCE = Path(os.environ["ABSENC_SOURCE_DIR"])
 TEXT = SOURCE / "examples" / "tformat.txt"
 
 
-@pytest.fixture(params=[60, 6000])
+@pytest.fixture(params=["", "&alarm=counting_error"], ids=["valid", "invalid"])
 def wave(tmp_path, request):
     path = tmp_path / "wave.vcd"
     subprocess.run(
-        [os.environ["ABSENC"], "wave", f"tformat?motion=rpm={request.param}", str(path), "--count", "300"],
+        [os.environ["ABSENC"], "wave", f"tformat?motion=rpm=60{request.param}", str(path), "--count", "300"],
         check=True, capture_output=True,
     )
     return path
@@ -33,14 +33,14 @@ def test_masks_position_of_rows_with_errors():
     assert capture.columns["angle_deg"].unit == "deg"
 
 
-def test_decodes_like_the_command(wave):
+def test_decodes_like_the_command(wave, request):
     printed = subprocess.run([os.environ["ABSENC"], "decode", "tformat", str(wave), "--csv"], capture_output=True, text=True)
     rows = list(csv.DictReader(io.StringIO(printed.stdout)))
     capture = absenc.decode(wave, "tformat")
     assert len(rows) == len(capture) >= 300
-    # A position that is not valid is empty in CSV and masked in NumPy; `absenc wave` gives valid ones at both speeds.
-    # position that is not valid is masked in NumPy and empty in CSV.
+    # A position that an alarm makes invalid is masked in NumPy and empty in CSV.
     absent = [row["angle_deg"] == "" for row in rows]
+    assert all(absent) == any(absent) == (request.node.callspec.id == "invalid")
     assert absent == list(np.ma.getmaskarray(capture["angle_deg"]))
     assert absent == [row["singleturn_valid"] == "false" for row in rows] == list(np.ma.getmaskarray(capture["singleturn"]))
     assert len(set(capture["reply"])) > 250  # the encoder turns

@@ -21,6 +21,10 @@ struct CanHostTimes {
 /// that were complete before the request was sent are not delivered to the subclass, unless it calls `overhear`.
 class CanEngine : public Conversation<CanFrame> {
  public:
+  /// Not copyable: requests and replies are views into the conversation itself.
+  CanEngine(const CanEngine&) = delete;
+  CanEngine& operator=(const CanEngine&) = delete;
+
   /// Handles an event that the port reports.
   void feed(const Event<CanFrame>& event) final;
   /// Returns the next step that the port must take.

@@ -22,6 +22,10 @@ struct ClockedHostTimes {
 /// too, because another host may have clocked just before.
 class ClockedEngine : public Conversation<std::uint8_t> {
  public:
+  /// Not copyable: requests and replies are views into the conversation itself.
+  ClockedEngine(const ClockedEngine&) = delete;
+  ClockedEngine& operator=(const ClockedEngine&) = delete;
+
   /// Handles an event that the port reports.
   void feed(const Event<std::uint8_t>& event) final;
   /// Returns the next step that the port must take.

@@ -46,6 +46,10 @@ struct Manner {
 /// can destroy the encoder's driver. A valid reply ends the exchange at once.
 class Engine : public Conversation<std::uint8_t> {
  public:
+  /// Not copyable: requests and replies are views into the conversation itself.
+  Engine(const Engine&) = delete;
+  Engine& operator=(const Engine&) = delete;
+
   /// Handles an event that the port reports.
   void feed(const Event<std::uint8_t>& event) final;
   /// Returns the next step that the port must take.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "absenc/protocol/author/memory_map.hpp"
 #include "absenc/protocol/biss/control_results.hpp"
 #include "absenc/protocol/biss/dialog.hpp"
 
@@ -173,7 +174,7 @@ Procedure write_memory(ControlDialog<F>& dialog, ControlResults& found, Argument
   const auto value = static_cast<std::uint8_t>(arguments[1]);
   const auto bank = static_cast<unsigned>(arguments[2]);
   const bool force = arguments[3] != 0;
-  const MemoryArea* const area = registers::find_area(bank, address);
+  const MemoryArea* const area = author::find_area(registers::areas, bank, address);
   if (address >= registers::bank_size && bank != 0) {
     co_return only(Error::invalid_argument, "registers outside the banks are on bank 0");
   }

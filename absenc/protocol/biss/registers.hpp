@@ -76,12 +76,4 @@ inline constexpr std::array<MemoryArea, 6> areas = [] {
   }};
 }();
 
-/// Returns the memory area of an address in a bank; null if no area has it.
-[[nodiscard]] constexpr const MemoryArea* find_area(unsigned bank, unsigned address) {
-  for (const MemoryArea& area : areas) {
-    if (area.has(bank, address)) return &area;
-  }
-  return nullptr;
-}
-
 }  // namespace absenc::biss::registers

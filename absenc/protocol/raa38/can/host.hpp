@@ -104,7 +104,7 @@ author::Procedure find_node(Dialog& dialog, Values& found);
 
 // ---- All nodes on the bus
 
-/// What a scan received from one node number.
+/// Counts of the frames that a scan received from one node number.
 struct NodeFrames {
   std::uint16_t unsolicited = 0;  ///< Number of frames that the node sent without a request.
   std::uint16_t per_second = 0;   ///< Number of frames that the node sent without a request in the first second.
