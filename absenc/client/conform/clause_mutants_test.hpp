@@ -262,7 +262,7 @@ ReplyChanges<Item> mutants_of(const EncoderAddress& address, const Clause& claus
     for (const ReplyChange<Item>& change : special_request_mutants<Item>(clause)) {
       all.push_back({.change = [change = change.change, &address](Mutant<Item>& m) {
         change(m);
-        m.is_meant = [&address, &m](const List& request) {
+        m.is_meant = [&](const List& request) {
           if constexpr (std::is_same_v<Item, CanFrame>) {
             return true;
           } else {
