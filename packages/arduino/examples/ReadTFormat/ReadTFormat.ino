@@ -2,6 +2,8 @@
 // Reads a Smart-Abs (T-format, 17 bits and 16 bits of turns) on Serial1 behind an RS-485 transceiver, every 10 ms.
 #include <absenc.h>
 
+#include <optional>
+
 #include "absenc/host/first_reading.hpp"
 #include "absenc/protocol/tformat/host.hpp"
 
@@ -32,7 +34,10 @@ struct SerialLine {
 
 SerialLine line;
 host::Carrier<std::uint8_t, SerialLine> carrier(line, latency);
-tformat::ReadPosition position(format);
+struct Read final : tformat::ReadPosition {
+  using ReadPosition::ReadPosition;
+};
+std::optional<Read> position;  // made in place for each reading, because it cannot be copied
 host::FirstReading first(fastest_rpm);
 
 // Returns the time since the start, although micros() wraps after 71 minutes.
@@ -46,11 +51,11 @@ Time now() {
 }
 
 void show() {
-  if (position.error() != Error::none) {
-    Serial.println(text_of(position.error()).name.data());
+  if (position->error() != Error::none) {
+    Serial.println(text_of(position->error()).name.data());
     return first.start_again();
   }
-  const Reading& reading = *position.reading();
+  const Reading& reading = *position->reading();
   if (!first.confirms(reading)) return;
   Serial.print(static_cast<unsigned long>(reading.multiturn));
   Serial.print(' ');
@@ -68,8 +73,7 @@ void loop() {
   static Time next_start{};
   if (!carrier.is_busy() && now() >= next_start) {
     next_start = now() + std::chrono::microseconds(period_us);
-    position = tformat::ReadPosition(format);
-    carrier.start(position, now());
+    carrier.start(position.emplace(format), now());
   }
   if (line.was_sent) {
     line.was_sent = false;
