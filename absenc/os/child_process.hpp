@@ -22,7 +22,8 @@ class Channel {
   /// Sends as many of `bytes` as there is room for and removes them from `bytes`. Returns false if the other end is
   /// closed.
   [[nodiscard]] bool send(std::string& bytes) const;
-  /// Appends the received bytes, at most 64 kB. Returns false if the other end is closed and everything was received.
+  /// Appends the received bytes to `bytes`, at most 65536 per call. Returns false if the other end is closed and
+  /// everything was received.
   [[nodiscard]] bool receive(std::string& bytes) const;
 
  private:
@@ -30,7 +31,8 @@ class Channel {
 };
 
 /// A second process that runs this program. It inherits no file, port or socket except its end of the channel, and
-/// receives no signals of the terminal. The kernel kills it when the thread that created it ends.
+/// blocks SIGINT, SIGTERM, SIGHUP, SIGQUIT and SIGPIPE. After `become_child` the kernel kills it when the thread that
+/// created it ends.
 class ChildProcess {
  public:
   /// Starts the process with `arguments` for its `main`. Throws Failure.

@@ -63,7 +63,9 @@ Descriptor bind_name_of(const fs::path& link) {
 EmulatorPort::EmulatorPort(std::string link, std::optional<std::uint16_t> tcp_port) {
   set_latency(2ms);
   set_idle_latency(200us);
-  set_read_at_once(true);  // a write wakes the reader, which often runs before the writer
+  // `sent` gets the time before the write, because the write wakes the host, which often answers before this program
+  // continues.
+  set_read_at_once(true);
   open_terminal();
   if (tcp_port) listen_on(*tcp_port);
   for (const Descriptor* end : {&master_, &watch_, &listener_}) {
@@ -92,8 +94,8 @@ void EmulatorPort::open_terminal() {
   check(::tcgetattr(slave_.get(), &settings) == 0, what);
   ::cfmakeraw(&settings);  // with the terminal's echo, the host's requests would be sent back to it
   check(::tcsetattr(slave_.get(), TCSANOW, &settings) == 0, what);
-  // The watch is added after this port's own open, which must not be counted. If inotify is missing, leftovers of the
-  // last user are not cleared.
+  // The watch is added after this port has opened the slave itself, so it reports only other programs. If inotify is
+  // missing, bytes and settings that a program leaves behind are not cleared for the next program.
   watch_ = Descriptor(::inotify_init1(IN_NONBLOCK | IN_CLOEXEC));
   if (watch_) ::inotify_add_watch(watch_.get(), terminal_.c_str(), IN_OPEN | IN_CLOSE);
 }
@@ -198,10 +200,10 @@ void EmulatorPort::accept_client() {
   clients_.push_back(std::move(client));
 }
 
-// Handles an open or close of the slave by a program. Because this port keeps the slave open, the next user does not
-// get the clean state of a real port: an exclusive mode (TIOCEXCL) left by the last user would lock the next one out,
-// and the next one would read replies to the last one. Replies of the last 200 ms are left alone: they may be for
-// another user.
+// Handles an open or close of the slave by a program. Because this port keeps the slave open, the next program does not
+// get the clean state of a real port: an exclusive mode (TIOCEXCL) left by the last program would lock it out, and it
+// would read replies to the last program. Within 200 ms after a reply no bytes are discarded: another program may still
+// read the reply.
 void EmulatorPort::users_changed() {
   std::array<std::byte, 4096> events;
   while (::read(watch_.get(), events.data(), events.size()) > 0) {

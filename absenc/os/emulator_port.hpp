@@ -14,17 +14,18 @@
 namespace absenc::os {
 
 /// A pseudo-terminal and TCP clients as one line: the device receives bytes from every end, and each end receives the
-/// bytes of the device. Like a wire, the line stores nothing: bytes that no program reads are lost. The default latency
-/// is 2 ms: a pause of that length is a gap. It is 0.2 ms where the device expects no more bytes.
+/// bytes of the device. As on a wire, bytes that no program reads are lost. A pause ends a frame when it exceeds the
+/// gap limit of the step by the latency: 2 ms by default, 0.2 ms where the device expects no more bytes.
 ///
-/// A device that configures the line communicates with a terminal only at its own rate. A terminal at the default rate
-/// (the kernel's 38400 baud) and TCP clients have no rate: they work at every rate. So a wrong change of the rate shows
-/// without hardware. Devices that share the line (sim::Bus) are not affected by rates.
+/// After a `configure` step the device receives bytes from a terminal only if the terminal has the same rate (within 1
+/// %) or the default rate (the kernel's 38400 baud), which means no rate. TCP clients have no rate either: the device
+/// receives their bytes at every rate. So a wrong change of the rate shows without hardware. Devices that share the
+/// line (sim::Bus) are not affected by rates.
 class EmulatorPort final : public StreamPort {
  public:
-  /// `link` is the path of a symbolic link to the pseudo-terminal, removed at the end; empty for none. It replaces only
-  /// a link to a pseudo-terminal that no other EmulatorPort uses. `tcp_port` is the port to listen on at 127.0.0.1; 0
-  /// for any free one. Throws Failure: `in_use` for either, `system`.
+  /// `link` is the path of a symbolic link to the pseudo-terminal, removed by the destructor; empty for none. It
+  /// replaces only a link to a pseudo-terminal that no other EmulatorPort uses. `tcp_port` is the port to listen on at
+  /// 127.0.0.1; 0 for any free one, empty for none. Throws Failure: `in_use` (the link or the TCP port), `system`.
   explicit EmulatorPort(std::string link = {}, std::optional<std::uint16_t> tcp_port = {});
   ~EmulatorPort() override;
 
@@ -61,7 +62,7 @@ class EmulatorPort final : public StreamPort {
   std::string link_;
   std::uint16_t tcp_port_ = 0;
   RunDelay delay_;
-  Time delay_read_at_{};  // time of the last look at `delay_`
+  Time delay_read_at_{};  // time at which `delay_` was last read
   Time lateness_{};
   Time lateness_until_{};
   std::uint64_t dropped_ = 0;

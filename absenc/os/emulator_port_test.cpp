@@ -103,7 +103,7 @@ TEST(EmulatorPort, IsOneLineForAllItsEnds) {
     EXPECT_EQ(receive(first), reply);
     EXPECT_EQ(receive(second), reply);
   }
-  expect_quiet(device);          // also handles the close of `second`
+  expect_quiet(device);          // the device also notices here that `second` was closed
   for (int i = 0; i < 2; ++i) {  // twice, because the first write to a closed connection succeeds
     device.begin(transfer(request));
     EXPECT_EQ(receive(first), request);
@@ -168,7 +168,8 @@ TEST(EmulatorPort, DiscardsBytesForTheNextUser) {
   const Data frame(1000, 0x55);
   while (device.dropped() == 0) device.begin(transfer(frame));  // no program reads, so bytes are dropped at last
   const Time written = now();
-  sleep_until(written + 200ms);  // later than any reply that may still be in transit
+  // Within 200 ms after a reply the port does not discard unread bytes.
+  sleep_until(written + 200ms);
   // Opens the terminal directly: a SerialPort would discard leftover bytes itself.
   const Descriptor host(::open(device.path().c_str(), O_RDWR | O_NOCTTY));
   put(host.get(), request);

@@ -55,8 +55,8 @@ class Failure : public std::runtime_error {
   return {Failure::Kind::system, what + " failed: " + std::generic_category().message(error)};
 }
 
-// Both types below are std::exceptions, so that a program whose `main` catches those ends in order. Code that catches
-// all std::exceptions and continues must catch these two first.
+// Interrupted and Ended below are std::exceptions, so that a program whose `main` catches std::exception ends in order.
+// Code that catches std::exception and continues must catch these two first.
 
 /// Thrown by every wait in this folder after SIGINT or SIGTERM (os/signals.hpp).
 struct Interrupted : std::exception {
@@ -64,8 +64,7 @@ struct Interrupted : std::exception {
   [[nodiscard]] const char* what() const noexcept override { return "interrupted"; }
 };
 
-/// Thrown by a port when the time set by `StreamPort::set_end` is reached, and by every wait when a CancelCheck
-/// returns true.
+/// Thrown by a port when the time set by its `set_end` is reached, and by every wait when a CancelCheck returns true.
 struct Ended : std::exception {
   /// Returns the text "cancelled".
   [[nodiscard]] const char* what() const noexcept override { return "cancelled"; }

@@ -76,7 +76,7 @@ class FakeCan final : public CanKernel {
   short flags = IFF_UP;
   std::deque<int> write_errors;
   bool keep_last_error = false;
-  Time age{};  // age that `read` gives the next frame: time since the kernel received it
+  Time age{};  // age that `read` gives every frame: time since the kernel received it
   int bound = 0;
   std::map<std::pair<int, int>, std::uint32_t> options;
   std::vector<can_frame> written;

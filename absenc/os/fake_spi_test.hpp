@@ -64,7 +64,7 @@ class FakeSpi final : public SpiKernel {
   [[nodiscard]] SpidevSettings& settings() { return spidev_->settings(); }
   [[nodiscard]] SpiDevice& device() { return *device_; }
 
-  std::map<unsigned long, int> refusals;  // errno with which a request fails, by number of the request
+  std::map<unsigned long, int> refusals;  // errno with which requests fail; the key is the number of the request
   int open_error = 0;
   std::uint32_t mode_mask = ~0u;  // SPI mode bits outside the mask are accepted without effect
   std::uint32_t highest_speed = ~0u;

@@ -11,8 +11,9 @@ namespace absenc::os {
 using namespace std::chrono_literals;
 
 namespace {
-constexpr std::size_t most_pending = 4096;  // limit for received frames that no caller has taken
-}
+// Greatest number of events that wait to be reported; older ones are dropped.
+constexpr std::size_t most_pending = 4096;
+}  // namespace
 
 void FramePort::push(const CanFrame& frame, Time at) { push_event({EventKind::received, at, frame}); }
 

@@ -17,7 +17,7 @@ class OutputFile {
   /// Waits until the content is on the disk. Throws Failure, also as `require_there` does.
   void sync();
   /// Throws Failure `lost` if the path does not lead to this file any more or the file was truncated: nobody would find
-  /// further data.
+  /// further data. Checks nothing before the file has its name.
   void require_there() const;
 
   [[nodiscard]] const std::string& path() const { return path_; }
@@ -57,8 +57,9 @@ class LineFile final : public OutputFile {
 class BlockFile final : public OutputFile {
  public:
   explicit BlockFile(const std::string& path) : OutputFile(path, Appears::later) {}
-  /// Gives the file its name. Before this call no other process sees the file, and it disappears when the process ends.
-  /// Throws Failure; `in_use` if another file has taken the name.
+  /// Gives the file its name. Before this call the file has no name and disappears when the process ends; on file
+  /// systems without nameless files it has a temporary name, which a killed process leaves behind. Throws Failure;
+  /// `in_use` if another file has taken the name.
   void appear();
   /// Writes `bytes` at offset `at`; a hole between the end and `at` reads as zeros. Throws Failure, also as
   /// `require_there` does.

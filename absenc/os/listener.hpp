@@ -18,7 +18,8 @@ struct Listener {
 };
 
 /// Opens a TCP port at `host`: a name, an IPv4 address, or an IPv6 address with or without brackets. `port` 0 means any
-/// free port. Throws Failure: `not_found` (no such host here), `in_use`, `no_permission`, `system`.
+/// free port. Throws Failure: `not_found` (unknown host, or no address of this computer), `in_use`, `no_permission`,
+/// `system`.
 [[nodiscard]] Listener listen_at(const std::string& host, std::uint16_t port);
 
 /// Returns the IP address in `address` as text, for example "127.0.0.1"; "" if it is no internet address.

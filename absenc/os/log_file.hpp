@@ -30,15 +30,15 @@ class OwnedFolder {
 class LogFile {
  public:
   enum class Open : std::uint8_t { fresh, existing };
-  /// Opens the file at `path`, new or existing. Throws Failure.
+  /// Creates the file at `path` (`fresh`; it must not exist) or opens it (`existing`). Throws Failure.
   LogFile(const std::string& path, Open how);
 
   /// Appends all of `bytes` or, on error, none of them. Returns 0 or a value of errno.
   [[nodiscard]] int append(std::string_view bytes);
   /// Replaces the existing byte at `offset`, which needs no room on the disk. Returns 0 or a value of errno.
   [[nodiscard]] int replace(std::size_t offset, char byte) const;
-  /// Replaces the whole content by `bytes`, which must not be longer: this needs no room on the disk. Returns false if
-  /// not everything was written.
+  /// Replaces the whole content by `bytes`, which must not be longer, so that no room on the disk is needed. Returns
+  /// false if `bytes` is longer or was not written completely.
   [[nodiscard]] bool shrink_to(std::string_view bytes);
   /// Returns up to `size` bytes of the file from `offset`; fewer at its end. Throws Failure.
   [[nodiscard]] std::string read(std::size_t offset, std::size_t size) const;

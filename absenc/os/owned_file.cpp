@@ -39,7 +39,7 @@ OwnedFile::OwnedFile(const std::string& path) : path_(path) {
     if (there) require_regular(is_regular(named), path);
     const int make = there ? 0 : O_CREAT | O_EXCL;
     file_ = Descriptor(::open(path.c_str(), O_RDWR | O_NONBLOCK | O_NOCTTY | O_CLOEXEC | make, 0666));
-    // Another process created or removed the file between the two calls.
+    // Another process created or removed the file between stat(2) and open(2).
     if (!file_ && (errno == EEXIST || (there && errno == ENOENT))) continue;
     if (!file_) throw system_failure("opening " + path, errno);
     made_ = made_ || !there;
@@ -53,7 +53,7 @@ OwnedFile::OwnedFile(const std::string& path) : path_(path) {
     // The file may have been replaced before it was locked.
     if (identity_of(path) == identity_of(opened)) return;
   }
-  // The path is a link to itself, or another process replaces the file again and again.
+  // After all tries: the path is a link to itself, or another process replaces the file again and again.
   throw system_failure("opening " + path, ELOOP);
 }
 

@@ -29,7 +29,8 @@ void Poller::remove(int descriptor) { ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, d
 
 void Poller::arm(Time deadline) {
   const auto whole = std::chrono::duration_cast<std::chrono::seconds>(deadline);
-  itimerspec setting{};  // a value of zero would disarm the timer
+  // An expiry time of zero would disarm the timer, so 1 ns is set instead.
+  itimerspec setting{};
   setting.it_value = {whole.count(), deadline > whole ? (deadline - whole).count() : whole.count() == 0 ? 1 : 0};
   if (::timerfd_settime(timer_.get(), TFD_TIMER_ABSTIME, &setting, nullptr) < 0) {
     throw system_failure("timerfd_settime", errno);

@@ -35,7 +35,7 @@ class Poller {
 
   Descriptor epoll_;
   Descriptor timer_;
-  Time armed_ = never;   // time for which `timer_` is set: never later than the deadline
+  Time armed_ = never;   // time at which `timer_` expires; `never` if it is not set
   int interrupts_ = -1;  // descriptor that is readable after SIGINT or SIGTERM; -1 if not caught yet
   std::array<int, most_ready> ready_{};
 };

@@ -64,8 +64,9 @@ Time processor_time() {
 RunDelay::RunDelay() : file_(::open("/proc/thread-self/schedstat", O_RDONLY | O_CLOEXEC)) { (void)take(); }
 
 Time RunDelay::take() {
-  std::array<char, 64> text{};  // /proc/thread-self/schedstat, in nanoseconds: time on a processor, time ready to run
-                                // but waiting; then the number of time slices
+  // The fields of /proc/thread-self/schedstat: nanoseconds on a processor, nanoseconds ready to run but waiting, number
+  // of time slices.
+  std::array<char, 64> text{};
   if (!file_ || ::pread(file_.get(), text.data(), text.size() - 1, 0) <= 0) return {};
   char* end = text.data();
   std::strtoull(end, &end, 10);

@@ -12,9 +12,9 @@
 namespace absenc::os {
 
 /// Protects this process from its standard streams: from this call on, a closed pipe and a file at its size limit
-/// (`ulimit -f`) cause write errors instead of ending the process. Standard streams that were closed are occupied, so
-/// that no port gets their numbers: with standard output closed, the readings would be sent to the encoder. Writing to
-/// a standard output that was closed fails. Throws Failure.
+/// (`ulimit -f`) cause write errors instead of ending the process. Standard streams that were closed are opened on
+/// /dev/null, so that no port gets their numbers: with standard output closed, the readings would be sent to the
+/// encoder. Writing to a standard output that was closed fails. Throws Failure.
 void protect_standard_streams();
 
 /// Writes `bytes` to standard output. If that is a file and the disk has no room for all of them, none remains. Returns
@@ -46,7 +46,8 @@ class RunDelay {
 
 enum class Durable : std::uint8_t { no, yes };
 
-/// A new file that replaces the file at `path` when it is complete; before, no other program sees it. Throws Failure.
+/// A new file that replaces the file at `path` when it is complete; until then `path` leads to the old file or to none.
+/// Throws Failure.
 class NewFile {
  public:
   explicit NewFile(const std::string& path);
@@ -58,7 +59,8 @@ class NewFile {
   /// Returns a path by which the new file can be opened before `take_place`.
   [[nodiscard]] const std::string& path() const { return temporary_path_; }
   void write(std::string_view content);
-  /// Gives the file its final name and returns its open descriptor. `Durable::yes` waits for the disk.
+  /// Gives the file its final name and returns its open descriptor. With `Durable::yes` first waits until the content
+  /// is on the disk.
   Descriptor take_place(Durable durable);
 
  private:

@@ -34,14 +34,14 @@ struct WireKernel {
   /// Calls ioctl(2) with TIOCMBIS or TIOCMBIC.
   virtual int set_modem_lines(int descriptor, unsigned long request, int lines);
   virtual gpiod_line* find_gpio(const std::string& name);
-  /// Requests `line` as an output at level 0.
+  /// Requests `line` as an output at logical level 0 (inactive).
   virtual int request_gpio(gpiod_line* line, bool active_low);
   virtual int set_gpio(gpiod_line* line, int value);
   virtual void release_gpio(gpiod_line* line);
 };
 [[nodiscard]] WireKernel& system_wires();
 
-/// A wire for pulses in use: it is held at rest from its construction on.
+/// An opened wire for pulses. It is at rest (inactive) until `drive(true)` is called.
 class PulseOutput {
  public:
   /// `descriptor` belongs to the serial port `path`. Throws Failure: `not_found`, `no_permission` and `in_use` for a

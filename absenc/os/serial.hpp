@@ -17,10 +17,11 @@ namespace absenc::os {
 
 /// Selects the component that switches an RS-485 transceiver to sending.
 enum class Rs485 : std::uint8_t {
-  automatic,  // the kernel switches with RTS if the port supports it and RTS is free, otherwise the adapter switches;
-              // for half-duplex lines
-  on,         // the kernel switches; a port that does not support it is an error
-  off,        // the kernel never switches; for full-duplex lines
+  // Automatic (half-duplex lines): the kernel switches with RTS if the port supports it and RTS carries no pulses,
+  // otherwise the adapter switches by itself.
+  automatic,
+  on,   // the kernel switches; throws `unsupported` if the port cannot do it
+  off,  // the kernel never switches; for full-duplex lines
 };
 
 /// Directions in which a port is used.
@@ -35,8 +36,8 @@ enum class SerialUse : std::uint8_t {
 /// A serial port in raw mode with 8 data bits, locked against other programs. Closing restores the previous settings.
 class SerialPort final : public DescriptorPort {
  public:
-  /// Discards bytes received before. Throws Failure of every kind except `lost`; `bad_rate` if the port's nearest rate
-  /// differs by more than 1 %. A pulse without its wire in `wires` is `unsupported`. `kernel` must outlive the port.
+  /// Discards bytes received before. Throws Failure; `bad_rate` if the port's nearest rate differs by more than 1 %. A
+  /// pulse step whose wire is not named in `wires` throws `unsupported`. `kernel` must outlive the port.
   SerialPort(const std::string& path, const LineSettings& settings, Rs485 rs485 = Rs485::automatic,
              const PulseWires& wires = {}, WireKernel& kernel = system_wires(), SerialUse use = SerialUse::both);
   ~SerialPort() override;

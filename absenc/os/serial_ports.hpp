@@ -30,14 +30,16 @@ namespace absenc::os {
 /// Properties of a port that can be read without opening it: opening raises DTR, which resets some boards.
 struct ListedPort {
   std::string path{};
-  std::string lasting_path{};  // "/dev/serial/by-id/...", a path that stays the same when ports are plugged in in
-                               // another order; or ""
+  // A path "/dev/serial/by-id/...", which stays the same when ports are plugged in in another order; "" if there is
+  // none.
+  std::string lasting_path{};
   std::string driver{};
   std::optional<UsbAdapter> usb{};
   std::optional<unsigned> latency_timer{};  // time for which a USB adapter holds back received bytes, in milliseconds
-  std::optional<std::uint32_t> highest_rate{};  // highest bit rate of the adapter's chip, in bits per second
-  std::string refusal{};                        // reason why this user may not open the port; "" if the user may
-  std::string holder{};                         // program that uses the port, as returned by `holder_of`
+  // Highest bit rate of the adapter's chip or of the UART's clock, in bits per second; empty if unknown.
+  std::optional<std::uint32_t> highest_rate{};
+  std::string refusal{};  // reason why this user may not open the port; "" if the user may
+  std::string holder{};   // program that uses the port, as returned by `holder_of`
 };
 
 /// Reads the properties of the port at `path`. `sys` and `links` are parameters for tests.

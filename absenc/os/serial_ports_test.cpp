@@ -78,7 +78,7 @@ TEST_F(ListedPorts, UnknownChipHasNoRate) {
   write("devices/usb1/1-2/bcdDevice", "9999");
   EXPECT_FALSE(look().highest_rate);
   write("devices/usb1/1-2/idVendor", "10c4");
-  // This number is that of CP2102 and of CP2102N, which is three times as fast.
+  // CP2102 and CP2102N, which is three times as fast, have the same product number ea60.
   write("devices/usb1/1-2/idProduct", "ea60");
   EXPECT_FALSE(look().highest_rate);
   EXPECT_EQ(look().lasting_path, "");

@@ -8,7 +8,7 @@
 namespace absenc::os {
 
 /// The files of one server: one file per port in $RUNTIME_DIRECTORY, which systemd gives to a service, or else in
-/// $XDG_RUNTIME_DIR/absenc, from the constructor to the destructor. Without these folders, or if they cannot be
+/// $XDG_RUNTIME_DIR/absenc. `set` writes them, the destructor removes them. Without these folders, or if they cannot be
 /// written, there are no files: a program that opens the port then finds only the process that holds it.
 class ServedPorts {
  public:

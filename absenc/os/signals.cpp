@@ -124,8 +124,9 @@ void sleep_until(Time time) {
 }
 
 void reach(Time time) {
-  constexpr Time wake_up = std::chrono::microseconds(100);  // the kernel may wake a thread this much late: timer slack
-                                                            // and scheduling
+  // Limit for the time by which the kernel wakes a thread late (timer slack and scheduling): the clock is polled for
+  // this long.
+  constexpr Time wake_up = std::chrono::microseconds(100);
   if (time - now() > wake_up) sleep_until(time - wake_up);
   while (now() < time) {
   }

@@ -58,8 +58,8 @@ bool wait_for(std::span<pollfd> watched, Time deadline);
 /// `wait_for` does.
 void sleep_until(Time time);
 
-/// Returns exactly at `time`, within one read of the clock: it polls the clock for the last 100 us. Throws as
-/// `wait_for` does.
+/// Polls the clock for the last 100 us and returns at `time`, late by one read of the clock unless another thread takes
+/// the processor; returns at once if `time` is past. Throws as `wait_for` does.
 void reach(Time time);
 
 }  // namespace absenc::os

@@ -20,7 +20,8 @@ class Signals : public ::testing::Test {
  protected:
   Signals() { catch_interrupts(); }
 
-  // SIGALRM also interrupts the system call, but must not end the wait.
+  // Sends `signal` to this thread after `milliseconds`. SIGALRM also interrupts the system call, but must not end the
+  // wait.
   static void signal_in(int milliseconds, int signal) {
     static pthread_t target;
     target = ::pthread_self();

@@ -20,7 +20,7 @@ class SlcanLine : public FramePort {
 
   void write(Bytes text);
   void collect(Time deadline) final;
-  /// Calls `collect` until anything is received or `deadline` is reached. Returns whether anything was received.
+  /// Calls `collect` and returns whether a line was received before `deadline`.
   bool receives_until(Time deadline);
   /// Returns the time of the next event that does not depend on received bytes; `never` if none is due.
   [[nodiscard]] virtual Time due() const { return never; }
@@ -57,7 +57,8 @@ class SlcanPort final : public SlcanLine {
 
   std::string name_;
   std::vector<std::string> notes_;
-  bool awaiting_reply_ = false;  // a command is outstanding: the next received line is its reply, not a frame
+  // A command is outstanding: the next empty line or refusal is the adapter's reply to it.
+  bool awaiting_reply_ = false;
   Reply reply_ = Reply::none;
   unsigned garbage_ = 0;
 };
@@ -74,7 +75,7 @@ class SlcanAdapter final : public SlcanLine {
   [[nodiscard]] std::uint64_t lost() const { return lost_; }
   /// Returns the number of frames refused because the queue was full.
   [[nodiscard]] std::uint64_t overflowed() const { return overflowed_; }
-  /// Returns the number of lines that are no valid command.
+  /// Returns the number of lines of the host that are no valid command or frame.
   [[nodiscard]] std::uint64_t garbage() const { return garbage_; }
 
  private:

@@ -236,7 +236,7 @@ void SocketCan::send(const CanFrame& from) {
   const Time limit = os::now() + queue_patience;
   for (;;) {
     if (kernel_->write(socket_.get(), frame) == static_cast<ssize_t>(sizeof frame)) return;
-    // poll(2) does not report the end of either error condition, so the write is repeated.
+    // poll(2) does not report when ENOBUFS (the queue is full) ends, so the write is repeated.
     const bool full = errno == ENOBUFS || errno == EAGAIN;
     if (!full && errno != EINTR) fail("sending on " + interface_, errno);
     if (os::now() >= limit) {

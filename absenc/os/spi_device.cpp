@@ -94,7 +94,8 @@ Time SpiDevice::clock(const SpiTransfer& transfer, Time at) {
   period_ = period_ == Time{} ? period : std::min(period_, period);
   received_.resize(std::min(received_.size() + transfer.size, most_received));
   std::fill(transfer.in.begin(), transfer.in.end(), std::uint8_t{0});
-  // Both sides change and sample at the same edge: the device samples the bit that was on the line before the edge.
+  // If the host shifts at the edge at which the device samples, the device gets the bit that was on the line before the
+  // edge.
   const bool samples_late = samples_at_trailing_edge(transfer.mode) && !shifts_at_leading_edge(transfer.mode);
   for (std::size_t bit = 0; bit < 8 * transfer.size; ++bit, ++clocks_) {
     const std::uint8_t mask = mask_of(bit, transfer.lsb_first);

@@ -14,14 +14,14 @@ namespace absenc::os {
 
 /// One transfer of an SPI message, as in spidev.
 struct SpiTransfer {
-  std::size_t size = 0;    // number of bytes of the transfer; without both buffers nothing is clocked
+  std::size_t size = 0;    // number of bytes of the transfer; if `out` and `in` are both empty, nothing is clocked
   Bytes out{};             // bytes that the host sends, `size` of them; empty: zeros are sent
   MutableBytes in{};       // buffer for the bytes of the device, `size` of them; empty: they are discarded
   std::uint32_t rate = 0;  // clock rate in Hz
   std::uint8_t mode = 0;   // 2 * CPOL + CPHA
   bool lsb_first = false;
   Time delay{};           // pause behind the last bit of the transfer
-  bool deselect = false;  // deselects the chip behind `delay`; in the last transfer: the chip stays selected
+  bool deselect = false;  // deselects the chip after `delay`; in the last transfer: the chip stays selected
 };
 
 /// One device machine behind a controller, simulated edge by edge in every SPI mode. A side that samples at an edge at
@@ -69,9 +69,9 @@ class SpiDevice {
   Time timer_ = never;
   std::uint64_t messages_ = 0;
   std::uint64_t wrong_modes_ = 0;
-  bool held_low_ = false;  // the clock line has been low since the last message
+  bool held_low_ = false;  // the clock line was low at some time since the last message
 
-  // State since the chip was selected or since the first clock.
+  // State since the chip was selected (spi) or since the first clock of a word (clocked).
   bool selected_ = false;
   std::vector<std::uint8_t> driven_;
   std::uint8_t after_driven_ = 0xFF;

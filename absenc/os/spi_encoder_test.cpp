@@ -134,7 +134,7 @@ TEST_F(SpiEncoder, ReadsRegistersWithClockLevel) {
   EXPECT_EQ(info.error(), Error::none);
 }
 
-// On this controller the two pulses of the start sequence are sent as one byte.
+// An SPI controller sends the two pulses of the BiSS start sequence as one byte.
 TEST_F(SpiEncoder, BissIsStartedByAByteOfPulses) {
   biss::Format format;
   format.start_sequence = true;

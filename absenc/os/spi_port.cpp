@@ -155,7 +155,7 @@ void SpiPort::transfer(const ByteStep& step) {
 void SpiPort::send_message(bool with_output) {
   std::array<spi_ioc_transfer, 2> transfers{};
   const auto lead = std::chrono::ceil<std::chrono::microseconds>(settings_.select_lead).count();
-  // A transfer without bytes that only waits between chip select and the first clock.
+  // The first transfer has no bytes: it only waits between chip select and the first clock.
   transfers[0].delay_usecs = static_cast<std::uint16_t>(lead);
   spi_ioc_transfer& bytes = transfers[1];
   if (with_output) bytes.tx_buf = reinterpret_cast<std::uintptr_t>(out_.data());
@@ -164,7 +164,7 @@ void SpiPort::send_message(bool with_output) {
   const int result = lead > 0 ? control(SPI_IOC_MESSAGE(2), transfers.data()) : control(SPI_IOC_MESSAGE(1), &bytes);
   if (result == static_cast<int>(in_.size())) return;
   const int error = result < 0 ? errno : EIO;
-  // The last two errors mean that a program (CUSE) served the device and has ended.
+  // ENOTCONN and ECONNABORTED mean that a program (CUSE) served the device and has ended.
   if (error == ENODEV || error == ESHUTDOWN || error == ENOTCONN || error == ECONNABORTED) {
     throw Failure(Kind::lost, path_ + " went away: was its driver unloaded?");
   }
@@ -177,8 +177,8 @@ void SpiPort::send_message(bool with_output) {
   throw Failure(Kind::system, what + ": try another speed=HZ, and see what the kernel says in dmesg");
 }
 
-// Reduces the sampled bytes to `bits` bits: removes the bits of the idle clocks, whose level is stored, and those of
-// clocks behind the last bit.
+// Reduces the sampled bytes to `bits` bits: removes the bits of the idle clocks, whose level goes to `idle_low_`, and
+// the bits of clocks behind the last one.
 void SpiPort::extract_bits(std::size_t bits) {
   const BitView clocked{in_, in_.size() * 8};
   idle_low_ = settings_.idle_clocks > 0 && clocked.load(0, settings_.idle_clocks) == 0;

@@ -39,7 +39,8 @@ bool is_message(unsigned long request) {
   return _IOC_TYPE(request) == SPI_IOC_MAGIC && _IOC_NR(request) == 0 && _IOC_DIR(request) == _IOC_WRITE;
 }
 
-// Memory that the program must provide for these transfers, and room for their results.
+// Memory ranges of the program that a message reads and writes (`reply`), and the number of bytes that it sends (`in`)
+// and receives (`out`).
 struct Buffers {
   SpidevReply reply{.again = true};
   std::size_t in = 0;

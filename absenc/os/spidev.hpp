@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The kernel's driver spidev and a controller in front of an SpiDevice: answers requests of programs to /dev/spidevB.C.
+// Simulates the kernel's driver spidev with a controller in front of an SpiDevice: answers requests of programs to
+// /dev/spidevB.C.
 #pragma once
 
 #include <cstddef>
@@ -28,7 +29,7 @@ struct SpidevReply {
   Time at{};                          // earliest time for the reply to the program: the end of its message
 };
 
-/// Settings of the controller and their possible values.
+/// Settings of the simulated controller, and the mode flags that it supports.
 struct SpidevSettings {
   std::uint32_t mode = 0;  // mode with the flags of <linux/spi/spi.h>
   std::uint8_t word_bits = 8;
@@ -37,9 +38,9 @@ struct SpidevSettings {
 };
 
 /// A simulated spidev device: implements Documentation/spi/spidev.rst with the kernel module's own limits. The
-/// controller sends words of 8 bits on one wire at every speed, and selects the chip as it is wired. It begins in mode
-/// 0, the default without an entry in the device tree. It never reads memory of the requesting program itself but
-/// returns the ranges that it needs, as the kernel requires of CUSE; tests read them by pointer.
+/// controller sends words of 8 bits on one wire at every speed, and refuses mode flags that change the chip select. It
+/// begins in mode 0, the default without an entry in the device tree. It never reads memory of the requesting program
+/// itself but returns the ranges that it needs, as the kernel requires of CUSE; tests read them by pointer.
 class Spidev {
  public:
   explicit Spidev(SpiDevice& device);

@@ -17,7 +17,7 @@
 
 namespace absenc::os {
 
-/// Base class of all byte stream ports. Every function throws Failure, Interrupted (os/signals.hpp) or Ended.
+/// Base class of all byte stream ports. `begin` and `wait` throw Failure, Interrupted (os/signals.hpp) or Ended.
 ///
 /// A transfer begins at `at`, never earlier; `begin` blocks until then. `timer` is reported if the `at` of a wait was
 /// later than the last event and the last call of `now`.
@@ -54,11 +54,11 @@ class StreamPort : public Port<std::uint8_t> {
   /// Sets the duration of a character. `sent` is computed from it, because tcdrain blocks for milliseconds. Default 0:
   /// a transfer counts as sent when it is written.
   void set_character_time(Time time) { character_time_ = time; }
-  /// With `yes`, `sent` gets the time before the write, because the program at the other end may read and answer the
+  /// With true, `sent` gets the time before the write, because the program at the other end may read and answer the
   /// bytes before the write returns. Default false: the time after the write.
   void set_read_at_once(bool yes) { read_at_once_ = yes; }
   [[nodiscard]] Time end() const { return end_; }
-  /// Returns the end of the last transfer.
+  /// Returns the end of the last transfer or pulse.
   [[nodiscard]] Time sent_at() const { return sent_at_; }
 
   /// Returns the poller; a derived port adds its descriptors.
@@ -90,8 +90,9 @@ class StreamPort : public Port<std::uint8_t> {
   bool read_at_once_ = false;
 
   Waiting<std::uint8_t> waiting_;
-  Time sent_at_{};             // end of the last transfer
-  Time sent_late_{};           // time by which the last transfer may have ended earlier
+  Time sent_at_{};  // end of the last transfer
+  // Greatest time by which the last transfer may have ended before `sent_at_`.
+  Time sent_late_{};
   bool sent_pending_ = false;  // whether the event `sent` is still to be reported
   std::array<std::uint8_t, 4096> buffer_;
 };

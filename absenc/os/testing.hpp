@@ -47,7 +47,7 @@ class TemporaryDirectory {
   std::filesystem::path path_;
 };
 
-/// A bare pseudo-terminal, with both its master and its path.
+/// A pseudo-terminal with its open master and the path of its slave.
 struct PseudoTerminal {
   PseudoTerminal() : master(::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC)) {
     ::grantpt(master.get());

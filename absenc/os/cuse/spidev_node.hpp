@@ -25,8 +25,8 @@ class SpidevNode {
 
   [[nodiscard]] const std::string& path() const { return path_; }
 
-  /// Answers requests of programs until `end`, one SPI message at a time, each when the message has ended. Throws as
-  /// `wait_for` (os/signals.hpp), and Failure if the kernel removes the device.
+  /// Answers requests of programs until `end`, one SPI message at a time; the reply is sent when its message has ended.
+  /// Throws as `wait_for` does (os/signals.hpp), and Failure if the kernel removes the device.
   void serve(Time end = never);
 
  private:
