@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decides which requests are allowed. On loopback everybody on this computer may read; from elsewhere, behind a proxy,
-// and to change an encoder, a request needs a token.
+// Decides which requests are allowed. On loopback everybody on this computer may read. A request needs a token if it
+// comes from elsewhere, if it comes through a proxy and the server has tokens, and if it changes an encoder.
 #pragma once
 
 #include <cstdint>

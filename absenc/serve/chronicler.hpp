@@ -20,7 +20,8 @@ namespace absenc::serve {
 /// A detector of jumps of the calendar clock.
 class ClockWatch {
  public:
-  static constexpr std::int64_t smallest_jump_ms = 10'000;  // in milliseconds; NTP adjusts the clock by less
+  // Smallest change of the calendar clock that counts as a jump, in milliseconds; NTP adjusts the clock by less.
+  static constexpr std::int64_t smallest_jump_ms = 10'000;
 
   /// Returns the jump of the calendar clock since the last call, in milliseconds; 0 without one. `now` is a time of
   /// os::now.

@@ -26,7 +26,8 @@ class Connections {
   /// `end` closes the connection of a socket; the server calls `remove` for it at once or later.
   explicit Connections(std::function<void(int socket)> end) : end_(std::move(end)) {}
 
-  /// Adds a connection. When a limit is exceeded, closes another connection, or this one.
+  /// Adds a connection. When a limit is exceeded, closes the connection that is idle for longest; if none is idle, this
+  /// connection belongs to the reserve or is closed.
   void add(Id id, int socket, std::string peer, Time now);
   void remove(Id id) { open_.erase(id); }
   /// Records that a whole request was received: the connection is not idle until `await_request`.
@@ -34,7 +35,7 @@ class Connections {
   void await_request(Id id, Time now);
   /// Returns whether the connection belongs to the reserve, which serves vital requests only.
   [[nodiscard]] bool is_in_reserve(Id id) const;
-  /// Closes connections whose request has been incomplete for longer than `request_time`.
+  /// Closes connections that have waited for a complete request for longer than `request_time`.
   void end_incomplete_requests(Time now);
 
  private:

@@ -218,8 +218,9 @@ bool HistoryWriter::has_day_of_rows_since(std::int64_t at_s) {
   return false;
 }
 
-// Returns the time in seconds before which the oldest tenth of all rows lies. Counts rows instead of comparing times,
-// because a wrong clock may have given some rows any time.
+// Returns the time in seconds before which the oldest tenth of the rows of the encoder with the most rows lies; without
+// rows, the oldest tenth of the events. Counts rows instead of comparing times, because a wrong clock may have given
+// some rows any time.
 std::int64_t HistoryWriter::end_of_oldest_tenth() {
   Sqlite& sqlite = file_->sqlite();
   const std::int64_t most = sqlite.number(

@@ -40,8 +40,8 @@ class HistoryFile {
 
   /// Closes a history file in state `changed`, and changes neither the file nor its log.
   void close();
-  /// Closes a history file in state `gone` or `replaced`. All written rows are in that file, and its log is removed
-  /// from the path.
+  /// Closes a history file in state `gone` or `replaced`. Writes the rows of the log into that file and removes the log
+  /// from the path; if the rows cannot be written, renames the log.
   void close_moved();
   /// Closes a history file in state `damaged` and renames it. Returns the new name. Throws Failure.
   std::string set_aside();
@@ -53,8 +53,8 @@ class HistoryFile {
   [[nodiscard]] bool passes_quick_check() const;
 
   std::string path_;
-  std::unique_ptr<os::OwnedFile> owned_file_;  // stays open until the database is closed: closing it would release
-                                               // SQLite's locks
+  // Stays open until the database is closed: closing a descriptor of the file would release SQLite's locks.
+  std::unique_ptr<os::OwnedFile> owned_file_;
   std::optional<Sqlite> sqlite_;
   os::FileIdentity log_;    // identity of the write-ahead log of SQLite
   os::FileIdentity index_;  // identity of the index of the write-ahead log

@@ -23,11 +23,11 @@ namespace {
 // Greatest number of connections of libmicrohttpd, above the limits of Connections: at its own limit the library would
 // leave new connections unaccepted.
 constexpr unsigned most_connections = Connections::most + Connections::reserve + 64;
-constexpr std::size_t memory_for_each = 64 * 1024;  // bytes for headers and unsent output; larger headers are refused
-                                                    // with status 431
-constexpr std::uint64_t most_body = 4096;           // bytes of a request body; no request needs one
-constexpr std::uint64_t most_read = 1 << 20;        // bytes of a body of unknown length that are read before the
-                                                    // connection is closed
+// Bytes for the headers and unsent output of a connection; larger headers are refused with status 431.
+constexpr std::size_t memory_for_each = 64 * 1024;
+constexpr std::uint64_t most_body = 4096;  // bytes of a request body; no request needs one
+// Bytes of a request body of unknown length that are read before the connection is closed.
+constexpr std::uint64_t most_read = 1 << 20;
 constexpr unsigned idle_seconds = 15;
 constexpr std::size_t block = 16 * 1024;
 
@@ -72,7 +72,7 @@ void add_headers(MHD_Response* response, const std::string& type) {
   ::MHD_add_response_header(response, "Cache-Control", "no-store");
   ::MHD_add_response_header(response, "X-Content-Type-Options", "nosniff");
   ::MHD_add_response_header(response, "Referrer-Policy", "no-referrer");
-  // Dygraphs inserts style elements into the document.
+  // Inline styles are allowed, because Dygraphs inserts style elements into the document.
   ::MHD_add_response_header(response, "Content-Security-Policy",
                             "default-src 'self'; style-src 'self' 'unsafe-inline'; base-uri 'none'; "
                             "form-action 'none'; frame-ancestors 'none'");

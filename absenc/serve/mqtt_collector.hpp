@@ -49,7 +49,7 @@ class MqttCollector {
   // The members below are used by the collector thread only.
   std::int64_t next_id_;
   std::map<std::string, std::uint64_t> next_numbers_;  // next number of a reading, by encoder
-  // By encoder: number of its last reading on disk, while messages wait in memory.
+  // By encoder: number of its last spooled reading. It goes to `Figures::taken` when no message waits in memory.
   std::map<std::string, std::uint64_t> not_on_disk_;
   Spool::Counts unreported_{};  // dropped messages that no event has reported yet
   std::string unreported_reason_;

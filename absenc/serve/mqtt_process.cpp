@@ -34,11 +34,11 @@ constexpr int keepalive_s = 15;
 // Greatest number of messages without acknowledgement; the broker may set a lower limit.
 constexpr int most_in_flight = 1000;
 constexpr const char* system_certificates = "/etc/ssl/certs";
-constexpr std::size_t most_memory = 128'000'000;  // greatest memory of the process in bytes; an MQTT packet may have
-                                                  // 256 MB, but none so large is expected
-constexpr std::size_t most_frame = 256'000'000;   // greatest size in bytes of a frame from the parent
-constexpr std::size_t outgoing_limit = 100'000;   // bytes for the parent; above this number nothing is read from the
-                                                  // broker until the parent has received them
+// Greatest memory of the process in bytes; an MQTT packet may have 256 MB, but none so large is expected.
+constexpr std::size_t most_memory = 128'000'000;
+constexpr std::size_t most_frame = 256'000'000;  // greatest size in bytes of a frame from the parent
+// Bytes for the parent above which nothing is read from the broker until the parent has received them.
+constexpr std::size_t outgoing_limit = 100'000;
 constexpr Time sign_of_life_interval = 1s;
 
 void require(int error, const std::string& what) {
@@ -176,7 +176,7 @@ class MqttProcess {
   void run_library() {
     if (client_ == nullptr || !connects_) return;
     if (::mosquitto_socket(client_) < 0) return lose("the connection was lost");
-    // Error or end of the connection: mosquitto_loop_read reports the reason.
+    // After an error or the end of the connection mosquitto_loop_read is called, because it reports the reason.
     const bool is_over = (broker_events_ & (POLLERR | POLLHUP | POLLNVAL)) != 0;
     const bool reads = is_over || (broker_events_ & POLLIN) != 0;
     const bool writes = (broker_events_ & POLLOUT) != 0;

@@ -32,8 +32,8 @@ constexpr Time longest_pause = 5s;
 constexpr Time time_to_connect = 10s;
 constexpr Time time_to_finish = 1s;
 constexpr Time stable_time = 10s;  // after a connection that lasted this long, the next pause is `first_pause` again
-constexpr Time connection_report_interval = 60s;  // minimum time between two events about a connection that is often
-                                                  // lost; a lasting connection is reported at once
+// Minimum time between two events about a connection that is often lost; a lasting connection is reported at once.
+constexpr Time connection_report_interval = 60s;
 
 }  // namespace
 
@@ -213,8 +213,7 @@ void MqttSender::send_states(MqttClient& client) {
   }
 }
 
-// Clears the retained messages of encoders that are no longer served. Otherwise the broker would keep the retained
-// messages of an encoder that is no longer served.
+// Clears the retained messages of encoders that are no longer served; otherwise the broker would keep them.
 void MqttSender::clear_unserved(MqttClient& client, const Fleet::Watches& watches) {
   std::set<std::string> now;
   for (const auto& watch : watches) now.insert(watch->name());
@@ -266,7 +265,8 @@ void MqttSender::send_messages(MqttClient& client) {
   }
 }
 
-// Removes acknowledged messages from the spool. Otherwise a message leaves the spool only when it is full.
+// Removes acknowledged messages from the spool. Without an acknowledgement a message leaves the spool only when the
+// spool is full.
 void MqttSender::settle(MqttClient& client) {
   std::vector<std::int64_t> arrived;
   for (const MqttClient::Acknowledgement& one : client.take_acknowledgements()) {

@@ -16,16 +16,16 @@ namespace absenc::serve {
 /// The kind of a frame, with the fields that follow it.
 enum class Wire : std::uint8_t {
   // Frames to the MQTT client process:
-  begin,    // host, port, tls, login_file, ca_file, cert_file, key_file, id, will topic, will, version
-  connect,  // host, whether to try all addresses of the host
-  publish,  // number, topic, payload, QoS, retain
+  begin,    // fields: host, port, tls, login_file, ca_file, cert_file, key_file, id, will topic, will, version
+  connect,  // fields: host, whether to try all addresses of the host
+  publish,  // fields: number, topic, payload, QoS, retain
   leave,    // no fields; the process disconnects from the broker and ends
   // Frames from the MQTT client process:
   ready,         // no fields; the settings of `begin` can be used
-  failed,        // reason why the settings of `begin` cannot be used
+  failed,        // fields: reason why the settings of `begin` cannot be used
   connected,     // no fields; the broker has accepted the connection
-  lost,          // reason of the lost connection, whether the broker does not support the MQTT version
-  acknowledged,  // number of the message, reason of a refusal or ""
+  lost,          // fields: reason of the lost connection, whether the broker does not support the MQTT version
+  acknowledged,  // fields: number of the message, reason of a refusal or ""
   alive,         // no fields; sign of life, every second
 };
 

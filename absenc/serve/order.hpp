@@ -14,7 +14,7 @@
 
 namespace absenc::serve {
 
-/// Result of an order.
+/// Result of an order: whether it succeeded, a text for people, and the fields of the reply.
 struct OrderResult {
   bool good = false;
   std::string text{};
