@@ -32,8 +32,8 @@ class Access {
     std::string public_url{};  // URL at which a proxy on this computer shows the page; "": no proxy
     bool on_loopback = false;  // the server listens on loopback, so no other computer can reach it directly
   };
-  /// Throws Failure when the token file cannot be read, users other than its owner may read it, or a token is shorter
-  /// than 16 characters; throws UsageError when `choices` are inconsistent. `server_events` must outlive this object.
+  /// Throws Failure when the token file cannot be read, users outside its group may read it, or a token is shorter than
+  /// 16 characters; throws UsageError when `choices` are inconsistent. `server_events` must outlive this object.
   Access(const Choices& choices, ServerEvents& server_events);
 
   /// Reads the token file again: a token that was removed from the file becomes invalid at once. Throws Failure like

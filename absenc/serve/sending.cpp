@@ -20,7 +20,7 @@ std::string Sending::change_to(const Outlets& outlets) {
     std::shared_ptr<Mqtt> next;
     if (outlets.mqtt) next = std::make_shared<Mqtt>(*outlets.mqtt, *fleet_, *server_events_);
     current_.mqtt = outlets.mqtt;
-    // With new settings the queued readings wait for the new object.
+    // If MQTT only gets new settings, the queued readings wait for the new Mqtt object.
     if (!outlets.mqtt) stop_outgoing(Watch::Outlet::mqtt);
     changed += fmt::format("; MQTT: {}", outlets.mqtt ? outlets.mqtt->broker.text() : "none");
     const std::lock_guard lock(mutex_);

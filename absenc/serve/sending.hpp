@@ -37,7 +37,7 @@ class Sending {
   const Fleet* fleet_;
   ServerEvents* server_events_;
   Outlets current_;
-  mutable std::mutex mutex_;  // mutex that guards the pointers below
+  mutable std::mutex mutex_;  // mutex that guards `mqtt_`; `udp_` is used by `change_to` only
   std::shared_ptr<Mqtt> mqtt_;
   std::unique_ptr<UdpSender> udp_;
 };

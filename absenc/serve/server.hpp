@@ -30,7 +30,8 @@ class Server {
  public:
   /// Starts reading and serving: all threads run when it returns. Throws UsageError, Failure, os::Failure.
   explicit Server(const Choices& choices);
-  /// Stops all threads, within the time that one reading may take.
+  /// Stops all threads. Waits for a reading in progress, and up to a second for a broker to receive the spooled
+  /// messages.
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
@@ -40,8 +41,9 @@ class Server {
   [[nodiscard]] std::size_t encoders() const;
   /// Returns why the history cannot be written; "" if it can, or if the server has no history.
   [[nodiscard]] std::string history_trouble() const;
-  /// Reads absenc.toml again and returns the changes in words. Throws UsageError if the file is invalid: then nothing
-  /// has changed. Call it from one thread only.
+  /// Reads absenc.toml and the token file again and returns the changes in words. Throws UsageError if a file is
+  /// invalid: the encoders and outlets then continue as before. Throws Failure or os::Failure if an outlet cannot be
+  /// started. Call it from one thread only.
   std::string reload();
 
  private:

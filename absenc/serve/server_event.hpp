@@ -28,7 +28,7 @@ struct ServerEvent {
   // command, change, history, mqtt, access.
   std::string kind{};
   std::string text{};
-  std::string who{};  // user who ordered the command of the event; "" for other events
+  std::string who{};  // user, or address of the client, that caused the event; "" if none did
 
   [[nodiscard]] client::Json json() const {
     return client::Json::object()

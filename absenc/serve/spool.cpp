@@ -160,7 +160,7 @@ std::vector<Message> Spool::after(std::int64_t id, std::size_t most) {
       collect_from(part, id, most, found);
     } catch (const os::Failure&) {
       std::error_code error;
-      // The error is temporary: the next call of this function tries again.
+      // The file still exists, so the error may be temporary: the next call of this function tries again.
       if (fs::exists(path_of(part.number), error)) break;
       drop_part(i--, fmt::format("{} was removed", path_of(part.number)));
     }

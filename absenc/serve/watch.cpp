@@ -25,7 +25,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr Time summary_interval = 1s;
-constexpr Time failure_report_interval = 1s;  // between two events about failures, which may occur with each reading
+constexpr Time failure_report_interval = 1s;  // minimum time between two events about failed readings
 constexpr Time retry_pause = 5s;              // pause before the next attempt to read an encoder in state `ended`
 
 // Converts a time of os::now, which is the steady clock.

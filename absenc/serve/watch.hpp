@@ -68,7 +68,7 @@ struct RaisedAlarm {
 /// A copy of the state of an encoder at one time.
 struct Snapshot {
   State state = State::opening;
-  Time age{};  // age of the last reading, or of the last change of state
+  Time age{};  // age of the last reading; before the first reading, time since the start
   bool has_reading = false;
   std::optional<double> place{};  // last valid position, as in `Point`
   client::Sample last{};          // last reading; current only in state `live`
@@ -116,7 +116,7 @@ class Watch {
   /// System to which readings are sent. Each outlet has its own queue of readings.
   enum class Outlet : std::uint8_t { mqtt, udp };
   [[nodiscard]] Outbox::Taken take_outgoing(Outlet outlet);
-  /// Stops storing readings for `outlet`.
+  /// Stops storing readings for `outlet` and drops the queued ones.
   void stop_outgoing(Outlet outlet);
 
   /// Gives an order to the reading thread. Returns "" or why the order is refused: another order waits, an examination
@@ -124,7 +124,7 @@ class Watch {
   [[nodiscard]] std::string_view give(Order order);
 
   /// Acknowledges the alarm of this name, in all channels, until it is cleared; `who` is stored in the history. Returns
-  /// "" or, if the alarm is not raised, this as the reason of the refusal.
+  /// "", or the reason of the refusal if the alarm is not raised.
   [[nodiscard]] std::string acknowledge(std::string_view alarm, const std::string& token, const std::string& who);
 
   [[nodiscard]] const std::string& name() const { return name_; }
@@ -158,7 +158,7 @@ class Watch {
   std::condition_variable_any changed_;
   Snapshot current_;
   Details details_;
-  Time current_since_{};  // time of the last reading, or of the last change of state
+  Time current_since_{};  // time of the last reading; before the first reading, time of the start
   std::optional<Order> order_;
   bool has_ended_ = false;     // whether the thread has ended and accepts no more orders
   bool is_examining_ = false;  // whether an examination runs; no orders are accepted meanwhile

@@ -8,7 +8,7 @@ import {Trace, isMarked, markText, quantities} from "./plots.js";
 import {download, pathOf, request, tokenInfo} from "./server.js";
 import {SHAPES, belowFigure, clock, condition, duration, fieldName, fieldText, figure, forPeople, eventKind, lastText, microseconds, numberText, plain, sentence, valueText, faultLines} from "./words.js";
 
-const LIVE_MS = 20000;      // length of the live plot: the server stores the points of this time
+const LIVE_MS = 20000;      // length of the live plot in milliseconds: the server stores the points of this time
 const LOST_SHARE = .15;     // share of a lost encoder's plot that shows the time without readings
 const MOST_POINTS = 2500;
 const REFRESH_MS = 1000;
@@ -19,7 +19,7 @@ const RANGES = {live: ["Live", 0], "10m": ["10 min", 600], "1h": ["1 h", 3600], 
 const TABS = {history: "History", exchanges: "Exchanges", settings: "Settings", memory: "Memory", doctor: "Doctor"};
 const AWAY = ["opening", "lost", "examined"];
 const SHOWN_COMMANDS = 3;
-const LEAST_MS = 12;      // minimum time between two stored points of the plot
+const LEAST_MS = 12;      // minimum time between two stored points of the plot, in milliseconds
 
 const byteText = (byte) => (Number.isNaN(byte) ? "?" : `0x${byte.toString(16).toUpperCase().padStart(2, "0")} (${byte})`);
 
@@ -218,7 +218,8 @@ export class EncoderPage {
     if (scaled) this.scale.move(encoder.position_mm === null ? null : encoder.position_mm / encoder.length_mm, `${numberText(encoder.length_mm)} mm`);
     const counts = encoder.counts === null ? [] : [`${numberText(encoder.counts)} ${encoder.counts_in_all === null ? "counts" : `of ${numberText(encoder.counts_in_all)} counts`}`];
     showParts(this.below, [...belowFigure(encoder, state.at_ms), ...counts]);
-    // In the states of AWAY no command can reach the encoder; the doctor finds the reason.
+    // While the port is missing, lost or used by an examination (AWAY), no command can reach the encoder; the doctor
+    // finds the reason.
     for (const button of this.commands.querySelectorAll("[data-command]")) button.disabled = AWAY.includes(encoder.state);
     this.showWrong();
     this.showChoices();

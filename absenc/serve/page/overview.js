@@ -6,8 +6,9 @@ import {GROUPS, GROUP_WORDS, MORE_WORDS, SHAPES, belowFigure, condition, figure,
 
 const MANY = 30;           // number of encoders above which the cards are small
 const FEW = 3;
-const DRAW_MS = 5;         // minimum time per encoder between two redraws, so that the load stays constant with many encoders
-const ORDER_MS = 2000;     // minimum time between two reorderings of the cards
+// Minimum time per encoder between two redraws, in milliseconds, so that the load stays constant with many encoders.
+const DRAW_MS = 5;
+const ORDER_MS = 2000;     // minimum time between two reorderings of the cards, in milliseconds
 const MINUTE_S = 60;
 const MOST_WORDS = 2;
 

@@ -44,7 +44,8 @@ function gridLines(quantity) {
   };
 }
 
-// Draws events as marks. A label that would overlap others is omitted; the history tab lists all events.
+// Kinds of events that are drawn as marks. A label that would overlap others is omitted; the history tab lists all
+// events.
 const MARKED = ["alarm", "lost", "silent", "ended", "restarted"];
 export const isMarked = (event) => MARKED.includes(event.kind);
 export const markText = (event) => (event.kind === "alarm" ? plain(event.text.split(":")[0]) : eventKind(event.kind)[1]);
@@ -116,7 +117,8 @@ export class Trace {
     let low = Infinity;
     let high = -Infinity;
     let before = null;
-    // Positions are drawn within one turn if no row, and no step between rows, covers half a turn or more.
+    // Positions are drawn within one turn if no row covers half a turn or more and, for multi-turn encoders, no step
+    // between rows does.
     const fits = within && rows.every((row, i) => row[2] === null ||
       (row[3] - row[1] < turn / 2 && (i === 0 || rows[i - 1][2] === null || this.quantity.wraps || Math.abs(row[2] - rows[i - 1][2]) < turn / 2)));
     for (const [at, ...values] of rows) {
