@@ -22,7 +22,7 @@ namespace {
 using namespace absenc::capture;
 
 constexpr std::size_t samples_size = 64 << 20;
-constexpr std::size_t piece_size = 4 << 20;  // the piece size of sigrok-cli
+constexpr std::size_t piece_size = 4 << 20;  // bytes per piece of a sigrok session, as sigrok-cli writes them
 
 void require_that(bool condition) {
   if (!condition) std::abort();
@@ -132,7 +132,8 @@ void raw_samples(benchmark::State& state) {
 }
 BENCHMARK(raw_samples)->Unit(benchmark::kMillisecond);
 
-// Reads the file into one buffer of `samples_size`, in pieces as large as possible, without the C library's own buffer.
+// Reads the file in pieces of 1 MiB into one buffer, without the C library's own buffer: the reference of
+// `raw_samples`.
 void raw_samples_reference(benchmark::State& state) {
   std::vector<char> buffer(1 << 20);
   const std::string path = files().raw();

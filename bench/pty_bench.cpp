@@ -202,7 +202,8 @@ int main(int argc, char** argv) {
   double bare_user = 0;
   double stack_user = 0;
   for (int i = 0; i < blocks; ++i) {
-    // Every second block swaps the order of the two bare runs, so that neither always comes first.
+    // The two bare runs swap their parts in every second block, so that neither part always has the run before the
+    // stack.
     const Block first = run(bare, exchanges);
     const Block measured = run(stack, exchanges);
     const Block second = run(bare, exchanges);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Extends Google Benchmark by an additional line for each pair NAME and NAME/reference: how many times faster NAME is.
+// Extends Google Benchmark by an additional line for each pair NAME and NAME_reference: how many times faster NAME is.
 #pragma once
 
 #include <benchmark/benchmark.h>

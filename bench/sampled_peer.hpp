@@ -68,8 +68,7 @@ Register gather(const std::uint8_t* samples, unsigned bits, unsigned pin) {
 
 }  // namespace detail
 
-/// Decodes the frame in `samples`, which must have at least four samples after the frame. The start bit is searched in
-/// the first 25.
+/// Decodes the frame in `samples`, of which there must be at least 28. The start bit is searched in the first 25.
 inline SampledPosition take(const SampledPeer& peer, std::span<const std::uint8_t> samples) {
   using Error = SampledPosition::Error;
   constexpr std::size_t searched = 25;

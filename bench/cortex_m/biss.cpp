@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A program without a standard library that decodes FRAMES times one of 64 BiSS frames with 32 bits, for count.sh.
+// A program without a standard library that decodes the first FRAMES of 64 BiSS frames with 32 bits, for count.sh.
 // DECODER selects the decoder: 0, a format known at compile time; 1, a format known at run time; 2, the peer of
 // bench/sampled_peer.hpp; 3, moteus' own function, whose header must be in an include folder. The exit status is 0 if
 // all positions are right.

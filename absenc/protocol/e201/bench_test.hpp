@@ -90,7 +90,7 @@ class TamperedInterface final : public Machine<std::uint8_t> {
   bool sending_text_ = false;  // the transmission in progress is a text of `tamper`
 };
 
-/// Result of a command, with the error as its name.
+/// Result of a command, with the name of its error.
 struct CommandResult : RunResult {
   CommandResult(const RunResult& told)
       : RunResult(told), error(told.finished ? text_of(told.error).name : "hangs"), fields(told.numbers) {}

@@ -13,8 +13,8 @@ using testing::count;
 using testing::turn;
 
 TEST(E201Device, RepliesWithExample4) {
-  // The encoder sends 13 bits of ACK at 280 kHz (3571 ns): its latency is longer than 12 periods, and 13 fit into the
-  // timeout.
+  // The encoder sends 13 bits of ACK at 280 kHz (period 3571 ns): its latency of 46 us is longer than 12 periods and
+  // shorter than 13.
   Bench bench("singleturn_bits=19 latency_us=46");
   bench.shaft.start.position = 275087 * count;
   EXPECT_EQ(bench.raw("4"), "c0014328ff300000\r");

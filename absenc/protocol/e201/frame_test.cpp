@@ -26,10 +26,10 @@ WordFormat position_of(unsigned bits) { return biss::word_with_status({.position
 
 TEST(E201Frame, DistinguishesErrorsOfSamples) {
   for (const auto& [reply, error] : std::to_array<std::pair<std::string_view, Error>>({
-           {"c0014328ff300000\n", Error::wrong_length},    // LF instead of CR
-           {"c0014328ff3000000\r", Error::wrong_length},   // one digit too many
-           {"c0014328ff300000\r\n", Error::wrong_length},  // LF after the CR
-           {"c0014328ff3000\r0\r", Error::bad_framing},    // CR among the digits
+           {"c0014328ff300000\n", Error::wrong_length},    // a reply that ends with LF instead of CR
+           {"c0014328ff3000000\r", Error::wrong_length},   // a reply with one digit too many
+           {"c0014328ff300000\r\n", Error::wrong_length},  // a reply with an LF after the CR
+           {"c0014328ff3000\r0\r", Error::bad_framing},    // a reply with a CR among its digits
            {"80014328ff300000\r", Error::bad_framing},     // the samples begin with 100 instead of 110
            {"c000000000000002\r", Error::truncated},       // the CDS bit is the last sample
            {"c000000000000003\r", Error::bad_framing},     // CDS is 1, and the frame is truncated

@@ -97,7 +97,7 @@ TEST(E201Read, ExplainsEachError) {
     EXPECT_FALSE(read.reading);
     EXPECT_TRUE(read.fields.empty());
   }
-  // Only the second `4` is answered.
+  // The first `4` gets an invalid reply, the second one a valid reply.
   int asked = 0;
   const Tamper once = [&](char letter) {
     return letter == '4' && ++asked == 1 ? std::optional(garbage) : std::nullopt;
@@ -215,7 +215,7 @@ TEST(E201Zero, ReadsZeroBack) {
   EXPECT_EQ(bench.run("set-zero").fields, (Fields{{"counts", 0}}));
   bench.shaft.start.position -= 10 * count;
   EXPECT_EQ(bench.run("decimal").fields, (Fields{{"counts", -10}}));
-  // position of the encoder, without the interface's zero
+  // The zero of the interface does not change the position that the command `position` reads.
   EXPECT_EQ(bench.run("position").fields.at("singleturn"), 275086);
   EXPECT_EQ(bench.run("clear-zero").error, "none");
   EXPECT_EQ(bench.run("decimal").fields, (Fields{{"counts", 275086}}));

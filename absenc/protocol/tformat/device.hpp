@@ -52,7 +52,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     latches_ |= static_cast<std::uint8_t>(bits & (alarms::latched | alarms::counting_error));
     forced_ |= static_cast<std::uint8_t>(bits & (alarms::full_absolute_status | alarms::battery_alarm));
   }
-  /// Ends the alarms `bits` and their cause, including latched alarms.
+  /// Ends the alarms `bits` that `raise_alarms` raised or that are latched.
   void lower_alarms(std::uint32_t bits) override {
     latches_ &= static_cast<std::uint8_t>(~bits);
     forced_ &= static_cast<std::uint8_t>(~bits);
@@ -113,15 +113,17 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   }
 
  private:
-  // MV, typical: battery_error at this voltage or less (5.4, 6.5).
+  // Typical voltage in mV at or below which battery_error is raised while the power is off (5.4, 6.5).
   static constexpr std::int32_t battery_error_voltage = 2750;
   static constexpr std::int32_t battery_alarm_voltage = 3100;
-  // 1/1000 rpm: switched on at this speed or more, full_absolute_status is set (5.4.1).
+  // Speed in 1/1000 rpm at or above which switching on sets full_absolute_status (5.4.1).
   static constexpr std::int32_t full_absolute_speed = 100'000;
-  static constexpr std::int32_t standing_still = 1'000;  // 1/1000 rpm: trembling of a servo at rest
-  // 1/1000 rpm: fastest that the counter follows without power (5.4.2).
+  // Greatest speed in 1/1000 rpm of a shaft that counts as standing still: a servo at rest trembles.
+  static constexpr std::int32_t standing_still = 1'000;
+  // Greatest speed in 1/1000 rpm that the turn counter follows without power (5.4.2).
   static constexpr std::int32_t power_off_speed = 6'000'000;
-  // Rad/s^2: greatest that the counter follows without power.
+  // Greatest acceleration in rad/s^2 that the turn counter follows without power; the second value holds for the time
+  // `power_off_timer` after power off.
   static constexpr std::int32_t power_off_acceleration = 4'000;
   static constexpr std::int32_t power_off_timer_acceleration = 80'000;
   static constexpr Time power_off_timer = 5s;
@@ -146,8 +148,9 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     reply.append(encode_reply(*made).view());
     return Answer::sent;
   }
-  // Returns whether a flawed request gets a refusal. After a missing start bit the encoder searches for the next one
-  // (8.1). The end of such a frame is unknown, so a missing start bit ends it (8.2, 9.2).
+  // Returns whether a flawed request gets a refusal. A byte without the sync code gets none: the encoder searches for
+  // the next start (8.1). A frame with an unknown data ID has no known length, so it ends where the next start bit is
+  // missing (8.2, 9.2).
   bool is_refused(Flaw flaw, Bytes heard) override {
     if (flaw == Flaw::unknown && !has_sync_code(heard[0])) return false;
     if (flaw == Flaw::unknown && heard[0] != control_field(heard[0] >> 3)) refused_status_ |= status::parity_error;
@@ -306,7 +309,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   std::array<std::uint8_t, memory_size> memory_{};
   std::uint32_t writes_ = 0;
 
-  std::optional<Time> off_since_{};  // time of the last power off; none: the encoder was never on, or is on
+  std::optional<Time> off_since_{};  // time of the last power off; empty before the first one
   bool off_ = true;
   bool battery_lost_ = false;  // the battery failed since the last power off
 

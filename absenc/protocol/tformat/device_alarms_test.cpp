@@ -36,7 +36,7 @@ TEST(TformatDevice, CounterContinuesAfterOverflow) {
   bench.shaft.put(65536, 5);
   EXPECT_EQ(bench.everything().alarms, alarms::counter_overflow);
   EXPECT_EQ(bench.everything().multiturn, 0u);
-  EXPECT_EQ(bench.everything().status, 0);  // SF does not show full_absolute_status
+  EXPECT_EQ(bench.everything().status, 0);  // SF does not show counter_overflow
   bench.restart();
   EXPECT_EQ(bench.everything().alarms, alarms::counter_overflow);
 }
@@ -64,7 +64,7 @@ TEST(TformatDevice, BatteryFlags) {
   bench.condition(battery_voltage, 3600);
   EXPECT_EQ(bench.everything().alarms, 0);  // battery_alarm is not latched
   bench.condition(battery_voltage, 2600);
-  bench.encoder.power_on(bench.line.now(), PowerOn::skip);  // the encoder is on already
+  bench.encoder.power_on(bench.line.now(), PowerOn::skip);  // without effect: the encoder is on already
   // Battery_error is raised only for a failure while the power is off.
   EXPECT_EQ(bench.everything().alarms, alarms::battery_alarm);
   bench.restart();
@@ -77,7 +77,7 @@ TEST(TformatDevice, BatteryFlags) {
   EXPECT_EQ(bench.everything().alarms, 0);
 }
 
-// 6.5: "3.1 V or less", "2.75 V or less".
+// Limits of battery_alarm and battery_error in 6.5: "3.1 V or less", "2.75 V or less".
 TEST(TformatDevice, BatteryLimitsBelongToTheFlags) {
   for (const auto& [millivolts, alarm, error] : {std::tuple(3101, false, false),
                                                  {3100, true, false},

@@ -78,7 +78,8 @@ TEST(TformatDevice, AnswersRefusedFrameAfterItsEnd) {
   EXPECT_EQ(bench.encoder.answer_count(), 1u);
   EXPECT_EQ(bench.violations(), 0u);
   for (const Wire& request : {Wire{0xA2, 0x05, 0xEF, 0x01}, Wire{0x32, 0x81, 0x00, 0xB3, 0x00}}) {
-    EXPECT_EQ(bench.raw(request), wire(Reply{.encoder_id = 0x11}));  // an unknown id; a busy bit with one byte too many
+    // The requests have an unknown data ID, and a busy bit with one byte too many.
+    EXPECT_EQ(bench.raw(request), wire(Reply{.encoder_id = 0x11}));
   }
   EXPECT_EQ(bench.violations(), 0u);
 }
@@ -169,7 +170,7 @@ TEST(TformatDevice, OtherRequestRestartsTheCount) {
   Bench bench;
   bench.shaft.put(7, 0);
   reset(bench, DataId::reset_multiturn, 9);
-  bench.raw({0xEA, 0x01, 0xEC});  // an abnormal request
+  bench.raw({0xEA, 0x01, 0xEC});  // an abnormal request (wrong CRC) restarts the count of reset requests
   reset(bench, DataId::reset_multiturn, 9);
   EXPECT_EQ(bench.everything().multiturn, 7u);
   reset(bench, DataId::clear_alarms, 9);
@@ -290,7 +291,7 @@ TEST(TformatDevice, DetectsRequestsWithoutPauseInAnyPieces) {
   }
 }
 
-// However long the machine is delayed, a host that never waits differs from one that had to give up.
+// A host that never waits for replies is detected even if the emulator reports a long delay with each reception.
 TEST(TformatDevice, HostThatNeverWaitsIsNotExcused) {
   testing::TestShaft shaft;
   VirtualEncoder encoder({}, shaft);
@@ -314,7 +315,7 @@ TEST(TformatDevice, HostThatNeverWaitsIsNotExcused) {
   EXPECT_EQ(ask(thrice), 4u);
 }
 
-// Breaches that are no violations, but are reported to the watch (9.1, 10).
+// Some broken rules do not count as violations, but are reported to the watcher of rules (9.1, 10).
 TEST(TformatDevice, ReportsRulesThatAreNoViolations) {
   using Rules = std::vector<std::string>;
   const std::string again = "what was refused as busy was not asked for again";

@@ -384,8 +384,8 @@ struct Protocol {
   static constexpr author::HostTimes host_times(const Format&) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit};
   }
-  /// Returns how a request is repeated: reads and page selects are, resets and writes never. A page change without a
-  /// valid reply may still be in progress, and must not be disturbed.
+  /// Returns how a request is repeated: reads and page selects up to two times, resets and writes never. A page change
+  /// without a valid reply may still be in progress, and must not be disturbed.
   static constexpr author::Manner manner(const Format&, const Request& request) {
     if (selects_page(request)) return {.repeats = 2, .pause = memory_time, .hold = memory_time};
     return {.repeats = request.id == DataId::write_memory || is_reset(request.id) ? 0u : 2u};
