@@ -40,7 +40,7 @@ std::uint16_t port_of(int socket) {
   if (::getsockname(socket, reinterpret_cast<sockaddr*>(&address), &size) < 0) {
     throw system_failure("getsockname", errno);
   }
-  // The port has the same offset in IPv4 and IPv6 addresses.
+  // The port number has the same offset in sockaddr_in and sockaddr_in6.
   return ntohs(reinterpret_cast<const sockaddr_in&>(address).sin_port);
 }
 

@@ -14,7 +14,7 @@ namespace absenc::os {
 struct Listener {
   Descriptor socket;
   std::uint16_t port = 0;    // actual number of the TCP port, also when any free port was requested
-  bool on_loopback = false;  // only programs on this computer can reach the port
+  bool on_loopback = false;  // whether only programs on this computer can reach the port
 };
 
 /// Opens a TCP port at `host`: a name, an IPv4 address, or an IPv6 address with or without brackets. `port` 0 means any

@@ -28,7 +28,7 @@ struct PortFacts {
   std::optional<unsigned> latency_timer{};  // time for which a USB adapter holds back received bytes, in milliseconds
   std::optional<bool> kernel_direction{};   // whether the kernel switches an RS-485 transceiver
   std::optional<LineCounts> counts{};
-  bool pseudo_terminal = false;  // a pseudo-terminal has no line and so no rate
+  bool pseudo_terminal = false;  // whether the port is a pseudo-terminal, which has no line and so no rate
 };
 
 /// Returns the properties of the port at `path`. The port should not be open in any program, or its driver does not

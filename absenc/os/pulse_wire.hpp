@@ -17,7 +17,7 @@ namespace absenc::os {
 struct PulseWire {
   enum class Kind { none, rts, dtr, gpio } kind = Kind::none;
   std::string name{};           // gpio: name of the line as `gpioinfo` lists it
-  bool active_high = false;     // level of the wire during the pulse; at rest it has the other level
+  bool active_high = false;     // whether the wire is high during the pulse; at rest it has the other level
   std::optional<Time> width{};  // pulse width that replaces the one requested by the protocol
 };
 

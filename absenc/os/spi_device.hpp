@@ -18,7 +18,7 @@ struct SpiTransfer {
   Bytes out{};             // bytes that the host sends, `size` of them; empty: zeros are sent
   MutableBytes in{};       // buffer for the bytes of the device, `size` of them; empty: they are discarded
   std::uint32_t rate = 0;  // clock rate in Hz
-  std::uint8_t mode = 0;   // 2 * CPOL + CPHA
+  std::uint8_t mode = 0;   // SPI mode: 2 * CPOL + CPHA
   bool lsb_first = false;
   Time delay{};           // pause behind the last bit of the transfer
   bool deselect = false;  // deselects the chip after `delay`; in the last transfer: the chip stays selected

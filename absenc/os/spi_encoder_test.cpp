@@ -148,7 +148,7 @@ TEST_F(SpiEncoder, BissIsStartedByAByteOfPulses) {
   EXPECT_EQ(encoder.violation_count(), 0u);
 }
 
-// Positions can be read without mode changes; only a register access fails, with advice.
+// On a controller whose clock can only idle high, positions can be read; only a register access fails, with advice.
 TEST_F(SpiEncoder, AControllerThatOnlyIdlesHighReadsNoRegisters) {
   BissRegisters registers(kernel, shaft);
   SpiPort port(FakeSpi::path, LinkKind::clocked, biss::line_settings, {}, kernel);
@@ -188,7 +188,7 @@ TEST_F(SpiEncoder, Encolink) {
     encolink::VirtualEncoder shifted(format, shaft);
     EXPECT_EQ(read(shifted, {{}, mode}), Error::bad_checksum) << int{mode};
   }
-  // The time between chip select and clock does not count as a slow clock.
+  // The time between chip select and the first clock does not count as a slow clock.
   encolink::VirtualEncoder hurried(format, shaft);
   EXPECT_EQ(read(hurried, {4'100'000, {}}), Error::none);
   ASSERT_GT(hurried.violation_count(), 0u);

@@ -32,7 +32,7 @@ struct SpiChoice {
   std::optional<std::uint8_t> mode;    // SPI mode, 0 to 3
 };
 
-/// A port on an SPI controller, locked against other programs that use locks. Every function throws Failure or
+/// A port on an SPI controller, locked against other programs that use locks. `begin` and `wait` throw Failure or
 /// Interrupted (os/signals.hpp).
 ///
 /// A transfer begins at `at`, never earlier, and `begin` blocks until it is over. On an `spi` link the transfer

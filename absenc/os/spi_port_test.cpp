@@ -136,7 +136,8 @@ TEST_F(SpiPortTest, ReportsLowIdleLine) {
   EXPECT_FALSE(idle_low(ssi_settings));
   kernel.shorted = true;
   EXPECT_TRUE(idle_low(ssi_settings));
-  EXPECT_FALSE(idle_low(biss_settings));  // without idle clocks in BiSS no clock shows the level of the idle line
+  // BiSS is read without idle clocks, so no sample shows the level of the idle line.
+  EXPECT_FALSE(idle_low(biss_settings));
 }
 
 TEST_F(SpiPortTest, BeginsNotBeforeItsTimeAndStampsTheEnd) {

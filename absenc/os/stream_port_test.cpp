@@ -207,7 +207,7 @@ TEST_F(StreamPortTest, EndsWhilePeerReadsNothing) {
   const Time end = now() + 5ms;
   port_.set_end(end);
   EXPECT_THROW(port_.begin(transfer(many)), Ended);
-  EXPECT_LT(now(), end + 2s);  // before the port's own limit for a stalled peer
+  EXPECT_LT(now(), end + 2s);  // the port gave up before its own limit for a peer that reads nothing
 }
 
 TEST_F(StreamPortTest, EndsWhileWaiting) {
@@ -225,7 +225,7 @@ TEST_F(StreamPortTest, IsLostWhenTheOtherSideCloses) {
   peer_.close();
   // Bytes received before the other side closed are not lost.
   EXPECT_EQ(port_.wait({.at = never}).kind, Kind::received);
-  errno = EAGAIN;  // left by an earlier call: the end of a stream does not set errno
+  errno = EAGAIN;  // like a value left by an earlier call: the end of a stream does not set errno
   const Failure failure = failure_of([&] { static_cast<void>(port_.wait({.at = never})); });
   EXPECT_EQ(failure.kind(), Failure::Kind::lost);
   EXPECT_STREQ(failure.what(), "the line went away: unplugged, or closed at the other end?");

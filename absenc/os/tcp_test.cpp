@@ -33,7 +33,7 @@ struct TestListener {
     sockaddr_in6 address{};
     socklen_t size = sizeof address;
     ::getsockname(socket.get(), reinterpret_cast<sockaddr*>(&address), &size);
-    port = ntohs(address.sin6_port);  // the port has the same offset in IPv4 and IPv6 addresses
+    port = ntohs(address.sin6_port);  // the port number has the same offset in sockaddr_in and sockaddr_in6
   }
   void listen(int backlog) const { ASSERT_EQ(::listen(socket.get(), backlog), 0); }
   [[nodiscard]] Descriptor accept() const { return Descriptor(::accept(socket.get(), nullptr, nullptr)); }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures how late this computer wakes a thread: a reply delayed by no more than this may be punctual.
+// Measures how late this computer wakes a thread: a reply delayed by no more than the measured time may be punctual.
 #pragma once
 
 #include <atomic>

@@ -25,7 +25,8 @@ namespace {
 constexpr unsigned most_connections = Connections::most + Connections::reserve + 64;
 // Bytes for the headers and unsent output of a connection; larger headers are refused with status 431.
 constexpr std::size_t memory_for_each = 64 * 1024;
-constexpr std::uint64_t most_body = 4096;  // bytes of a request body; no request needs one
+// Greatest size of a request body in bytes; no request to this server needs a body.
+constexpr std::uint64_t most_body = 4096;
 // Bytes of a request body of unknown length that are read before the connection is closed.
 constexpr std::uint64_t most_read = 1 << 20;
 constexpr unsigned idle_seconds = 15;

@@ -60,7 +60,7 @@ struct Server::Parts {
     publisher.request_stop();
     publisher.join();
     http.reset();  // HTTP ends first: requests use the other parts
-    fleet.end();   // before distribute_events, so that events of the last commands are distributed
+    fleet.end();   // before distribute_events is called, so that the events of the last commands are distributed
     distribute_events();
     sending.change_to({});
   }

@@ -57,7 +57,7 @@ std::string checked(const std::string& name) {
 std::vector<iovec> ranges(const std::vector<UserMemory>& memory) {
   std::vector<iovec> found;
   for (const UserMemory& one : memory) {
-    // an address in the memory of another process, which only the kernel uses
+    // The pointer is an address in the memory of another process; only the kernel uses it.
     found.push_back({reinterpret_cast<void*>(static_cast<std::uintptr_t>(one.address)), one.size});
   }
   return found;
@@ -146,7 +146,7 @@ SpidevNode::SpidevNode(const std::string& name, Spidev& spidev) : spidev_(&spide
     wait_for({&readable, 1}, never);
     process_one();
   }
-  // The kernel reports no error if it refuses the name of the device.
+  // The kernel reports no error if it refuses the name of the device, so this checks whether the device exists.
   if (!std::filesystem::exists(path_, ignored)) {
     throw Failure(Kind::system,
                   "the kernel did not make " + path_ + ": see what it says in dmesg, or choose another name");

@@ -48,7 +48,7 @@ inline constexpr std::string_view all = "4vse?>mbnfza01MB";  ///< Letters of all
 /// Letters of the commands whose reply is a line of text.
 inline constexpr std::string_view answered_by_a_line = "vse?>mb";
 
-/// Returns whether `letter` is one of `letters`.
+/// Returns whether `letters` contains the letter `one`.
 [[nodiscard]] constexpr bool is_in(std::string_view letters, std::uint8_t one) {
   return index_of(letters, static_cast<char>(one)) < letters.size();
 }
@@ -191,7 +191,8 @@ inline constexpr unsigned widest = 64;  ///< Greatest width of a position in bit
   return reply;
 }
 
-/// The protocol, as author layers use it: frames, lengths and times. author/dialog.hpp explains each member.
+/// The protocol as the code in absenc/protocol/author uses it: frames, lengths and times. author/dialog.hpp explains
+/// each member.
 struct Protocol {
   /// Layout of the encoder's frames and properties of the interface, as the unit's options select them.
   using Format = e201::Format;

@@ -119,7 +119,8 @@ TEST(E201Frame, DecodesReplyLines) {
   const std::string longest(64, 'x');
   for (const auto& [letter, reply, error] : std::to_array<std::tuple<char, std::string, std::string_view>>(
            {{'v', "anything 1\r", "none"},
-            {'s', "\n anything ~\r\n", "none"},  // begins with the LF of the previous line, and ends with an LF
+            // A reply that begins with the LF of the previous line, and ends with an LF.
+            {'s', "\n anything ~\r\n", "none"},
             {'e', longest + "\r", "none"},
             {'e', longest + "x\r", "wrong_length"},
             {'v', "anything 1", "wrong_length"},

@@ -58,7 +58,7 @@ TEST(TformatDevice, AnswersAbnormalRequestsLikeId3) {
   EXPECT_EQ(bench.raw({0xEA, 0x01}), plain);                     // incomplete request
   EXPECT_EQ(bench.raw({0x32, 0x81, 0x00, 0x32 ^ 0x81}), plain);  // request with the busy bit
   EXPECT_EQ(bench.raw({0x00}), Wire{});           // request with a wrong sync code, which is not answered
-  EXPECT_EQ(bench.raw({0x00, 0x1A}), plain);      // the request 1A after a wrong byte is found
+  EXPECT_EQ(bench.raw({0x00, 0x1A}), plain);      // a wrong byte, then the request 1A, which is answered
   EXPECT_EQ(memory_write(bench, 127, 6), plain);  // page 6 is closed
   EXPECT_EQ(memory_write(bench, 127, 7), wire(hex<"327F074A">));
   bench.pass(memory_time);

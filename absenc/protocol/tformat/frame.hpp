@@ -43,7 +43,8 @@ inline constexpr CrcParameters crc_parameters{8, 0x01, 0, true, true, 0};
 
 /// Returns CF, the control field of a request: sync code 010, the data ID, and its even parity (6.3.1).
 [[nodiscard]] constexpr std::uint8_t control_field(std::uint8_t id) {
-  // One bit for each ID, because a small core needs many steps to compute a parity.
+  // Bit N is set if the data ID N has an odd number of ones: a table, because a small core needs many steps to compute
+  // a parity.
   constexpr unsigned odd_parities = 0x6996;
   return static_cast<std::uint8_t>(0x02u | (id & 0xFu) << 3 | (odd_parities >> (id & 0xF) & 1) << 7);
 }

@@ -63,14 +63,14 @@ TEST(TformatHost, ReadsPartsWithTheirAlarms) {
   ReadPosition first({}, DataId::singleturn);
   EXPECT_EQ(bench.run(first).reading()->singleturn, 0x12345u);
   EXPECT_TRUE(first.reading()->singleturn_valid());
-  EXPECT_EQ(bench.encoder.answer_count(), 2u);  // the reading with ID 0 or 1 is preceded by one with ID 3
+  EXPECT_EQ(bench.encoder.answer_count(), 2u);  // a request with ID 3 precedes the request with ID 0
   ReadPosition turns({}, DataId::multiturn, 0);
   EXPECT_EQ(bench.run(turns).reading()->multiturn, 4660u);
   EXPECT_EQ(bench.encoder.answer_count(), 3u);
   bench.encoder.raise_alarms(alarms::multiturn_error);
   ReadPosition alarmed({}, DataId::multiturn, 0);
   bench.run(alarmed);
-  EXPECT_EQ(bench.encoder.answer_count(), 5u);  // the reading is followed by one with ID 3
+  EXPECT_EQ(bench.encoder.answer_count(), 5u);  // a request with ID 3 follows the request with ID 1
   EXPECT_FALSE(alarmed.reading()->multiturn_valid);
   EXPECT_EQ(alarmed.reading()->alarms, alarms::multiturn_error);
   const auto id = bench.run("encoder-id");
@@ -101,7 +101,7 @@ TEST(TformatHost, TimeoutIsNotRepeated) {
 
 // ---- Refusals (6.3.2)
 
-// The explanation names ca0 and ca1, other reasons for such an answer, and what to try.
+// The explanation of a refusal names ca0 and ca1, other reasons for such an answer, and what to try.
 TEST(TformatHost, ExplainsRefusals) {
   struct Row {
     std::uint8_t alarm;

@@ -120,7 +120,8 @@ TEST(TformatProcedures, RefusesOverHeatThresholdOfZeroDegrees) {
   for (const std::int64_t value : {0x81, 0xFF, 0x00, 0x7F}) {
     EXPECT_EQ(bench.run("memory-write", {overheat_address, value, service_page}).error, Error::none) << value;
   }
-  EXPECT_EQ(bench.run("memory-write", {overheat_address, 0x80, 0}).error, Error::none);  // a byte of the user's pages
+  // 0x80 is valid on a page of the user.
+  EXPECT_EQ(bench.run("memory-write", {overheat_address, 0x80, 0}).error, Error::none);
 }
 
 TEST(TformatProcedures, RefusesClosedMemoryBeforeSending) {
@@ -138,7 +139,7 @@ TEST(TformatProcedures, RefusesClosedMemoryBeforeSending) {
   EXPECT_EQ(bench.encoder.answer_count(), 0u);
 }
 
-// The command memory-write gets these replies: page select, read, write, page select, read.
+// The command memory-write gets the replies to these requests: page select, read, write, page select, read.
 TEST(TformatProcedures, VerifiesWritesByReadingBackAndNeverRepeatsThem) {
   struct Row {
     const char* what;
@@ -256,8 +257,10 @@ TEST(TformatProcedures, SendsNoForbiddenReset) {
     const auto reset = bench.run(row.name);
     EXPECT_EQ(reset.error, row.rpm != 0 ? Error::not_still : Error::invalid_argument) << row.detail;
     EXPECT_TRUE(reset.says(row.detail)) << reset.detail;
-    EXPECT_EQ(reset.advice.empty(), row.rpm != 0) << row.detail;  // not_still has an advice of its own
-    EXPECT_EQ(bench.encoder.answer_count(), 2u);                  // only two positions were read
+    // The error not_still has its own advice, so the command adds none.
+    EXPECT_EQ(reset.advice.empty(), row.rpm != 0) << row.detail;
+    // Only two positions were requested, and no reset was sent.
+    EXPECT_EQ(bench.encoder.answer_count(), 2u);
     EXPECT_EQ(bench.violations(), 0u);
   }
 }

@@ -273,7 +273,7 @@ Procedure write_threshold(Dialog& dialog, ProcedureResult& found, Arguments argu
 
 constexpr Explanation explain_refusal(Bytes reply) {
   constexpr std::array<std::string_view, 4> found{
-      // index: the bits ca1 and ca0 of SF
+      // The index is the value of the bits ca1 and ca0 of SF.
       "it answered as to data ID 3, without a communication alarm: a data ID that it does not have, a CRC that is "
       "wrong, or an address that is closed",
       "ca0: it received the request with a parity error of the data ID",

@@ -10,7 +10,7 @@ const body = document.getElementById("dialog-body");
 const wrong = document.getElementById("dialog-wrong");
 const yes = document.getElementById("dialog-yes");
 const no = document.getElementById("dialog-no");
-const WRITING_MS = 300;  // delay after a key press before the encoder is polled
+const WRITING_MS = 300;  // delay in milliseconds after a key press before the encoder is polled
 
 /** Shows a dialog with `nodes`. `agree` returns "" to close it, else an error text. Resolves to true after consent. */
 function ask(words, button, nodes, agree) {

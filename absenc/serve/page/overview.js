@@ -37,7 +37,7 @@ export function figureNode() {
   };
 }
 
-/** Selects position (1) or speed (2) for the small plot: speed if the position changed by more than two turns. */
+/** Selects position (1) or speed (2) for the small plot: speed if a rotary encoder moved by more than two turns. */
 export function sparkColumn(points, linear) {
   if (linear) return 1;
   const places = points.map((row) => row[1]).filter((place) => place !== null);

@@ -44,7 +44,8 @@ export const sentence = (text) => {
   return /[.!?]$/.test(whole) ? whole : whole + ".";
 };
 
-/** Returns the large figure as {text, unit, width}; `width` is the digits of the greatest value, so the layout is stable. */
+/** Returns the large figure as {text, unit, width}; `width` is the number of characters of the greatest value, so that
+ *  the layout is stable. */
 export function figure(encoder) {
   const whole = encoder.length_mm === null ? 6 : numberText(encoder.length_mm).length;
   const width = encoder.linear ? whole + 5 : 7;
