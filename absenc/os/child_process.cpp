@@ -46,9 +46,9 @@ struct SpawnSteps {
     }
     ::posix_spawn_file_actions_adddup2(&files, channel, channel_of_child);
     ::posix_spawn_file_actions_addclosefrom_np(&files, channel_of_child + 1);
-    // The child blocks signals: Ctrl-C and systemd signal all processes at once, but the child must go on until the parent
-  // has used it to end its connections in order.
-  sigset_t blocked;
+    // The child blocks signals: Ctrl-C and systemd signal all processes at once, but the child must go on until the
+    // parent has used it to end its connections in order.
+    sigset_t blocked;
     ::sigemptyset(&blocked);
     for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE}) ::sigaddset(&blocked, signal);
     ::posix_spawnattr_setsigmask(&attributes, &blocked);

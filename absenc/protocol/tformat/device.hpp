@@ -148,9 +148,9 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     reply.append(encode_reply(*made).view());
     return Answer::sent;
   }
-  // Returns whether a flawed request gets a refusal. A byte without the sync code gets none: the encoder searches for
-  // the next start (8.1). A frame with an unknown data ID has no known length, so it ends where the next start bit is
-  // missing (8.2, 9.2).
+  // Returns whether a flawed request gets a refusal when the line is silent. A byte without the sync code gets none: the
+  // encoder searches for a request at the next byte (8.1). The length of a refused frame is unknown, so a missing start
+  // bit ends the frame (8.2, 9.2).
   bool is_refused(Flaw flaw, Bytes heard) override {
     if (flaw == Flaw::unknown && !has_sync_code(heard[0])) return false;
     if (flaw == Flaw::unknown && heard[0] != control_field(heard[0] >> 3)) refused_status_ |= status::parity_error;
