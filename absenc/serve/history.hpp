@@ -61,7 +61,8 @@ class HistoryReader {
   std::string refused_;
 };
 
-/// The writer of the history, used by one thread. After kill -9 or a power failure only the last second is missing.
+/// The writer of the history, used by one thread. After kill -9 only the last second is missing. After a power failure
+/// the rows that the system had not yet written to the disk are missing too (SQLite with synchronous = NORMAL).
 class HistoryWriter {
  public:
   /// Throws HistoryInUse when another server writes to the history file. Any other error is stored in `trouble`, and

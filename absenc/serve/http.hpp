@@ -43,7 +43,7 @@ struct Response {
 };
 
 /// The body of a response, which is produced while it is sent. Texts wait in a bounded queue until the client has
-/// received the earlier ones. A slow client loses the oldest texts and delays no thread.
+/// received the earlier ones. A slow client loses the oldest unsent texts and delays no thread.
 class Stream {
  public:
   using Text = std::shared_ptr<const std::string>;

@@ -141,7 +141,8 @@ OrderResult read_settings(Encoder& encoder, const Command* wanted, const Between
   return reads.done(json.set("rows", rows).set("failed", failed));
 }
 
-// Reads all readable registers. The last field of a register's reply is its value.
+// Reads all readable registers. The last field of a register's reply is its value, decoded if the unit describes the
+// register.
 OrderResult read_registers(Encoder& encoder, const Between& between) {
   const Command& command = *find_command(encoder.unit(), Verb::memory_read);
   Json registers = Json::array();

@@ -19,7 +19,8 @@ class Sending {
 
   /// Applies new settings of MQTT and UDP; an outlet with unchanged settings continues without interruption. Returns
   /// the changes in words, each with a leading semicolon. Throws Failure, os::Failure: the outlet that could not be
-  /// started is off, the others are as before. Call it from one thread only.
+  /// started is then off. MQTT comes first: if MQTT fails, UDP is as before; if UDP fails, MQTT has its new settings.
+  /// Call it from one thread only.
   std::string change_to(const Outlets& outlets);
 
   void add(const std::vector<ServerEvent>& server_events);
