@@ -69,7 +69,7 @@ class FakeSpi final : public SpiKernel {
   std::uint32_t mode_mask = ~0u;  // SPI mode bits outside the mask are accepted without effect
   std::uint32_t highest_speed = ~0u;
   int missing = 0;       // number of bytes by which the result of a message is too short
-  bool shorted = false;  // the data line is shorted to low
+  bool shorted = false;  // whether the data line is shorted to low
   std::string log;
 
  private:

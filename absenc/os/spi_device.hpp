@@ -69,7 +69,7 @@ class SpiDevice {
   Time timer_ = never;
   std::uint64_t messages_ = 0;
   std::uint64_t wrong_modes_ = 0;
-  bool held_low_ = false;  // the clock line was low at some time since the last message
+  bool held_low_ = false;  // whether the clock line was low at some time since the last message
 
   // State since the chip was selected (spi) or since the first clock of a word (clocked).
   bool selected_ = false;

@@ -30,7 +30,7 @@ class Access {
   struct Choices {
     std::string token_file{};  // file with lines of a name and a token; "": no tokens, allowed on loopback only
     std::string public_url{};  // URL at which a proxy on this computer shows the page; "": no proxy
-    bool on_loopback = false;  // the server listens on loopback, so no other computer can reach it directly
+    bool on_loopback = false;  // whether the server listens on loopback, so no other computer can reach it directly
   };
   /// Throws Failure when the token file cannot be read, users outside its group may read it, or a token is shorter than
   /// 16 characters; throws UsageError when `choices` are inconsistent. `server_events` must outlive this object.

@@ -94,8 +94,8 @@ struct Stream::Sending {
   MHD_Connection* suspended = nullptr;
   int socket = -1;  // socket of the connection that sends this stream; -1 before there is one
   Time taken_at = os::now();
-  bool ended = false;  // no more texts will be added to the queue
-  bool over = false;   // the connection of the stream has ended
+  bool ended = false;  // whether no more texts will be added to the queue
+  bool over = false;   // whether the connection of the stream has ended
   std::uint64_t dropped = 0;
 
   // Resumes the suspended connection of the stream. The mutex must be held, so that the connection is never resumed

@@ -28,7 +28,7 @@ struct Request {
   std::string origin;
   std::string fetch_site;
   std::string authorization;
-  bool is_forwarded = false;  // a header shows that a proxy forwarded the request
+  bool is_forwarded = false;  // whether a header shows that a proxy forwarded the request
   std::string forwarded_for;  // header X-Forwarded-For; "" if it is missing or occurs twice
 
   /// Returns the first value of the query parameter `name`; "" if the query has none.

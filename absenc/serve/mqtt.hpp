@@ -22,7 +22,7 @@ struct MqttHealth {
   bool connected = false;
   // Why the broker is not connected, what it refuses, or why the spool cannot be written; "" without an error.
   std::string trouble{};
-  bool failing = false;       // new readings cannot be spooled, or the spool is full and drops the oldest
+  bool failing = false;       // whether new readings cannot be spooled, or the spool is full and drops the oldest
   std::uint64_t waiting = 0;  // number of messages in the spool
   std::int64_t waiting_bytes = 0;
   std::uint64_t sent = 0;           // messages that the broker has acknowledged since the start

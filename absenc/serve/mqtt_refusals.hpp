@@ -51,8 +51,8 @@ class MqttRefusals {
     Time pause{};
     Time retry{};
     bool ends_connection = false;
-    bool is_due = false;    // the pause of the topic has ended and a message may be sent
-    bool is_tried = false;  // one message of the refused topic was sent as a trial and is not acknowledged
+    bool is_due = false;    // whether the pause of the topic has ended and a message may be sent
+    bool is_tried = false;  // whether one message of the refused topic was sent as a trial and is not acknowledged
   };
 
   std::map<std::string, Refused> refused_;  // refused topics, with the state of each

@@ -64,7 +64,7 @@ class Spool {
 
   struct Condition {
     std::string trouble{};   // why messages cannot be written to disk; "" without an error
-    bool in_memory = false;  // messages wait in memory, where kill -9 loses them
+    bool in_memory = false;  // whether messages wait in memory, where kill -9 loses them
   };
   [[nodiscard]] Condition condition() const;
 

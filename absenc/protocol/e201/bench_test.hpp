@@ -86,8 +86,8 @@ class TamperedInterface final : public Machine<std::uint8_t> {
   TextReply out_;
   unsigned rest_ = 0;  // remaining bytes of the command that is being received
   bool is_tampered_ = false;
-  bool busy_ = false;          // a transmission is in progress
-  bool sending_text_ = false;  // the transmission in progress is a text of `tamper`
+  bool busy_ = false;          // whether a transmission is in progress
+  bool sending_text_ = false;  // whether the transmission in progress is a text of `tamper`
 };
 
 /// Result of a command, with the name of its error.

@@ -148,9 +148,9 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     reply.append(encode_reply(*made).view());
     return Answer::sent;
   }
-  // Returns whether a flawed request gets a refusal when the line is silent. A byte without the sync code gets none: the
-  // encoder searches for a request at the next byte (8.1). The length of a refused frame is unknown, so a missing start
-  // bit ends the frame (8.2, 9.2).
+  // Returns whether a flawed request gets a refusal when the line is silent. A byte without the sync code gets none:
+  // the encoder searches for a request at the next byte (8.1). The length of a refused frame is unknown, so a missing
+  // start bit ends the frame (8.2, 9.2).
   bool is_refused(Flaw flaw, Bytes heard) override {
     if (flaw == Flaw::unknown && !has_sync_code(heard[0])) return false;
     if (flaw == Flaw::unknown && heard[0] != control_field(heard[0] >> 3)) refused_status_ |= status::parity_error;
@@ -311,7 +311,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
 
   std::optional<Time> off_since_{};  // time of the last power off; empty before the first one
   bool off_ = true;
-  bool battery_lost_ = false;  // the battery failed since the last power off
+  bool battery_lost_ = false;  // whether the battery failed since the last power off
 
   std::int64_t turn_offset_ = 0;  // subtracted from the turns of the shaft
   std::int64_t counter_lap_ = 0;  // how often the turn counter had overflowed at the last update

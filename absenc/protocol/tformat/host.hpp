@@ -53,7 +53,7 @@ class ReadPosition : public author::HostOf<Protocol> {
   void ask_for(DataId id) { ask({id}, author::Manner{}); }
 
   DataId id_;
-  bool part_read_ = false;  // a request with ID 0 or 1 was answered
+  bool part_read_ = false;  // whether a request with ID 0 or 1 was answered
   std::optional<std::uint8_t> known_alarms_;
   Reading reading_{};
 };
