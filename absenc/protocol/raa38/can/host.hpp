@@ -63,10 +63,11 @@ class Read : public author::CanEngine {
 
   /// Returns the format of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
-  /// Returns the position that was read; empty before it.
+  /// Returns the position that was read; its `singleturn_bits` is 0 as long as none was read.
   [[nodiscard]] const Reading& found() const { return reading_; }
   [[nodiscard]] const Reading* reading() const final {
-    return reading_.singleturn_bits != 0 ? &reading_ : nullptr;  // set only after a successful end
+    // `singleturn_bits` is 0 until a valid position was received.
+    return reading_.singleturn_bits != 0 ? &reading_ : nullptr;
   }
 
  private:
@@ -77,7 +78,7 @@ class Read : public author::CanEngine {
   Reading reading_{};
 };
 
-/// Returns the frame that requests a position in this mode; for `listen`, the single read request.
+/// Returns the frame that requests a position: order 01 in the mode `start`, otherwise order 80.
 [[nodiscard]] constexpr CanFrame position_request(const Format& format, Read::Mode mode) {
   // Two calls with constant orders, so that the table of orders is not linked.
   return mode == Read::Mode::start ? encode(Order::start, format.node) : encode(Order::read, format.node);
@@ -88,14 +89,16 @@ using Dialog = author::DialogOf<Protocol>;
 
 // ---- One node
 
-/// Sets with order 31 the number of positions per second that the node sends, 0 for none, and counts the frames that
-/// are received. Error: cross_check_failed (another number of frames arrives).
+/// Sets with order 31 the number of positions per second that the node sends, 0 for none, and measures the rate of
+/// the frames that are received. Errors: timeout (neither an answer nor a frame arrives), cross_check_failed (another
+/// rate).
 author::Procedure set_cyclic(Dialog& dialog, Values& found, Arguments arguments);
 
-/// Changes the zero or the direction. Order 20 makes the present position 0, as the document suggests; the position is
-/// read before and after, and nothing is written if it is 0 already. Order 22 sets the counting direction, which no
-/// command reads; the position afterwards must be unchanged or mirrored. Errors: not_still (the shaft turns),
-/// cross_check_failed (any other position), timeout (order 22 has neither an answer nor an effect).
+/// Changes the zero or the direction. Order 20 makes the present position 0, as the document suggests; the position
+/// is read before and after, and nothing is written if it is 0 already. Order 22 sets the counting direction, which
+/// no command reads; the position afterwards must be unchanged or mirrored. Errors: not_still (the shaft turns),
+/// cross_check_failed (any other position, or the node no longer sends cyclic positions), timeout (order 22 has
+/// neither an answer nor an effect).
 author::Procedure change(Dialog& dialog, Values& found, Order order, Arguments arguments);
 
 /// Reports the number of the node if the node answers. Requests no other number: on a CANopen bus such requests are
@@ -130,7 +133,8 @@ struct Nodes {
 };
 
 /// Finds all nodes on the bus. Listens first, because nodes may send without a request after power on, then requests
-/// every number. Error: timeout if no node is found.
+/// every number. Errors: timeout (no node is found), bad_framing (frames are destroyed for more than 16 numbers:
+/// wrong bit rate).
 author::Procedure scan(Dialog& dialog, Nodes& nodes);
 
 /// Result of a setting, and the nodes that were found on the bus before it.
@@ -140,10 +144,11 @@ struct ConfigureResult : Values {
 };
 
 /// Changes the node number (order 11) or the bit rate (order 13). The node must answer under the new number and no
-/// longer under the old one; for the bit rate the host switches too, and back if the node does not answer. Both orders
-/// are sent on 7E5, which reaches every node, so only one node may be on the bus. Errors: invalid_argument (other nodes
-/// are on the bus, or the document does not have that rate), timeout, request_rejected, cross_check_failed (the node
-/// kept its old setting).
+/// longer under the old one; for the bit rate the host switches too, and back if the node does not answer. Both
+/// orders are sent on 7E5, which reaches every node, so only one node may be on the bus. Errors: invalid_argument
+/// (other nodes are on the bus, or the document does not have that rate), unexpected_reply (only other nodes are on
+/// the bus), timeout, request_rejected, cross_check_failed (the node answers under its old number or at its old
+/// rate).
 author::Procedure configure(Dialog& dialog, ConfigureResult& found, Order order, Arguments arguments);
 
 }  // namespace absenc::raa38::can

@@ -57,10 +57,11 @@ TEST(Raa38CanRead, IgnoresFramesFromBeforeTheRequest) {
     ByHand by_hand(command);
     by_hand.next();
     if (command == "position") {
-      by_hand.receive(encode_position(0x20, 1));  // received before the request is sent
+      by_hand.receive(encode_position(0x20, 1));  // a position that is received before the request is sent
       by_hand.sent();
     }
-    by_hand.receive(encode_position(0x20, 2), -1ms);  // received from a queue, with a time before the request
+    // A position from a queue, whose time of reception is before the request.
+    by_hand.receive(encode_position(0x20, 2), -1ms);
     EXPECT_EQ(by_hand.next(), Kind::wait);
     by_hand.receive(encode_position(0x20, 3), 1ms);
     EXPECT_EQ(by_hand.next(), Kind::done);
@@ -167,7 +168,7 @@ TEST(Raa38CanZero, RefusesWhileShaftTurns) {
   EXPECT_EQ(bench.encoder().settings().writes(), 0u);
 }
 
-// A node that uses order 20 for something else, or not at all: it answers correctly, but its position does not change.
+// The node uses order 20 for something else, or does not know it: its position does not become 0, even if it answers.
 TEST(Raa38CanZero, FailsWhenPositionDoesNotBecomeZero) {
   // The answer to order 20 is 32 if it is read as a position; at 21 bits that is near 0.
   for (const std::uint32_t counts : {32u << 10, 1'000'000u}) {
@@ -268,7 +269,7 @@ TEST(Raa38CanDirection, FailsWhenPositionIsNeitherSameNorMirrored) {
   EXPECT_TRUE(ended(with(jumping, "direction", {1}), Error::cross_check_failed, "mirror image"));
 }
 
-// The position 32 may be a late answer to order 22.
+// A position that the next reply does not repeat may be a late answer to an order, which looks like a position.
 TEST(Raa38CanDirection, RejectsPositionThatIsNotRepeated) {
   unsigned measurements = 0;
   Scripted late([&](const CanFrame& request) {

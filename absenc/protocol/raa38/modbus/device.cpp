@@ -22,7 +22,7 @@ constexpr bool is_address(std::uint8_t address) {
 
 }  // namespace
 
-// A memory from a file may have any content.
+// A memory from a file may have any content: the format's address and baud rate replace invalid ones.
 void VirtualEncoder::started() {
   if (!is_address(address())) memory()[Settings::number_at] = format_.address;
   if (settings_.rate() >= bauds.size()) memory()[Settings::rate_at] = static_cast<std::uint8_t>(format_.baud);
