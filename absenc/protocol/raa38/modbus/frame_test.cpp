@@ -68,7 +68,7 @@ TEST(Raa38ModbusFrame, ChecksAddressRangeAndExplainsEachRefusal) {
   }
   EXPECT_EQ(error_of({}, ask, {0x01, 0xA0, 0x01}), Error::unexpected_reply);
   EXPECT_EQ(error_of({}, one_register, {2, 0x83, 2}), Error::unexpected_reply);
-  // A refusal of CC would equal the echo of a request.
+  // A refusal of CC would equal the echo of another parameter.
   EXPECT_EQ(error_of({}, {.function = function::set_parameter, .value = 0x19}, {1, 0xCC, 1}), Error::unexpected_reply);
 }
 

@@ -233,7 +233,7 @@ struct Protocol {
             .gap_limit = std::max(format.transmission, gap_limit),
             .patience = patience};
   }
-  /// Returns how a host sends a request (repetitions, pauses) and how the reply to it ends.
+  /// Returns how a host sends a request: as bytes or as a pulse on a wire, and whether a reply is expected.
   static constexpr author::Manner manner(const Format&, const Request& request) {
     switch (request.kind) {
       case Request::Kind::trigger:
@@ -253,13 +253,13 @@ struct Protocol {
     const RequestBytes request = encode_request({});
     return begin[0] == request[0] && (begin.size() < 2 || begin[1] == request[1]) ? request_bytes : 0;
   }
-  /// Returns the length of the reply to `request`, in bytes.
+  /// Returns the length of the reply to `request`, in bytes; 0 for zero clearing, which has no reply.
   static constexpr std::size_t reply_size(const Format& format, const Request& request) {
     return request.kind == Request::Kind::zero_clear ? 0 : format.frame_bytes();
   }
-  /// Returns the length of a reply in bytes, judged by its first bytes; 0 if they do not determine it.
+  /// Returns the length of a reply in bytes; it depends only on the format.
   static constexpr std::size_t expected(const Format& format, const Request&, Bytes) { return format.frame_bytes(); }
-  /// Returns whether a reply that has this error is complete, so that the host awaits no more bytes.
+  /// Returns false: a reply with an error may be incomplete, so the host awaits more bytes.
   static constexpr bool is_whole(const Format&, Error) { return false; }
   /// Returns the bytes of `reply` as they are sent.
   static constexpr FrameBytes encode_reply(const Format& format, const Request&, const Position& position) {
@@ -277,7 +277,8 @@ struct Protocol {
   }
   /// Returns when the encoder latched the position that answers a request sent at `sent_at`.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
-  /// Returns the times of the virtual encoder: duration of a character, time until a reply, time to start.
+  /// Returns the times of the virtual encoder: the time until a reply, and the silence after which it drops an
+  /// incomplete request.
   static constexpr author::DeviceTimes device_times(const Format& format) {
     return {.answer_time = format.acquisition > Time{} ? format.acquisition : virtual_acquisition, .gap = request_gap};
   }

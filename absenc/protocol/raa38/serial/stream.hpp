@@ -65,7 +65,7 @@ class StreamDecoder {
   [[nodiscard]] constexpr std::uint64_t discarded() const { return discarded_.count(); }
   /// Returns whether a frame was valid except for a position with more bits than the format has.
   [[nodiscard]] constexpr bool saw_larger_positions() const { return saw_larger_positions_; }
-  /// Returns the bytes of the last invalid frame.
+  /// Returns the bytes of the last frame that ended the alignment; empty if a damaged character ended it.
   [[nodiscard]] constexpr Bytes bad() const { return bad_.view(); }
 
  private:
