@@ -249,8 +249,9 @@ constexpr bool append_head(const ReplyType& head, std::size_t size, BitBuffer<Ca
   return detail::decode_by(Given<Format>{format, format.word}, samples, cds);
 }
 
-/// Decodes a frame whose format is known at compile time, as fast as code written for this format by hand. Errors as
-/// above. The word in the result has the member `values` only if the format has further fields.
+/// Decodes a frame whose format is known at compile time, as fast as code written for this format by hand. The errors
+/// are those of `decode` with a format as an argument. The word in the result has the member `values` only if the
+/// format has further fields.
 template <const Format& format>
 [[nodiscard]] constexpr Result<ReplyTo<format>> decode(BitView samples, Cds cds = Cds::zero) {
   return detail::decode_by(Known<format>{}, samples, cds);
