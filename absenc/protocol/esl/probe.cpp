@@ -168,7 +168,7 @@ bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sin
   Profile best = nth_profile(base, 0);
   bool any = false;
   Reached reached;
-  // The value that every profile exceeds or equals.
+  // Start value: the progress of every profile exceeds or equals it.
   for (auto& option : reached) option.fill({0, Check::request_not_accepted});
   for (std::size_t number = 0; number < combinations; ++number) {
     const Profile profile = nth_profile(base, number);

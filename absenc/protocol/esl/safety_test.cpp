@@ -238,7 +238,7 @@ Wire stuck(Wire reply, std::size_t byte, unsigned bit, bool value) {
   return reply;
 }
 
-// Counts accepted replies with a wrong byte.
+// Counts accepted replies in which one bit is stuck.
 TEST(EslSafetyCampaign, EveryBitOfEveryFieldStuckAt0AndAt1) {
   sim::Random random(7);
   for (const StuckField& field : stuck_fields) {
@@ -370,7 +370,7 @@ TEST(EslSafetyCampaign, ReplaysAndDelays) {
   }
 }
 
-// Random bytes of the right length that are accepted: 2^-32 by the CRCs alone.
+// Random bytes of the right length pass both CRCs once in 2^32 times.
 TEST(EslSafetyCampaign, NoiseOfTheRightLength) {
   sim::Random random(1);
   Monitored pair;
