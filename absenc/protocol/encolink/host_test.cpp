@@ -366,7 +366,7 @@ TEST(EncolinkListen, LatchedIsTimeOfPosition) {
   EXPECT_EQ(compared, 9u);
 }
 
-// Document: "Nothing is sent then."
+// Document, on an encoder that transmits without requests: "Nothing is sent then."
 TEST(EncolinkListen, SendsNothingToStreamingEncoder) {
   Bench bench(streaming);
   std::size_t sent = 0;

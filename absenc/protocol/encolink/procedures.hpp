@@ -110,7 +110,9 @@ author::Procedure send_command(Dialog& dialog, ProcedureState& found, std::uint8
 /// also: invalid_argument (the position is invalid), not_still (the shaft turns), cross_check_failed (the position is
 /// not zero afterwards; the old offset is restored).
 author::Procedure zero(Dialog& dialog, ProcedureState& found, Arguments arguments);
-/// Sets the turn counter. Arguments: turns, 1 to save them. Error also: unsupported (the encoder has no turn counter).
+/// Sets the turn counter. Arguments: turns, 1 to save them. Errors also: unsupported (the encoder has no turn
+/// counter), invalid_argument (the turn counter has too few bits), cross_check_failed (the turns are others
+/// afterwards).
 author::Procedure preset_multiturn(Dialog& dialog, ProcedureState& found, Arguments arguments);
 /// Starts the self-calibration and polls its status while the user turns the shaft; emits each status. Errors also:
 /// cross_check_failed (the self-calibration failed; the detail states why), timeout (it does not end).
