@@ -35,7 +35,8 @@ class NumberList {
   Buffer<char, 96> text_;  // Text of the list; numbers that do not fit are dropped.
 };
 
-/// The two characters of a manufacturer as text; bytes that are not printable as "\\x00".
+/// The two characters of a manufacturer as text; a byte that is not printable is shown as \x and two hexadecimal
+/// digits.
 class MakerName {
  public:
   /// Appends these bytes of the manufacturer registers.

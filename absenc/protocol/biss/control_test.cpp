@@ -49,7 +49,8 @@ std::string cdm_of(const ControlMaster& master) {
   return text;
 }
 
-// Compares CDM bits with those of the protocol description and of TI's table. Only zeros may follow.
+// Compares CDM bits with those of the protocol description and of TI's table. After the drawn bits only zeros may
+// follow.
 TEST(BissControl, EncodesRequestsOfTheDocument) {
   const auto expect = [](const ControlMaster& master, std::string_view drawn) {
     const std::string cdm = cdm_of(master);
@@ -187,7 +188,7 @@ TEST(BissControl, DecodesHostThatContinuesAfterStopBit) {
   EXPECT_EQ((run(master, slaves, target), master.error()), Error::request_rejected);
   EXPECT_EQ(master.frame().data.size(), 1u);
   EXPECT_EQ(master.frame().data[0], 10);
-  // LENZ's reader ignores P of a read.
+  // LENZ's host ignores the bit P after a register that it has read.
   BitBuffer<256> cdm;
   BitBuffer<256> cds;
   slaves.reset();
@@ -254,7 +255,7 @@ TEST(BissControl, RandomAccessesEndWithExpectedResult) {
   }
 }
 
-// A lost start bit shifts all bits after it, which four bits of CRC may miss: it shows as a delay.
+// A lost start bit shifts all bits after it, which four bits of CRC may miss: the loss shows as a delay of the byte.
 TEST(BissControl, FlippedCdsBitIsDetectedOrShowsAsDelay) {
   for (std::size_t flip = 0; flip < 14 + 33 + 14; ++flip) {
     for (const bool write : {false, true}) {

@@ -24,7 +24,8 @@ struct Behaviour {
 /// Samples of SLO, one per clock of MA.
 using Samples = author::DrivenBits;
 
-/// Delays samples as a line does: by whole clocks, and by one more at random where an edge falls on a sample.
+/// Delays samples as a line does: by whole clocks, and at random by one clock more or less where an edge falls on a
+/// sample.
 class LineDelay {
  public:
   /// Delays `samples`, which were taken at this period of MA, by `behaviour.line_delay`.

@@ -279,7 +279,7 @@ TEST(BissHost, ExplainsErrors) {
   EXPECT_NE(found(Error::truncated, 10'000).find("raise it"), std::string_view::npos);
   EXPECT_NE(found(Error::bad_checksum, 10'000).find("try another one"), std::string_view::npos);
   EXPECT_NE(found(Error::invalid_argument, 1'000'000).find("lower latency_us"), std::string_view::npos);
-  // No text without too many clocks: the argument that is invalid is then the word format.
+  // A frame of few clocks has no explanation: the invalid argument is then the word format.
   EXPECT_EQ(found(Error::invalid_argument, 10'000), "");
   EXPECT_EQ(found(Error::line_stuck, 10'000), "");
 }

@@ -201,7 +201,7 @@ Procedure write_memory(ControlDialog<F>& dialog, ControlResults& found, Argument
   co_return done;
 }
 
-/// Reads the register with a name at `address`. A refusal means that the encoder lacks it, which is reported as a
+/// Reads the named register at `address`. A refusal means that the encoder lacks the register, which is reported as a
 /// result.
 template <class F>
 Procedure read_setting(ControlDialog<F>& dialog, ControlResults& found, unsigned address) {

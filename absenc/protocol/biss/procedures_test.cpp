@@ -47,7 +47,7 @@ TEST(BissProcedures, WaitsFortyMillisecondsForStartBit) {
   asked(42'000, Error::busy);
 }
 
-// LENZ's reader treats P = 1 after bank select as a fault; other encoders send it after each register.
+// LENZ's host treats P = 1 after bank select as a fault; other encoders send P = 1 after each register.
 TEST(BissProcedures, ReadsOnAfterStopBit) {
   for (const StopBit stop_bit : {StopBit::next, StopBit::zero, StopBit::one}) {
     Format format = testing::bits_24;

@@ -19,7 +19,8 @@ enum class Ask : std::uint8_t {
   identity,
 };
 
-/// The protocol, as author layers use it: frames, lengths and times. author/dialog.hpp explains each member.
+/// Types and functions of the protocol that the classes in absenc/protocol/author use: frames, lengths and times.
+/// author/dialog.hpp explains each member.
 struct Frames {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = encolink::Format;

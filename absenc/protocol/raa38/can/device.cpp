@@ -11,7 +11,7 @@ using namespace std::chrono_literals;
 using FrameStep = Step<CanFrame>;
 using FrameEvent = Event<CanFrame>;
 
-// Times of the virtual node; the document gives none.
+// Time until the virtual node answers, and time until it has started; the document gives none.
 constexpr Time answer_time = 200us;
 constexpr Time start_up_time = 100ms;
 

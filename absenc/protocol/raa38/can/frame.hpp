@@ -171,7 +171,8 @@ inline constexpr std::array<OrderInfo, 8> orders{{
 /// Returns the description of an order.
 [[nodiscard]] constexpr const OrderInfo& info_of(Order order) { return orders[static_cast<std::size_t>(order)]; }
 
-/// Returns the order that a frame carries, or that it answers if it is on 7E5 or 7E4; null if there is no such order.
+/// Returns the order whose code is in byte 0 of a frame: one for all nodes if the frame is on 7E5 or 7E4, otherwise
+/// one for a single node; null if there is no such order.
 [[nodiscard]] constexpr const OrderInfo* order_of(const CanFrame& frame) {
   const bool for_all = is_setting(function_of(frame));
   for (const OrderInfo& info : orders) {

@@ -19,9 +19,9 @@ inline constexpr Time busy_limit = 250ms;   ///< Timeout of a reply on a bus tha
 /// Time for which the host listens for unsolicited frames before it sends requests.
 inline constexpr Time listening_time = 1200ms;
 
-/// The protocol, as author layers use it: frames, lengths and times.
+/// Types and functions of the protocol that the classes in absenc/protocol/author use: frames, lengths and times.
 struct Protocol {
-  /// Type of the items on the line.
+  /// Type of what the line transmits: CAN frames.
   using Item = CanFrame;
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = can::Format;
@@ -53,7 +53,7 @@ struct Protocol {
 [[nodiscard]] Explanation explain(const Format& format, Error error, std::span<const CanFrame> request,
                                   std::span<const CanFrame> reply);
 
-/// Reads one position: requests it (orders 80 and 01), or waits for the next that the node sends without a request.
+/// Reads one position: requests it (order 80 or 01), or waits for the next one that the node sends without a request.
 class Read : public author::CanEngine {
  public:
   /// How the position is obtained: read request, start request, or listening.
@@ -80,7 +80,7 @@ class Read : public author::CanEngine {
 
 /// Returns the frame that requests a position: order 01 in the mode `start`, otherwise order 80.
 [[nodiscard]] constexpr CanFrame position_request(const Format& format, Read::Mode mode) {
-  // Two calls with constant orders, so that the table of orders is not linked.
+  // `encode` is called twice with a constant order, so that firmware does not link the table of orders.
   return mode == Read::Mode::start ? encode(Order::start, format.node) : encode(Order::read, format.node);
 }
 
@@ -124,7 +124,7 @@ struct NodeFrames {
   }
 };
 
-/// Result of a scan.
+/// Result of a scan: the frames that were received from each node number.
 struct Nodes {
   std::array<NodeFrames, 256> at{};  ///< What was received from each node number.
 
@@ -137,7 +137,7 @@ struct Nodes {
 /// wrong bit rate).
 author::Procedure scan(Dialog& dialog, Nodes& nodes);
 
-/// Result of a setting, and the nodes that were found on the bus before it.
+/// Result of `configure`: the setting, and the nodes that were found on the bus before it.
 struct ConfigureResult : Values {
   Nodes nodes{};          ///< Nodes that were found on the bus.
   bool verified = false;  ///< Whether the written setting was verified.

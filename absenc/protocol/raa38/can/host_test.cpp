@@ -60,7 +60,7 @@ TEST(Raa38CanRead, IgnoresFramesFromBeforeTheRequest) {
       by_hand.receive(encode_position(0x20, 1));  // a position that is received before the request is sent
       by_hand.sent();
     }
-    // A position from a queue, whose time of reception is before the request.
+    // This position waited in a queue: its time of reception is before the request.
     by_hand.receive(encode_position(0x20, 2), -1ms);
     EXPECT_EQ(by_hand.next(), Kind::wait);
     by_hand.receive(encode_position(0x20, 3), 1ms);
@@ -78,7 +78,7 @@ TEST(Raa38CanRead, IgnoresFramesOfOtherNodes) {
     by_hand.receive(other);
     EXPECT_EQ(by_hand.next(), Kind::wait);
     by_hand.tell(Event<CanFrame>::Kind::silence, by_hand.now + 50ms);
-    // A 29-bit frame is reported if no other frame arrives.
+    // The host reports a 29-bit frame if no other frame arrives.
     const bool is_long = other.extended;
     EXPECT_EQ(by_hand.talk->error(), is_long ? Error::unexpected_reply : Error::timeout);
     EXPECT_EQ(says(by_hand.talk->detail(), "29 bits"), is_long);

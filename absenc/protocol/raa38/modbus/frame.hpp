@@ -265,7 +265,7 @@ constexpr bool is_answer(const Request& request, Bytes reply) {
 /// Timeout of a reply. The document gives no time; slaves of this kind need a few milliseconds.
 inline constexpr Time answer_limit = std::chrono::milliseconds(50);
 
-/// The protocol, as author layers use it: frames, lengths and times.
+/// Types and functions of the protocol that the classes in absenc/protocol/author use: frames, lengths and times.
 struct Protocol {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = rtu::Format;

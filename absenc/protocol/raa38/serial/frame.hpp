@@ -26,11 +26,11 @@ enum class Mode : std::uint8_t {
   bus,        ///< A request with the encoder's number.
 };
 
-/// Value of the second byte of a frame: 81 in the document's tables, Bx with the encoder's number in its text about the
-/// bus.
+/// Values that are accepted as the second byte of a frame: 81 as in the document's tables (fixed), Bx with the
+/// encoder's number as in its text about the bus (echo), or both (automatic).
 enum class SecondByte : std::uint8_t { automatic, fixed, echo };
 
-/// How the zero of an encoder is set; this depends on the order.
+/// How the zero of an encoder is set; this depends on how the encoder was ordered.
 enum class Zeroing : std::uint8_t {
   none,
   line,     ///< By a pulse on CLR.
@@ -83,7 +83,7 @@ struct Format {
   /// Number x in the request Cx that sets the zero; -1: the same as in Bx.
   std::int32_t zero_unit = -1;
   std::int64_t refresh_millihertz = 0;  ///< Frames per second in timing mode, in 0.001 Hz; 0: unknown.
-  /// Time T3, or on a bus the time from a request to its reply; 0: unknown.
+  /// Time T3 from the pulse on CLK to the frame, or on a bus the time from a request to its reply; 0: unknown.
   Time acquisition{};
   /// Time T1 - T3, the duration of a frame; 0: as long as its characters take.
   Time transmission{};
@@ -140,7 +140,8 @@ using RequestBytes = ByteBuffer<request_bytes>;
   return bytes;
 }
 
-/// Number that accepts a frame of any unit. Used without a request, where the frame itself shows its unit.
+/// Value of `unit` with which decoding accepts a frame of any unit. Used without a request, where the frame itself
+/// shows its unit.
 inline constexpr int any_unit = -1;
 
 /// Returns whether `second_byte` is valid in a frame of `unit`.
@@ -217,7 +218,7 @@ struct Values {
           .angle = degrees(position.singleturn, format.bits)};
 }
 
-/// The protocol, as author layers use it: frames, lengths and times.
+/// Types and functions of the protocol that the classes in absenc/protocol/author use: frames, lengths and times.
 struct Protocol {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = serial::Format;
