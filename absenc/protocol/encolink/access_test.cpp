@@ -311,7 +311,7 @@ TEST(EncolinkAccess, ReportsFailedAndEndlessSelfCalibration) {
             {0, Error::timeout, "does not end"}})) {
     Bench bench(testing::single);
     unsigned reads = 0;
-    unsigned step = 0;  // progress of the answer: 0 ready, 1 status, 2 value
+    unsigned step = 0;  // byte of the answer that comes next: 0 ready, 1 status, 2 value
     const OnChannel3 changed(bench, [&, status = says](std::uint8_t told) {
       if (step == 0)
         step = told == channel3::read_ready ? 1 : 0;

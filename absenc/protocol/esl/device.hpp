@@ -95,7 +95,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     condition_[index] = static_cast<std::int32_t>(value);
   }
   void raise_alarms(std::uint32_t bits) override {
-    // A turn counter that was cleared before the error does not count as cleared.
+    // A turn counter that was cleared before multiturn_error is raised does not count as cleared.
     if ((bits & ~unsigned{latches_} & alarms::multiturn_error) != 0) turns_cleared_ = false;
     latches_ |= static_cast<std::uint8_t>(bits & ~unsigned{alarms::voltage});
     forced_ |= static_cast<std::uint8_t>(bits & alarms::voltage);

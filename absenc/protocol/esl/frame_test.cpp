@@ -24,7 +24,7 @@ constexpr std::array all_ids{DataId::position,         DataId::singleturn,      
 
 constexpr std::array<std::uint8_t, 9> check_input{'1', '2', '3', '4', '5', '6', '7', '8', '9'};
 
-// Returns all profiles that differ in the frames.
+// Returns one profile for each combination of the options that change frames.
 std::vector<Profile> all_profiles() {
   std::vector<Profile> profiles{Profile{}};
   for (std::size_t option = 0; option < open_options; ++option) {

@@ -106,8 +106,8 @@ Progress progress_of(const Profile& profile, std::span<const Capture> captures) 
   return {};
 }
 
-// For each value of an option: how far the best profile with this value explains the captures. Reached has one for each
-// option.
+// For each value of an option: how far the best profile with this value explains the captures. Reached has a
+// ReachedByValue for each option.
 using ReachedByValue = std::array<Progress, most_choices>;
 using Reached = std::array<ReachedByValue, open_options>;
 

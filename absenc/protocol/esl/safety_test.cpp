@@ -32,7 +32,8 @@ void print(const char* kind, unsigned tried, unsigned accepted) {
   std::printf("%-58s %7u tried %6u accepted\n", kind, tried, accepted);
 }
 
-/// An encoder with its monitor and without a line: it gives its replies as bytes, at another position each time.
+/// An encoder with its monitor and without a line: it gives its replies as bytes. The shaft stays where the test puts
+/// it.
 class Monitored {
  public:
   explicit Monitored(const Profile& profile = {}) : profile_(profile), encoder(profile, shaft), monitor(profile) {
@@ -323,7 +324,7 @@ TEST(EslSafetyCampaign, SmallErrorsAndSwapsOfAnId1Reply) {
   EXPECT_EQ(cut, 0u);
 }
 
-// Faults that deliver old replies: the last one repeated, one of `age` replies ago, and a line that delays replies.
+// Faults that deliver old replies: the last reply again, an older reply once, and every reply one cycle late.
 TEST(EslSafetyCampaign, ReplaysAndDelays) {
   for (const SequenceStep step : {SequenceStep::change, SequenceStep::safety}) {
     std::printf("sequence_step=%s:\n", step == SequenceStep::change ? "change" : "safety");
