@@ -23,7 +23,7 @@ author::testing::Tamper damaging(std::vector<unsigned> frames) {
   };
 }
 
-/// Returns a function that replaces the byte `right` by `wrong` in the first `times` requests that contain `right`.
+/// Returns a function that replaces the first `times` bytes `right` in the requests by `wrong`.
 author::testing::Tamper replacing(std::uint8_t right, std::uint8_t wrong, int times) {
   return [=](unsigned, RawBytes& request) mutable {
     for (std::uint8_t& byte : request) {

@@ -29,7 +29,7 @@ struct Frames {
     Ask ask = Ask::position;  ///< Purpose of the request.
     std::uint8_t ra = 0;      ///< One byte of a register access.
   };
-  /// Type of replies; an identity is stored elsewhere and leaves it empty.
+  /// Type of replies; empty for an identity, which is decoded from the bytes of the reply instead.
   using Reply = Position;
   static constexpr std::size_t longest_reply = identity_bytes;  ///< Number of bytes of the longest reply.
 

@@ -85,7 +85,8 @@ author::Part<AccessOutcome> attempt_write(Dialog& dialog, ProcedureState& found,
 author::Procedure read_alarms(Dialog& dialog, ProcedureState& found);
 /// Reads the identity of the encoder.
 author::Procedure read_identity(Dialog& dialog, ProcedureState& found);
-/// Reads the identity and every register that has `in_info`. Leaves out registers that the encoder rejects.
+/// Reads the identity and every register that has `in_info`. Leaves out registers that the encoder rejects. Reads no
+/// register from an AksIM-4 or without channel 2.
 author::Procedure read_info(Dialog& dialog, ProcedureState& found);
 
 /// Reads register `index` of the table. Errors of this and the following procedures: request_rejected (the detail

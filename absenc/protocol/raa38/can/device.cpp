@@ -130,7 +130,8 @@ void VirtualNode::execute(const OrderInfo& info, std::uint8_t value, Time at) {
   if (info.answer == Answer::code) answer(encode_answer(node(), info.order), at);
 }
 
-// Stores a setting. A new bit rate becomes active after the answer was sent.
+// Stores a setting whose value the document defines, and answers it. A new bit rate becomes active after the answer
+// was sent.
 void VirtualNode::configure(const OrderInfo& info, std::uint8_t value, Time at) {
   const bool known = meaning_of(info, value).has_value();
   const bool is_rate = info.order == Order::rate;

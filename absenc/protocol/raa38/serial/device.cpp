@@ -63,8 +63,8 @@ void VirtualEncoder::triggered(const ByteEvent& event) {
   transmit(encode_position(format(), position(event.at)), event.at + Protocol::device_times(format()).answer_time);
 }
 
-// Reports a request that arrives during a transmission. Two encoders with one number send at the same time, so only the
-// bytes of a request break the rule, not other bytes.
+// Reports a request that arrives during a transmission. Two encoders with one number send at the same time, so only a
+// whole request with the number of this encoder breaks the rule, not other bytes.
 void VirtualEncoder::check_during_transmission(const ByteEvent& event) {
   const std::uint32_t own = 0xBCAA00u | number_mark | format().unit;
   // If this program was scheduled late, the frame should have been sent before the request arrived, so the request
