@@ -87,7 +87,7 @@ struct ControlFrame {
   /// Whether the register after the last one may be accessed too (P = 0).
   bool next_address_accepted = false;
   std::uint8_t acknowledged = 0;  ///< Slaves that acknowledged a command: bit n is slave n.
-  bool executed = false;          ///< Whether the host had the command executed.
+  bool executed = false;          ///< Whether the host let the slaves execute the command (bit EX).
 };
 
 /// Decodes a control frame from the bits of CDM and CDS, one of each per position frame. The start bit may be the

@@ -79,7 +79,7 @@ struct ControlResults {
   std::optional<bool> broadcast{};              ///< Whether the command is for all slaves, without acknowledgement.
   NumberList slave_ids;                         ///< IDs of the slaves to which a command is addressed.
   NumberList acknowledged;                      ///< IDs of the slaves that acknowledged a command.
-  std::optional<bool> executed{};               ///< Whether the host had the command executed.
+  std::optional<bool> executed{};               ///< Whether the host let the slaves execute the command (bit EX).
   // ---- Results of procedures
   /// False: the register had this value already, so nothing was written.
   std::optional<bool> written{};

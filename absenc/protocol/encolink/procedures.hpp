@@ -19,7 +19,7 @@ using Dialog = author::DialogOf<Frames>;
 /// How a register access ended.
 enum class AccessOutcome : std::uint8_t {
   good,     ///< The encoder executed the access.
-  refused,  ///< The encoder did not execute the access.
+  refused,  ///< The encoder refused the access, or was busy with it for longer than `busy_limit`.
   lost,     ///< Frames arrive, but the answer to the access does not: the encoder may have executed the access.
   gone,     ///< No frames arrive; `was_sent` tells whether the encoder may have executed the access.
 };
@@ -42,7 +42,7 @@ struct ProcedureState : Channels {
   bool emits = false;                 ///< Whether the procedure emits each position.
   bool is_new = false;                ///< Whether the latest position was not emitted yet.
   std::uint8_t protocol_version = 0;  ///< Protocol version in the identity; 0: the identity was not read yet.
-  unsigned lost = 0;                  ///< Number of frames in a row that were lost.
+  unsigned lost = 0;                  ///< Number of frames in a row that were lost or damaged.
   AccessBytes access{};               ///< All `ra` bytes of the present register access.
   bool writes = false;                ///< Whether the present register access is a write.
   /// Whether all `ra` bytes were sent, so that the encoder may have executed the access.

@@ -118,19 +118,19 @@ constexpr std::uint16_t crc_of_pairs(Channel channel, Bytes bytes, bool swapped)
 
 /// Data ID: code of a request's kind, with the values of Table 3; ID 6 is in Tables 6 and 12 only.
 enum class DataId : std::uint8_t {
-  position = 1,          ///< data ID whose reply can make a safe position; it has both channels
-  singleturn = 2,        ///< data ID whose reply can make a safe position; it has both channels
-  position_short = 4,    ///< data ID whose reply cannot make a safe position
-  singleturn_short = 5,  ///< data ID whose reply cannot make a safe position
-  calibration = 6,       ///< data ID whose reply cannot make a safe position
+  position = 1,          ///< Position and turns, with both channels; the reply can make a safe position.
+  singleturn = 2,        ///< Position within the turn, with both channels; the reply can make a safe position.
+  position_short = 4,    ///< Position and turns of channel 1 alone; the reply cannot make a safe position.
+  singleturn_short = 5,  ///< Position within the turn of channel 1 alone; the reply cannot make a safe position.
+  calibration = 6,       ///< Position within the turn of each channel; the reply cannot make a safe position.
   /// Data ID that must never be sent eight times in a row: that is "dynamic addressing", which the document does not
   /// describe.
   encoder_id = 8,
   temperature = 9,
   alarms = 0xA,
-  zero = 0xB,             ///< data ID of which eight consecutive requests make a reset
-  clear_alarms = 0xC,     ///< data ID of which eight consecutive requests make a reset
-  reset_multiturn = 0xD,  ///< data ID of which eight consecutive requests make a reset
+  zero = 0xB,             ///< Eight consecutive requests make the present position the zero of the turn.
+  clear_alarms = 0xC,     ///< Eight consecutive requests clear alarms.
+  reset_multiturn = 0xD,  ///< Eight consecutive requests set the turns to zero.
   read_memory = 0xE,
   write_memory = 0xF,
 };

@@ -59,7 +59,7 @@ enum class Check : std::uint8_t {
 struct CheckText {
   Error error;                ///< Error that the failed check gives.
   std::string_view sentence;  ///< What is wrong with the reply, as a sentence.
-  std::string_view advice{};  ///< advice that replaces that of the error; "": the error's advice stands
+  std::string_view advice{};  ///< Advice that replaces the advice of the error; empty: none.
 };
 
 /// Error and texts of each check, in the order of Check.

@@ -50,8 +50,8 @@ struct CommandValues : Values {
 /// Interface by which procedures send requests and await replies.
 using Dialog = author::DialogOf<Protocol>;
 
-// If no encoder answers at the address of the format, the procedures below except `scan` send A0 and report the
-// address in the reply.
+// If no encoder answers at the address of the format, the procedures below except `read_address` and `scan` send A0
+// and name the address in the reply in their error text.
 
 /// Reads the position once and reports it.
 author::Procedure read_position_once(Dialog& dialog, CommandValues& found);
