@@ -37,7 +37,8 @@ struct ChainFormat {
   [[nodiscard]] constexpr unsigned shown() const { return slave < count ? count - 1u - slave : 0u; }
 };
 
-/// Returns whether the options of the chain are consistent.
+/// Returns whether the chain has a valid number of words and selected slave, and whether each used word has a
+/// position and a usable check.
 [[nodiscard]] constexpr bool is_usable(const ChainFormat& format) {
   if (format.count > ChainFormat::most || format.slave >= format.count) return false;
   for (unsigned i = 0; i < format.count; ++i) {
@@ -54,7 +55,8 @@ struct ChainFormat {
   return bits;
 }
 
-/// Returns the number of clocks that the slaves add to the ACK: each but the first passes it on one clock later.
+/// Returns the number of clocks that the slaves add to the ACK: each slave except the farthest from the host passes
+/// the start bit on one clock later.
 [[nodiscard]] constexpr unsigned relay_bits(const ChainFormat& format) { return format.count - 1u; }
 
 /// A decoded frame of several encoders in a chain.
@@ -65,7 +67,8 @@ struct ChainReply {
   bool cds = false;                                       ///< CDS: the encoder's bit of control communication.
 };
 
-/// Decodes a frame of a chain, with the errors of `decode` for one word. An error in one word rejects the whole frame.
+/// Decodes a frame of a chain. Errors: those of `decode` for one word, and invalid_argument (`is_usable` is false).
+/// An error in one word rejects the whole frame.
 [[nodiscard]] constexpr Result<ChainReply> decode(const ChainFormat& format, BitView samples, Cds cds = Cds::zero) {
   if (!is_usable(format)) return Error::invalid_argument;
   ChainReply reply;

@@ -19,7 +19,8 @@ using namespace author;
 
 constexpr unsigned most = ChainFormat::most;
 
-// Options of one word of the chain; options of several words are numbered in the order of the line.
+// Options of the word in one channel of the chain. The names of the options begin with the number of the channel,
+// counted in the order of the line, such as channel0_.
 template <unsigned>
 struct ChannelSettings {
   std::uint8_t singleturn_bits = 19;

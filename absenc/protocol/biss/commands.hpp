@@ -151,7 +151,7 @@ template <const auto& report, class F>
   };
 }
 
-/// Returns cause and advice for `error` of a frame; empty if the document gives none.
+/// Returns cause and advice for `error` of a frame; empty if none is known.
 template <class F>
 [[nodiscard]] Explanation explain_frame(const F& format, Error error, Bytes = {}, Bytes reply = {}) {
   switch (error) {
@@ -171,9 +171,8 @@ template <class F>
   }
 }
 
-/// Returns whether an error in sample `bit` is always detected, or harmless. At the end of the idle line a flipped
-/// sample only changes the length of the ACK. Within the ACK and at the start bit it moves the frame, which a CRC of 6
-/// bits misses once in 64 times.
+/// Returns whether an error in sample `bit` counts as detected. At the last idle sample an error only makes the ACK
+/// longer. Within the ACK and at the start bit it moves the frame, which a CRC of 6 bits misses once in 64 times.
 [[nodiscard]] inline bool is_behind_ack(Frame reply, std::size_t bit) {
   const BitView samples = author::to_bits(reply);
   const std::size_t idle = samples[0] ? samples.end_of_run(0) : 0;

@@ -87,14 +87,15 @@ struct ControlFrame {
   /// Whether the register after the last one may be accessed too (P = 0).
   bool next_address_accepted = false;
   std::uint8_t acknowledged = 0;  ///< Slaves that acknowledged a command: bit n is slave n.
-  bool executed = false;          ///< Whether the host had the command executed.
+  bool executed = false;          ///< Whether the host let the slaves execute the command (bit EX).
 };
 
-/// Decodes a control frame from the bits of CDM and CDS, one of each per position frame. The start bit may be the first
-/// bit, or follow zeros. Without CDS bits only the request is decoded: written data is taken from CDM, and repeated
-/// start bits are separated from data by the CRC. Errors: wrong_length (no bits), bad_framing (no start bit, too few
-/// zeros before it, or neither read nor write), truncated, bad_checksum (header or a byte), timeout (no slave has this
-/// ID, or the slave does not answer), unexpected_reply (written data is returned with another value), request_rejected.
+/// Decodes a control frame from the bits of CDM and CDS, one of each per position frame. The start bit may be the
+/// first bit, or follow zeros. Without CDS bits only the request is decoded: written data is taken from CDM, and
+/// repeated start bits are separated from data by the CRC. Errors: wrong_length (no bits, or more than 64 data
+/// bytes), bad_framing (no start bit, too few zeros before it, or neither read nor write), truncated, bad_checksum
+/// (header or a byte), timeout (no slave has this ID, or the slave does not answer), unexpected_reply (written data
+/// is returned with another value), request_rejected.
 [[nodiscard]] Result<ControlFrame> decode_control(BitView cdm, BitView cds);
 
 /// The host's side of control frames. It owns no line: the caller passes the CDS of each position frame to `next` and
@@ -174,12 +175,12 @@ struct ControlTarget {
   [[nodiscard]] virtual bool stop_bit(bool next_allowed) const { return !next_allowed; }
   /// Returns whether the next data byte can begin now: its value is available, or the encoder can accept a new one.
   [[nodiscard]] virtual bool is_ready() const = 0;
-  /// Returns whether `slave` takes part in register accesses. One command switches its participation off, another on;
-  /// all slaves receive both commands.
+  /// Returns whether `slave` takes part in register accesses. Command 1 switches this off for the slaves that it
+  /// addresses, and on again if it is sent to all slaves; slaves that are switched off still receive it.
   [[nodiscard]] virtual bool listens(unsigned) const { return true; }
   /// Returns whether `slave` executes the command with number `command`.
   [[nodiscard]] virtual bool obeys(unsigned slave, unsigned command) const = 0;
-  /// Executes a command on all slaves whose bit is set in `slaves`.
+  /// Executes a command on all slaves whose bit is set in `slaves`; 0: on all slaves.
   virtual void execute(std::uint8_t slaves, unsigned command) = 0;
 
  protected:
@@ -189,7 +190,7 @@ struct ControlTarget {
 /// The encoders' side of control frames, for all slaves on one line.
 class ControlSlaves {
  public:
-  /// Creates the side of `count` slaves.
+  /// Creates the encoders' side of a line with `count` slaves.
   explicit ControlSlaves(unsigned count) : count_(count) {}
 
   /// Processes the CDM that the host sent after the last frame, and sets the CDS of the next frame, which `cds`
@@ -197,7 +198,7 @@ class ControlSlaves {
   void take(bool cdm, ControlTarget& target);
   /// Returns the CDS that the slaves send in the next frame.
   [[nodiscard]] bool cds() const { return cds_; }
-  /// Returns to the state after power on.
+  /// Resets the slaves to their state after power on.
   void reset() { *this = ControlSlaves(count_); }
 
  private:

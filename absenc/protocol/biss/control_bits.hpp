@@ -11,10 +11,11 @@ namespace absenc::biss::control_bits {
 /// Kind of a control request.
 using Operation = ControlRequest::Operation;
 
-/// Positions of CDM and CDS bits, as frames counted from the start bit.
+/// Position of the first lock bit in CDS. All positions here count position frames from the start bit of the control
+/// frame.
 inline constexpr unsigned lock_bits_at = 1;
 inline constexpr unsigned more_slaves_at = 9;  ///< Position of the bit that announces slaves without an ID.
-/// Position of the CDM bits R, W and S; in CDS they are one frame later.
+/// Position of R, the first of the CDM bits R, W and S; in CDS these bits are one frame later.
 inline constexpr unsigned direction_at = 16;
 inline constexpr unsigned acknowledge_at = 17;  ///< Position of the first of the acknowledge bits IDA0 to IDA7 in CDS.
 inline constexpr unsigned byte_bits = 12;       ///< Number of bits of a data byte and its CRC.

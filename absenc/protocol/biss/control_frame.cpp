@@ -72,7 +72,8 @@ Error decode_register_access(const ControlBits& cdm, const ControlBits& cds, Con
   const bool first = cds[direction_at + 1];
   const bool second = cds[direction_at + 2];
   if (first == write) return write ? Error::unexpected_reply : Error::timeout;
-  if (second != write) return Error::request_rejected;  // the second direction bit is the inverted first one
+  // A slave that accepts the access sends the inverted first direction bit as the second.
+  if (second != write) return Error::request_rejected;
   if (!cdm[direction_at + 2]) return Error::timeout;
   return decode_bytes(cdm, cds, write, frame);
 }

@@ -35,7 +35,8 @@ class NumberList {
   Buffer<char, 96> text_;  // Text of the list; numbers that do not fit are dropped.
 };
 
-/// The two characters of a manufacturer as text; bytes that are not printable as "\\x00".
+/// The two characters of a manufacturer as text; a byte that is not printable is shown as \x and two hexadecimal
+/// digits.
 class MakerName {
  public:
   /// Appends these bytes of the manufacturer registers.
@@ -78,7 +79,7 @@ struct ControlResults {
   std::optional<bool> broadcast{};              ///< Whether the command is for all slaves, without acknowledgement.
   NumberList slave_ids;                         ///< IDs of the slaves to which a command is addressed.
   NumberList acknowledged;                      ///< IDs of the slaves that acknowledged a command.
-  std::optional<bool> executed{};               ///< Whether the host had the command executed.
+  std::optional<bool> executed{};               ///< Whether the host let the slaves execute the command (bit EX).
   // ---- Results of procedures
   /// False: the register had this value already, so nothing was written.
   std::optional<bool> written{};

@@ -26,7 +26,8 @@ Result<ControlFrame> decoded(std::string_view cdm, std::string_view cds) {
   return decode_control(BitText(cdm).bits.view(), BitText(cds).bits.view());
 }
 
-// A register read from TI's table; the other frames follow the rules of the protocol description.
+// The bits of a register read from a table of Texas Instruments (TI); the other frames follow the rules of the
+// protocol description.
 constexpr std::string_view read_44 = "0000000000000011000100010011011010000000000000000";
 constexpr std::string_view read_44_answer = "0000000000000001000000000000000101000010100010000";
 
@@ -48,7 +49,8 @@ std::string cdm_of(const ControlMaster& master) {
   return text;
 }
 
-// Compares CDM bits with those of the protocol description and of TI's table. Only zeros may follow.
+// Compares CDM bits with those of the protocol description and of TI's table. After the drawn bits only zeros may
+// follow.
 TEST(BissControl, EncodesRequestsOfTheDocument) {
   const auto expect = [](const ControlMaster& master, std::string_view drawn) {
     const std::string cdm = cdm_of(master);
@@ -186,7 +188,7 @@ TEST(BissControl, DecodesHostThatContinuesAfterStopBit) {
   EXPECT_EQ((run(master, slaves, target), master.error()), Error::request_rejected);
   EXPECT_EQ(master.frame().data.size(), 1u);
   EXPECT_EQ(master.frame().data[0], 10);
-  // LENZ's reader ignores P of a read.
+  // LENZ's host ignores the bit P after a register that it has read.
   BitBuffer<256> cdm;
   BitBuffer<256> cds;
   slaves.reset();
@@ -253,7 +255,7 @@ TEST(BissControl, RandomAccessesEndWithExpectedResult) {
   }
 }
 
-// A lost start bit shifts all bits after it, which four bits of CRC may miss: it shows as a delay.
+// A lost start bit shifts all bits after it, which four bits of CRC may miss: the loss shows as a delay of the byte.
 TEST(BissControl, FlippedCdsBitIsDetectedOrShowsAsDelay) {
   for (std::size_t flip = 0; flip < 14 + 33 + 14; ++flip) {
     for (const bool write : {false, true}) {
@@ -340,10 +342,10 @@ TEST(BissControl, DecoderChecksEachRuleOfAControlFrame) {
   EXPECT_EQ(error(read.cdm, begin(read.cds, 5)), Error::truncated);
   EXPECT_EQ(error(read.cdm, begin(read.cds, 18)), Error::truncated);
   EXPECT_EQ(error(begin(read.cdm, 20), read.cds), Error::truncated);
-  EXPECT_EQ(error(flipped(read.cdm, {18}), read.cds), Error::timeout);       // no S of the host
+  EXPECT_EQ(error(flipped(read.cdm, {18}), read.cds), Error::timeout);       // the host sends no start bit S
   EXPECT_EQ(error(late(read.cdm, 13), late(read.cds, 13)), Error::none);     // start bit S of the encoder is late
   EXPECT_EQ(error(late(read.cdm, 14), late(read.cds, 14)), Error::timeout);  // 14 zeros end the frame
-  // P refuses the next register
+  // P refuses the next register, but the host requests it.
   EXPECT_EQ(error(flipped(read.cdm, {32}), flipped(read.cds, {32})), Error::request_rejected);
   // a delay is not allowed for the first written byte
   EXPECT_EQ(error(write.cdm, late(write.cds, 1)), Error::bad_framing);

@@ -15,7 +15,7 @@ void LineDelay::apply(const Behaviour& behaviour, Time period, Samples& samples)
   const BitBuffer driven = samples;
   samples.clear();
   const auto bit = [&driven](std::size_t index, unsigned by) {
-    if (index < by) return true;  // the line is still idle
+    if (index < by) return true;  // before the delay is over, the line is still idle
     return index - by < driven.size() && driven.view()[index - by];
   };
   for (std::size_t i = 0; i < driven.size() + late && i < Samples::capacity(); ++i) {
@@ -35,7 +35,7 @@ namespace {
 // off.
 constexpr std::size_t direct = VirtualRegisters::banks * registers::bank_size;
 
-// device ID (6 bytes), then manufacturer (2 bytes)
+// Initial content of the registers device ID (6 bytes) and manufacturer (2 bytes).
 constexpr std::array<std::uint8_t, 8> identity{'A', 'b', 's', 'e', 'n', 'c', 'v', 'e'};
 }  // namespace
 

@@ -24,7 +24,8 @@ struct Behaviour {
 /// Samples of SLO, one per clock of MA.
 using Samples = author::DrivenBits;
 
-/// Delays samples as a line does: by whole clocks, and by one more at random where an edge falls on a sample.
+/// Delays samples as a line does: by whole clocks, and at random by one clock more or less where an edge falls on a
+/// sample.
 class LineDelay {
  public:
   /// Delays `samples`, which were taken at this period of MA, by `behaviour.line_delay`.
@@ -126,7 +127,7 @@ class VirtualRegisters final : public ControlTarget {
   [[nodiscard]] bool is_ready() const override;
   [[nodiscard]] bool listens(unsigned slave) const override { return (control_off_ >> slave & 1) == 0; }
   [[nodiscard]] bool obeys(unsigned slave, unsigned command) const override;
-  /// Executes a command on all slaves whose bit is set in `slaves`.
+  /// Executes a command on all slaves whose bit is set in `slaves`; 0: on all slaves.
   void execute(std::uint8_t slaves, unsigned command) override;
 
  private:
@@ -145,7 +146,7 @@ class VirtualRegisters final : public ControlTarget {
   std::uint8_t control_off_ = 0;  // slaves with control communication switched off: bit n is slave n
 };
 
-/// Returns the number of slaves whose words the frames carry.
+/// Returns 1: a frame with one word has one slave.
 [[nodiscard]] constexpr unsigned slaves_of(const Format&) { return 1; }
 /// Returns the number of slaves: one for each word of BiSS Safety.
 [[nodiscard]] constexpr unsigned slaves_of(const SafetyFormat&) { return 2; }
@@ -180,7 +181,7 @@ class VirtualEncoderOf final : public author::ClockedDevice {
     timeout_ = encoder_.format().timeout.of_encoder(period);
     period_ = period;
     if (period / 2 < timeout_) hold_low(timeout_);
-    // SLO is still low after the previous frame.
+    // Before the BiSS timeout has passed, SLO is still low after the previous frame.
     if (!expect(at >= free_at_, "clocked before the BiSS timeout has passed", at)) {
       samples.append(0, 64);
       return;

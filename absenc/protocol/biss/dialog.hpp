@@ -41,7 +41,8 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
   /// Returns whether the texts of the outcome suffice, so that no explanation of the last reply is added.
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
   [[nodiscard]] ChangeSent change_sent() const final { return this->change(); }
-  /// Accepts frames whose process data a command may have switched off: their CDS is valid.
+  /// Makes the dialog accept frames without process data, because a command may have switched the data off. The CDS
+  /// of such frames is valid.
   void accept_empty_frames() { accepts_empty_ = true; }
   /// Makes the conversation emit each valid position before the next frame begins.
   void emit_positions() { emits_ = true; }

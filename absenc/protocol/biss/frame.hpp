@@ -65,7 +65,7 @@ class Timeout {
   }
   explicit constexpr Timeout(std::uint8_t code) : code_(code) {}
 
-  std::uint8_t code_ = 0;  // unit 0.5 us; 0: unknown timeout, 1: adaptive
+  std::uint8_t code_ = 0;  // timeout in units of 0.5 us; 0: unknown, 1: adaptive
 };
 
 /// The bit P that the virtual encoder sends after each register: 0 if the next register may be accessed, or always 0,
@@ -76,7 +76,7 @@ inline constexpr std::array<std::string_view, 3> stop_bit_choices{"next", "zero"
 
 /// Byte order of a number that several registers hold.
 enum class RegisterOrder : std::uint8_t { big, little };
-/// Values of the option `register_order`, in the order of RegisterOrder.
+/// Values of the option `register_byte_order`, in the order of RegisterOrder.
 inline constexpr std::array<std::string_view, 2> register_order_choices{"big", "little"};
 
 /// Frame layout and settings of one encoder, as the unit's options select them.
@@ -249,8 +249,9 @@ constexpr bool append_head(const ReplyType& head, std::size_t size, BitBuffer<Ca
   return detail::decode_by(Given<Format>{format, format.word}, samples, cds);
 }
 
-/// Decodes a frame whose format is known at compile time, as fast as code written for this format by hand. Errors as
-/// above. The word in the result has the member `values` only if the format has further fields.
+/// Decodes a frame whose format is known at compile time, as fast as code written for this format by hand. The errors
+/// are those of `decode` with a format as an argument. The word in the result has the member `values` only if the
+/// format has further fields.
 template <const Format& format>
 [[nodiscard]] constexpr Result<ReplyTo<format>> decode(BitView samples, Cds cds = Cds::zero) {
   return detail::decode_by(Known<format>{}, samples, cds);

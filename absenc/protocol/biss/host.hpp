@@ -14,7 +14,7 @@ namespace absenc::biss {
 /// Longest extra delay of encoder and line, beyond the expected delay, with which a host still finds the frame.
 inline constexpr Time longest_delay = 80us;
 
-/// A conversation that reads positions and meanwhile carries control frames: dialog.hpp.
+/// A conversation that reads positions and meanwhile carries control frames; dialog.hpp defines it.
 template <class F>
 class ControlDialog;
 

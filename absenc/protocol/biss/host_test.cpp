@@ -209,7 +209,7 @@ TEST(BissHost, AssumesLatencyOfTenMicroseconds) {
   expect_ten_microseconds<ChainFormat>();
 }
 
-// After power on: 40 us, two pulses, 40 us, and only then a frame.
+// The first frame is stuck: the host pauses 40 us, sends two pulses, pauses 40 us, and clocks a frame again.
 TEST(BissHost, SendsStartSequenceWhenFirstFrameIsStuck) {
   Format format = turns_19;
   format.start_sequence = true;
@@ -247,9 +247,9 @@ TEST(BissHost, SendsStartSequenceWhenFirstFrameIsStuck) {
   clocks.clear();
   FindPosition<Format> nobody(format);
   EXPECT_EQ(bench.run(nobody).error(), Error::line_stuck);
-  // the delay of the line may be long
+  // The host also clocks for the longest delay of the line, because the delay may be longer than expected.
   const std::size_t longest = ProtocolOf<Format>::all_clocks(format);
-  EXPECT_EQ(clocks, (std::vector<std::size_t>{frame, start_pulses, frame, longest}));  // each transfer occurs once
+  EXPECT_EQ(clocks, (std::vector<std::size_t>{frame, start_pulses, frame, longest}));
 }
 
 TEST(BissHost, ClocksLongerBeforeReportingStuckLine) {
@@ -279,7 +279,8 @@ TEST(BissHost, ExplainsErrors) {
   EXPECT_NE(found(Error::truncated, 10'000).find("raise it"), std::string_view::npos);
   EXPECT_NE(found(Error::bad_checksum, 10'000).find("try another one"), std::string_view::npos);
   EXPECT_NE(found(Error::invalid_argument, 1'000'000).find("lower latency_us"), std::string_view::npos);
-  EXPECT_EQ(found(Error::invalid_argument, 10'000), "");  // the word format itself is invalid
+  // A frame of few clocks has no explanation: the invalid argument is then the word format.
+  EXPECT_EQ(found(Error::invalid_argument, 10'000), "");
   EXPECT_EQ(found(Error::line_stuck, 10'000), "");
 }
 

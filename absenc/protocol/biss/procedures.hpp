@@ -103,8 +103,8 @@ Part<Error> read_registers(ControlDialog<F>& dialog, ControlMaster& master, Byte
   co_return error;
 }
 
-/// Writes a register and reads it back, even after an error: the value in the register decides, not the encoder's
-/// answer. Returns cross_check_failed if the value differs.
+/// Writes a register and reads it back, even after an error other than a refusal: the value in the register decides,
+/// not the encoder's answer. Returns cross_check_failed if the value differs.
 template <class F>
 Part<Error> write_register(ControlDialog<F>& dialog, ControlMaster& master, unsigned address, std::uint8_t value) {
   const std::array<std::uint8_t, 1> bytes{value};
@@ -201,7 +201,7 @@ Procedure write_memory(ControlDialog<F>& dialog, ControlResults& found, Argument
   co_return done;
 }
 
-/// Reads the register with a name at `address`. A refusal means that the encoder lacks it, which is reported as a
+/// Reads the named register at `address`. A refusal means that the encoder lacks the register, which is reported as a
 /// result.
 template <class F>
 Procedure read_setting(ControlDialog<F>& dialog, ControlResults& found, unsigned address) {

@@ -35,7 +35,7 @@ TEST(BissProcedures, RefusesImpossibleRegistersWithoutRequest) {
   EXPECT_EQ(one.ask<write_memory<Format>>({3, 7, 0, 0}).written, false);
 }
 
-// D2: an encoder takes up to 20 ms for a start bit; the host waits twice as long.
+// BiSS C Protocol Description rev D2: an encoder takes up to 20 ms for a start bit; the host waits twice as long.
 TEST(BissProcedures, WaitsFortyMillisecondsForStartBit) {
   const auto asked = [](std::uint16_t delay_us, Error expected) {
     Format format = testing::bits_24;
@@ -47,7 +47,7 @@ TEST(BissProcedures, WaitsFortyMillisecondsForStartBit) {
   asked(42'000, Error::busy);
 }
 
-// LENZ's reader treats P = 1 after bank select as a fault; other encoders send it after each register.
+// LENZ's host treats P = 1 after bank select as a fault; other encoders send P = 1 after each register.
 TEST(BissProcedures, ReadsOnAfterStopBit) {
   for (const StopBit stop_bit : {StopBit::next, StopBit::zero, StopBit::one}) {
     Format format = testing::bits_24;
@@ -196,7 +196,7 @@ TEST(BissProcedures, AcceptsLateFrameWhenTheNextIsAsLate) {
   const Error none = Error::none;
   const Error late = Error::truncated;
   EXPECT_EQ(errors({10, 10, 9, 10, 10}), (Errors{none, none, none, none, none}));
-  // The first late frame had too few clocks.
+  // The first late frame had too few clocks, so the host compares the delays of the second and the third.
   EXPECT_EQ(errors({10, 12, 12, 12, 14}), (Errors{none, late, late, none, late}));
 }
 

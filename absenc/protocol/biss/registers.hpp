@@ -24,7 +24,7 @@ inline constexpr unsigned device_id = 0x78;     ///< Address of the device ID, s
 inline constexpr unsigned manufacturer = 0x7E;  ///< Address of the manufacturer's two characters.
 inline constexpr unsigned end = 0x80;           ///< First address beyond the registers.
 
-/// Returns the size in bytes of the register with a name at `address`.
+/// Returns the size in bytes of the named register at `address`.
 [[nodiscard]] constexpr unsigned size_of(unsigned address) {
   switch (address) {
     case profile:

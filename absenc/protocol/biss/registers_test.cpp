@@ -105,7 +105,7 @@ struct Host {
 struct Outcome {
   std::uint64_t positions = 0;
   std::uint64_t wrong = 0;
-  std::uint64_t gaps = 0;  // number of frames that began later than one timeout after the previous frame
+  std::uint64_t gaps = 0;  // frames that did not begin exactly one timeout after the previous frame
   std::uint64_t damaged = 0;
   sim::FaultCounts faults{};
   // number of registers whose value differs from the one that the host believes to have written

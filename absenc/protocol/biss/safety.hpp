@@ -122,8 +122,8 @@ constexpr std::uint64_t compared_bits(const Channel& channel, const Word& word, 
   return reply;
 }
 
-/// Appends the frame of `reply` to `out`. `silent`: bits 0 and 1 are set if SPW and CPW are not sent. Returns false if
-/// `out` is too small.
+/// Appends the frame of `reply` to `out`. `silent`: bit 0 is set if the SPW is not sent, bit 1 if the CPW is not
+/// sent. Returns false if `out` is too small.
 template <std::size_t Capacity>
 constexpr bool encode(const SafetyFormat& format, const SafetyReply& reply, BitBuffer<Capacity>& out,
                       std::uint8_t silent = 0) {

@@ -24,7 +24,7 @@ TEST(BissWords, ChainNeedsOneToEightWordsWithPosition) {
   EXPECT_TRUE(is_usable(format));
   format.count = ChainFormat::most + 1;
   expect_unusable(format);
-  format.count = format.slave;  // no slave has this number
+  format.count = format.slave;  // no slave has the number `format.slave`
   expect_unusable(format);
   format = {};
   format.channels[1].word = WordFormat{};
@@ -80,7 +80,7 @@ TEST(BissWords, SafetyComparesPositionsAndLifeCounter) {
     EXPECT_TRUE(encode(format, reply, frame));
     return decode(format, frame.view()).error();
   };
-  // The highest 13 bits are compared, of 24 and of 16 bits.
+  // The highest 13 bits are compared: of the 24 bits of the CPW and of the 16 bits of the SPW.
   EXPECT_EQ(error(0x123456, 0x1234, 5), Error::none);
   EXPECT_EQ(error(0x123456, 0x1234 + 8, 5), Error::none);
   EXPECT_EQ(error(0x123456, 0x1234 + 16, 5), Error::cross_check_failed);

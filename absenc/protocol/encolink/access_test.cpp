@@ -23,7 +23,7 @@ author::testing::Tamper damaging(std::vector<unsigned> frames) {
   };
 }
 
-/// Returns a function that replaces the byte `right` by `wrong` in the first `times` requests that contain `right`.
+/// Returns a function that replaces the first `times` bytes `right` in the requests by `wrong`.
 author::testing::Tamper replacing(std::uint8_t right, std::uint8_t wrong, int times) {
   return [=](unsigned, RawBytes& request) mutable {
     for (std::uint8_t& byte : request) {
@@ -311,7 +311,7 @@ TEST(EncolinkAccess, ReportsFailedAndEndlessSelfCalibration) {
             {0, Error::timeout, "does not end"}})) {
     Bench bench(testing::single);
     unsigned reads = 0;
-    unsigned step = 0;  // progress of the answer: 0 ready, 1 status, 2 value
+    unsigned step = 0;  // byte of the answer that comes next: 0 ready, 1 status, 2 value
     const OnChannel3 changed(bench, [&, status = says](std::uint8_t told) {
       if (step == 0)
         step = told == channel3::read_ready ? 1 : 0;

@@ -19,10 +19,10 @@ struct Text {
 constexpr std::array<Text, 3> texts{
     {{serial_number, "AK2A0001"}, {serial_number_extended, "AK2A0001-0000001"}, {part_number, "MB080SLA20MENT00 SIM"}}};
 
-// Initial values of the registers that are numbers, and of `turns_taken`. Values that only a calibration or the factory
-// determines are 0.
 // Index, after those of the registers, of the turns that a preset subtracts from the shaft's turns.
 constexpr std::size_t turns_taken = registers.size();
+// Initial values of the registers that are numbers, and of `turns_taken`. Values that only a calibration or the factory
+// determines are 0.
 constexpr auto at_shipping = [] {
   std::array<std::uint32_t, turns_taken + 1> values{};
   values[firmware_major] = 1;
@@ -38,7 +38,6 @@ constexpr std::array<std::size_t, 9> stored_registers{position_offset, multiturn
 
 }  // namespace
 
-// While it starts, the encoder answers requests with zeros.
 VirtualEncoder::VirtualEncoder(const Format& format, const Shaft& shaft)
     : Responder({.character = uart_settings.character(), .answer_time = answer_time}), format_(format), shaft_(&shaft) {
   if (format_.resolution == 0) format_.resolution = virtual_format.resolution;
@@ -100,6 +99,7 @@ void VirtualEncoder::stopped_clocking(const ByteEvent& event) {
 }
 
 ReplyBytes VirtualEncoder::make_frame(Time now) {
+  // While it starts, the encoder sends well-formed frames whose position is zero.
   if (now < zeros_until_) return encode_position(format_, {});
   if (identity_next_) {
     identity_next_ = false;
@@ -168,7 +168,8 @@ void VirtualEncoder::ra_received(std::uint8_t byte, Time at) {
 
 // ---- State
 
-// Returns the shaft's position plus the position offset in 2^-32 revolution, as if the turn counter had no limit.
+// Returns the shaft's position with the position offset added or subtracted, in 2^-32 revolution, as if the turn
+// counter had no limit.
 std::int64_t VirtualEncoder::offset_position(Time now) const {
   const auto fraction = static_cast<std::int32_t>(format_.offset_fraction(offset()));
   const std::int64_t position = shaft_->at(now).position;

@@ -73,7 +73,7 @@ TEST(EncolinkDevice, ReportsBrokenRulesOfAccessAndTransmission) {
   EXPECT_EQ(loud.first_violation(), "request during the encoder's transmission");
 }
 
-/// Makes two SPI transfers with this pause between them, and returns the rule that the host broke.
+/// Makes two SPI transfers with the pause `pause` between them.
 class SpiHost final : public Machine<std::uint8_t> {
  public:
   explicit SpiHost(Time pause) : pause_(pause) {}

@@ -91,7 +91,7 @@ struct Values {
   Maybe<std::uint32_t> address{};  ///< Address of the accessed register.
   Maybe<std::size_t> length{};     ///< Number of bytes of the accessed register.
   Maybe<Bytes> data{};             ///< Bytes of the accessed register, most significant first.
-  Maybe<std::int64_t> value{};     ///< Number in the accessed register, if the table does not describe it.
+  Maybe<std::int64_t> value{};     ///< Bytes as a number; in an answer only if the table lacks the register.
 };
 
 namespace detail {
@@ -180,7 +180,8 @@ inline constexpr auto procedure_fields = author::fields_of<ProcedureValues>(
 /// All fields of the unit: those of frames, registers and procedures.
 inline constexpr auto fields = author::joined(frame_fields.infos, register_fields, procedure_fields.infos);
 
-/// Puts a position frame into `sink`, with the detailed status if known; with `channel3`, a cycle of channel 2.
+/// Puts a position into `sink`, with the detailed status if it is known: the position of a cycle of channel 2 if
+/// `channel3` has a value, otherwise that of a position frame.
 constexpr void put_position(FieldSink& sink, const Format& format, const Position& position,
                             std::optional<std::uint16_t> detailed = {}, std::optional<std::uint8_t> channel3 = {}) {
   Values values{.position = position, .status = detailed, .channel3 = channel3};

@@ -58,8 +58,8 @@ void Channels::take(const author::HostOf<Frames>& host) {
     }
   }
   reading = to_reading(format, position, status);
-  // Returns when the encoder took the position. On SPI it does so when NCS falls. For a UART the document does not
-  // state it: at the latest at the end of the request.
+  // On SPI the encoder takes the position when NCS falls. For a UART the document does not state when: at the latest
+  // at the end of the request.
   reading.latched = format.interface == Interface::spi ? host.begun_at() : host.sent_at();
   reading.received = host.received_at();
 }

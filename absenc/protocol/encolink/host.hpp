@@ -19,7 +19,8 @@ enum class Ask : std::uint8_t {
   identity,
 };
 
-/// The protocol, as author layers use it: frames, lengths and times. author/dialog.hpp explains each member.
+/// Types and functions of the protocol that the classes in absenc/protocol/author use: frames, lengths and times.
+/// author/dialog.hpp explains each member.
 struct Frames {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = encolink::Format;
@@ -28,7 +29,7 @@ struct Frames {
     Ask ask = Ask::position;  ///< Purpose of the request.
     std::uint8_t ra = 0;      ///< One byte of a register access.
   };
-  /// Type of replies; an identity is stored elsewhere and leaves it empty.
+  /// Type of replies; empty for an identity, which is decoded from the bytes of the reply instead.
   using Reply = Position;
   static constexpr std::size_t longest_reply = identity_bytes;  ///< Number of bytes of the longest reply.
 
@@ -36,13 +37,13 @@ struct Frames {
   static constexpr author::HostTimes host_times(const Format& format) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit, .silence = pause(format)};
   }
-  /// Returns how a host sends a request (repetitions, pauses) and how the reply to it ends.
+  /// Returns how a host sends a request; all requests are sent in the same manner.
   static constexpr author::Manner manner(const Format&, const Request&) { return {}; }
   /// Returns the bytes of `request` as they are sent.
   static std::array<std::uint8_t, request_bytes> encode(const Format&, const Request& request);
-  /// Returns the length of a reply in bytes, judged by its first bytes; 0 if they do not determine it.
+  /// Returns the length of the reply to `request` in bytes; 0 if only silence ends the reply.
   static std::size_t expected(const Format& format, const Request& request, Bytes);
-  /// Decodes a reply. Errors: timeout, line_stuck (SPI: all bits alike), and those of decode_position or of
+  /// Decodes a reply. Errors: line_stuck (SPI: all bytes are 00, or all are FF), and those of decode_position or of
   /// decode_identity.
   static Result<Position> decode(const Format& format, const Request& request, Bytes reply);
   /// Returns whether the host awaits no more bytes: on SPI, where a transfer has a fixed length; on a UART more may

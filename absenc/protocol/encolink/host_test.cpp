@@ -259,8 +259,8 @@ TEST_P(EncolinkHost, RepeatsInvalidCycle) {
     Error error;
     unsigned frames;
   };
-  for (const Case& one : std::vector<Case>{{at(4, 6), Error::none, 2 * 10},      // channel 2 byte
-                                           {at(3, 0), Error::none, 3 + 1 + 10},  // position frame
+  for (const Case& one : std::vector<Case>{{at(4, 6), Error::none, 2 * 10},      // damages a channel 2 byte
+                                           {at(3, 0), Error::none, 3 + 1 + 10},  // damages a position frame
                                            {turned, Error::cross_check_failed, 3 * 10},
                                            {damaged, Error::bad_checksum, 3 * 10}}) {
     Bench bench(testing::multi, interface);
@@ -366,7 +366,7 @@ TEST(EncolinkListen, LatchedIsTimeOfPosition) {
   EXPECT_EQ(compared, 9u);
 }
 
-// Document: "Nothing is sent then."
+// Document, on an encoder that transmits without requests: "Nothing is sent then."
 TEST(EncolinkListen, SendsNothingToStreamingEncoder) {
   Bench bench(streaming);
   std::size_t sent = 0;

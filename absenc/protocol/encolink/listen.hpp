@@ -17,8 +17,9 @@ namespace absenc::encolink {
 /// valid frame arrives for `listen_limit`.
 class Listen final : public Conversation<std::uint8_t> {
  public:
-  /// Creates a conversation that receives an encoder of this format, which must be known, because it sends no requests
-  /// for the identity. Errors: invalid_argument, timeout, bad_checksum.
+  /// Creates a conversation that receives an encoder of this format, which must be known, because it sends no
+  /// requests for the identity. Errors: invalid_argument (the format is not known), timeout (nothing is received), or
+  /// wrong_length, bad_checksum or out_of_range (no two valid frames in a row are received).
   explicit Listen(const Format& format);
 
   /// Processes an event of the port, such as received data or silence.
@@ -32,7 +33,8 @@ class Listen final : public Conversation<std::uint8_t> {
     return error_ == Error::none && !frame_.empty() ? &reading_ : nullptr;
   }
   void report(FieldSink& sink) const override;
-  /// Returns the bytes of the last frame; before the first frame, all bytes that were received.
+  /// Returns the bytes of the last frame, valid or damaged; without such a frame, the received bytes that are not
+  /// examined yet.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const override {
     return {{}, frame_.empty() ? waiting() : frame_.view(), received_at_, received_at_};
   }

@@ -15,7 +15,8 @@ namespace {
 
 constexpr unsigned frame_attempts = 3;
 constexpr unsigned cycle_attempts = 3;
-// greatest number of attempts; an access takes some hundred frames, and all of them must be valid
+// greatest number of attempts of a register access: an access takes some hundred frames, and all of them must be
+// valid
 constexpr unsigned access_attempts = 5;
 constexpr unsigned write_attempts = 3;
 // number of idle cycles allowed between the last byte of an access and its answer
@@ -29,7 +30,7 @@ constexpr std::string_view size_needed = "this address is not in the table of re
 
 // ---- Frames
 
-// Requests one frame and returns whether it is valid. A lost or damaged frame ends the alignment of channel 2.
+// Requests one frame and returns its error. A lost or damaged frame ends the alignment of channel 2.
 Part<Error> ask_frame(Dialog& dialog, ProcedureState& found, Frames::Request request) {
   if (found.emits && found.is_new) dialog.emit();
   found.is_new = false;
@@ -106,7 +107,7 @@ Part<Error> send(Dialog& dialog, ProcedureState& found) {
   co_return Error::none;
 }
 
-// Receives the next cycle; the channel 3 byte of the cycle is part of the answer to the register access.
+// Requests frames until a cycle of channel 2 ends; `found.channel3` is then the channel 3 byte of the cycle.
 Part<Error> receive(Dialog& dialog, ProcedureState& found) {
   do {
     const Error error = co_await ask_frame(dialog, found, {});
@@ -160,7 +161,8 @@ Part<AccessOutcome> try_to_execute(Dialog& dialog, ProcedureState& found) {
   co_return found.end(AccessOutcome::good, done);
 }
 
-// Reads the identity first: registers of an AksIM-4 must not be accessed.
+// Executes the present register access in several attempts. Reads the identity first, because registers of an AksIM-4
+// must not be accessed.
 Part<AccessOutcome> execute(Dialog& dialog, ProcedureState& found) {
   if (!dialog.format().has_ch2) co_await dialog.stop({Error::unsupported, no_channel2});
   if (found.protocol_version == 0) co_await identify(dialog, found, false);

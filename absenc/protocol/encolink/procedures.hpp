@@ -19,7 +19,7 @@ using Dialog = author::DialogOf<Frames>;
 /// How a register access ended.
 enum class AccessOutcome : std::uint8_t {
   good,     ///< The encoder executed the access.
-  refused,  ///< The encoder did not execute the access.
+  refused,  ///< The encoder refused the access, or was busy with it for longer than `busy_limit`.
   lost,     ///< Frames arrive, but the answer to the access does not: the encoder may have executed the access.
   gone,     ///< No frames arrive; `was_sent` tells whether the encoder may have executed the access.
 };
@@ -42,7 +42,7 @@ struct ProcedureState : Channels {
   bool emits = false;                 ///< Whether the procedure emits each position.
   bool is_new = false;                ///< Whether the latest position was not emitted yet.
   std::uint8_t protocol_version = 0;  ///< Protocol version in the identity; 0: the identity was not read yet.
-  unsigned lost = 0;                  ///< Number of frames in a row that were lost.
+  unsigned lost = 0;                  ///< Number of frames in a row that were lost or damaged.
   AccessBytes access{};               ///< All `ra` bytes of the present register access.
   bool writes = false;                ///< Whether the present register access is a write.
   /// Whether all `ra` bytes were sent, so that the encoder may have executed the access.
@@ -85,7 +85,8 @@ author::Part<AccessOutcome> attempt_write(Dialog& dialog, ProcedureState& found,
 author::Procedure read_alarms(Dialog& dialog, ProcedureState& found);
 /// Reads the identity of the encoder.
 author::Procedure read_identity(Dialog& dialog, ProcedureState& found);
-/// Reads the identity and every register that has `in_info`. Leaves out registers that the encoder rejects.
+/// Reads the identity and every register that has `in_info`. Leaves out registers that the encoder rejects. Reads no
+/// register from an AksIM-4 or without channel 2.
 author::Procedure read_info(Dialog& dialog, ProcedureState& found);
 
 /// Reads register `index` of the table. Errors of this and the following procedures: request_rejected (the detail
@@ -110,7 +111,9 @@ author::Procedure send_command(Dialog& dialog, ProcedureState& found, std::uint8
 /// also: invalid_argument (the position is invalid), not_still (the shaft turns), cross_check_failed (the position is
 /// not zero afterwards; the old offset is restored).
 author::Procedure zero(Dialog& dialog, ProcedureState& found, Arguments arguments);
-/// Sets the turn counter. Arguments: turns, 1 to save them. Error also: unsupported (the encoder has no turn counter).
+/// Sets the turn counter. Arguments: turns, 1 to save them. Errors also: unsupported (the encoder has no turn
+/// counter), invalid_argument (the turn counter has too few bits), cross_check_failed (the turns are others
+/// afterwards).
 author::Procedure preset_multiturn(Dialog& dialog, ProcedureState& found, Arguments arguments);
 /// Starts the self-calibration and polls its status while the user turns the shaft; emits each status. Errors also:
 /// cross_check_failed (the self-calibration failed; the detail states why), timeout (it does not end).

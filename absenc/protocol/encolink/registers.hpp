@@ -178,7 +178,7 @@ struct RegisterRequest {
   ByteBuffer<access_capacity> data{};     ///< Bytes to write, `length` in number; empty for a read.
 };
 
-/// First bytes of a register access, which open write access, in their order.
+/// First bytes of every register access, in their order; the encoder recognises an access by them.
 inline constexpr std::array<std::uint8_t, 5> access_keys{0x00, 0xCD, 0xEF, 0x89, 0xAB};
 /// Number of bytes before the data: keys, operation, length and address.
 inline constexpr std::size_t access_header = access_keys.size() + 1 + 2 + 4;

@@ -95,7 +95,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     condition_[index] = static_cast<std::int32_t>(value);
   }
   void raise_alarms(std::uint32_t bits) override {
-    // A turn counter that was cleared before the error does not count as cleared.
+    // A turn counter that was cleared before multiturn_error is raised does not count as cleared.
     if ((bits & ~unsigned{latches_} & alarms::multiturn_error) != 0) turns_cleared_ = false;
     latches_ |= static_cast<std::uint8_t>(bits & ~unsigned{alarms::voltage});
     forced_ |= static_cast<std::uint8_t>(bits & alarms::voltage);
@@ -119,21 +119,22 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     reply.temperature = static_cast<std::int8_t>(value_of(condition::temperature));
     return reply;
   }
-  /// Switches the encoder on at `now`. It answers at once; SF reports later that it is ready.
+  /// Switches the encoder on at `now`. It answers at once; with PowerOn::real SF reports `ready` only after the
+  /// start-up time.
   void power_on(Time now, PowerOn kind) override {
     ready_at_ = kind == PowerOn::real ? now + start_up : now;
     Responder::power_on(now, kind);
   }
 
  private:
-  // 1/1000 rpm: the alarm overspeed is raised above this speed (Table 8).
+  // Speed in 1/1000 rpm above which the alarm overspeed is raised (Table 8).
   static constexpr std::int32_t overspeed_above = 10'000'000;
-  // MV, typical: the alarm under_voltage is raised below this supply voltage.
+  // Supply voltage in mV below which the alarm under_voltage is raised; typical value of the document.
   static constexpr std::int32_t under_voltage_below = 2900;
   static constexpr std::int32_t over_voltage_above = 3700;
-  // 1/1000 rpm: a slower shaft is at rest, because a servo at rest trembles.
+  // Greatest speed in 1/1000 rpm at which the shaft counts as at rest, because a servo at rest trembles.
   static constexpr std::int32_t standing_still = 1'000;
-  // DegC: SF warns above this temperature; assumed, because the document states no limit.
+  // Temperature in degC above which SF warns; assumed, because the document states no limit.
   static constexpr std::int32_t warning_above = 105;
   // Time from power on until SF reports `ready`; assumed, because the document states none.
   static constexpr Time start_up = 100ms;
@@ -195,7 +196,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
         is_memory_access(request->id) ? access_memory(*request, at) : reply_to(request->id, at);
     if (!made) return Answer::for_others;
     reply.append(encode_reply(profile_, *made));
-    // Counted after the reply is made, because it still shows the old state.
+    // The reset is counted after its reply is made, because the reply still shows the old state.
     if (is_reset(request->id)) count_reset(request->id, at);
     return Answer::sent;
   }
@@ -214,8 +215,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   [[nodiscard]] bool is_reported(std::uint8_t field) const {
     return profile_.bad_request == BadRequest::report && !is_memory_access(*data_id(field));
   }
-  // Makes the reply that reports a wrong request in SF, and echoes its CF as received. Returns whether there is such a
-  // reply.
+  // Makes the reply that reports a wrong request in SF, and echoes its CF as received. Returns Answer::for_others if
+  // the encoder sends no such reply.
   Answer report_bad_request(std::uint8_t field, std::uint8_t status_bit, Time at, ByteBuffer<64>& reply) {
     if (!is_reported(field)) return Answer::for_others;
     const DataId id = *data_id(field);
@@ -249,8 +250,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
       for (std::uint8_t& counter : counters_) ++counter;
     }
   }
-  // Executes a memory request and returns the reply; nothing for an address that does not exist, because the document
-  // defines no answer to it.
+  // Executes a memory request and returns the reply. Nothing with several encoders on the line, and for an address
+  // that does not exist, because the document defines no answer to it.
   std::optional<Reply> access_memory(const Request& request, Time at) {
     if (!expect(profile_.bus != sharing_yes, "memory access with several encoders on the line", at))
       return std::nullopt;
@@ -359,7 +360,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     counters_.fill(0);
   }
   void stopped(Time) override {
-    // Alarms about turns survive power off, and end with an ID C; all others end with the power.
+    // Alarms about turns survive power off, and resets by IDs C and D end them; all other alarms end with the power.
     latches_ &= alarms::turns_wrong;
     turns_cleared_ = false;
     in_a_row_ = resets_sent_ = 0;
@@ -378,7 +379,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   Time ready_at_{};
   std::uint8_t latches_ = 0;
   std::uint8_t forced_ = 0;     // voltage alarms that `raise_alarms` raised
-  bool turns_cleared_ = false;  // an ID D was executed, so an ID C can clear multiturn_error
+  bool turns_cleared_ = false;  // whether an ID D was executed, so that an ID C can clear multiturn_error
   std::array<std::uint8_t, 2> counters_{};
 
   DataId last_id_{};

@@ -51,7 +51,7 @@ TEST(EslDevice, SequenceCounters) {
   each.raw(Request{DataId::temperature});
   EXPECT_EQ(each.read(DataId::position).one.sequence, 2);
   for (unsigned i = 2; i < 256; ++i) bench.read(DataId::position);
-  EXPECT_EQ(bench.read(DataId::position).one.sequence, 1);  // SC1 has 8 bits, SC2 7 bits
+  EXPECT_EQ(bench.read(DataId::position).one.sequence, 1);  // both counters have wrapped: SC1 has 8 bits, SC2 7 bits
   EXPECT_EQ(bench.read(DataId::position).two.sequence, 2);
 }
 
@@ -67,7 +67,8 @@ TEST(EslDevice, AnswersOnlyItsOwnValidRequests) {
   EXPECT_EQ(bench.encoder.answer_count(), 1u);
 }
 
-// "Else, it will continue to search for the next available logic of low state."
+// After bytes that are no request the encoder searches for the next start bit: "Else, it will continue to search for
+// the next available logic of low state."
 TEST(EslDevice, FindsRequestAfterOtherBytes) {
   for (const Wire& before : {wire(hex<"AB7B">), wire(hex<"AB">), wire(hex<"FF">), wire(hex<"FF10">), wire(hex<"18">),
                              wire(hex<"0874">), wire(hex<"08">), wire(hex<"ABFF">), wire(hex<"70">)}) {
@@ -80,7 +81,7 @@ TEST(EslDevice, FindsRequestAfterOtherBytes) {
   }
 }
 
-// The bytes would be a request, but are part of another encoder's reply.
+// The reply of another encoder contains bytes that look like a request for this encoder.
 TEST(EslDevice, FindsNoRequestInAnotherEncodersReply) {
   Bench bench;
   const Wire reply = wire({.id = DataId::position_short,
@@ -224,7 +225,7 @@ TEST(EslDevice, ReadsRegistersAtOnceAndEepromInTwoSteps) {
   ASSERT_EQ(bench.violations(), 1u);
   EXPECT_EQ(bench.encoder.violations()[0].rule, "memory read again less than 200 us after the request before");
   bench.pass(eeprom_read_time);
-  // Busy, because another byte was fetched before.
+  // The reply is busy, because another byte was fetched before.
   EXPECT_EQ(bench.raw(memory_read(5)), memory_reply(memory_read(5), true, 0));
 }
 
@@ -239,7 +240,7 @@ TEST(EslDevice, PageChangeTakes18Milliseconds) {
   EXPECT_EQ(bench.raw(memory_read(page_select_address)), memory_reply(memory_read(page_select_address), false, 4));
 }
 
-// Breaches that are no violations, but are reported to the watch.
+// Some broken rules are no violations; the encoder reports them to its RuleWatch only.
 TEST(EslDevice, ReportsRulesThatAreNoViolations) {
   using Rules = std::vector<std::string>;
   const std::string once = "an EEPROM byte asked for only once";

@@ -50,7 +50,7 @@ inline constexpr std::array<FlagInfo, 8> alarm_flags{{
 /// Values of the fields of a frame, or of a procedure's result. A member without a value is not in the frame.
 struct Shown {
   constexpr Shown() = default;
-  /// Takes the values of a request.
+  /// Constructs the values of a request.
   constexpr Shown(const Profile& profile, const Request& request)
       : data_id(request.id),
         control_field(esl::control_field(profile, request.encoder_address, request.id)),
@@ -58,7 +58,7 @@ struct Shown {
     if (is_memory_access(request.id)) memory_address = request.memory_address;
     if (request.id == DataId::write_memory) value = request.value;
   }
-  /// Takes the values of a reply.
+  /// Constructs the values of a reply.
   constexpr explicit Shown(const Reply& one) { show(one); }
 
   /// Adds the values of a reply.

@@ -118,19 +118,19 @@ constexpr std::uint16_t crc_of_pairs(Channel channel, Bytes bytes, bool swapped)
 
 /// Data ID: code of a request's kind, with the values of Table 3; ID 6 is in Tables 6 and 12 only.
 enum class DataId : std::uint8_t {
-  position = 1,          ///< data ID whose reply can make a safe position; it has both channels
-  singleturn = 2,        ///< data ID whose reply can make a safe position; it has both channels
-  position_short = 4,    ///< data ID whose reply cannot make a safe position
-  singleturn_short = 5,  ///< data ID whose reply cannot make a safe position
-  calibration = 6,       ///< data ID whose reply cannot make a safe position
+  position = 1,          ///< Position and turns, with both channels; the reply can make a safe position.
+  singleturn = 2,        ///< Position within the turn, with both channels; the reply can make a safe position.
+  position_short = 4,    ///< Position and turns of channel 1 alone; the reply cannot make a safe position.
+  singleturn_short = 5,  ///< Position within the turn of channel 1 alone; the reply cannot make a safe position.
+  calibration = 6,       ///< Position within the turn of each channel; the reply cannot make a safe position.
   /// Data ID that must never be sent eight times in a row: that is "dynamic addressing", which the document does not
   /// describe.
   encoder_id = 8,
   temperature = 9,
   alarms = 0xA,
-  zero = 0xB,             ///< data ID of which eight consecutive requests make a reset
-  clear_alarms = 0xC,     ///< data ID of which eight consecutive requests make a reset
-  reset_multiturn = 0xD,  ///< data ID of which eight consecutive requests make a reset
+  zero = 0xB,             ///< Eight consecutive requests make the present position the zero of the turn.
+  clear_alarms = 0xC,     ///< Eight consecutive requests clear alarms.
+  reset_multiturn = 0xD,  ///< Eight consecutive requests set the turns to zero.
   read_memory = 0xE,
   write_memory = 0xF,
 };
@@ -271,8 +271,8 @@ inline constexpr std::array<Layout, 16> layouts = [] {
 [[nodiscard]] constexpr DataId position_id(const Profile& profile) {
   return profile.turns ? DataId::position : DataId::singleturn;
 }
-/// Returns whether replies to this data ID carry the sequence counter. With sequence_step=safety these replies are what
-/// it counts.
+/// Returns whether replies to this data ID carry the sequence counter. With sequence_step=safety the counter counts
+/// exactly these replies.
 [[nodiscard]] constexpr bool has_sequence(DataId id) { return layout_of(id).crc_bytes == 2; }
 
 /// Returns the length in bytes of replies to this data ID, with both channels.
@@ -316,7 +316,7 @@ struct ChannelReply {
   std::uint8_t status = 0;      ///< status (SF): bits of the namespace `status`, in the order of the document
   std::uint8_t alarms = 0;      ///< Alarms of the channel (ALM): bits of the namespace `alarms`.
   std::uint8_t sequence = 0;    ///< sequence counter: 8 bits in channel 1 (SC1), 7 bits in channel 2 (SC2)
-  std::uint8_t encoder_id = 0;  ///< Part: encoder id (ENID).
+  std::uint8_t encoder_id = 0;  ///< Encoder id (ENID).
 };
 
 /// A decoded reply; members that its data ID does not carry are 0.
@@ -340,8 +340,8 @@ struct Reply {
 
 namespace detail {
 
-// Converts SF from the order of the document to that of the wire. In T-format order DD is in b0..3, EA in b4..5, CA in
-// b6..7.
+// Converts SF from the order of the document to that of the wire. In T-format order b0..3 are information (DD), b4..5
+// errors of the encoder (EA), and b6..7 communication errors (CA).
 [[nodiscard]] constexpr std::uint8_t status_to_wire(const Profile& profile, std::uint8_t value) {
   if (profile.status_order == FieldOrder::document) return value;
   return static_cast<std::uint8_t>(value >> 4 | (value & 0x0C) << 2 | (value & 0x03) << 6);
@@ -351,7 +351,8 @@ namespace detail {
   return static_cast<std::uint8_t>(value << 4 | (value >> 2 & 0x0C) | value >> 6);
 }
 
-// Moves b7 of a byte to b0 if `at_b0`. Such bytes are {busy, ADF}, {RS1, SC2}, {0, SC2}, and RS1 alone.
+// Rotates a byte to the left by one bit if `at_b0`, so that its b7 is sent as b0. Such bytes are {busy, ADF}, {RS1,
+// SC2}, {0, SC2}, and RS1 alone.
 [[nodiscard]] constexpr std::uint8_t to_wire(bool at_b0, unsigned byte) {
   return std::rotl(static_cast<std::uint8_t>(byte), at_b0 ? 1 : 0);
 }

@@ -24,7 +24,7 @@ constexpr std::array all_ids{DataId::position,         DataId::singleturn,      
 
 constexpr std::array<std::uint8_t, 9> check_input{'1', '2', '3', '4', '5', '6', '7', '8', '9'};
 
-// Returns all profiles that differ in the frames.
+// Returns one profile for each combination of the options that change frames.
 std::vector<Profile> all_profiles() {
   std::vector<Profile> profiles{Profile{}};
   for (std::size_t option = 0; option < open_options; ++option) {
@@ -97,7 +97,8 @@ TEST(EslFrame, EveryFieldWithEitherParityScope) {
   }
 }
 
-// Bits of SF in both orders (Table 5): in T-format order DD, EA and CA follow from b0 up.
+// Bits of SF in both orders (Table 5). T-format order from b0 up: information (DD), errors of the encoder (EA),
+// communication errors (CA).
 TEST(EslFrame, StatusBitsInBothOrders) {
   const Profile tformat{.status_order = FieldOrder::tformat};
   const std::array<std::pair<std::uint8_t, std::uint8_t>, 8> places{{{status::temperature_warning, 0x01},
@@ -241,7 +242,8 @@ TEST(EslFrame, LedAndLissajousErrorsCountForEveryId) {
       EXPECT_NE(to_reading(reply).multiturn_validity(), Validity::invalid) << static_cast<int>(id);
     }
   }
-  // The alarm bit is in the other channel than the non-safety error, or LED and Lissajous errors are raised at once.
+  // The position is invalid if the alarm bit is in the other channel than the non-safety error, or if LED and
+  // Lissajous errors are raised at once.
   Reply reply = sample(DataId::position);
   reply.one = {.status = status::ready | status::non_safety_error};
   reply.two = {.status = status::channel_2 | status::ready, .alarms = alarms::led_or_lissajous_error};
@@ -252,7 +254,7 @@ TEST(EslFrame, LedAndLissajousErrorsCountForEveryId) {
   EXPECT_EQ(to_reading(reply).singleturn_validity(), Validity::invalid);
 }
 
-// The request's checksum is right, and the encoder reports its parity bit.
+// The request has a right checksum but a wrong parity bit, which the encoder reports.
 TEST(EslUnit, AnswerToAWrongParityBitIsARefusal) {
   const Options values = author::testing::options_of(unit, "");
   const auto field = static_cast<std::uint8_t>(control_field({}, 0, DataId::position) ^ 0x80);

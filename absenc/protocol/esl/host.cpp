@@ -12,7 +12,8 @@ using author::Procedure;
 
 namespace {
 
-// How often reads and page selects are sent until a valid reply; resets, writes and ID 8 are never repeated.
+// Greatest number of times that a read or a page select is sent until a reply is valid; resets, writes and ID 8 are
+// never repeated.
 constexpr unsigned attempts = 3;
 constexpr unsigned safe_attempts = 6;
 
@@ -296,8 +297,8 @@ Procedure read_error_info(Dialog& dialog, ProcedureResult& found) {
   if (known && before->value == register_page) co_return done;
   found.page_left = register_page;
   if (!known) co_return done;
-  // The result is complete. Selecting the page from before must be verified, because the next user of the encoder finds
-  // what is selected.
+  // The result is complete. The return to the page from before must be verified, because the page stays selected for
+  // the next user of the encoder.
   const Request restore{DataId::write_memory, dialog.format().address, page_select_address, before->value};
   const Result<Reply> restored = co_await when_ready(dialog, restore);
   if (restored.error() == Error::busy) co_return failure(Error::busy, {}, page_time);

@@ -69,7 +69,7 @@ inline constexpr unsigned most_encoders = 8;  ///< most encoders on a line, beca
 struct Nodes {
   std::array<std::optional<Reply>, most_encoders> answers{};  ///< valid reply of each address; nothing: there was none
   std::array<bool, most_encoders> disturbed{};                ///< Whether every reply of an address was damaged.
-  /// Check that a complete but invalid reply of each address failed; `passed`: there was none.
+  /// For each address, the check that a complete but invalid reply failed; `passed`: there was no such reply.
   std::array<Check, most_encoders> troubles{};
 };
 /// Finds the encoders on the line: sends ID 5 to every address, never ID 8, because eight consecutive IDs 8 are

@@ -159,7 +159,7 @@ TEST(EslHost, DetectsStoppedSequenceCounter) {
   EXPECT_EQ((*made).reading(), nullptr);
 }
 
-// Host and encoder use each profile, also with another address.
+// Host and encoder use the same profile: each value of each option that the document leaves open, at address 5.
 TEST(EslHost, HostAndEncoderAgreeInEveryProfile) {
   for (std::size_t option = 0; option < open_options; ++option) {
     for (std::size_t value = 0; value < options.infos[option].choices.size(); ++value) {

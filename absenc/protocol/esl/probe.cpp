@@ -106,8 +106,8 @@ Progress progress_of(const Profile& profile, std::span<const Capture> captures) 
   return {};
 }
 
-// For each value of an option: how far the best profile with this value explains the captures. Reached has one for each
-// option.
+// For each value of an option: how far the best profile with this value explains the captures. Reached has a
+// ReachedByValue for each option.
 using ReachedByValue = std::array<Progress, most_choices>;
 using Reached = std::array<ReachedByValue, open_options>;
 
@@ -168,7 +168,7 @@ bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sin
   Profile best = nth_profile(base, 0);
   bool any = false;
   Reached reached;
-  // The value that every profile exceeds or equals.
+  // Start value: the progress of every profile exceeds or equals it.
   for (auto& option : reached) option.fill({0, Check::request_not_accepted});
   for (std::size_t number = 0; number < combinations; ++number) {
     const Profile profile = nth_profile(base, number);

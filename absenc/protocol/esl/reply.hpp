@@ -59,7 +59,7 @@ enum class Check : std::uint8_t {
 struct CheckText {
   Error error;                ///< Error that the failed check gives.
   std::string_view sentence;  ///< What is wrong with the reply, as a sentence.
-  std::string_view advice{};  ///< advice that replaces that of the error; "": the error's advice stands
+  std::string_view advice{};  ///< Advice that replaces the advice of the error; empty: none.
 };
 
 /// Error and texts of each check, in the order of Check.
@@ -114,7 +114,8 @@ inline constexpr std::array<Error, check_texts.size()> check_errors = [] {
 
 namespace detail {
 // Returns the content of a request with this data ID, or of the request that a reply echoes, without checking it.
-// Address and value of a memory access are set only as far as there are bytes. `busy` is set if the busy bit is.
+// Address and value of a memory access are set only if there are at least three bytes. `busy` is set if the busy bit
+// is.
 constexpr Request split_request(const Profile& profile, DataId id, Bytes bytes, bool& busy) {
   Request request{id, address_of(bytes[0])};
   if (!is_memory_access(id) || bytes.size() < 3) return request;

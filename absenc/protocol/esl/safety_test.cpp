@@ -32,7 +32,8 @@ void print(const char* kind, unsigned tried, unsigned accepted) {
   std::printf("%-58s %7u tried %6u accepted\n", kind, tried, accepted);
 }
 
-/// An encoder with its monitor and without a line: it gives its replies as bytes, at another position each time.
+/// An encoder with its monitor and without a line: it gives its replies as bytes. The shaft stays where the test puts
+/// it.
 class Monitored {
  public:
   explicit Monitored(const Profile& profile = {}) : profile_(profile), encoder(profile, shaft), monitor(profile) {
@@ -238,7 +239,7 @@ Wire stuck(Wire reply, std::size_t byte, unsigned bit, bool value) {
   return reply;
 }
 
-// Counts accepted replies with a wrong byte.
+// Counts accepted replies in which one bit is stuck.
 TEST(EslSafetyCampaign, EveryBitOfEveryFieldStuckAt0AndAt1) {
   sim::Random random(7);
   for (const StuckField& field : stuck_fields) {
@@ -323,7 +324,7 @@ TEST(EslSafetyCampaign, SmallErrorsAndSwapsOfAnId1Reply) {
   EXPECT_EQ(cut, 0u);
 }
 
-// Faults that deliver old replies: the last one repeated, one of `age` replies ago, and a line that delays replies.
+// Faults that deliver old replies: the last reply again, an older reply once, and every reply one cycle late.
 TEST(EslSafetyCampaign, ReplaysAndDelays) {
   for (const SequenceStep step : {SequenceStep::change, SequenceStep::safety}) {
     std::printf("sequence_step=%s:\n", step == SequenceStep::change ? "change" : "safety");
@@ -370,7 +371,7 @@ TEST(EslSafetyCampaign, ReplaysAndDelays) {
   }
 }
 
-// Random bytes of the right length that are accepted: 2^-32 by the CRCs alone.
+// Random bytes of the right length pass both CRCs once in 2^32 times.
 TEST(EslSafetyCampaign, NoiseOfTheRightLength) {
   sim::Random random(1);
   Monitored pair;

@@ -64,14 +64,14 @@ struct Bench : raa38::testing::Bench<CanFrame, VirtualNode, Format, can_unit> {
     static_cast<void>(raw(encode(Order::direction, 0x20, 0)));
     ASSERT_NE(encoders.front().settings().position(line.now()), encoders.back().settings().position(line.now()));
   }
-  /// Sets the position to `counts` in the encoder's resolution.
+  /// Turns the shaft to the position `counts`, in counts of the encoder's resolution.
   void put(std::int64_t counts) { shaft.put(0, counts << (21 - format.bits)); }
   /// Sends a request and returns the frames that were received within 20 ms.
   Frames raw(const CanFrame& request) {
     RawHost host(request, line.now() + 20ms);
     return run(host).received_frames;
   }
-  /// Returns the number of frames that nodes send without a request.
+  /// Returns the number of frames that nodes send without a request within `duration`.
   std::size_t count(Time duration) {
     RawHost host(CanFrame{.id = 0x7FF}, line.now() + duration);
     return run(host).received_frames.size();
@@ -119,7 +119,7 @@ struct Scripted final : Machine<CanFrame> {
   bool sending = false;
 };
 
-/// Runs a command against a scripted node on a bus of `rate` and returns its result.
+/// Runs a command against a scripted node on a bus of `rate` bits per second and returns its result.
 inline CommandResult with(Scripted node, std::string_view command, std::vector<std::int64_t> arguments = {},
                           const Format& format = {}, std::uint32_t rate = 250'000) {
   sim::Line<CanFrame> line(LinkKind::can, {.rate = rate});

@@ -11,11 +11,11 @@ using namespace std::chrono_literals;
 using FrameStep = Step<CanFrame>;
 using FrameEvent = Event<CanFrame>;
 
-// Times of the virtual node; the document gives none.
+// Time until the virtual node answers, and time until it has started; the document gives none.
 constexpr Time answer_time = 200us;
 constexpr Time start_up_time = 100ms;
 
-constexpr std::uint8_t refused = 1;  // CiA 305: value not supported
+constexpr std::uint8_t refused = 1;  // error code of CiA 305: value not supported
 
 }  // namespace
 
@@ -27,7 +27,8 @@ void VirtualNode::start_cyclic(std::uint8_t readings_per_s, Time from) {
 }
 
 void VirtualNode::power_on(Time now, PowerOn kind) {
-  // The memory may be from the file of an encoder with other settings.
+  // The memory may be from the file of an encoder with other settings: the format's node number and bit rate replace
+  // invalid ones.
   if (node() == 0) memory()[Settings::number_at] = format_.node;
   if (rate_of_index(settings_.rate()) == nullptr) memory()[Settings::rate_at] = rates[format_.rate].index;
   powered_ = true;
@@ -98,7 +99,7 @@ void VirtualNode::receive(const CanFrame& frame, Time at) {
   }
   const std::string_view unknown = for_all ? "an unknown configuration command" : "an unknown command";
   if (!rules_.expect(info != nullptr, unknown, at)) return;
-  // The first byte of the rate selects a table of rates; the document only has table 0.
+  // Byte 1 of the order `rate` selects a table of bit rates; the document only has table 0.
   const bool is_other_table = info->order == Order::rate && frame.data[1] != 0;
   const std::uint8_t value = frame.data[info->value_at];
   if (sets) return configure(*info, is_other_table ? std::uint8_t{0xFF} : value, at);
@@ -112,7 +113,8 @@ void VirtualNode::answer(const CanFrame& frame, Time at) {
 
 void VirtualNode::execute(const OrderInfo& info, std::uint8_t value, Time at) {
   const bool changes = info.order == Order::zero || info.order == Order::direction;
-  // A host cannot distinguish the answer to these orders from a cyclic position, so it must stop the node first.
+  // A host cannot distinguish the answer to the order `zero` or `direction` from a cyclic position, so it must stop
+  // the cyclic positions first.
   if (changes) rules_.expect(readings_per_s_ == 0, "a setting changed while the node sends by itself", at);
   if (info.order == Order::enter) configuring_ = value == 1;
   if (info.order == Order::start && readings_per_s_ == 0) start_cyclic(format_.cyclic, at);
@@ -128,7 +130,8 @@ void VirtualNode::execute(const OrderInfo& info, std::uint8_t value, Time at) {
   if (info.answer == Answer::code) answer(encode_answer(node(), info.order), at);
 }
 
-// Stores a setting. A new bit rate becomes active after the answer was sent.
+// Stores a setting whose value the document defines, and answers it. A new bit rate becomes active after the answer
+// was sent.
 void VirtualNode::configure(const OrderInfo& info, std::uint8_t value, Time at) {
   const bool known = meaning_of(info, value).has_value();
   const bool is_rate = info.order == Order::rate;

@@ -53,7 +53,7 @@ TEST(Raa38CanDevice, SettingsSurvivePowerOff) {
   const Step<CanFrame> step = again.next(Time{});
   EXPECT_EQ(step.kind, Step<CanFrame>::Kind::configure);
   EXPECT_EQ(step.rate, 500'000u);
-  // The memory may be from the file of an encoder with other settings.
+  // The memory may be from the file of an encoder with other settings: the node replaces invalid ones at power on.
   std::fill(again.memory().begin(), again.memory().end(), std::uint8_t{0});
   again.memory()[1] = 9;
   again.power_on(Time{}, Device<CanFrame>::PowerOn::skip);

@@ -45,20 +45,21 @@ enum class Function : std::uint8_t {
   if (id == 0x7E5) return Function::configuration;
   return Function::unknown;
 }
-/// Returns the purpose of a frame.
+/// Returns the purpose of a frame; `unknown` for a 29-bit identifier.
 [[nodiscard]] constexpr Function function_of(const CanFrame& frame) {
   return frame.extended ? Function::unknown : function_of(frame.id);
 }
 
-/// Returns the node number in the identifier of a frame; only for purposes whose identifier contains one.
+/// Returns the node number in the identifier of a frame. Valid only for purposes whose identifier contains a node
+/// number.
 [[nodiscard]] constexpr std::uint8_t node_of(const CanFrame& frame) {
   const Function function = function_of(frame);
   const bool has_eight_bits = function == Function::reply || function == Function::command;
   return static_cast<std::uint8_t>(frame.id & (has_eight_bits ? 0xFF : 0x7F));
 }
 
-/// Names of the CANopen functions that the document lists but this encoder does not use; empty for the functions it
-/// uses.
+/// Names of the CANopen functions that the document lists but this encoder does not use; empty for all other
+/// functions.
 inline constexpr std::array<std::string_view, 10> function_names{"NMT", "SYNC", "EMCY", "", "", "SDO RX", "SDO TX"};
 /// Returns whether the document only names a function, without describing its frames.
 [[nodiscard]] constexpr bool is_only_named(Function function) {
@@ -170,7 +171,8 @@ inline constexpr std::array<OrderInfo, 8> orders{{
 /// Returns the description of an order.
 [[nodiscard]] constexpr const OrderInfo& info_of(Order order) { return orders[static_cast<std::size_t>(order)]; }
 
-/// Returns the order that a frame carries, or that it answers if it is on 7E5 or 7E4; null if there is no such order.
+/// Returns the order whose code is in byte 0 of a frame: one for all nodes if the frame is on 7E5 or 7E4, otherwise
+/// one for a single node; null if there is no such order.
 [[nodiscard]] constexpr const OrderInfo* order_of(const CanFrame& frame) {
   const bool for_all = is_setting(function_of(frame));
   for (const OrderInfo& info : orders) {
@@ -186,7 +188,8 @@ inline constexpr std::array<OrderInfo, 8> orders{{
   return rate != nullptr ? Values::Number(rate->bits_per_second) : Values::Number{};
 }
 
-/// Converts the argument of a command to the value byte of an order; no value if the document does not define it.
+/// Converts the argument of a command to the value byte of an order; no value for a bit rate that the encoder does
+/// not have.
 [[nodiscard]] constexpr std::optional<std::uint8_t> value_of(const Format& format, Order order, std::int64_t argument) {
   if (order == Order::direction) return argument == 0 ? format.positive : format.negative;
   if (order != Order::rate) return static_cast<std::uint8_t>(argument);
@@ -239,8 +242,8 @@ inline constexpr std::array<OrderInfo, 8> orders{{
   return true;
 }
 
-/// Returns the position of a reply, in counts. Errors: those of `check_shape`, unexpected_reply, out_of_range (more
-/// bits than the encoder has).
+/// Returns the position of a reply, in counts. Errors: those of `check_shape`, unexpected_reply (not from a node),
+/// out_of_range (more bits than the encoder has).
 [[nodiscard]] constexpr Result<std::uint32_t> decode_position(const Format& format, const CanFrame& frame) {
   if (const Error error = check_shape(frame); error != Error::none) return error;
   if (function_of(frame) != Function::reply) return Error::unexpected_reply;

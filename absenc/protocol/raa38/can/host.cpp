@@ -20,8 +20,8 @@ void Read::heard(const CanFrame& frame, Time at) {
   if (!is_from(frame, format_.node)) return;
   keep(frame, at);
   const Result<std::uint32_t> counts = decode_position(format_, frame);
-  // The document does not state when the node takes the position: not before the request, and before it starts to send
-  // a cyclic frame.
+  // The document does not state when the node takes the position. A requested position is taken after the request was
+  // sent; a cyclic position, before its frame was received.
   if (counts) {
     reading_ = {.singleturn = *counts,
                 .singleturn_bits = format_.bits,

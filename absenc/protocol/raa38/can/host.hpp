@@ -19,9 +19,9 @@ inline constexpr Time busy_limit = 250ms;   ///< Timeout of a reply on a bus tha
 /// Time for which the host listens for unsolicited frames before it sends requests.
 inline constexpr Time listening_time = 1200ms;
 
-/// The protocol, as author layers use it: frames, lengths and times.
+/// Types and functions of the protocol that the classes in absenc/protocol/author use: frames, lengths and times.
 struct Protocol {
-  /// Type of the items on the line.
+  /// Type of what the line transmits: CAN frames.
   using Item = CanFrame;
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = can::Format;
@@ -53,7 +53,7 @@ struct Protocol {
 [[nodiscard]] Explanation explain(const Format& format, Error error, std::span<const CanFrame> request,
                                   std::span<const CanFrame> reply);
 
-/// Reads one position: requests it (orders 80 and 01), or waits for the next that the node sends without a request.
+/// Reads one position: requests it (order 80 or 01), or waits for the next one that the node sends without a request.
 class Read : public author::CanEngine {
  public:
   /// How the position is obtained: read request, start request, or listening.
@@ -63,10 +63,11 @@ class Read : public author::CanEngine {
 
   /// Returns the format of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
-  /// Returns the position that was read; empty before it.
+  /// Returns the position that was read; its `singleturn_bits` is 0 as long as none was read.
   [[nodiscard]] const Reading& found() const { return reading_; }
   [[nodiscard]] const Reading* reading() const final {
-    return reading_.singleturn_bits != 0 ? &reading_ : nullptr;  // set only after a successful end
+    // `singleturn_bits` is 0 until a valid position was received.
+    return reading_.singleturn_bits != 0 ? &reading_ : nullptr;
   }
 
  private:
@@ -77,9 +78,9 @@ class Read : public author::CanEngine {
   Reading reading_{};
 };
 
-/// Returns the frame that requests a position in this mode; for `listen`, the single read request.
+/// Returns the frame that requests a position: order 01 in the mode `start`, otherwise order 80.
 [[nodiscard]] constexpr CanFrame position_request(const Format& format, Read::Mode mode) {
-  // Two calls with constant orders, so that the table of orders is not linked.
+  // `encode` is called twice with a constant order, so that firmware does not link the table of orders.
   return mode == Read::Mode::start ? encode(Order::start, format.node) : encode(Order::read, format.node);
 }
 
@@ -88,14 +89,16 @@ using Dialog = author::DialogOf<Protocol>;
 
 // ---- One node
 
-/// Sets with order 31 the number of positions per second that the node sends, 0 for none, and counts the frames that
-/// are received. Error: cross_check_failed (another number of frames arrives).
+/// Sets with order 31 the number of positions per second that the node sends, 0 for none, and measures the rate of
+/// the frames that are received. Errors: timeout (neither an answer nor a frame arrives), cross_check_failed (another
+/// rate).
 author::Procedure set_cyclic(Dialog& dialog, Values& found, Arguments arguments);
 
-/// Changes the zero or the direction. Order 20 makes the present position 0, as the document suggests; the position is
-/// read before and after, and nothing is written if it is 0 already. Order 22 sets the counting direction, which no
-/// command reads; the position afterwards must be unchanged or mirrored. Errors: not_still (the shaft turns),
-/// cross_check_failed (any other position), timeout (order 22 has neither an answer nor an effect).
+/// Changes the zero or the direction. Order 20 makes the present position 0, as the document suggests; the position
+/// is read before and after, and nothing is written if it is 0 already. Order 22 sets the counting direction, which
+/// no command reads; the position afterwards must be unchanged or mirrored. Errors: not_still (the shaft turns),
+/// cross_check_failed (any other position, or the node no longer sends cyclic positions), timeout (order 22 has
+/// neither an answer nor an effect).
 author::Procedure change(Dialog& dialog, Values& found, Order order, Arguments arguments);
 
 /// Reports the number of the node if the node answers. Requests no other number: on a CANopen bus such requests are
@@ -108,7 +111,7 @@ author::Procedure find_node(Dialog& dialog, Values& found);
 struct NodeFrames {
   std::uint16_t unsolicited = 0;  ///< Number of frames that the node sent without a request.
   std::uint16_t per_second = 0;   ///< Number of frames that the node sent without a request in the first second.
-  std::uint8_t answers = 0;       ///< Number of answers to one request.
+  std::uint8_t answers = 0;       ///< Number of answers to the requests for this node number.
   std::uint8_t damaged = 0;       ///< Number of requests during which frames were destroyed.
   bool readable = false;          ///< Whether the last frame is a position that fits the format.
   std::uint32_t counts = 0;       ///< Position in the last frame, in counts.
@@ -121,7 +124,7 @@ struct NodeFrames {
   }
 };
 
-/// Result of a scan.
+/// Result of a scan: the frames that were received from each node number.
 struct Nodes {
   std::array<NodeFrames, 256> at{};  ///< What was received from each node number.
 
@@ -130,20 +133,22 @@ struct Nodes {
 };
 
 /// Finds all nodes on the bus. Listens first, because nodes may send without a request after power on, then requests
-/// every number. Error: timeout if no node is found.
+/// every number. Errors: timeout (no node is found), bad_framing (frames are destroyed for more than 16 numbers:
+/// wrong bit rate).
 author::Procedure scan(Dialog& dialog, Nodes& nodes);
 
-/// Result of a setting, and the nodes that were found on the bus before it.
+/// Result of `configure`: the setting, and the nodes that were found on the bus before it.
 struct ConfigureResult : Values {
   Nodes nodes{};          ///< Nodes that were found on the bus.
   bool verified = false;  ///< Whether the written setting was verified.
 };
 
 /// Changes the node number (order 11) or the bit rate (order 13). The node must answer under the new number and no
-/// longer under the old one; for the bit rate the host switches too, and back if the node does not answer. Both orders
-/// are sent on 7E5, which reaches every node, so only one node may be on the bus. Errors: invalid_argument (other nodes
-/// are on the bus, or the document does not have that rate), timeout, request_rejected, cross_check_failed (the node
-/// kept its old setting).
+/// longer under the old one; for the bit rate the host switches too, and back if the node does not answer. Both
+/// orders are sent on 7E5, which reaches every node, so only one node may be on the bus. Errors: invalid_argument
+/// (other nodes are on the bus, or the document does not have that rate), unexpected_reply (only other nodes are on
+/// the bus), timeout, request_rejected, cross_check_failed (the node answers under its old number or at its old
+/// rate).
 author::Procedure configure(Dialog& dialog, ConfigureResult& found, Order order, Arguments arguments);
 
 }  // namespace absenc::raa38::can

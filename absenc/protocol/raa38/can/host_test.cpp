@@ -57,10 +57,11 @@ TEST(Raa38CanRead, IgnoresFramesFromBeforeTheRequest) {
     ByHand by_hand(command);
     by_hand.next();
     if (command == "position") {
-      by_hand.receive(encode_position(0x20, 1));  // received before the request is sent
+      by_hand.receive(encode_position(0x20, 1));  // a position that is received before the request is sent
       by_hand.sent();
     }
-    by_hand.receive(encode_position(0x20, 2), -1ms);  // received from a queue, with a time before the request
+    // This position waited in a queue: its time of reception is before the request.
+    by_hand.receive(encode_position(0x20, 2), -1ms);
     EXPECT_EQ(by_hand.next(), Kind::wait);
     by_hand.receive(encode_position(0x20, 3), 1ms);
     EXPECT_EQ(by_hand.next(), Kind::done);
@@ -77,7 +78,7 @@ TEST(Raa38CanRead, IgnoresFramesOfOtherNodes) {
     by_hand.receive(other);
     EXPECT_EQ(by_hand.next(), Kind::wait);
     by_hand.tell(Event<CanFrame>::Kind::silence, by_hand.now + 50ms);
-    // A 29-bit frame is reported if no other frame arrives.
+    // The host reports a 29-bit frame if no other frame arrives.
     const bool is_long = other.extended;
     EXPECT_EQ(by_hand.talk->error(), is_long ? Error::unexpected_reply : Error::timeout);
     EXPECT_EQ(says(by_hand.talk->detail(), "29 bits"), is_long);
@@ -167,7 +168,7 @@ TEST(Raa38CanZero, RefusesWhileShaftTurns) {
   EXPECT_EQ(bench.encoder().settings().writes(), 0u);
 }
 
-// A node that uses order 20 for something else, or not at all: it answers correctly, but its position does not change.
+// The node uses order 20 for something else, or does not know it: its position does not become 0, even if it answers.
 TEST(Raa38CanZero, FailsWhenPositionDoesNotBecomeZero) {
   // The answer to order 20 is 32 if it is read as a position; at 21 bits that is near 0.
   for (const std::uint32_t counts : {32u << 10, 1'000'000u}) {
@@ -268,7 +269,7 @@ TEST(Raa38CanDirection, FailsWhenPositionIsNeitherSameNorMirrored) {
   EXPECT_TRUE(ended(with(jumping, "direction", {1}), Error::cross_check_failed, "mirror image"));
 }
 
-// The position 32 may be a late answer to order 22.
+// A position that the next reply does not repeat may be a late answer to an order, which looks like a position.
 TEST(Raa38CanDirection, RejectsPositionThatIsNotRepeated) {
   unsigned measurements = 0;
   Scripted late([&](const CanFrame& request) {

@@ -41,7 +41,8 @@ struct SendRate {
     if (mean <= Time{}) return 1;
     return std::clamp(static_cast<unsigned>((Time(1s) + mean / 2) / mean), 1u, 255u);
   }
-  /// Returns the time after which a node without a frame counts as silent: two periods and a margin.
+  /// Returns the time after which a node without a frame counts as silent: two periods and a margin, or
+  /// `listening_time` if the period is unknown.
   [[nodiscard]] Time pause() const { return count < 2 ? listening_time : 2 * period() + answer_limit; }
 };
 
@@ -141,7 +142,8 @@ Part<PositionResult> read_at_rest(Dialog& dialog) {
   co_return second;
 }
 
-// Reads the position twice, because the first frame may be a late answer that equals position 32.
+// Checks that both positions are near 0. Two are needed, because the first may be a late answer, which equals
+// position 32.
 Outcome check_zero(const Format& format, const Values& found, std::uint32_t first, std::uint32_t second) {
   if (is_near(first, 0, format.bits, zero_millidegrees) && is_near(second, 0, format.bits, zero_millidegrees)) {
     return done;
@@ -188,7 +190,7 @@ Part<Outcome> change_quietly(Dialog& dialog, Values& found, Order order, std::ui
                     : check_direction(dialog.format(), found, first.counts, second.counts);
 }
 
-// Compares the number of received frames, not their times: the adapter may deliver frames in bursts.
+// Accepts a mean send rate within about 25 % of the wanted one, because the adapter may deliver frames in bursts.
 Outcome check_cyclic(Dialog& dialog, unsigned wanted, bool answered, const SendRate& heard) {
   if (wanted == 0) {
     if (heard.count == 0) return done;
@@ -245,13 +247,14 @@ Procedure change(Dialog& dialog, Values& found, Order order, Arguments arguments
 namespace {
 
 constexpr Time between_requests = 2ms;  // time between two requests; one request and one answer take 1 ms at 250 kbit/s
-constexpr unsigned answering = 10;      // a frame this many requests later counts as unsolicited, not as an answer
+// A frame this many requests after the request for its node number counts as unsolicited, not as an answer.
+constexpr unsigned answering = 10;
 constexpr Time last_answers = 100ms;
 constexpr Time entering_time = 20ms;  // time after "enter configuration", which is not answered
 constexpr Time answer_window = 100ms;
 constexpr Time switching_time = 50ms;  // time that a controller needs to rejoin the bus after a change of its bit rate
 constexpr int rate_attempts = 3;
-constexpr auto most_clashes = 16;  // more shared numbers than this indicate a bad line
+constexpr auto most_clashes = 16;  // more numbers with destroyed frames indicate a bad line
 
 constexpr std::string_view connect_alone = "connect this one alone: 7E5 reaches every node on the bus";
 constexpr std::string_view number_shared = "two nodes share the number, or the line is bad";
@@ -359,7 +362,8 @@ Part<Outcome> verify_node(Dialog& dialog, std::uint8_t before, std::uint8_t node
   co_return only(Error::timeout, "it answers neither under its old number nor under the new one", supply);
 }
 
-// Sets the host to the new rate, waits `switching_time`, and checks whether the node answers.
+// Sets the host to the new rate, waits `switching_time`, and checks whether the node answers. If not, sets the host
+// back to the old rate and reports whether the node answers there.
 Part<Outcome> verify_rate(Dialog& dialog, std::uint32_t bits_per_second) {
   const Format& format = dialog.format();
   dialog.configure(bits_per_second, switching_time);

@@ -174,8 +174,8 @@ constexpr Error decode_frames(const Format& format, Frame request, Frame reply, 
 constexpr FrameEnd end_of_frame(const Options&, Direction, Bytes bytes) {
   return {FrameEnd::Kind::complete, bytes.size()};
 }
-// Returns whether this protocol detects a wrong bit. The controller checks the CRC of CAN; here only bits with a fixed
-// value are checked.
+// Returns whether this protocol detects a wrong bit in a reply. The controller checks the CRC of CAN; here only bits
+// with a fixed value are checked.
 bool is_checked(const Options& values, Frame request, Frame reply, std::size_t bit) {
   if (is_only_named(function_of(*reply.can))) return false;
   const OrderInfo* const asked = request.can != nullptr ? order_of(*request.can) : &info_of(Order::read);

@@ -45,9 +45,9 @@ struct Bench : raa38::testing::Bench<std::uint8_t, VirtualEncoder, Format, modbu
                                                                                  own.line()) {
     add(own);
   }
-  /// Sets the position to `counts` in the encoder's resolution.
+  /// Turns the shaft to the position `counts`, in counts of the encoder's resolution.
   void put(std::int64_t counts) { shaft.put(0, counts << (21 - format.bits)); }
-  /// Sends `request` as it is after 20 ms of silence and returns the reply.
+  /// Sends the bytes of `request` unchanged, after 20 ms of silence, and returns the reply.
   Wire raw(const Wire& request) {
     sim::testing::RawHost host(request, 100ms, 20ms, line.now() + 20ms);
     return run(host).reply;

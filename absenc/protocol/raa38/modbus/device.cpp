@@ -11,8 +11,8 @@ using modbus::Exception;
 using modbus::FrameBytes;
 using namespace std::chrono_literals;
 
-// Number of settings within a minute above which the rule is broken. Document: "Do not regularly send in case the
-// internal structure of the device would be damaged".
+// Greatest number of settings within a minute; the virtual encoder reports more as a broken rule. Document: "Do not
+// regularly send in case the internal structure of the device would be damaged".
 constexpr std::uint32_t most_settings = 10;
 constexpr Time settings_window = 1min;
 
@@ -22,7 +22,7 @@ constexpr bool is_address(std::uint8_t address) {
 
 }  // namespace
 
-// A memory from a file may have any content.
+// A memory from a file may have any content: the format's address and baud rate replace invalid ones.
 void VirtualEncoder::started() {
   if (!is_address(address())) memory()[Settings::number_at] = format_.address;
   if (settings_.rate() >= bauds.size()) memory()[Settings::rate_at] = static_cast<std::uint8_t>(format_.baud);
@@ -60,7 +60,7 @@ void VirtualEncoder::read(Bytes body, Time at, FrameBytes& reply) {
   const auto registers = static_cast<std::uint16_t>(body[4] << 8 | body[5]);
   if (registers == 0 || registers > modbus::most_registers) return refused(Exception::illegal_data_value);
   if (first != 0 || registers > 2) return refused(Exception::illegal_data_address);
-  // A single register would carry a part of the position that equals a whole position.
+  // A single register would carry only the lower 16 bits, which look like a whole position.
   if (registers == 1 && format_.bits > 16) return refused(Exception::illegal_data_value);
   append_position(registers, at, reply);
 }

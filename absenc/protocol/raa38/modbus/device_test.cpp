@@ -51,7 +51,7 @@ TEST(Raa38ModbusDevice, IgnoresFramesOfOthers) {
            Wire{0, 3, 0, 0, 0, 1},  // address 0: broadcast
            Wire{0xFF, 3, 0, 0, 0, 1},
            Wire{1, 0xA0},     // A0 is only for address FF
-           Wire{1, 0x83, 2},  // a refusal of another slave
+           Wire{1, 0x83, 2},  // a refusal, which only a slave sends
            Wire{1, 0xA1},
            Wire{1, 0xCC, 1, 1},
        }) {

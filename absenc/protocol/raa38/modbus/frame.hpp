@@ -44,7 +44,7 @@ inline constexpr std::array<std::uint32_t, 5> bauds{2400, 4800, 9600, 19'200, 57
 inline constexpr std::array<std::uint8_t, bauds.size()> baud_parameters{0x24, 0x48, 0x96, 0x19, 0x57};
 inline constexpr std::size_t baud_at_shipping = 3;  ///< Index in `bauds` of the rate at shipping.
 
-/// Returns the meaning of a parameter of function CC, in words.
+/// Returns the meaning of a parameter of function CC in words; "unknown" if the encoder does not have the parameter.
 [[nodiscard]] constexpr std::string_view name_of_setting(std::uint8_t value) {
   constexpr std::array<std::string_view, bauds.size()> baud_names{"2400 baud", "4800 baud", "9600 baud", "19200 baud",
                                                                   "57600 baud"};
@@ -104,7 +104,7 @@ struct Request {
 /// Bytes of one request.
 using RequestBytes = ByteBuffer<8>;
 
-/// Returns the length of a request in bytes.
+/// Returns the length in bytes of a request with the function code `code`, which the encoder must have.
 [[nodiscard]] constexpr std::size_t request_length(std::uint8_t code) {
   if (code == function::read) return 8;
   return code == function::read_address ? 4 : 5;
@@ -183,8 +183,8 @@ constexpr std::optional<std::uint8_t> refusal_of(const Request& request, Bytes r
   return modbus::refusal_code(reply, request.function);
 }
 
-// Checks header, byte count, data and CRC. Two registers may have two, three or four bytes of data: the text of 3.1.7
-// says two or three, its table counts four and shows three.
+// Returns whether the length of a reply to `read` fits its byte count. The reply to a request of two registers has
+// four or three bytes of data, and three may be counted as 03 or 04: 3.1.7 contains all three forms.
 constexpr bool read_length_is_right(const Request& request, Bytes reply) {
   if (reply.size() < modbus::shortest_frame) return false;
   const std::size_t count = reply[2];
@@ -265,7 +265,7 @@ constexpr bool is_answer(const Request& request, Bytes reply) {
 /// Timeout of a reply. The document gives no time; slaves of this kind need a few milliseconds.
 inline constexpr Time answer_limit = std::chrono::milliseconds(50);
 
-/// The protocol, as author layers use it: frames, lengths and times.
+/// Types and functions of the protocol that the classes in absenc/protocol/author use: frames, lengths and times.
 struct Protocol {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = rtu::Format;
@@ -281,23 +281,23 @@ struct Protocol {
   }
   /// Returns the host's times on a line with the baud rate of the format.
   static constexpr author::HostTimes host_times(const Format& format) { return host_times(format, format.line().rate); }
-  /// Returns that requests are never repeated, because each setting wears the memory.
+  /// Returns how a host sends a request: once and never repeated, because each setting wears the memory.
   static constexpr author::Manner manner(const Format&, const Request&) { return {}; }
   /// Returns the bytes of `request` as they are sent.
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
   /// Decodes a request; returns an error if its bytes are invalid.
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return rtu::decode_request(bytes); }
-  /// Returns the length of a reply in bytes, judged by its first bytes; 0 if they do not determine it.
+  /// Returns the greatest length in bytes of a reply with these first bytes.
   static constexpr std::size_t expected(const Format&, const Request& request, Bytes reply) {
     return reply_length(request, reply);
   }
-  /// Returns whether a reply that has this error is complete, so that the host awaits no more bytes.
+  /// Returns false: a reply with an error may be incomplete, so the host awaits more bytes.
   static constexpr bool is_whole(const Format&, Error) { return false; }
   /// Decodes a reply with all checks; returns the first error if one fails.
   static constexpr Result<Reply> decode(const Format& format, const Request& request, Bytes bytes) {
     return decode_reply(format, request, bytes);
   }
-  /// Converts a reply to a reading.
+  /// Converts a reply to a reading; the reading is empty for other functions than `read`.
   static constexpr Reading reading(const Format& format, const Request& request, const Reply& reply) {
     if (request.function != function::read) return {};
     return author::position_reading(reply.singleturn, format.bits);

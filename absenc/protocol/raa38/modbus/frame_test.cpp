@@ -68,7 +68,7 @@ TEST(Raa38ModbusFrame, ChecksAddressRangeAndExplainsEachRefusal) {
   }
   EXPECT_EQ(error_of({}, ask, {0x01, 0xA0, 0x01}), Error::unexpected_reply);
   EXPECT_EQ(error_of({}, one_register, {2, 0x83, 2}), Error::unexpected_reply);
-  // A refusal of CC would equal the echo of a request.
+  // A refusal of CC would equal the echo of another parameter.
   EXPECT_EQ(error_of({}, {.function = function::set_parameter, .value = 0x19}, {1, 0xCC, 1}), Error::unexpected_reply);
 }
 
@@ -88,7 +88,7 @@ TEST(Raa38ModbusFrame, AssumesRequestFromReply) {
   EXPECT_EQ(assumed_request({}, {}).function, function::read);
 }
 
-// A valid frame with 00 appended has a valid CRC too.
+// The CRC stays valid if a 00 is appended to a valid frame.
 TEST(Raa38ModbusFrame, RecognizesLengthThatTheCrcDoesNotProve) {
   Wire followed = framed({1, 3, 4, 0x00, 0x00, 0x05});
   EXPECT_TRUE(decode_reply(fine, two_registers, followed));

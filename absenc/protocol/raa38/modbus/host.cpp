@@ -114,7 +114,8 @@ constexpr Request setting(const Format& format, std::uint8_t value) {
   return {.function = function::set_parameter, .address = format.address, .value = value};
 }
 
-// Reads the position, up to `attempts` times; ends early if the encoder refuses.
+// Reads the position in up to `attempts` attempts; ends early after a refusal, or if the line is never silent. A
+// reply of doubtful length is confirmed by a second request within the attempt.
 Part<Result<Reply>> read_position(Dialog& dialog, std::uint8_t address, unsigned attempts) {
   Request request = read_request(dialog.format());
   request.address = address;
@@ -227,7 +228,7 @@ Procedure find_baud(Dialog& dialog, CommandValues& found) {
   const std::size_t own = dialog.format().baud;
   found.baud = bauds[own];
   const Result<Reply> first = co_await read_position(dialog, dialog.format().address, 2);
-  // an encoder that refuses answers at this rate too
+  // An encoder that refuses the request has answered, so this is its baud rate.
   if (first || first.error() == Error::request_rejected) co_return done;
   if (dialog.is_noisy()) co_return {first.error()};
   const Explanation reason = explain_reply(read_request(dialog.format()), first.error(), dialog.reply());

@@ -50,8 +50,8 @@ struct CommandValues : Values {
 /// Interface by which procedures send requests and await replies.
 using Dialog = author::DialogOf<Protocol>;
 
-// If no encoder answers at the address of the format, each of these procedures sends A0 and names the address in the
-// reply.
+// If no encoder answers at the address of the format, the procedures below except `read_address` and `scan` send A0
+// and name the address in the reply in their error text.
 
 /// Reads the position once and reports it.
 author::Procedure read_position_once(Dialog& dialog, CommandValues& found);
@@ -79,8 +79,8 @@ struct Slaves {
 author::Procedure scan(Dialog& dialog, Slaves& found, Arguments arguments);
 
 /// Sets the address with A1. Refuses an address at which another slave answers (invalid_argument). Then reads the
-/// position at the new address to verify. Errors: cross_check_failed (the encoder still has its old address), timeout
-/// (the encoder answers at neither address).
+/// position at the new address to verify. Errors: request_rejected, cross_check_failed (the encoder still has its old
+/// address), timeout (the encoder answers at neither address).
 author::Procedure set_address(Dialog& dialog, CommandValues& found, Arguments arguments);
 
 /// Sets the baud rate of encoder and line with CC and verifies that the encoder answers. Errors: invalid_argument (the
@@ -92,8 +92,8 @@ author::Procedure set_baud(Dialog& dialog, CommandValues& found, Arguments argum
 /// setting.
 author::Procedure set_direction(Dialog& dialog, CommandValues& found, Arguments arguments);
 
-/// Makes the present position zero with CC 00. Errors also: not_still (the shaft turns), cross_check_failed (the
-/// position is not zero afterwards).
+/// Makes the present position zero with CC 00. Errors besides those of reading the position: not_still (the shaft
+/// turns), cross_check_failed (the position is not zero afterwards).
 author::Procedure set_zero(Dialog& dialog, CommandValues& found, Arguments arguments);
 
 }  // namespace absenc::raa38::rtu

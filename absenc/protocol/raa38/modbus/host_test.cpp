@@ -22,7 +22,8 @@ TEST(Raa38ModbusHost, ReadsAsFastAsSilencesAllow) {
     const Time start = bench.line.now();
     constexpr int readings = 200;
     for (int i = 0; i < readings; ++i) ASSERT_EQ(bench.position(), 0x1555u);
-    // Silence, 8 characters, silence, the encoder's answer time, 7 characters.
+    // Shortest time of one exchange: silence, request of 8 characters, silence, the encoder's answer time, reply of 7
+    // characters.
     const LineSettings line = bench.format.line();
     const Time least = modbus::frame_silence(line) * 2 + 200us + 15 * line.character();
     const auto seconds = std::chrono::duration<double>(bench.line.now() - start);

@@ -80,7 +80,7 @@ struct Bench : raa38::testing::Bench<std::uint8_t, Tampered, Format, serial_unit
   }
   /// Adds an encoder whose zero differs by one count from that of the first encoder.
   void add_twin(const Format& of_it) { add(of_it).memory()[2] = 4; }
-  /// Sets the position to `counts` of 14 bits.
+  /// Turns the shaft to the position `counts`, in counts of 14 bits.
   void put(std::int64_t counts) { shaft.put(0, counts << 7); }
 };
 

@@ -9,8 +9,8 @@ ByteStep VirtualEncoder::next(Time now) {
   if (std::exchange(pending_, false)) return character();
   const bool streams = format().mode == Mode::timing && is_on(now) && !is_transmitting();
   if (streams && now >= due_) {
-    // Frames that were delayed up to this time are sent late, so that their rate is kept; after a longer delay they are
-    // dropped.
+    // A frame that is delayed by up to `most_backlog` is sent late, so that the refresh rate is kept; after a longer
+    // delay the delayed frames are dropped.
     if (now - due_ > most_backlog) due_ = now;
     transmit(encode_position(format(), position(due_)), due_);
     due_ += format().period() > Time{} ? format().period() : virtual_period;
@@ -63,11 +63,12 @@ void VirtualEncoder::triggered(const ByteEvent& event) {
   transmit(encode_position(format(), position(event.at)), event.at + Protocol::device_times(format()).answer_time);
 }
 
-// Reports a request that arrives during a transmission. Two encoders with one number send at the same time, so only the
-// bytes of a request break the rule, not other bytes.
+// Reports a request that arrives during a transmission. Two encoders with one number send at the same time, so only a
+// whole request with the number of this encoder breaks the rule, not other bytes.
 void VirtualEncoder::check_during_transmission(const ByteEvent& event) {
   const std::uint32_t own = 0xBCAA00u | number_mark | format().unit;
-  // If this program was scheduled late, the frame should have been sent before the request arrived.
+  // If this program was scheduled late, the frame should have been sent before the request arrived, so the request
+  // breaks no rule.
   const bool may_have_waited = event.late > Protocol::device_times(format()).answer_time + format().transmission;
   for (const std::uint8_t byte : event.items) {
     last_characters_ = (last_characters_ << 8 | byte) & 0xFFFFFF;

@@ -21,9 +21,10 @@ class VirtualEncoder final : public author::BusDevice<Protocol, VirtualEncoder, 
   /// Switches the encoder off.
   void power_off(Time now) override;
 
-  /// Returns whether a request has the number of this encoder.
+  /// Returns whether a request is for this encoder: the request has its number, and the encoder has the command if
+  /// the request sets the zero.
   [[nodiscard]] bool is_mine(const Request& request) const;
-  /// Returns the reply to a request; no value if the encoder does not answer it.
+  /// Executes a request and returns the reply; no value after the request that sets the zero, which is not answered.
   std::optional<Position> answer(const Request& request, Time at);
 
  private:

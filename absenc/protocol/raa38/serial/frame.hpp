@@ -26,11 +26,11 @@ enum class Mode : std::uint8_t {
   bus,        ///< A request with the encoder's number.
 };
 
-/// Value of the second byte of a frame: 81 in the document's tables, Bx with the encoder's number in its text about the
-/// bus.
+/// Values that are accepted as the second byte of a frame: 81 as in the document's tables (fixed), Bx with the
+/// encoder's number as in its text about the bus (echo), or both (automatic).
 enum class SecondByte : std::uint8_t { automatic, fixed, echo };
 
-/// How the zero of an encoder is set; this depends on the order.
+/// How the zero of an encoder is set; this depends on how the encoder was ordered.
 enum class Zeroing : std::uint8_t {
   none,
   line,     ///< By a pulse on CLR.
@@ -83,7 +83,7 @@ struct Format {
   /// Number x in the request Cx that sets the zero; -1: the same as in Bx.
   std::int32_t zero_unit = -1;
   std::int64_t refresh_millihertz = 0;  ///< Frames per second in timing mode, in 0.001 Hz; 0: unknown.
-  /// Time T3, or on a bus the time from a request to its reply; 0: unknown.
+  /// Time T3 from the pulse on CLK to the frame, or on a bus the time from a request to its reply; 0: unknown.
   Time acquisition{};
   /// Time T1 - T3, the duration of a frame; 0: as long as its characters take.
   Time transmission{};
@@ -140,7 +140,8 @@ using RequestBytes = ByteBuffer<request_bytes>;
   return bytes;
 }
 
-/// Number that accepts a frame of any unit. Used without a request, where the frame itself shows its unit.
+/// Value of `unit` with which decoding accepts a frame of any unit. Used without a request, where the frame itself
+/// shows its unit.
 inline constexpr int any_unit = -1;
 
 /// Returns whether `second_byte` is valid in a frame of `unit`.
@@ -217,7 +218,7 @@ struct Values {
           .angle = degrees(position.singleturn, format.bits)};
 }
 
-/// The protocol, as author layers use it: frames, lengths and times.
+/// Types and functions of the protocol that the classes in absenc/protocol/author use: frames, lengths and times.
 struct Protocol {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = serial::Format;
@@ -233,7 +234,7 @@ struct Protocol {
             .gap_limit = std::max(format.transmission, gap_limit),
             .patience = patience};
   }
-  /// Returns how a host sends a request (repetitions, pauses) and how the reply to it ends.
+  /// Returns how a host sends a request: as bytes or as a pulse on a wire, and whether a reply is expected.
   static constexpr author::Manner manner(const Format&, const Request& request) {
     switch (request.kind) {
       case Request::Kind::trigger:
@@ -253,13 +254,13 @@ struct Protocol {
     const RequestBytes request = encode_request({});
     return begin[0] == request[0] && (begin.size() < 2 || begin[1] == request[1]) ? request_bytes : 0;
   }
-  /// Returns the length of the reply to `request`, in bytes.
+  /// Returns the length of the reply to `request`, in bytes; 0 for zero clearing, which has no reply.
   static constexpr std::size_t reply_size(const Format& format, const Request& request) {
     return request.kind == Request::Kind::zero_clear ? 0 : format.frame_bytes();
   }
-  /// Returns the length of a reply in bytes, judged by its first bytes; 0 if they do not determine it.
+  /// Returns the length of a reply in bytes; it depends only on the format.
   static constexpr std::size_t expected(const Format& format, const Request&, Bytes) { return format.frame_bytes(); }
-  /// Returns whether a reply that has this error is complete, so that the host awaits no more bytes.
+  /// Returns false: a reply with an error may be incomplete, so the host awaits more bytes.
   static constexpr bool is_whole(const Format&, Error) { return false; }
   /// Returns the bytes of `reply` as they are sent.
   static constexpr FrameBytes encode_reply(const Format& format, const Request&, const Position& position) {
@@ -277,7 +278,8 @@ struct Protocol {
   }
   /// Returns when the encoder latched the position that answers a request sent at `sent_at`.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
-  /// Returns the times of the virtual encoder: duration of a character, time until a reply, time to start.
+  /// Returns the times of the virtual encoder: the time until a reply, and the silence after which it drops an
+  /// incomplete request.
   static constexpr author::DeviceTimes device_times(const Format& format) {
     return {.answer_time = format.acquisition > Time{} ? format.acquisition : virtual_acquisition, .gap = request_gap};
   }

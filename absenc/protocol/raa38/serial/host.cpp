@@ -80,7 +80,8 @@ ByteStep Listen::next(Time now) {
     restart_timeout_ = true;
     return {.kind = ByteStep::Kind::emit};
   }
-  // The timeout restarts here: the time that the caller takes to process a result does not count.
+  // After an emitted result the timeout restarts in the next call: the time that the caller takes to process the
+  // result does not count.
   if (restart_timeout_) deadline_ = now + std::max(listen_limit, 4 * format_.period());
   restart_timeout_ = false;
   // Bytes that form no frames do not extend the deadline, so the deadline is checked even while bytes arrive.

@@ -69,7 +69,7 @@ class Listen final : public Conversation<std::uint8_t> {
   bool restart_timeout_ = true;     // whether the timeout must be restarted
   Time deadline_{};
   Time received_at_{};             // time at which the bytes that are being processed were received
-  Time received_before_{};         // time at which the bytes before them were received
+  Time received_before_{};         // time at which the bytes before those of `received_at_` were received
   std::uint64_t valid_count_ = 0;  // number of valid frames received so far
   StreamCounts counts_{};
   Reading reading_{};

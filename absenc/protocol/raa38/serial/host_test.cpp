@@ -26,7 +26,7 @@ TEST(Raa38SerialHandshake, ReadsOneFramePerPulse) {
   EXPECT_EQ(read.reading->latched, Time{}) << "at the edge";
   EXPECT_EQ(read.took, virtual_acquisition + frame_time) << "T1";
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
-  // T3 may be shorter than the pulse.
+  // T3 may be shorter than the pulse on CLK.
   EXPECT_TRUE(ended(Bench(with(handshake, &Format::acquisition, Time(1))).run_command("position"), Error::none));
 }
 

@@ -65,7 +65,7 @@ class StreamDecoder {
   [[nodiscard]] constexpr std::uint64_t discarded() const { return discarded_.count(); }
   /// Returns whether a frame was valid except for a position with more bits than the format has.
   [[nodiscard]] constexpr bool saw_larger_positions() const { return saw_larger_positions_; }
-  /// Returns the bytes of the last invalid frame.
+  /// Returns the bytes of the last frame that ended the alignment; empty if a damaged character ended it.
   [[nodiscard]] constexpr Bytes bad() const { return bad_.view(); }
 
  private:
@@ -114,7 +114,8 @@ class StreamDecoder {
     return true;
   }
 
-  // Returns whether the second frame is earlier than the refresh rate allows, so that the bytes are no frames.
+  // Returns whether the second of two frames in a row follows the first after less than half a period, so that the
+  // bytes are no frames.
   [[nodiscard]] constexpr bool is_too_early() const {
     const Time between = times_[2 * frame_ - 1] - times_[frame_ - 1];
     return between > Time{} && between < format_.period() / 2;

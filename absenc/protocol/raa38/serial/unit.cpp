@@ -146,7 +146,7 @@ constexpr auto commands = std::array{
 
 // ---- Declaration
 
-// The document gives no highest speed.
+// The document gives no highest speed of the shaft.
 constexpr auto models =
     std::array{author::ModelText{"RAA38S6", "10 to 21 bits, single-turn; by itself, by pulse, on a bus", 0, ""}};
 
@@ -156,7 +156,7 @@ BitRanges bits_in(const Options& values, Frame, Frame, const FieldInfo& field) {
   if (&field != fields.of<&Values::singleturn>()) return {};
   return author::big_endian_bits(2, format.data_bytes(), format.bits);
 }
-// The duration of a frame. Document: "T1: baud rate". It states no value, so the user must set one.
+// Rate 0: the user must set the baud rate, because the document only has "T1: baud rate" without a value.
 constexpr LineSettings line_of(const Format&) { return {.rate = 0}; }
 constexpr Resolution resolution_of(const Format& format) { return {format.bits, 0}; }
 constexpr Result<Request> guess_request(const Format&, Bytes) { return Request{Request::Kind::trigger}; }
