@@ -78,8 +78,8 @@ Stored stored(VirtualDevice& device) {
   return one.bytes != nullptr ? of(one.bytes->memory()) : of(one.frames->memory());
 }
 
-/// Runs a command on a virtual encoder and returns its end. The port fails after `steps` steps; without `steps` the
-/// port does not fail.
+/// Runs a command on a virtual encoder and returns how it ended. The port fails after `steps` steps; without `steps`
+/// the port does not fail.
 Ended run(const std::string& address, const Command& command, const Values& values,
           std::optional<std::size_t> steps = {}) {
   VirtualDevice* device = nullptr;
@@ -171,7 +171,7 @@ void require_truth(const Ended& ended, const Ended& good, const std::string& wha
   }
 }
 
-// Returns the number of steps that the command takes at the port until it ends well.
+// Returns the smallest number of steps at the port with which the command ends without an exception.
 std::size_t steps_of(const std::string& address, const Command& command, const Values& values) {
   std::size_t most = 64;
   while (run(address, command, values, most).thrown) most *= 2;
@@ -237,7 +237,7 @@ TEST_P(EveryUnit, ReportedChangeMatchesMemoryAfterPortLoss) {
     const Ended good = run(address, command, values);
     Counts of_command{};
     const std::size_t all = steps_of(address, command, values);
-    // Tests each of the last steps, in which the change occurs, and some of the earlier ones.
+    // Lets the port fail after each of the last steps, in which the change occurs, and after some of the earlier ones.
     const std::size_t each = test_cases(60);
     const std::size_t last = all > each ? all - each : 0;
     for (std::size_t steps = 0; steps < all; steps = steps < last ? std::min(steps + 1 + all / 12, last) : steps + 1) {

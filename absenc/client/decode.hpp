@@ -16,8 +16,8 @@
 
 namespace absenc::client {
 
-/// Properties of a capture and of the encoder in it. A property that is not set is detected in the capture, or is the
-/// protocol's default.
+/// Properties of a capture and of the encoder in it. A property that is not set is detected in the capture, or has its
+/// default.
 struct DecodeChoices {
   /// Channels of the wires, as "D0" or "clock=D0"; one entry may hold several, separated by commas.
   std::vector<std::string> channels{};
@@ -65,7 +65,7 @@ class Decoded {
   [[nodiscard]] const Row* current() const { return row_; }
   /// Moves to the next row, and waits until it is decoded.
   void advance();
-  /// Cancels from any thread: a caller that waits for a row, now or later, gets Cancelled.
+  /// Cancels from any thread: a caller that waits for a row, now or later, gets the exception Cancelled.
   void cancel();
 
   /// Returns the columns of each row, in their order.

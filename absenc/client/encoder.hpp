@@ -52,14 +52,16 @@ struct Sample {
   Kind kind = Kind::absent;  ///< Whether this sample holds a reading, a failure or an event.
   Time at{};                 ///< Time at which the reading was latched, or at which the event occurred.
   Reading reading{};         ///< The reading; default-constructed if `kind` is not `reading`.
-  /// Whether a second reading confirmed the position: the shaft can have moved from one to the other.
+  /// Whether a second reading confirmed the position, because the shaft can have moved from one to the other in the
+  /// time between them.
   bool confirmed = false;
-  /// Whether the position was valid but no second reading confirmed it. It is then marked invalid.
+  /// Whether the position was valid but no second reading confirmed it. `reading` then marks the position as unknown.
   bool doubtful = false;
   bool position_valid = false;  ///< Whether `position` is valid.
   /// Position in counts, continued past the end of the encoder's counter; see `position_valid`.
   std::int64_t position = 0;
-  /// Whether `position` starts again, because the position jumped or the distance since the last reading is unknown.
+  /// Whether `position` starts again at this sample, because the position jumped or the distance since the last reading
+  /// is unknown.
   bool restarted = false;
   /// Whether `speed` is valid: the times of the two positions must determine it closely enough.
   bool speed_valid = false;
@@ -85,7 +87,7 @@ struct Sample {
   /// Returns the speed of a linear encoder in mm/s; nothing for a rotary encoder or if the speed is invalid.
   [[nodiscard]] std::optional<Estimate> speed_mm_s() const;
 
-  /// Returns the text of the failure or of the event; "" for a reading without an event.
+  /// Returns the text of the failure, or of the event; "" if the sample has neither.
   [[nodiscard]] std::string text() const { return kind == Kind::failed ? trouble.text() : message; }
 };
 
@@ -101,7 +103,7 @@ class Samples;
 /// An open encoder. One thread at a time may use it; only `cancel` may be called from another thread.
 class Encoder {
  public:
-  /// Connection and state of an encoder, for the library itself only.
+  /// Connection and state of an encoder; for the library itself only.
   struct Parts;
 
   /// Moves the encoder; afterwards the other object may only be destroyed or assigned to.
@@ -149,8 +151,8 @@ class Encoder {
   /// used.
   [[nodiscard]] Settings settings() { return Settings(*this); }
 
-  /// Cancels from any thread: every wait, now or later, ends with Cancelled; a loop over samples ends without an
-  /// exception.
+  /// Cancels from any thread: every wait, now or later, ends with the exception Cancelled; a loop over samples ends
+  /// without an exception.
   void cancel();
   /// Withdraws `cancel`, so that the encoder can be used again.
   void resume();
@@ -163,7 +165,7 @@ class Encoder {
   /// state (change.hpp).
   [[nodiscard]] const Change& change() const;
 
-  /// Starts the continued position again at the next reading; for use after a command that moves the zero.
+  /// Makes the continued position start again at the next reading; call it after a command that moves the zero.
   void forget_position();
 
   /// Returns protocol and port of the address, without settings: "tformat:/dev/ttyUSB0".

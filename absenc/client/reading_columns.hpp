@@ -9,8 +9,8 @@
 
 namespace absenc::client {
 
-/// The columns of position, turns and flags. A unit with two channels has columns of flags for each channel, and
-/// `alarms` with the alarms of both.
+/// The columns of position, turns and flags in a row. A unit with two channels has columns of flags for each channel,
+/// and the column `alarms` with the alarms of both channels.
 class ReadingColumns {
  public:
   /// Makes the columns for the unit with these options. `unit` must outlive this object.

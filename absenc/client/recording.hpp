@@ -21,7 +21,8 @@ struct RecordingSettings {
   std::string path;
   std::string encoder;   ///< Name of the encoder, as the header of the file shows it.
   double rate_hz = 100;  ///< Intended number of readings per second; 0: as many as possible.
-  /// Selects the readings to write: every Nth, and each whose alarms differ from the reading before.
+  /// Writes only every Nth reading, and also each reading whose alarms differ from those of the reading before. 1:
+  /// writes all.
   std::uint64_t every = 1;
   std::uint64_t count = 0;         ///< Number of written readings after which the recording ends; 0: no limit.
   std::optional<Time> duration{};  ///< Time after which the recording ends; without a value: no limit.
@@ -50,7 +51,7 @@ class Recording {
   [[nodiscard]] RecordCounts counts() const;
   /// Returns the number of bytes that were written to all files so far.
   [[nodiscard]] std::uint64_t bytes() const;
-  /// Returns the time at which the recording began, by os::now.
+  /// Returns the time of os::now at which the recording began.
   [[nodiscard]] Time start() const;
   /// Returns the path of the file, or the paths of the parts so far, in their order.
   [[nodiscard]] std::vector<std::string> paths() const;

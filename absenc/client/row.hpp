@@ -38,7 +38,7 @@ struct Column {
   Presentation presentation{};  ///< How people see the value.
 };
 
-/// Type of a value that consists of bytes.
+/// Type of a value that is a sequence of bytes.
 using ByteVector = std::vector<std::uint8_t>;
 
 /// Alternative of `Value` for a value that the encoder reported as invalid. The value itself is not stored.
@@ -64,9 +64,10 @@ using Value = std::variant<std::monostate, std::int64_t, std::uint64_t, double, 
   return value.index() != 0 && !std::holds_alternative<Invalid>(value) && !std::holds_alternative<Unknown>(value);
 }
 
-/// Returns flags as a value; `Unknown` if no flag is raised and not every flag was reported.
+/// Returns flags as a value; `Unknown` if no flag is raised but the state of some flag was not reported.
 [[nodiscard]] Value value_of(const Flags& flags);
-/// Returns whether the validity is `valid`, as a boolean value; no value if it is absent, `Unknown` if it is unknown.
+/// Returns the validity as a boolean value, true if it is `valid`; no value if the validity is absent, `Unknown` if it
+/// is unknown.
 [[nodiscard]] Value value_of(Validity validity);
 
 /// Returns the value as text, "12.5", "yes", "over_heat battery_alarm" or "1A 00"; "" if there is no value or no flag
@@ -91,17 +92,17 @@ struct Row {
   }
 };
 
-/// Returns the description of a field as a column of a row.
+/// Returns a field's description as the column of a row.
 [[nodiscard]] Column column_of(const FieldInfo& field);
-/// Returns the value of a field as a value for a row.
+/// Returns the value of a decoded field as a value for a row.
 [[nodiscard]] Value value_of(const FieldValue& value);
 
 /// Result of a command: a row that owns its columns.
 struct Answer {
   std::vector<Column> columns;  ///< Descriptions of the values, one for each value.
   std::vector<Value> values;    ///< Values in the order of the columns.
-  /// Owners of column names that come from a described position word; such names would otherwise live only as long as
-  /// the encoder.
+  /// Owners of those column names that are defined by the user's description of a position word; without an owner the
+  /// names would live only as long as the encoder.
   std::vector<std::shared_ptr<const std::string>> names;
 
   /// Returns columns and values as a row, which is valid while this object is unchanged.

@@ -65,7 +65,7 @@ class CheckCode {
   [[nodiscard]] std::vector<std::uint32_t> dual_weights() const;
   [[nodiscard]] std::size_t free_bits() const { return syndromes_.size() - fixed_; }
 
-  // syndrome of each bit of the frame; bit n of a syndrome is the check bit `check_[n]`
+  // syndrome of each bit of the frame; bit n of a syndrome stands for the check bit `check_[n]`
   std::vector<std::uint32_t> syndromes_;
   std::vector<bool> is_fixed_;
   std::vector<std::size_t> check_;  // indexes of the check bits in the frame
