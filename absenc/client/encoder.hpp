@@ -119,10 +119,10 @@ class Encoder {
   /// Returns whether the port is open: from `open` until `disconnect`, or until a sample reports the loss of the port.
   [[nodiscard]] bool connected() const;
 
-  /// Returns a reading of the position with all alarms that the encoder can report. A position that a second reading
-  /// did not confirm is marked invalid. Opens a lost port again. Throws EncoderFailure, os::Failure, Cancelled. Throws
-  /// DeadlinePassed if there is no reading at `deadline` (a time of os::now), up to 20 ms and the duration of one
-  /// exchange later.
+  /// Returns a reading of the position with all alarms that the encoder can report. If no second reading confirmed the
+  /// position, its validity is marked as unknown. Opens a lost port again. Throws EncoderFailure, os::Failure,
+  /// Cancelled. Throws DeadlinePassed if there is no reading at `deadline` (a time of os::now), up to 20 ms and the
+  /// duration of one exchange later.
   [[nodiscard]] Reading read(Time deadline = never);
   /// Returns a reading with the alarms: by the command that reads each alarm by name if the unit has one, otherwise by
   /// `read`.

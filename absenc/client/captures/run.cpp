@@ -262,7 +262,8 @@ CaptureOutcome CaptureRun::run_bytes(capture::AnnotationSink& sink, const std::f
   if (settings.channel_count == 2) settings.channels = {Carries::requests, Carries::replies};
   settings.gap = reader_->layout().arrival_gap;
   settings.by_arrival = settings.gap != 0;
-  // a log by arrival times begins with a complete frame, because a program received it
+  // A log by arrival times may begin inside a frame, because its program may have begun to listen during a frame. Other
+  // captures of bytes begin with a complete frame.
   settings.begins_silent = !settings.by_arrival;
   CaptureOutcome outcome;
   std::unique_ptr<capture::Annotator> annotator;

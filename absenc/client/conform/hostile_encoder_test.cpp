@@ -327,7 +327,7 @@ TEST_P(HostileEncoders, KeepNoClauseWithoutEvidence) {
   }
 }
 
-// Checks the encoder with each option value with which it can be read.
+// Checks that the encoder at the address breaks no clause; does nothing if it cannot be read with its options.
 template <class Item>
 void check_good_one(const EncoderAddress& address) {
   if (reply_of<Item>(address).empty()) return;

@@ -128,7 +128,7 @@ class Tester {
     AnswerSink sink;
   };
 
-  // Takes one reading with these options, then listens for a late reply.
+  // Takes one reading with these options; if it fails, listens for a late reply.
   Attempted once(const Options& options, Time listen_for = listening) {
     runner_.set_options(options);
     if (!is_streamed(options)) runner_.start_again();
@@ -166,7 +166,8 @@ class Tester {
   }
   // Returns whether the encoder replies to requests. On clocked and SPI links the host clocks the bits instead.
   [[nodiscard]] bool is_polled() const { return unit_.link != LinkKind::clocked && unit_.link != LinkKind::spi; }
-  // Returns whether the encoder replies to a reading: otherwise a missing reply to another request is no evidence.
+  // Returns whether one of up to three readings gets a good reply: otherwise a missing reply to another request is no
+  // evidence.
   [[nodiscard]] bool answers() {
     for (unsigned i = 0; i < times; ++i) {
       if (once(options_).error == Error::none) return true;

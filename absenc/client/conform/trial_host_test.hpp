@@ -172,7 +172,7 @@ class Host {
     device_.set_faults({});
     if (!flaws_.sends.empty()) send_all();
     for (const Command& command : unit_.commands) {
-      // the command changes an option, so the host would have to change its own options
+      // Skips commands that change an option, because the host would have to change its own options after them.
       const bool moves = !command.changes_option.empty();
       if (all && !moves) run(command, complete_arguments(command, required_arguments(command)));
     }

@@ -107,7 +107,7 @@ TEST(ClientEncoder, SettingsAreReadWrittenAndReadBack) {
   EXPECT_THAT(thrown_by<UsageError>(misspelt), HasSubstr("overheat-threshold"));
 }
 
-// After a change of its rate the encoder is reached at the new rate.
+// After a change of its address the encoder is reached at the new address.
 TEST(ClientEncoder, GoesOnWithTheAddressThatItWasSetTo) {
   Encoder encoder = open("sim:raa38-modbus");
   const std::int64_t address[] = {7};
@@ -253,7 +253,7 @@ TEST(ClientSamples, AreRowsOfNamedValues) {
   EXPECT_EQ(rows.of_gap(Time{}, 12).get<std::uint64_t>("missed"), 12u);
 }
 
-// Two flipped bits of the same weight pass the checksum of T-format, which is an XOR.
+// Two wrong bits at the same place of two bytes pass the checksum of T-Format, which is an exclusive OR of the bytes.
 TEST(ClientEncoder, APositionThatNoShaftReachesIsReadAgain) {
   Encoder encoder = open("sim:tformat?singleturn=1000&fault=corrupt=0.6");
   const std::uint64_t& refused = encoder.counters().errors[static_cast<std::size_t>(Error::cross_check_failed)];

@@ -150,7 +150,8 @@ class Runner {
   /// the unit cannot run the command.
   template <class Use>
   const Conversation<Item>* converse(const Use& use) {
-    // if no request was sent since then, received bytes belong to the command before
+    // If the command before sent no request, the stored exchange is an older one, whose bytes must not be counted
+    // again.
     if (requests_before_ == port_.requests) port_.last.clear();
     requests_before_ = port_.requests;
     received_before_ = port_.last.received.size();

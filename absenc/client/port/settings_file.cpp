@@ -149,8 +149,8 @@ std::size_t end_of_string(std::string_view text, std::size_t at) {
   return text.size();
 }
 
-// Refuses a file with deep nesting, because the library's recursion is as deep; absenc.toml needs only a list in
-// [encoder.NAME]. Throws UsageError.
+// Refuses a file that is nested more than 16 deep, because toml++ calls itself once for each level; absenc.toml needs
+// only a list in [encoder.NAME]. Throws UsageError.
 void check_depth(std::string_view text, const SettingsFileReader& reader) {
   constexpr std::size_t deepest = 16;
   std::size_t brackets = 0;
@@ -240,7 +240,7 @@ std::optional<SettingsFile> load_settings_file() {
       if (type == fs::file_type::not_found || type == fs::file_type::none) {  // none: the link leads to itself
         throw UsageError(fmt::format("{} is a link that leads to no file: correct it or remove it", path));
       }
-      // reading such a file might wait forever for a writer
+      // reading a FIFO or a socket might wait forever for a writer
       if (type == fs::file_type::fifo || type == fs::file_type::socket) {
         throw UsageError(fmt::format("{} is no regular file: write the encoders' names into a file", path));
       }

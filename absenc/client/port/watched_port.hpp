@@ -67,7 +67,7 @@ class WatchedPort final : public Port<Item> {
     port_ = &port;
     rate_ = 0;
   }
-  /// Restores the encoder's rate before a conversation, because an aborted conversation may have left another rate.
+  /// Sets the line back to `rate` before a conversation, because an aborted conversation may have left another rate.
   void return_to(std::uint32_t rate) {
     if (rate_ != 0 && rate_ != rate) begin({.kind = Step<Item>::Kind::configure, .rate = rate});
   }
