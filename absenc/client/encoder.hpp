@@ -176,7 +176,7 @@ class Encoder {
   [[nodiscard]] const Options& options() const;
   /// Returns the settings of the address that describe joint and motor.
   [[nodiscard]] const Joint& joint() const;
-  /// Returns a sentence for each setting of the port that could be better.
+  /// Returns a sentence for each setting of the port that could be better. The encoder must be connected.
   [[nodiscard]] const std::vector<std::string>& notes() const;
   /// Returns the counts of all exchanges: good ones, errors by kind, repeated requests.
   [[nodiscard]] const host::Counters& counters() const;
@@ -238,8 +238,8 @@ class Samples {
   std::unique_ptr<Parts> parts_;
 };
 
-/// Returns a word for the sample: "" for a reading, "lost" or "back" for events of the port, and the name of the error
-/// for a failed attempt.
+/// Returns a word for the sample: "" for a reading ("restarted" if its position starts again) and while the port is
+/// still lost, "lost" or "back" for the other events of the port, and the name of the error for a failed attempt.
 [[nodiscard]] std::string_view event_name(const Sample& sample);
 
 /// Returns the unit of the speed: "rpm", or "mm/s" for a linear encoder.

@@ -18,7 +18,7 @@ struct Flags {
   /// Bits of the flags that were reported; the state of the other flags is unknown.
   std::uint32_t reported = ~std::uint32_t{0};
 
-  /// Returns whether every flag of the field was reported, so that none is unknown.
+  /// Returns whether every flag of the field that has a name and is not optional was reported.
   [[nodiscard]] bool is_complete() const;
 
   /// Returns whether field, raised bits and reported bits are equal.

@@ -17,7 +17,8 @@ namespace absenc::client {
 
 /// File, rate, and length of a recording, and the limits of its parts.
 struct RecordingSettings {
-  /// Path of the file, which ends in .csv, .jsonl or .ndjson (JSON lines), or .h5 (HDF5). The file must not exist yet.
+  /// Path of the file, which ends in .csv, .jsonl or .ndjson (JSON lines), or .h5 or .hdf5 (HDF5). The file must not
+  /// exist yet.
   std::string path;
   std::string encoder;   ///< Name of the encoder, as the header of the file shows it.
   double rate_hz = 100;  ///< Intended number of readings per second; 0: as many as possible.

@@ -64,14 +64,15 @@ using Value = std::variant<std::monostate, std::int64_t, std::uint64_t, double, 
   return value.index() != 0 && !std::holds_alternative<Invalid>(value) && !std::holds_alternative<Unknown>(value);
 }
 
-/// Returns flags as a value; `Unknown` if no flag is raised but the state of some flag was not reported.
+/// Returns flags as a value; `Unknown` if no flag is raised and `Flags::is_complete` is false, so that some flag may be
+/// raised without being reported.
 [[nodiscard]] Value value_of(const Flags& flags);
 /// Returns the validity as a boolean value, true if it is `valid`; no value if the validity is absent, `Unknown` if it
 /// is unknown.
 [[nodiscard]] Value value_of(Validity validity);
 
-/// Returns the value as text, "12.5", "yes", "over_heat battery_alarm" or "1A 00"; "" if there is no value or no flag
-/// is raised.
+/// Returns the value as text, "12.5", "yes", "over_heat battery_alarm" or "1A 00"; "" if the value is missing, invalid
+/// or unknown, or if no flag is raised.
 [[nodiscard]] std::string to_text(const Value& value);
 /// Returns the value of a column as text with its unit: "80 degC".
 [[nodiscard]] std::string to_text(const Column& column, const Value& value);

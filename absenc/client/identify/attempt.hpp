@@ -134,8 +134,8 @@ class Attempt {
     }
   }
 
-  /// Reads the identity of a found encoder with these options and returns it. More requests are allowed than during the
-  /// search.
+  /// Reads the identity of a found encoder with these options and returns it. Runs the unit's commands for the
+  /// identity, if they change nothing and need no argument.
   Introduction introduce(const Options& options) {
     Introduction all;
     IdentitySink identity;
@@ -363,7 +363,7 @@ class Attempt {
   std::vector<std::vector<std::uint8_t>> harmful_;  // beginnings of requests that must not be sent; empty on CAN
   Talk* talk_ = nullptr;
   bool cut_ = false;
-  bool asked_ = false;          // whether a request was sent
+  bool asked_ = false;          // whether a conversation was begun, so that a reply to it may still be on the line
   bool is_unanswered_ = false;  // whether the last request has no reply yet
   Time allowance_{};            // time by which each timeout is extended, because replies were late
 };
