@@ -80,7 +80,7 @@ struct CampaignResult {
   Share older{};
   std::optional<Guarded> guarded{};  ///< Shares of confirmed and wrong positions; without a value unless `rpm` was set.
   /// Computed strength of the frame check. Without a value on CAN, and if the check has more than 16 bits, is not
-  /// linear or covers less than half of the reply, or if replies differ in length.
+  /// linear or covers at most half of the reply, or if replies differ in length.
   std::optional<CheckWorth> worth{};
   double seconds = 0;  ///< Processor time that the whole campaign used, in seconds.
 };

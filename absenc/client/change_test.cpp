@@ -45,7 +45,7 @@ class BreakingPort final : public Port<Item> {
     if (left_ == 0) throw os::Failure(os::Failure::Kind::lost, "the port went away");
     --left_;
   }
-  Link link_;  // owns the port
+  Link link_;  // the link, which owns the port
   Port<Item>& port_;
   std::size_t left_;
 };
@@ -212,7 +212,7 @@ TEST_P(EveryUnit, ReportedChangeMatchesMemoryUnderFaults) {
     const std::string address = fmt::format("sim:{}?singleturn=77", unit.id);
     const Ended good = run(address, command, values);
     for (const std::string_view fault : sim::fault_names) {
-      // Skips this fault on CAN: a CAN controller drops frames whose CRC is wrong.
+      // Skips wrong bits on CAN: a CAN controller drops frames whose CRC is wrong.
       if (unit.link == LinkKind::can && fault.ends_with("corrupt")) continue;
       for (const double rate : {0.1, 0.4, 1.0}) {
         for (unsigned seed = 1; seed <= test_cases(5); ++seed) {

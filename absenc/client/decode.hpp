@@ -36,7 +36,7 @@ struct DecodeChoices {
 /// Columns: `time_s` (`tick` in a capture without times), `end_s` (`end_tick`), `kind` ("exchange", "request", "reply",
 /// "noise"), `request` and `reply` (bytes; text for CAN and clocked links, as "1FF:022B" and "0001"), `turnaround_us`,
 /// `angle_deg` (`position_mm` for linear encoders), then each field of the unit under its name, and `error` with
-/// `message`, which are empty in a good row. A row with an error has only these two, its times and its frames.
+/// `message`, which are empty in a good row. In a row with an error the position and the fields are empty.
 ///
 /// If a reply does not carry the alarms, they come from an earlier reply of the same encoder, until a request is
 /// unanswered or clears alarms. Without such a reply, alarms and the position that depends on them are `Unknown`.

@@ -34,7 +34,8 @@ struct RuleCount {
 struct RequestCounts {
   /// Number of requests that comply with the document, including those for other encoders on the line.
   std::uint64_t good = 0;
-  /// Number of byte runs that are no request, and of damaged characters, received after the first good request.
+  /// Number of byte runs that are no request, and of damaged characters, received after the first good request; while
+  /// there is no good request, of all that were received.
   std::uint64_t bad = 0;
   /// Number of byte runs that are no request, and of damaged characters, received before the first good request; 0
   /// until there is one.

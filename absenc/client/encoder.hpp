@@ -130,8 +130,8 @@ class Encoder {
   /// Returns samples for a loop, which continues after a lost port is back. The loop ends after `count` samples, at the
   /// deadline, or with `cancel`.
   [[nodiscard]] Samples samples(const SampleChoices& choices = {});
-  /// Takes one sample and returns it: reads once, or, while the port is lost, waits a quarter of a second and tries to
-  /// open the port again. Throws os::Interrupted, UsageError, Failure, Cancelled.
+  /// Takes one sample and returns it: reads once, or, while the port is lost, waits up to a quarter of a second and
+  /// tries to open the port again. Throws os::Interrupted, UsageError, Failure, Cancelled.
   Sample next();
 
   /// Runs a command of the unit by name and returns the fields of its result. Arguments that are left out have their

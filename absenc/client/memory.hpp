@@ -86,7 +86,7 @@ class Memory {
   void check_model();
 
   /// Reads the bytes at the addresses of `image` and returns them. Throws UsageError for addresses that cannot be read.
-  /// `dump_addresses` returns an image with all readable addresses.
+  /// `dump_addresses` returns an image with all addresses that a dump contains.
   [[nodiscard]] MemoryImage read(const MemoryImage& image, const MemoryProgress& progress = {});
 
   /// Writes a byte and reads it back. `before` is the byte that is stored now, if it is known.
@@ -123,7 +123,7 @@ class MemoryChange {
   [[nodiscard]] const MemoryImage& differing() const { return differing_; }
   /// Returns the bytes that were written and verified.
   [[nodiscard]] const MemoryImage& written() const { return written_; }
-  /// Returns the wanted bytes that differed and were not written.
+  /// Returns the wanted bytes that differed and were not written, without the byte that `unknown` returns.
   [[nodiscard]] MemoryImage not_written() const;
   /// Returns the state of the last byte that was written; not_sent before the first write.
   [[nodiscard]] ChangeState state() const { return state_; }

@@ -102,8 +102,8 @@ struct Row {
 struct Answer {
   std::vector<Column> columns;  ///< Descriptions of the values, one for each value.
   std::vector<Value> values;    ///< Values in the order of the columns.
-  /// Owners of those column names that are defined by the user's description of a position word; without an owner the
-  /// names would live only as long as the encoder.
+  /// Owners of the column names. Without them, a name from the user's description of a position word would live only as
+  /// long as the encoder.
   std::vector<std::shared_ptr<const std::string>> names;
 
   /// Returns columns and values as a row, which is valid while this object is unchanged.

@@ -112,7 +112,8 @@ class Campaign {
     std::int64_t position;
   };
 
-  // Moves the shaft to a position that it never had before, so that an older position is recognised.
+  // Moves the shaft to a random position of 64 bits, which it hardly had before, so that an older position is
+  // recognised.
   void move() {
     shaft_.position = static_cast<std::int64_t>(bench_.random.next());
     constexpr Time longest = 30s;  // limit of a reply's delay

@@ -129,8 +129,8 @@ WireChannels find_wires(LinkKind link, std::span<const std::string> channels, st
         if (!found.wires[wire] && is_called(wires[wire], channels[i])) found.wires[wire] = i;
       }
     }
-    // If no channel has the name of a wire, the channels are assigned to the wires in order, if there are not more
-    // channels than wires. Not for clocked lines and SPI, where a wrong order would not be noticed.
+    // If no channel has the name of a wire, the channels are assigned to the wires in order, provided that there are
+    // not more channels than wires. Not for clocked lines and SPI.
     const bool any =
         std::any_of(found.wires.begin(), found.wires.end(), [](const auto& one) { return one.has_value(); });
     if (!any && !is_clocked(link) && channels.size() <= wires.size()) {

@@ -15,8 +15,8 @@
 
 namespace absenc::client {
 
-/// Parses the address. If its encoder sends unsolicited frames, selects the first option with which the encoder is
-/// polled.
+/// Parses the address. If its encoder sends unsolicited frames, selects the first value of an option with which the
+/// encoder is polled.
 inline EncoderAddress polled_address(const std::string& text) {
   const EncoderAddress usual = parse_address(text);
   const Unit& unit = *usual.unit;

@@ -21,8 +21,9 @@ namespace absenc::client {
 struct Outcome {
   Error error = Error::none;
   std::string_view detail{};
-  std::string_view advice{};         // advice of the unit on what to try; "": the general advice for the error applies
-  bool aborted = false;              // whether a signal ended the command early, without a change of the encoder
+  std::string_view advice{};  // advice of the unit on what to try; "": the general advice for the error applies
+  // whether a signal ended the command early, after the command had restored the encoder
+  bool aborted = false;
   const Reading* reading = nullptr;  // the reading; null if the command failed or reads no position
   Change change{};                   // state of the change, for a command that changes the encoder; otherwise none
 };

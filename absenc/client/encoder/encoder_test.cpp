@@ -115,7 +115,8 @@ TEST(ClientEncoder, GoesOnWithTheAddressThatItWasSetTo) {
   EXPECT_TRUE(encoder.read().singleturn_valid());
 }
 
-// The new rate must also be used when the port was lost and is opened again.
+// After a change of its rate the encoder is read at the new rate, and its address has the new rate, with which a lost
+// port is opened again.
 TEST(ClientEncoder, GoesOnAtTheRateThatItWasSetTo) {
   for (const bool by_name : {true, false}) {
     Encoder encoder = open("sim:raa38-modbus");

@@ -18,7 +18,8 @@ class Pace {
   explicit Pace(double rate, Time offset = {})
       : period_(rate > 0 ? static_cast<std::int64_t>(1e9 / rate) : 0), next_(os::now() + offset) {}
 
-  /// Returns the next time that is due; with rate 0 a time in the past.
+  /// Returns the next time; if the caller is late, the last time that has passed, and skips those before it. With rate
+  /// 0 returns a time in the past.
   Time next() {
     if (period_ == Time{}) return {};
     next_ += period_;

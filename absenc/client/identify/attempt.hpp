@@ -308,7 +308,8 @@ class Attempt {
     if (exchanges.empty()) return false;
     ++findings_.searches;
     std::vector<Hypothesis> found = capture::find_hypotheses(unit_, known, exchanges);
-    // Polls again if other options explain more replies than those of the request: their requests may be better, too.
+    // Polls again with the likeliest options if they do not explain all replies and need another request, because that
+    // request may get better replies.
     if (!found.empty() && !found.front().evidence.explains_all() &&
         request_of(unit_, found.front().options, read) != request_of(unit_, options, read)) {
       std::vector<ObservedExchange> again;

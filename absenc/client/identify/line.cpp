@@ -289,7 +289,8 @@ class Search {
     }
   }
 
-  // Removes candidates with the same options, and those that only send if an encoder of the same unit replies.
+  // Removes candidates with the same options as a likelier one, and candidates from unsolicited frames if an encoder of
+  // the same unit replies to requests and all its replies are explained.
   void drop_repeated() {
     std::vector<Candidate> kept;
     for (const Candidate& one : findings_.candidates) {

@@ -62,7 +62,7 @@ std::vector<const Unit*> units_of_bytes() {
 }
 
 // Checks the messages about encoders that are set up differently from their host, with each choice of each option: a
-// message names the setting that would help once.
+// message names the setting that would help, and only once.
 TEST(Diagnosis, ASettingThatWouldHelpIsNamedOnce) {
   std::set<std::string> named;
   for (const Unit* unit : units_of_bytes()) {

@@ -143,7 +143,8 @@ std::size_t end_of_string(std::string_view text, std::size_t at) {
     } else if (!lines && (text[i] == quote || text[i] == '\n')) {
       return i;
     } else if (lines && text.substr(i).starts_with(std::string(3, quote))) {
-      return std::min(text.find_first_not_of(quote, i), i + 5) - 1;  // up to two more quotes belong to the string
+      // up to two quotes directly before the closing three belong to the string
+      return std::min(text.find_first_not_of(quote, i), i + 5) - 1;
     }
   }
   return text.size();
@@ -237,7 +238,8 @@ std::optional<SettingsFile> load_settings_file() {
     std::error_code ignored;
     if (fs::symlink_status(path, ignored).type() != fs::file_type::not_found) {
       const fs::file_type type = fs::status(path, ignored).type();
-      if (type == fs::file_type::not_found || type == fs::file_type::none) {  // none: the link leads to itself
+      // type `none`: the symbolic link leads to itself
+      if (type == fs::file_type::not_found || type == fs::file_type::none) {
         throw UsageError(fmt::format("{} is a link that leads to no file: correct it or remove it", path));
       }
       // reading a FIFO or a socket might wait forever for a writer
