@@ -152,7 +152,8 @@ class Tester {
       const std::uint64_t requests = runner_.port().requests - before;
       const std::uint64_t unanswered = std::min(requests, one.unanswered + (was_answered(one) ? 0 : 1));
       readings.requests += requests;
-      // Counts a reply that came after a repeated request as late, not as missing.
+      // If the last reply is late, counts earlier requests without a reply as answered too: their replies were late,
+      // not missing.
       readings.answered += was_answered(one) && one.is_late() ? requests : requests - unanswered;
       readings.good += one.error == Error::none ? std::max<std::uint64_t>(requests, 1) : 0;
       readings.discarded += one.discarded;
