@@ -144,7 +144,7 @@ std::optional<Values> working_values(const Unit& unit, const Command& command) {
   for (const Values& values : candidates) {
     try {
       if (run(address, command, values).change.state == ChangeState::confirmed) return values;
-    } catch (const UsageError&) {  // the command does not exist with these options
+    } catch (const UsageError&) {  // skips options with which the command does not exist
     }
   }
   return std::nullopt;
@@ -221,7 +221,7 @@ TEST_P(EveryUnit, ReportedChangeMatchesMemoryUnderFaults) {
             const Ended ended = run(bad, command, values);
             count(counts, ended);
             require_truth(ended, good, fmt::format("{} {}", bad, command.name));
-          } catch (const UsageError&) {  // this link has no such fault
+          } catch (const UsageError&) {  // skips a fault that the unit's link cannot have
           }
         }
       }

@@ -113,8 +113,8 @@ struct Answer {
 };
 
 /// A sink that collects the fields of a reply into an answer. Fields of an invalid position become `Invalid`; fields of
-/// a position whose validity nobody has reported become `Unknown`. If a field repeats, as in a list, the last value is
-/// stored.
+/// a position whose validity no reply has reported become `Unknown`. If a field repeats, as in a list, the last value
+/// is stored.
 class AnswerSink final : public FieldSink {
  public:
   /// Adds the field as a column with its value.

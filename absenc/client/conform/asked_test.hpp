@@ -41,7 +41,7 @@ inline std::vector<EncoderAddress> variations_of(const Unit& unit) {
       EncoderAddress address = parse_address(text);
       const VirtualDevice device(unit, address.options, address.device);
       all.push_back(std::move(address));
-    } catch (const UsageError&) {  // no such virtual encoder exists
+    } catch (const UsageError&) {  // leaves out a value that no virtual encoder has
     }
   };
   for (const Option& option : unit.options) {

@@ -87,7 +87,7 @@ void check_kept(const EncoderAddress& address, std::set<std::string>& seen) {
       }
       EXPECT_TRUE(broken) << variation_name(address) << ": " << clause.id << "\n" << good.report();
     }
-  } catch (const UsageError&) {  // no host reads with these options
+  } catch (const UsageError&) {  // skips options with which no host can read the encoder
   }
 }
 

@@ -311,7 +311,7 @@ void check(const Unit& unit) {
       check_strangers<Item>(address, choices);
       check_damaged_line<Item>(address, choices);
     } catch (const UsageError&) {
-      EXPECT_FALSE(usual);  // no host reads with these options
+      EXPECT_FALSE(usual);  // only with options other than the defaults may reading be impossible
     }
   }
   std::printf("%s: %zu variations\n", std::string(unit.id).c_str(), variations);

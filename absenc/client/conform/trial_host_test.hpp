@@ -313,7 +313,7 @@ class Host {
   RuleCounter rules_;
   VirtualDevice device_;
   RequestWatch<Item> watch_;
-  std::shared_ptr<ControllerPort> controller_;  // set on clocked and SPI links only
+  std::shared_ptr<ControllerPort> controller_;  // port of the SPI controller; null unless the link is SPI or clocked
   std::shared_ptr<Port<Item>> line_;
   HastyPort<Item> port_;
   std::vector<std::byte> storage_;

@@ -185,7 +185,7 @@ TEST(ClientEncoder, DisconnectedEncoderOpensItsPortForTheNextReading) {
   encoder.disconnect();
   const Sample sample = encoder.next();
   EXPECT_EQ(sample.kind, Sample::Kind::back);
-  EXPECT_EQ(sample.message, "the port is open");  // the port was not lost in between
+  EXPECT_EQ(sample.message, "the port is open");  // a port that `disconnect` closed was not lost
   EXPECT_EQ(encoder.losses(), 0u);
 }
 

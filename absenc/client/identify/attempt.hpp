@@ -45,7 +45,7 @@ struct ScannedAddresses final : FieldSink {
 
 /// Reason why a conversation was aborted.
 enum class TryEnd : std::uint8_t {
-  silent,   // no reply came, or no valid one
+  silent,   // no valid reply arrived in the allowed time
   harmful,  // the next request would be a changing command for an encoder of another protocol
 };
 
@@ -175,7 +175,7 @@ class Attempt {
     }
     if (step.answer != Time{}) step.answer += allowance_;
     talk.patience.see(step, now);
-    if constexpr (!is_can) {  // skipped on CAN, where identifiers distinguish nodes
+    if constexpr (!is_can) {  // CAN needs no check for harmful requests: identifiers distinguish nodes
       if (step.kind == Kind::transfer && begins_harmful(step.out)) throw TryEnd::harmful;
     }
   }

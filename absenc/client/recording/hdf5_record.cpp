@@ -134,7 +134,7 @@ class Hdf5Record final : public RecordFile {
   }
 
   os::BlockFile file_;
-  Hdf5Table table_;  // used only by the writing thread
+  Hdf5Table table_;  // table in the file; only the writing thread uses it
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;
   Hdf5Rows rows_;        // rows that wait to be written
