@@ -14,7 +14,7 @@
 
 namespace absenc::client {
 
-/// A fault of the line, or of the bytes that the encoder sends.
+/// A kind of fault that a campaign injects: into the line, into the encoder's replies or into the host's requests.
 struct LineFault {
   std::string_view name;     ///< Name of the fault, as `--fault` takes it.
   std::string_view meaning;  ///< What the fault does to the line, as a phrase.
@@ -72,18 +72,21 @@ struct CampaignResult {
   Share given_up{};             ///< Share of readings that ended with an error after all attempts.
   Share recovered{};            ///< Share of readings that succeeded after a failed attempt.
   Share wrong{};                ///< Share of exchanges that returned a position which the shaft did not have.
-  /// Share of exchanges in which a damaged request changed the encoder; a fresh encoder replaced it afterwards.
+  /// Share of exchanges (with `rpm`: of readings) after which a damaged request had changed the encoder for good; the
+  /// campaign then continues with a fresh encoder.
   Share changed{};
-  /// Share of exchanges that returned an earlier position of the shaft, from a frame sent before the request.
+  /// Share of exchanges that returned an earlier position of the shaft, taken from a frame that was sent before the
+  /// request.
   Share older{};
   std::optional<Guarded> guarded{};  ///< Shares of confirmed and wrong positions; without a value unless `rpm` was set.
-  /// Computed strength of the frame check; without a value if the check has more than 16 bits or is not linear, and on
-  /// CAN.
+  /// Computed strength of the frame check. Without a value on CAN, and if the check has more than 16 bits, is not
+  /// linear or covers at most half of the reply, or if replies differ in length.
   std::optional<CheckWorth> worth{};
   double seconds = 0;  ///< Processor time that the whole campaign used, in seconds.
 };
 
-/// Runs a campaign on one core. Throws UsageError for unknown names and for rates outside 0 to 1.
+/// Runs a campaign on one core. Throws UsageError for unknown names, for rates outside 0 to 1, and for options with
+/// which the unit has no virtual encoder.
 [[nodiscard]] CampaignResult campaign(std::string_view protocol, const CampaignChoices& choices = {});
 
 }  // namespace absenc::client

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reports whether a command changed its encoder: not sent, confirmed, refused or unknown. Programs compare the word of
-// the state, people read its sentence, and every exception of such a command carries it.
+// Reports whether a command changed its encoder: not sent, confirmed, refused or unknown. Programs compare the state's
+// word, people read its sentence. Every exception of a command that changes the encoder carries the state.
 #pragma once
 
 #include <cstdint>
@@ -39,19 +39,20 @@ struct Change {
   [[nodiscard]] std::string text() const;
 };
 
-/// Returns `what`, the text of a failure, followed by the sentence of the change on a line of its own.
+/// Returns `what`, the text of a failure, followed by the sentence of the change on a line of its own; only `what` for
+/// the state `none`.
 [[nodiscard]] std::string with_change(std::string_view what, const Change& change);
 
-/// The part of an exception that carries the state of a change.
+/// Base class of exceptions that carry the state of a change.
 struct Changing {
-  /// Carries `what_became`, the change and its state.
+  /// Makes the part of an exception that carries `what_became`, the change and its state.
   explicit Changing(Change what_became) : change(std::move(what_became)) {}
   virtual ~Changing() = default;
   Change change;  ///< The change and its state when the exception was thrown.
 };
 
-/// An exception of a command that changes the encoder: `Base` with the state of the change. Handlers of `Base` catch
-/// it.
+/// An exception of a command that changes the encoder: an exception of type `Base` with the state of the change.
+/// Handlers of `Base` catch it.
 template <class Base>
 class OfChange final : public Base, public Changing {
  public:
@@ -68,15 +69,15 @@ class OfChange final : public Base, public Changing {
   std::string text_;
 };
 
-/// Returns the change that the exception carries; null if it carries none.
+/// Returns the change that the exception carries; null if it carries none, or one with the state `none`.
 [[nodiscard]] const Change* change_of(const std::exception& failure);
 
-/// Throws the exception that is being handled again, with `change` added unless it already carries one. Call this only
-/// in a catch block.
+/// Throws the exception that is being handled again, with `change` added unless the exception already carries a change
+/// or has a type that carries none. Call this only in a catch block.
 [[noreturn]] void rethrow_with(const Change& change);
 
-/// Runs `work`, which sends nothing that changes the encoder, and returns its result. Marks its exceptions as
-/// `not_sent`.
+/// Runs `work`, which sends nothing that changes the encoder, and returns its result. Adds the state `not_sent` to
+/// exceptions of `work`.
 template <class Work>
 auto before_change(const Work& work) {
   try {

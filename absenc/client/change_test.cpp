@@ -45,7 +45,7 @@ class BreakingPort final : public Port<Item> {
     if (left_ == 0) throw os::Failure(os::Failure::Kind::lost, "the port went away");
     --left_;
   }
-  Link link_;  // owns the port
+  Link link_;  // the link, which owns the port
   Port<Item>& port_;
   std::size_t left_;
 };
@@ -78,8 +78,8 @@ Stored stored(VirtualDevice& device) {
   return one.bytes != nullptr ? of(one.bytes->memory()) : of(one.frames->memory());
 }
 
-/// Runs a command on a virtual encoder and returns its end. The port fails after `steps` steps; without `steps` the
-/// port does not fail.
+/// Runs a command on a virtual encoder and returns how it ended. The port fails after `steps` steps; without `steps`
+/// the port does not fail.
 Ended run(const std::string& address, const Command& command, const Values& values,
           std::optional<std::size_t> steps = {}) {
   VirtualDevice* device = nullptr;
@@ -144,7 +144,7 @@ std::optional<Values> working_values(const Unit& unit, const Command& command) {
   for (const Values& values : candidates) {
     try {
       if (run(address, command, values).change.state == ChangeState::confirmed) return values;
-    } catch (const UsageError&) {  // the command does not exist with these options
+    } catch (const UsageError&) {  // skips options with which the command does not exist
     }
   }
   return std::nullopt;
@@ -171,7 +171,7 @@ void require_truth(const Ended& ended, const Ended& good, const std::string& wha
   }
 }
 
-// Returns the number of steps that the command takes at the port until it ends well.
+// Returns the smallest number of steps at the port with which the command ends without an exception.
 std::size_t steps_of(const std::string& address, const Command& command, const Values& values) {
   std::size_t most = 64;
   while (run(address, command, values, most).thrown) most *= 2;
@@ -212,7 +212,7 @@ TEST_P(EveryUnit, ReportedChangeMatchesMemoryUnderFaults) {
     const std::string address = fmt::format("sim:{}?singleturn=77", unit.id);
     const Ended good = run(address, command, values);
     for (const std::string_view fault : sim::fault_names) {
-      // Skips this fault on CAN: a CAN controller drops frames whose CRC is wrong.
+      // Skips wrong bits on CAN: a CAN controller drops frames whose CRC is wrong.
       if (unit.link == LinkKind::can && fault.ends_with("corrupt")) continue;
       for (const double rate : {0.1, 0.4, 1.0}) {
         for (unsigned seed = 1; seed <= test_cases(5); ++seed) {
@@ -221,7 +221,7 @@ TEST_P(EveryUnit, ReportedChangeMatchesMemoryUnderFaults) {
             const Ended ended = run(bad, command, values);
             count(counts, ended);
             require_truth(ended, good, fmt::format("{} {}", bad, command.name));
-          } catch (const UsageError&) {  // this link has no such fault
+          } catch (const UsageError&) {  // skips a fault that the unit's link cannot have
           }
         }
       }
@@ -237,7 +237,7 @@ TEST_P(EveryUnit, ReportedChangeMatchesMemoryAfterPortLoss) {
     const Ended good = run(address, command, values);
     Counts of_command{};
     const std::size_t all = steps_of(address, command, values);
-    // Tests each of the last steps, in which the change occurs, and some of the earlier ones.
+    // Lets the port fail after each of the last steps, in which the change occurs, and after some of the earlier ones.
     const std::size_t each = test_cases(60);
     const std::size_t last = all > each ? all - each : 0;
     for (std::size_t steps = 0; steps < all; steps = steps < last ? std::min(steps + 1 + all / 12, last) : steps + 1) {

@@ -19,7 +19,7 @@ enum class Verdict : std::uint8_t {
   untested,  ///< the tested behaviour was not observed
 };
 
-/// Result of the test of one clause of a document.
+/// Result of the test of one clause, a requirement of a document.
 struct ClauseResult {
   std::string_view id{};         ///< Identifier of the clause, as "crc".
   std::string_view document{};   ///< Name of the document that contains the clause.
@@ -29,7 +29,7 @@ struct ClauseResult {
   std::string evidence{};        ///< What was observed and how often; if the clause is untested, the reason.
 };
 
-/// Results of all clauses of a unit that were tested.
+/// Results of the tests of a unit's clauses.
 struct Conformance {
   std::string protocol{};               ///< Identifier of the unit.
   std::vector<ClauseResult> clauses{};  ///< Results in the order of the unit's clauses.
@@ -64,7 +64,7 @@ struct ConformChoices {
 /// Returns the verdict as a word: "kept", "broken" or "untested".
 [[nodiscard]] std::string_view name_of(Verdict verdict);
 
-/// Tests the encoder of an address and returns the results. Writes to the encoder only with `changes`. `text` and
+/// Tests the encoder of an address and returns the results. Changes the encoder only with `changes`. `text` and
 /// `settings` are those of `open`. Restores changed values before it throws UsageError, Cancelled or an exception of
 /// the port. If it cannot restore them, it throws a Failure whose text contains the commands that do.
 [[nodiscard]] Conformance conform(std::string_view text, std::span<const std::string> settings = {},

@@ -23,8 +23,9 @@ struct ConformHostChoices {
 };
 
 /// Tests a host and returns the results. Suppresses replies for a while and damages others; the host must continue with
-/// its requests. Ends when the number of answered requests or the silence of the host reaches its limit. `text` and
-/// `place` are those of `emulate`. Throws UsageError, os::Interrupted and exceptions of the port.
+/// its requests. Ends when the number of answered requests or the silence of the host reaches its limit, or when `over`
+/// returns true. `text` and `place` are those of `emulate`. Throws UsageError, os::Interrupted and exceptions of the
+/// port.
 [[nodiscard]] Conformance conform_host(std::string_view text, const EmulateChoices& place = {},
                                        const ConformHostChoices& choices = {});
 

@@ -16,8 +16,8 @@
 
 namespace absenc::client {
 
-/// Properties of a capture and of the encoder in it. A property that is not set is detected in the capture, or is the
-/// protocol's default.
+/// Properties of a capture and of the encoder in it. A property that is not set is detected in the capture, or has its
+/// default.
 struct DecodeChoices {
   /// Channels of the wires, as "D0" or "clock=D0"; one entry may hold several, separated by commas.
   std::vector<std::string> channels{};
@@ -36,7 +36,7 @@ struct DecodeChoices {
 /// Columns: `time_s` (`tick` in a capture without times), `end_s` (`end_tick`), `kind` ("exchange", "request", "reply",
 /// "noise"), `request` and `reply` (bytes; text for CAN and clocked links, as "1FF:022B" and "0001"), `turnaround_us`,
 /// `angle_deg` (`position_mm` for linear encoders), then each field of the unit under its name, and `error` with
-/// `message`, which are empty in a good row. A row with an error has only these two, its times and its frames.
+/// `message`, which are empty in a good row. In a row with an error the position and the fields are empty.
 ///
 /// If a reply does not carry the alarms, they come from an earlier reply of the same encoder, until a request is
 /// unanswered or clears alarms. Without such a reply, alarms and the position that depends on them are `Unknown`.
@@ -65,7 +65,7 @@ class Decoded {
   [[nodiscard]] const Row* current() const { return row_; }
   /// Moves to the next row, and waits until it is decoded.
   void advance();
-  /// Cancels from any thread: a caller that waits for a row, now or later, gets Cancelled.
+  /// Cancels from any thread: a caller that waits for a row, now or later, gets the exception Cancelled.
   void cancel();
 
   /// Returns the columns of each row, in their order.

@@ -17,7 +17,7 @@ namespace absenc::client {
 /// Port on which programs reach the virtual encoder.
 struct EmulateChoices {
   std::string link{};  ///< Path of a symbolic link to the pseudo-terminal; "": no link.
-  /// TCP port of 127.0.0.1 on which the encoder also listens; 0: a free port; without a value: none.
+  /// TCP port of 127.0.0.1 on which the encoder also listens; 0: the system chooses a free port; without a value: none.
   std::optional<std::uint16_t> tcp{};
   /// Network interface of a CAN encoder, as "can0"; "": the encoder is on an emulated slcan adapter.
   std::string can{};
@@ -30,11 +30,12 @@ struct RuleCount {
   std::uint64_t broken = 0;  ///< Number of times that the host broke the rule.
 };
 
-/// Counts of requests that the virtual encoder received. CAN frames for other nodes are not counted.
+/// Counts of requests that the virtual encoder received. CAN frames for other devices are not counted.
 struct RequestCounts {
   /// Number of requests that comply with the document, including those for other encoders on the line.
   std::uint64_t good = 0;
-  /// Number of byte runs that are no request, and of damaged characters, received after the first good request.
+  /// Number of byte runs that are no request, and of damaged characters, received after the first good request; while
+  /// there is no good request, of all that were received.
   std::uint64_t bad = 0;
   /// Number of byte runs that are no request, and of damaged characters, received before the first good request; 0
   /// until there is one.

@@ -52,14 +52,16 @@ struct Sample {
   Kind kind = Kind::absent;  ///< Whether this sample holds a reading, a failure or an event.
   Time at{};                 ///< Time at which the reading was latched, or at which the event occurred.
   Reading reading{};         ///< The reading; default-constructed if `kind` is not `reading`.
-  /// Whether a second reading confirmed the position: the shaft can have moved from one to the other.
+  /// Whether a second reading confirmed the position, because the shaft can have moved from one to the other in the
+  /// time between them.
   bool confirmed = false;
-  /// Whether the position was valid but no second reading confirmed it. It is then marked invalid.
+  /// Whether the position was valid but no second reading confirmed it. `reading` then marks the position as unknown.
   bool doubtful = false;
   bool position_valid = false;  ///< Whether `position` is valid.
   /// Position in counts, continued past the end of the encoder's counter; see `position_valid`.
   std::int64_t position = 0;
-  /// Whether `position` starts again, because the position jumped or the distance since the last reading is unknown.
+  /// Whether `position` starts again at this sample, because the position jumped or the distance since the last reading
+  /// is unknown.
   bool restarted = false;
   /// Whether `speed` is valid: the times of the two positions must determine it closely enough.
   bool speed_valid = false;
@@ -85,7 +87,7 @@ struct Sample {
   /// Returns the speed of a linear encoder in mm/s; nothing for a rotary encoder or if the speed is invalid.
   [[nodiscard]] std::optional<Estimate> speed_mm_s() const;
 
-  /// Returns the text of the failure or of the event; "" for a reading without an event.
+  /// Returns the text of the failure, or of the event; "" if the sample has neither.
   [[nodiscard]] std::string text() const { return kind == Kind::failed ? trouble.text() : message; }
 };
 
@@ -101,7 +103,7 @@ class Samples;
 /// An open encoder. One thread at a time may use it; only `cancel` may be called from another thread.
 class Encoder {
  public:
-  /// Connection and state of an encoder, for the library itself only.
+  /// Connection and state of an encoder; for the library itself only.
   struct Parts;
 
   /// Moves the encoder; afterwards the other object may only be destroyed or assigned to.
@@ -117,10 +119,10 @@ class Encoder {
   /// Returns whether the port is open: from `open` until `disconnect`, or until a sample reports the loss of the port.
   [[nodiscard]] bool connected() const;
 
-  /// Returns a reading of the position with all alarms that the encoder can report. A position that a second reading
-  /// did not confirm is marked invalid. Opens a lost port again. Throws EncoderFailure, os::Failure, Cancelled. Throws
-  /// DeadlinePassed if there is no reading at `deadline` (a time of os::now), up to 20 ms and the duration of one
-  /// exchange later.
+  /// Returns a reading of the position with all alarms that the encoder can report. If no second reading confirmed the
+  /// position, its validity is marked as unknown. Opens a lost port again. Throws EncoderFailure, os::Failure,
+  /// Cancelled. Throws DeadlinePassed if there is no reading at `deadline` (a time of os::now), up to 20 ms and the
+  /// duration of one exchange later.
   [[nodiscard]] Reading read(Time deadline = never);
   /// Returns a reading with the alarms: by the command that reads each alarm by name if the unit has one, otherwise by
   /// `read`.
@@ -128,8 +130,8 @@ class Encoder {
   /// Returns samples for a loop, which continues after a lost port is back. The loop ends after `count` samples, at the
   /// deadline, or with `cancel`.
   [[nodiscard]] Samples samples(const SampleChoices& choices = {});
-  /// Takes one sample and returns it: reads once, or, while the port is lost, waits a quarter of a second and tries to
-  /// open the port again. Throws os::Interrupted, UsageError, Failure, Cancelled.
+  /// Takes one sample and returns it: reads once, or, while the port is lost, waits up to a quarter of a second and
+  /// tries to open the port again. Throws os::Interrupted, UsageError, Failure, Cancelled.
   Sample next();
 
   /// Runs a command of the unit by name and returns the fields of its result. Arguments that are left out have their
@@ -149,8 +151,8 @@ class Encoder {
   /// used.
   [[nodiscard]] Settings settings() { return Settings(*this); }
 
-  /// Cancels from any thread: every wait, now or later, ends with Cancelled; a loop over samples ends without an
-  /// exception.
+  /// Cancels from any thread: every wait, now or later, ends with the exception Cancelled; a loop over samples ends
+  /// without an exception.
   void cancel();
   /// Withdraws `cancel`, so that the encoder can be used again.
   void resume();
@@ -163,7 +165,7 @@ class Encoder {
   /// state (change.hpp).
   [[nodiscard]] const Change& change() const;
 
-  /// Starts the continued position again at the next reading; for use after a command that moves the zero.
+  /// Makes the continued position start again at the next reading; call it after a command that moves the zero.
   void forget_position();
 
   /// Returns protocol and port of the address, without settings: "tformat:/dev/ttyUSB0".
@@ -174,7 +176,7 @@ class Encoder {
   [[nodiscard]] const Options& options() const;
   /// Returns the settings of the address that describe joint and motor.
   [[nodiscard]] const Joint& joint() const;
-  /// Returns a sentence for each setting of the port that could be better.
+  /// Returns a sentence for each setting of the port that could be better. The encoder must be connected.
   [[nodiscard]] const std::vector<std::string>& notes() const;
   /// Returns the counts of all exchanges: good ones, errors by kind, repeated requests.
   [[nodiscard]] const host::Counters& counters() const;
@@ -236,8 +238,8 @@ class Samples {
   std::unique_ptr<Parts> parts_;
 };
 
-/// Returns a word for the sample: "" for a reading, "lost" or "back" for events of the port, and the name of the error
-/// for a failed attempt.
+/// Returns a word for the sample: "" for a reading ("restarted" if its position starts again) and while the port is
+/// still lost, "lost" or "back" for the other events of the port, and the name of the error for a failed attempt.
 [[nodiscard]] std::string_view event_name(const Sample& sample);
 
 /// Returns the unit of the speed: "rpm", or "mm/s" for a linear encoder.

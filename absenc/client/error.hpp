@@ -9,20 +9,21 @@
 
 namespace absenc::client {
 
-/// The caller requested something impossible. The text is a sentence that names the wrong value and its place.
+/// Exception: the caller requested something impossible. The text is a sentence that names the wrong value and its
+/// place.
 struct UsageError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// A file or a well-formed reply has unexpected content. The text is a sentence that states the problem.
+/// Exception: a file or a well-formed reply has unexpected content. The text is a sentence that states the problem.
 struct Failure : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Another thread or a callback cancelled the operation.
+/// Exception: another thread or a callback cancelled the operation.
 using Cancelled = os::Ended;
 
-/// The operation did not end before the caller's deadline.
+/// Exception: the operation did not end before the caller's deadline.
 struct DeadlinePassed : Cancelled {
   /// Returns a sentence about the deadline.
   [[nodiscard]] const char* what() const noexcept override { return "the deadline passed before there was a reading"; }

@@ -50,8 +50,8 @@ struct IdentifyChoices {
 /// "spi:/dev/spidev0.0", "can0". Throws os::Failure, UsageError, os::Interrupted.
 [[nodiscard]] Identified identify(std::string_view place, const IdentifyChoices& choices = {});
 
-/// Returns the encoders that explain the frames of a capture. The model and options of `choices` limit the search.
-/// Throws UsageError, Failure.
+/// Returns the encoders that explain the frames of the capture in the file `path`. `choices` must contain neither a
+/// model nor options, because these are searched for. Throws UsageError, Failure.
 [[nodiscard]] Identified identify_capture(const std::string& path, const DecodeChoices& choices = {});
 
 }  // namespace absenc::client

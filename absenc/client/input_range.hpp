@@ -17,7 +17,7 @@ class InputIterator {
   /// Type that an iterator must declare; no function returns a distance.
   using difference_type = std::ptrdiff_t;
 
-  /// Points to the current item of `range`.
+  /// Makes an iterator that points to the current value of `range`, which must outlive it.
   explicit InputIterator(Range& range) : range_(&range) {}
   /// Returns a reference to the current value.
   const value_type& operator*() const { return *range_->current(); }
@@ -28,7 +28,7 @@ class InputIterator {
     range_->advance();
     return *this;
   }
-  /// Moves the range to its next value.
+  /// Moves the range to its next value. Returns nothing, because the range can be read only once.
   void operator++(int) { range_->advance(); }
   /// Returns whether the range has no further value.
   bool operator==(End) const { return range_->current() == nullptr; }

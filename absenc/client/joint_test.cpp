@@ -47,7 +47,7 @@ TEST(Joint, ElectricalAngleIsFrom0ToBelow360) {
   EXPECT_DOUBLE_EQ(electrical_degrees(linear, 5 + 24 * 1000), 0);
 }
 
-/// Compares the angles of samples with those computed from the encoder's continued position.
+/// Compares the joint and motor angles of samples with angles that are computed from the encoder's continued position.
 void expect_angles(const std::string& address, double direction, double offset, double gear, double pole_pairs) {
   Encoder encoder = open(address);
   double first = 0;
@@ -91,7 +91,7 @@ TEST(Joint, IsUnknownWithoutTurns) {
   EXPECT_FALSE(open(single + "&gear=2").samples({.count = 1}).begin()->angles.joint_deg.has_value());
   EXPECT_TRUE(open(single + "&gear=1").samples({.count = 1}).begin()->angles.joint_deg.has_value());
   EXPECT_TRUE(open(single + "&gear=2&pole_pairs=3").samples({.count = 1}).begin()->angles.electrical_deg.has_value());
-  // This alarm makes the turns of the encoder invalid.
+  // The alarm battery_error makes the turns of the encoder invalid.
   const std::string lost = "sim:tformat?multiturn=5&gear=2&alarm=battery_error";
   EXPECT_FALSE(open(lost).samples({.count = 1}).begin()->angles.joint_deg.has_value());
 }

@@ -19,9 +19,9 @@ namespace absenc::client {
 struct MemoryAddress {
   std::uint32_t page = 0;     ///< Number of the page; 0 if the memory has no pages.
   std::uint32_t address = 0;  ///< Address within the page.
-  /// Returns whether both are the same page and address.
+  /// Returns whether two places have the same page and address.
   friend constexpr bool operator==(const MemoryAddress&, const MemoryAddress&) = default;
-  /// Compares by page, then by address.
+  /// Returns whether `one` is before `other`, by page, then by address.
   friend constexpr bool operator<(const MemoryAddress& one, const MemoryAddress& other) {
     return one.page != other.page ? one.page < other.page : one.address < other.address;
   }
@@ -42,7 +42,7 @@ struct MemoryRun {
 /// Returns all addresses that a dump of the unit's memory contains, each with the value 0.
 [[nodiscard]] MemoryImage dump_addresses(const Unit& unit);
 
-/// Returns the bytes of `wanted` that are missing or different in `found`.
+/// Returns the bytes of `wanted`, with their addresses, that are missing or different in `found`.
 [[nodiscard]] MemoryImage differing(const MemoryImage& wanted, const MemoryImage& found);
 
 /// Returns the address in words: "page 2 address 0x05", or "address 0x05" for a memory without pages.
@@ -85,8 +85,8 @@ class Memory {
   /// model and would accept the bytes. Does nothing if the unit cannot read positions.
   void check_model();
 
-  /// Reads the bytes at the addresses of `image` and returns them; dump_addresses returns all readable addresses.
-  /// Throws UsageError for addresses that cannot be read.
+  /// Reads the bytes at the addresses of `image` and returns them. Throws UsageError for addresses that cannot be read.
+  /// `dump_addresses` returns an image with all addresses that a dump contains.
   [[nodiscard]] MemoryImage read(const MemoryImage& image, const MemoryProgress& progress = {});
 
   /// Writes a byte and reads it back. `before` is the byte that is stored now, if it is known.
@@ -123,7 +123,7 @@ class MemoryChange {
   [[nodiscard]] const MemoryImage& differing() const { return differing_; }
   /// Returns the bytes that were written and verified.
   [[nodiscard]] const MemoryImage& written() const { return written_; }
-  /// Returns the wanted bytes that differed and were not written.
+  /// Returns the wanted bytes that differed and were not written, without the byte that `unknown` returns.
   [[nodiscard]] MemoryImage not_written() const;
   /// Returns the state of the last byte that was written; not_sent before the first write.
   [[nodiscard]] ChangeState state() const { return state_; }

@@ -18,7 +18,7 @@ struct Flags {
   /// Bits of the flags that were reported; the state of the other flags is unknown.
   std::uint32_t reported = ~std::uint32_t{0};
 
-  /// Returns whether each flag of the field was reported.
+  /// Returns whether every flag of the field that has a name and is not optional was reported.
   [[nodiscard]] bool is_complete() const;
 
   /// Returns whether field, raised bits and reported bits are equal.
@@ -37,8 +37,8 @@ struct Flags {
 /// them. Returns nothing if the unit has no alarms.
 [[nodiscard]] std::optional<Flags> joined_alarms(const Unit& unit, const Reading& reading);
 
-/// Returns the reading. If `confirmed` is false, no second reading confirmed its position, so the validity of the
-/// position becomes unknown.
+/// Returns the reading unchanged if `confirmed` is true. If no second reading confirmed its position, marks the
+/// validity of the position as unknown.
 [[nodiscard]] Reading checked(Reading reading, bool confirmed);
 
 }  // namespace absenc::client

@@ -9,8 +9,8 @@
 
 namespace absenc::client {
 
-/// The columns of position, turns and flags. A unit with two channels has columns of flags for each channel, and
-/// `alarms` with the alarms of both.
+/// The columns of position, turns and flags in a row. A unit with two channels has columns of flags for each channel,
+/// and the column `alarms` with the alarms of both channels.
 class ReadingColumns {
  public:
   /// Makes the columns for the unit with these options. `unit` must outlive this object.
@@ -18,9 +18,9 @@ class ReadingColumns {
 
   /// Returns the columns, in the order in which `fill` writes their values.
   [[nodiscard]] std::span<const Column> columns() const { return columns_; }
-  /// Writes the reading into `values`, one value for each column. A value that the reading does not have stays empty.
-  /// An invalid position in degrees or millimetres becomes `Invalid`; flags that no reply has reported become
-  /// `Unknown`.
+  /// Writes the reading into `values`, one value for each column. A value that the reading does not have stays empty. A
+  /// position in degrees or millimetres becomes `Invalid` unless it is known to be valid; flags that no reply has
+  /// reported become `Unknown`.
   void fill(const Reading& reading, std::span<Value> values) const;
 
  private:

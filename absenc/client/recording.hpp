@@ -17,11 +17,13 @@ namespace absenc::client {
 
 /// File, rate, and length of a recording, and the limits of its parts.
 struct RecordingSettings {
-  /// Path of the file, which ends in .csv, .jsonl or .ndjson (JSON lines), or .h5 (HDF5). The file must not exist yet.
+  /// Path of the file, which ends in .csv, .jsonl or .ndjson (JSON lines), or .h5 or .hdf5 (HDF5). The file must not
+  /// exist yet.
   std::string path;
   std::string encoder;   ///< Name of the encoder, as the header of the file shows it.
   double rate_hz = 100;  ///< Intended number of readings per second; 0: as many as possible.
-  /// Selects the readings to write: every Nth, and each whose alarms differ from the reading before.
+  /// Writes only every Nth reading, and also each reading whose alarms differ from those of the reading before. 1:
+  /// writes all.
   std::uint64_t every = 1;
   std::uint64_t count = 0;         ///< Number of written readings after which the recording ends; 0: no limit.
   std::optional<Time> duration{};  ///< Time after which the recording ends; without a value: no limit.
@@ -50,7 +52,7 @@ class Recording {
   [[nodiscard]] RecordCounts counts() const;
   /// Returns the number of bytes that were written to all files so far.
   [[nodiscard]] std::uint64_t bytes() const;
-  /// Returns the time at which the recording began, by os::now.
+  /// Returns the time of os::now at which the recording began.
   [[nodiscard]] Time start() const;
   /// Returns the path of the file, or the paths of the parts so far, in their order.
   [[nodiscard]] std::vector<std::string> paths() const;

@@ -38,7 +38,7 @@ struct Column {
   Presentation presentation{};  ///< How people see the value.
 };
 
-/// Type of a value that consists of bytes.
+/// Type of a value that is a sequence of bytes.
 using ByteVector = std::vector<std::uint8_t>;
 
 /// Alternative of `Value` for a value that the encoder reported as invalid. The value itself is not stored.
@@ -64,13 +64,15 @@ using Value = std::variant<std::monostate, std::int64_t, std::uint64_t, double, 
   return value.index() != 0 && !std::holds_alternative<Invalid>(value) && !std::holds_alternative<Unknown>(value);
 }
 
-/// Returns flags as a value; `Unknown` if no flag is raised and not every flag was reported.
+/// Returns flags as a value; `Unknown` if no flag is raised and `Flags::is_complete` is false, so that some flag may be
+/// raised without being reported.
 [[nodiscard]] Value value_of(const Flags& flags);
-/// Returns whether the validity is `valid`, as a boolean value; no value if it is absent, `Unknown` if it is unknown.
+/// Returns the validity as a boolean value, true if it is `valid`; no value if the validity is absent, `Unknown` if it
+/// is unknown.
 [[nodiscard]] Value value_of(Validity validity);
 
-/// Returns the value as text, "12.5", "yes", "over_heat battery_alarm" or "1A 00"; "" if there is no value or no flag
-/// is raised.
+/// Returns the value as text, "12.5", "yes", "over_heat battery_alarm" or "1A 00"; "" if the value is missing, invalid
+/// or unknown, or if no flag is raised.
 [[nodiscard]] std::string to_text(const Value& value);
 /// Returns the value of a column as text with its unit: "80 degC".
 [[nodiscard]] std::string to_text(const Column& column, const Value& value);
@@ -91,17 +93,17 @@ struct Row {
   }
 };
 
-/// Returns the description of a field as a column of a row.
+/// Returns a field's description as the column of a row.
 [[nodiscard]] Column column_of(const FieldInfo& field);
-/// Returns the value of a field as a value for a row.
+/// Returns the value of a decoded field as a value for a row.
 [[nodiscard]] Value value_of(const FieldValue& value);
 
 /// Result of a command: a row that owns its columns.
 struct Answer {
   std::vector<Column> columns;  ///< Descriptions of the values, one for each value.
   std::vector<Value> values;    ///< Values in the order of the columns.
-  /// Owners of column names that come from a described position word; such names would otherwise live only as long as
-  /// the encoder.
+  /// Owners of the column names. Without them, a name from the user's description of a position word would live only as
+  /// long as the encoder.
   std::vector<std::shared_ptr<const std::string>> names;
 
   /// Returns columns and values as a row, which is valid while this object is unchanged.
@@ -111,8 +113,8 @@ struct Answer {
 };
 
 /// A sink that collects the fields of a reply into an answer. Fields of an invalid position become `Invalid`; fields of
-/// a position whose validity nobody has reported become `Unknown`. If a field repeats, as in a list, the last value is
-/// stored.
+/// a position whose validity no reply has reported become `Unknown`. If a field repeats, as in a list, the last value
+/// is stored.
 class AnswerSink final : public FieldSink {
  public:
   /// Adds the field as a column with its value.

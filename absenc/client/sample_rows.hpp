@@ -50,7 +50,7 @@ class SampleRows {
   Joint joint_;
   ReadingColumns reading_;
   std::vector<Column> columns_;
-  // Index of each column in a row; 0 for a column that these rows do not have.
+  // Index of each column in a row; 0 for a column that the rows do not have.
   std::size_t protocol_, reading_at_, confirmed_, ok_;
   std::size_t motion_ = 0;  // index of the first motion column; 0: no such columns
   std::size_t missed_ = 0;

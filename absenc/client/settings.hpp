@@ -14,7 +14,7 @@
 
 namespace absenc::client {
 
-/// A setting, as the commands that write and read it.
+/// A setting, with the commands that write and read it.
 struct Setting {
   const Command* setter;  ///< Command that writes the setting; null: the setting can only be read.
   const Command* getter;  ///< Command that reads the setting; null: the setting can only be written.
@@ -35,7 +35,7 @@ struct Setting {
 /// it suggests the nearest name.
 [[nodiscard]] const Command& require_readable_setting(const Unit& unit, std::string_view name);
 /// Returns the setting `name`, which can be written. Throws UsageError if the setting can only be read, or if there is
-/// none of this name; only then it suggests the nearest name.
+/// no setting of this name; in the second case the text suggests the nearest name.
 [[nodiscard]] Setting require_setting(const Unit& unit, std::string_view name);
 
 /// Result of writing a setting.

@@ -26,8 +26,8 @@ struct TapChoices {
 };
 
 /// An input range of rows with the columns of `Decoded`, one for each exchange on the line. Rows are ordered by the end
-/// of their frames and available as soon as their last frame is complete. Bytes that arrive between two calls are
-/// stored. `time_s` is the time of arrival at this computer since the first byte, which is too coarse for the latency
+/// of their frames and available as soon as their last frame is complete. Bytes that arrive while the caller is busy
+/// are stored. `time_s` is the time of arrival at this computer since the first byte. It is too coarse for the latency
 /// of an encoder, so `turnaround_us` is empty.
 class Tap {
  public:
@@ -55,7 +55,7 @@ class Tap {
   [[nodiscard]] const Row* current() const { return row_; }
   /// Waits until the next row is complete.
   void advance();
-  /// Cancels from any thread: a caller that waits for a row, now or later, gets Cancelled.
+  /// Cancels from any thread: a caller that waits for a row, now or later, gets the exception Cancelled.
   void cancel();
 
   /// Returns the identifier of the unit with which the tap decodes.

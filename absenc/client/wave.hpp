@@ -13,7 +13,7 @@
 
 namespace absenc::client {
 
-/// Commands that `draw_wave` draws, how often, and how the file is written.
+/// Choices of `draw_wave`: which commands it draws, how often, and how the file is written.
 struct WaveChoices {
   /// Commands with their arguments, as "memory-read 5", drawn in this order; empty: the command that reads the
   /// position.

@@ -71,7 +71,7 @@ struct PlacedShaft final : Shaft {
   std::int64_t position = 0;
 };
 
-/// Reads again and again, each time with the shaft at another position, and counts the results.
+/// Reads the encoder repeatedly, each time with the shaft at another position, and counts the results.
 template <class Item>
 class Campaign {
  public:
@@ -112,7 +112,8 @@ class Campaign {
     std::int64_t position;
   };
 
-  // Moves the shaft to a position that it never had before, so that an older position is recognised.
+  // Moves the shaft to a random position of 64 bits, which it hardly had before, so that an older position is
+  // recognised.
   void move() {
     shaft_.position = static_cast<std::int64_t>(bench_.random.next());
     constexpr Time longest = 30s;  // limit of a reply's delay
@@ -174,7 +175,9 @@ class Campaign {
 std::optional<CheckWorth> worth_of(const Unit& unit, const Options& options, double bit_errors) {
   if (unit.link == LinkKind::can) return {};
   constexpr unsigned frames =
-      20'000;  // number of sample frames: a shifted frame passes the check in some positions only, so many are needed
+      // Number of sample replies. A reply whose frame is shifted passes the check only at some positions of the shaft,
+      // so many replies are needed.
+      20'000;
   constexpr unsigned samples = 500'000;
   const std::vector<GoodReply> replies = Campaign<std::uint8_t>(unit, options, {}, 7).good_replies(frames);
   if (replies.empty()) return {};

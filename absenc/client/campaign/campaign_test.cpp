@@ -53,7 +53,8 @@ INSTANTIATE_TEST_SUITE_P(Units, Computed,
                                            Named{"amt21", "bit=0.1", 2, 2}, Named{"ssi", "bit=0.01", 0, 1},
                                            Named{"biss", "bit=0.005", 6, 3}, Named{"biss", "bit=0.02", 6, 3}));
 
-// The exclusive OR of eleven bytes misses two errors at the same bit of two bytes, and no three errors.
+// The exclusive OR of eleven bytes misses every error of two bits in the same column (the same bit of two bytes), and
+// detects every error of three bits.
 TEST(CheckCodeTest, ExclusiveOrHasTheWeightsOfItsColumns) {
   const Unit& unit = *find_unit("tformat");
   Options options;
@@ -64,12 +65,14 @@ TEST(CheckCodeTest, ExclusiveOrHasTheWeightsOfItsColumns) {
   EXPECT_EQ(code->bits(), 88u);
   const std::vector<double> words = code->weights(4);
   EXPECT_EQ(words, (std::vector<double>{1, 0, 8 * 55, 0, 8 * 330 + 28 * 55 * 55}));
-  // Counts all code words by their number of even columns, at a bit error rate for which the formula is simple.
+  // An error is missed if each of the 8 bit columns contains an even number of wrong bits. The probability of that,
+  // less the probability of no error, must be `unseen`.
   const double even = (1 + std::pow(1 - 2 * 0.02, 11)) / 2;
   EXPECT_NEAR(code->unseen(0.02), std::pow(even, 8) - std::pow(0.98, 88), 1e-12);
 }
 
-// A cyclic code with 16 check bits: the polynomial of Modbus detects every error of 3 bits in a frame of this length.
+// The CRC of Modbus has 16 bits and detects every error of up to 3 bits in a reply; that of BiSS has 6 bits and detects
+// every error of up to 2 bits. A CAN protocol has no computed check.
 TEST(CampaignTest, KnowsOtherChecks) {
   const CampaignResult modbus = run("raa38-modbus", {"bit=0.01"}, 1000);
   ASSERT_TRUE(modbus.worth);
@@ -91,26 +94,29 @@ TEST(CampaignTest, AGoodLineFailsNowhere) {
   }
 }
 
-// Tries each fault alone: it makes exchanges fail or is harmless. No unit with a checksum accepts an old position.
+// Injects each fault alone into the exchanges of T-Format: some exchanges fail (many, except with `delay`), some
+// succeed, and none returns an older position.
 TEST(CampaignTest, EveryFaultIsThere) {
   for (const LineFault& fault : line_faults()) {
     const CampaignResult result = run("tformat", {std::string(fault.name) + "=0.1"}, 20'000);
     const bool harmless =
-        fault.name == "delay";  // replies are delayed by 200 us: they are within the timeout, or dropped as late
+        fault.name == "delay";  // a reply that is 200 us late still arrives within the timeout, or is dropped as late
     EXPECT_GT(result.failed.count, harmless ? 0u : 500u) << fault.name;
     EXPECT_EQ(result.older.count, 0u) << fault.name;
     EXPECT_LT(result.failed.count, result.exchanges) << fault.name;
   }
 }
 
-// Delayed frames are accepted from an encoder that sends unsolicited: its frames do not show when they were sent.
+// The host accepts delayed frames of an encoder that sends unsolicited frames, because they do not show when they were
+// sent.
 TEST(CampaignTest, OldFramesAreCounted) {
   const CampaignResult result = run("raa38", {"late=0.1"}, 20'000);
   EXPECT_GT(result.older.count, 0u);
   EXPECT_LE(result.older.count, result.wrong.count);
 }
 
-// A damaged request may set the zero: the present reading is still right, and every later one would be wrong.
+// A damaged request may set the encoder's zero, which makes every later reading wrong, so the campaign must replace the
+// encoder.
 TEST(CampaignTest, EncodersThatWereChangedAreReplaced) {
   const CampaignResult result = run("raa38-can", {"request_corrupt=0.05"}, 100'000);
   EXPECT_GT(result.changed.count, 0u);

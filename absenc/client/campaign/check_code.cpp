@@ -75,8 +75,9 @@ std::optional<CheckCode> CheckCode::learn(const Unit& unit, const Options& optio
   return code;
 }
 
-// Searches check bits from the last bit of the frame, because most checks are at the end; otherwise any independent
-// bits serve. Bits before the covered ones belong to other frames, or mark the beginning of the frame.
+// Searches the check bits from the last bit of the reply backwards, because most checks are at the end; if the check is
+// elsewhere, other independent bits take the role of check bits. Bits before the first covered bit count as fixed: they
+// belong to another frame or mark the beginning of this frame.
 bool CheckCode::find_check(AlteredReply& asked) {
   bool complete = false;
   bool before = false;
@@ -106,7 +107,7 @@ std::optional<std::uint32_t> CheckCode::syndrome_of(AlteredReply& asked, std::si
   asked.flip(bit);
   std::uint32_t pattern = 0;
   if (asked.passes()) return pattern;
-  // Iterates over the combinations in Gray code, which changes one bit at a time.
+  // Tries all combinations of check bits in the order of the Gray code, in which one bit changes at a time.
   for (std::uint32_t i = 1; i < std::uint32_t{1} << check_.size(); ++i) {
     const auto changed = static_cast<unsigned>(std::countr_zero(i));
     asked.flip(check_[changed]);
@@ -116,7 +117,8 @@ std::optional<std::uint32_t> CheckCode::syndrome_of(AlteredReply& asked, std::si
   return {};
 }
 
-// Verifies that code words pass the checksum in every reply and that other errors do not.
+// Returns whether 1000 random errors, each of a random reply, agree with the syndromes: code words pass the checksum,
+// and other errors do not.
 bool CheckCode::is_linear(const Unit& unit, const Options& options, std::span<const GoodReply> replies) const {
   sim::Random random(1);
   for (unsigned i = 0; i < 1000; ++i) {
@@ -127,7 +129,8 @@ bool CheckCode::is_linear(const Unit& unit, const Options& options, std::span<co
       asked.flip(bit);
       syndrome ^= syndromes_[bit];
     }
-    // Accepts any other error code, because another check of the decoder may reject the reply before the checksum.
+    // Only `bad_checksum` for a code word, or no error for an error that is no code word, contradicts the syndromes.
+    // Any other error code is accepted, because another check of the decoder may reject the reply before the checksum.
     const Error error = asked.error();
     if (error == (syndrome == 0 ? Error::bad_checksum : Error::none)) return false;
     for (unsigned one = 0; one < check_.size(); ++one) {

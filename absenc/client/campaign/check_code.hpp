@@ -35,8 +35,8 @@ class CheckCode {
  public:
   /// Derives the code from the decoder. The last independent bits of the frame are the check bits; for every other bit,
   /// the check bits that compensate its error are its syndrome. Returns nothing if the check has more than 16 bits,
-  /// covers less than half of the frame (each channel has a check of its own), or is not linear (a sum, digits as
-  /// text), or if the replies differ in length. `replies` must not be empty.
+  /// covers at most half of the frame (each channel has a check of its own), or is not linear (a sum, digits as text),
+  /// or if the replies differ in length. `replies` must not be empty.
   [[nodiscard]] static std::optional<CheckCode> learn(const Unit& unit, const Options& options,
                                                       std::span<const GoodReply> replies);
 
@@ -65,7 +65,7 @@ class CheckCode {
   [[nodiscard]] std::vector<std::uint32_t> dual_weights() const;
   [[nodiscard]] std::size_t free_bits() const { return syndromes_.size() - fixed_; }
 
-  // syndrome of each bit of the frame; bit n of a syndrome is the check bit `check_[n]`
+  // syndrome of each bit of the frame; bit n of a syndrome stands for the check bit `check_[n]`
   std::vector<std::uint32_t> syndromes_;
   std::vector<bool> is_fixed_;
   std::vector<std::size_t> check_;  // indexes of the check bits in the frame

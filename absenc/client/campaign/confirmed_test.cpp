@@ -69,7 +69,8 @@ TEST_P(Confirmed, IsNotWrongMoreOftenThanChecksAndLimitLetThrough) {
   }
 }
 
-// The speed limit of this host is near the speed of the shaft.
+// Lowers the host's speed limit to 100 rpm, near the 60 rpm of the shaft: at most as many wrong positions may pass, and
+// nearly all right ones must still be confirmed.
 TEST_P(Confirmed, IsWrongLessOftenWithALowerLimit) {
   const Guarded usual = *read(0.1, 60).guarded;
   const Guarded lower = *read(0.1, 60, 100).guarded;

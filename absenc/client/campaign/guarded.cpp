@@ -24,8 +24,8 @@ std::int64_t wrapped(std::uint64_t difference, unsigned bits) {
   return static_cast<std::int64_t>(difference << unused) >> unused;
 }
 
-/// A shaft that starts one millisecond after power-on and then turns steadily. It stores the time and position of each
-/// measurement of the encoder.
+/// A shaft that starts one millisecond after power-on and then turns steadily. It stores the time and position of the
+/// encoder's last 16 measurements.
 class MeasuredShaft final : public Shaft {
  public:
   MeasuredShaft(std::int64_t start, double turns_a_second) : start_(start), speed_(turns_a_second) {}
@@ -55,7 +55,7 @@ class MeasuredShaft final : public Shaft {
     std::int64_t position = 0;
   };
 
-  // Returns a stored measurement; `number` 0 is the last one.
+  // Returns a stored measurement; `number` counts backwards from 0, the newest.
   [[nodiscard]] const ShaftSample& last(std::size_t number) const {
     return samples_[(count_ - 1 - number) % samples_.size()];
   }
@@ -123,7 +123,8 @@ class LetThrough {
     std::int64_t before;
   };
 
-  // Returns whether the fastest shaft can have made the step, computed in floating point.
+  // Returns whether the host's comparison of positions would accept `step`, by the host's rule but computed in floating
+  // point. `before` is the step between the two positions before.
   [[nodiscard]] bool agrees(Time between, std::uint64_t step, std::uint64_t before) const {
     const double most = std::ldexp(15.0 / 32, static_cast<int>(bits_));
     const double reached = 4 + counts_per_second_ * std::chrono::duration<double>(between).count();
@@ -145,7 +146,7 @@ class LetThrough {
 
 double turns_a_second(const Resolution& resolution, double rpm) {
   if (resolution.unit_um == 0) return rpm / 60;
-  // One revolution of the simulated shaft is the whole scale.
+  // A simulated linear encoder moves over its whole scale, 2^singleturn_bits counts, in one revolution of the shaft.
   return rpm * 1000 / resolution.unit_um / std::ldexp(1.0, static_cast<int>(resolution.singleturn_bits));
 }
 
@@ -182,7 +183,8 @@ class GuardedCampaign {
     return limit;
   }
 
-  // The true movement includes turns, as the host's comparison of positions does.
+  // Returns the width of the position in bits, including the turns if the reading has valid turns, as in the host's
+  // comparison of positions.
   static unsigned bits_of(const Reading& reading) {
     return reading.singleturn_bits + (reading.multiturn_valid ? reading.multiturn_bits : 0);
   }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a campaign with confirmed positions and computes how many wrong ones pass frame checks and speed limit.
+// Runs a campaign with confirmed positions and computes how many wrong positions pass both the frame checks and the
+// speed limit.
 #pragma once
 
 #include "absenc/client/campaign.hpp"

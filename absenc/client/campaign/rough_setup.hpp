@@ -47,7 +47,7 @@ struct Rates {
 
 template <class Item>
 struct RoughBench {
-  /// Connects host and virtual encoder. All arguments must outlive the object.
+  /// Connects host and virtual encoder. `what`, `how` and `measured` must outlive the object.
   RoughBench(const Unit& what, const Options& how, const Shaft& measured, const Rates& often, std::uint64_t seed)
       : unit(what),
         options(how),
@@ -81,7 +81,8 @@ struct RoughBench {
     faulty.set_rates(on ? rates.device : sim::FaultRates{});
   }
 
-  /// Returns the number of exchanges since `before`: requests, or frames of a stream, which has no requests.
+  /// Returns the number of requests since `before`; if there were none, the number of unsolicited frames since then, at
+  /// least 1.
   [[nodiscard]] std::uint64_t exchanges_since(const sim::RoughCounts& before) const {
     const std::uint64_t asked = line.counts().requests - before.requests;
     return asked != 0 ? asked : std::max<std::uint64_t>(1, line.counts().replies - before.replies);
@@ -95,8 +96,8 @@ struct RoughBench {
     }
   }
 
-  // Returns whether a damaged request has changed the encoder permanently. Reads over a line without faults to find
-  // out; if so, replaces the encoder by a new one.
+  // Returns whether a damaged request has changed the encoder permanently; false if the fault `request_corrupt` is off.
+  // Reads over a line without faults to find out, and replaces a changed encoder by a new one.
   template <class IsRight>
   bool was_changed(const Command& read, const IsRight& is_right) {
     using namespace std::chrono_literals;
@@ -111,8 +112,8 @@ struct RoughBench {
     return changed;
   }
 
-  // After a failure the host tries again after 10 us to 10 s, each decade with the same probability: a line that delays
-  // a reply also delays later ones. With unsolicited frames the pause is shorter.
+  // Lets 10 us to 10 s pass after a failure (at most 100 ms if the encoder sends unsolicited frames), each decade with
+  // the same probability: a line that delays a reply also delays later ones.
   void pause() {
     const double decades = (unsolicited ? 4 : 6) * static_cast<double>(random.next() >> 11) * 0x1p-53;
     line.rest(line.now() + Time(static_cast<std::int64_t>(1e4 * std::pow(10.0, decades))));

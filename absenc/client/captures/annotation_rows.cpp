@@ -70,7 +70,8 @@ void AnnotationRows::fill(const Annotation& annotation, const Options& options, 
                                                 : degrees(reading.singleturn, reading.singleturn_bits);
 }
 
-// Finds the column of a field: the column made for it, or one with the same name.
+// Returns the index of the field's description in the unit's list; otherwise that of a field with the same name;
+// otherwise the length of the list.
 std::size_t AnnotationRows::place_of(const FieldInfo& info) const {
   const std::span<const FieldInfo> fields = unit_.fields;
   std::size_t place = 0;

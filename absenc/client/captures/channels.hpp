@@ -16,7 +16,8 @@ namespace absenc::client {
 /// Returns the wires of a link, by the names that --channel accepts.
 [[nodiscard]] std::span<const std::string_view> wires_of(LinkKind link);
 
-/// The channel of each wire of the link, in the order of `wires_of`; nothing for a wire that was not recorded.
+/// The index of the capture's channel for each wire of the link, in the order of `wires_of`; no value for a wire that
+/// was not recorded.
 struct WireChannels {
   std::vector<std::optional<unsigned>> wires;
   bool found = false;  // full duplex: false if neither --channel nor channel names show which wire is the host's
@@ -27,7 +28,8 @@ struct WireChannels {
 [[nodiscard]] WireChannels find_wires(LinkKind link, std::span<const std::string> channels,
                                       std::span<const std::string> wanted);
 
-/// Returns the channel that `text` gives by name, in upper or lower case, or by number. Throws UsageError.
+/// Returns the index of the channel `name`, which is a channel's name in upper or lower case, or its number from 0.
+/// Throws UsageError if there is no such channel.
 [[nodiscard]] unsigned find_channel(std::span<const std::string> channels, std::string_view name);
 
 }  // namespace absenc::client

@@ -29,7 +29,8 @@ class Wires {
   // Draws a change of the data line, `behind` nanoseconds after the clock edge that causes it.
   void data(bool level, std::int64_t behind = 5) { changes_[{now_ + behind, 'd'}] = level; }
 
-  /// Draws `count` clock periods; the data line has the value `bit(i)` before the rising edge of clock i.
+  /// Draws `count` clock periods. Just after the rising edge of clock i, counted from 1, the data line changes to
+  /// `bit(i)`.
   template <class Bit>
   void burst(std::int64_t period, std::size_t count, Bit&& bit) {
     for (std::size_t i = 0; i < count; ++i) {
@@ -160,7 +161,8 @@ TEST_F(ClockedLines, BissOfAnyClockTimeoutAndMaster) {
     const std::int64_t period = 1'000'000 / khz;
     for (const std::int64_t timeout :
          {3 * period / 2, std::int64_t{12'500}, std::int64_t{20'000}, std::int64_t{40'000}}) {
-      if (timeout < 6 * period / 10) continue;  // skips this timeout, which would elapse between two edges of the clock
+      // skips a timeout so short that it would elapse between two edges of the clock
+      if (timeout < 6 * period / 10) continue;
       for (const bool releases : {false, true}) {
         for (const int more : {-1, 0, biss_bits - 1}) {
           for (const std::int64_t pause : {0, 300'000}) {
@@ -183,14 +185,16 @@ TEST_F(ClockedLines, BissOfAnyClockTimeoutAndMaster) {
   EXPECT_GT(cells, 300u);
 }
 
-// MA may fall at any time before the timeout elapses, because the encoder samples MA only then.
+// The master may set the control bit by a falling edge of MA at any time before the timeout elapses, because the
+// encoder samples MA only when the timeout elapses.
 TEST_F(ClockedLines, AControlBitMayComeLateInTheTimeout) {
   for (const std::int64_t khz : {100, 250, 1000, 10'000}) {
     const std::int64_t period = 1'000'000 / khz;
     for (const std::int64_t timeout : {3 * period / 2, std::int64_t{20'000}, std::int64_t{40'000}}) {
       for (const std::int64_t falls : {5 * timeout / 10, 6 * timeout / 10}) {
         for (const bool releases : {false, true}) {
-          if (falls < 6 * period / 10) continue;  // skips this time: the falling edge would be one more clock
+          // skips a time so short that the falling edge would count as one more clock
+          if (falls < 6 * period / 10) continue;
           SCOPED_TRACE(std::to_string(khz) + " kHz, timeout " + std::to_string(timeout) + " ns, CDM behind " +
                        std::to_string(falls) + " ns, " + (releases ? "released" : "held"));
           Wires wires;
@@ -206,8 +210,8 @@ TEST_F(ClockedLines, AControlBitMayComeLateInTheTimeout) {
   }
 }
 
-// An interrupted host: its clock pauses inside a word for nearly the timeout, and between words hardly longer. Only the
-// data line SLO shows where the timeout has elapsed.
+// An interrupted host: its clock pauses inside a word for nearly the timeout, and between words hardly longer than the
+// timeout. Only the data line SLO shows where the timeout has elapsed.
 TEST_F(ClockedLines, ATimeoutThatIsOverEndsAWordWhoseClockRestsAsLong) {
   constexpr std::int64_t timeout = 12'500;
   const std::string frame = biss_frame(17, false);
@@ -248,7 +252,8 @@ TEST_F(ClockedLines, AControlFrameThatTheFileCutsIsCut) {
 
 constexpr unsigned ssi_bits = 13;
 
-// Draws the same word `copies` times, with a zero between the copies; the monoflop time starts at the last clock edge.
+// Draws `words` words with different positions. With more than 14 clocks the same word follows again after a zero bit.
+// The monoflop time starts at the last clock edge.
 void draw_ssi(Wires& wires, std::int64_t period, std::int64_t monoflop, std::int64_t pause, std::size_t clocks,
               unsigned words) {
   for (unsigned word = 0; word < words; ++word) {
@@ -268,7 +273,7 @@ TEST_F(ClockedLines, SsiOfAnyClockMonoflopAndNumberOfClocks) {
   for (const std::int64_t khz : {30, 50, 80, 100, 250, 1000, 2000, 10'000}) {
     const std::int64_t period = 1'000'000 / khz;
     for (const std::int64_t monoflop : {9'000, 12'500, 20'000, 25'000, 41'000, 500'000}) {
-      // skips this monoflop time, which would elapse between two edges of the clock
+      // skips a monoflop time so short that it would elapse between two edges of the clock
       if (monoflop < 6 * period / 10) continue;
       for (const std::size_t clocks : {ssi_bits, ssi_bits + 1, 2 * ssi_bits + 1, 2 * ssi_bits + 2}) {
         for (const std::int64_t pause : {0, 30'000}) {
@@ -307,7 +312,8 @@ TEST_F(ClockedLines, AMonoflopThatIsOverEndsAWord) {
   EXPECT_EQ(rows.words, 12u);
 }
 
-// With a shorter pause between them, two drawn words may be two readings, or one reading that was repeated.
+// If the data line never shows the end of the monoflop time, two drawn words may be two readings, or one reading that
+// was repeated; a note must say so.
 TEST_F(ClockedLines, TwoWaysToCutAreSaid) {
   Wires wires;
   for (unsigned word = 0; word < 12; ++word) {

@@ -42,7 +42,8 @@ class Comparison {
  public:
   Comparison(const Unit& unit, const LineSettings& line, bool faulty, const std::vector<Said>& rows)
       : rows_(rows), faulty_(faulty) {
-    // The row of a CAN frame ends with the frame in the waveform, but the live receiver waits until the bus is idle.
+    // On CAN the row of a frame ends with the frame in the waveform, but the live receiver waits until the bus is idle,
+    // so the times may differ by that wait.
     tolerance_ = unit.link == LinkKind::can ? line.bits(160) : 2 * line.character();
   }
 
@@ -70,7 +71,8 @@ class Comparison {
     if (told) return {};
     const bool any =
         std::any_of(within_.begin(), within_.end(), [](const Said* row) { return row->error != Error::none; });
-    // A live host may reject a reply to a repeated request, because the reply may belong to the request before.
+    // A live host that repeats a request may reject the reply, because the reply may belong to the request before; the
+    // capture then has another error or, with faults, none.
     return (any || faulty_) && live.exchanges != 1 ? "" : "no row has the error";
   }
 
@@ -106,14 +108,16 @@ class Comparison {
     return row.end > reading.received - tolerance_ && row.end < reading.received + tolerance_;
   }
 
-  // Looks for the value in the last row, or for its parts in several rows.
+  // Compares the live position with the last good row that has a position; its turns may be in another row. Returns a
+  // sentence about the difference; "" if they match.
   std::string compare_position(const Said& live) const {
     const Said* row = nullptr;
     for (const Said* one : within_) {
       const bool fits = live.exchanges != 0 || is_of(*one, *live.reading);
       if (one->reading && one->error == Error::none && fits) row = one;
     }
-    // The first good frame of a stream determines the length of its frames.
+    // The first good frame of a stream determines the length of its frames, so there may be no row with a position
+    // before it.
     const bool knows_size = std::any_of(
         rows_.begin(), rows_.end(), [&](const Said& one) { return one.reading && one.end < live.reading->received; });
     if (row == nullptr) return live.exchanges != 0 || knows_size ? "no row has a position" : "";

@@ -55,7 +55,8 @@ TEST(ClientDecode, RowsHaveTypedColumns) {
 TEST(ClientIdentify, SaysHowToOpenWhatItFound) {
   const Emulation emulation = emulate("tformat?motion=rpm=60");
   Identified all;
-  // Each request without a reply delays the end by several latencies, so the latency is long only on a slow machine.
+  // Tries a longer latency only if the shorter one fails, as on a slow machine: each request without a reply takes
+  // several latencies.
   for (const char* const latency : {"20", "200", "1000"}) {
     all = identify(emulation.path() + "?latency=" + latency, {.limit = std::chrono::minutes(5)});
     if (!all.found.empty() && all.found[0].sure) break;

@@ -104,8 +104,8 @@ CaptureRun::Speed CaptureRun::likely_speed(const Lines& lines) const {
 }
 
 // A clock has pauses of several lengths: between words, and between the bytes of a host that sends eight clocks at a
-// time. Only one pause length divides the clocks into the right words. Lengths of pauses are tried first, because the
-// data line may also change in a long pause inside a word.
+// time. Only one pause length divides the clocks into the right words. Lengths of pauses are preferred to changes of
+// the data line, because the data line may also change in a long pause inside a word.
 std::size_t CaptureRun::likely_pause(std::span<const capture::PauseReading> readings,
                                      std::vector<std::string>& notes) const {
   struct Words final : capture::AnnotationSink {

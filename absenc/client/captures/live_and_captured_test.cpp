@@ -146,7 +146,7 @@ class LiveAndCaptured : public ::testing::TestWithParam<const Unit*> {
     try {
       stage.emplace(address);
     } catch (const UsageError&) {
-      return;  // no virtual encoder has these options together
+      return;  // skips options that no virtual encoder has together
     }
     stage->run(together.commands);
     if (stage->live.empty()) return;

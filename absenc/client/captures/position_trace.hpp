@@ -17,8 +17,8 @@ class PositionTrace {
  public:
   static constexpr std::size_t columns = 64;
 
-  /// Adds a position. `tick` must not be before the tick of the first position. An invalid position leaves a gap in the
-  /// plot.
+  /// Adds a position; a `tick` before that of the first position counts as the first. An invalid position leaves a gap
+  /// in the plot.
   void add(std::uint64_t tick, const Reading& reading) {
     if (!reading.singleturn_valid() || !reading.ready) return;
     if (count_ == 0) {
@@ -43,7 +43,7 @@ class PositionTrace {
   [[nodiscard]] std::uint64_t count() const { return count_; }
   /// Returns a small plot with its scale; "" if no position was valid.
   [[nodiscard]] std::string plot() const;
-  /// Return the tick of the first and of the last valid position.
+  /// Return the tick of the first and of the last valid position that was added.
   [[nodiscard]] std::uint64_t first() const { return first_; }
   [[nodiscard]] std::uint64_t last() const { return last_; }
 
@@ -67,7 +67,7 @@ class PositionTrace {
   std::uint64_t count_ = 0;
   unsigned bits_ = 1;
   bool signed_ = false;
-  bool turns_ = false;  // whether the first position had turns; positions without turns then leave a gap
+  bool turns_ = false;  // whether the first valid position had turns; a position without turns then leaves a gap
   double unit_um_ = 0;
 };
 

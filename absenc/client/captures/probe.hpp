@@ -19,9 +19,9 @@ struct Probed {
   std::vector<std::string> settled{};  // options that later commands need, as "name=value"; empty: the defaults suffice
 };
 
-/// Judges captured frames. `replies` have the form of `absenc decode`, "" for a missing reply. `requests` are as many,
-/// in the same order, "" for an unknown request; or the list is empty. Throws UsageError, also for a protocol without
-/// open options.
+/// Judges captured frames. `replies` have the text form that `absenc decode` reads, "" for a missing reply. `requests`
+/// are as many, in the same order, "" for an unknown request; or the list is empty. Throws UsageError, also for a
+/// protocol without open options.
 [[nodiscard]] Probed probe(std::string_view protocol, std::string_view model, std::span<const std::string> settings,
                            std::span<const std::string> replies, std::span<const std::string> requests);
 

@@ -32,7 +32,8 @@ using capture::Content;
 using capture::DecodedPart;
 using capture::Tick;
 
-// Stores an exception of the sink until decoding has ended, because it must not pass through a decoder with threads.
+// Stores an exception of the annotation sink until decoding has ended, because the exception must not pass through a
+// decoder that uses threads.
 class Guard {
  public:
   template <class Work>
@@ -261,14 +262,15 @@ CaptureOutcome CaptureRun::run_bytes(capture::AnnotationSink& sink, const std::f
   if (settings.channel_count == 2) settings.channels = {Carries::requests, Carries::replies};
   settings.gap = reader_->layout().arrival_gap;
   settings.by_arrival = settings.gap != 0;
-  // a log by arrival times begins with a complete frame, because a program received it
+  // A log by arrival times may begin inside a frame, because its program may have begun to listen during a frame. Other
+  // captures of bytes begin with a complete frame.
   settings.begins_silent = !settings.by_arrival;
   CaptureOutcome outcome;
   std::unique_ptr<capture::Annotator> annotator;
   read_all(*reader_, [&](const capture::Block& block) {
     for (const capture::Character& character : block.bytes) {
       if (annotator == nullptr) {
-        // In captures of a line decoder a character lasts from its first data bit to its last.
+        // In the export of a logic analyser's UART decoder a character lasts from its first data bit to its last.
         const double data_bits = static_cast<double>(character.end - character.begin);
         if (data_bits > 1) settings.ticks = capture::line_ticks(unit_, data_bits / 8, ticks_per_second());
         if (data_bits > 1) settings.ticks.pause += static_cast<Tick>(data_bits / 4);
@@ -279,7 +281,7 @@ CaptureOutcome CaptureRun::run_bytes(capture::AnnotationSink& sink, const std::f
     outcome.end = std::max(outcome.end, block.end);
     progress(block.end);
   });
-  // A log ends at the time of its last line.
+  // A log ends at the time of its last line, so the length of a pause is added to end the last frame.
   if (annotator != nullptr) annotator->finish(outcome.end + settings.ticks.pause);
   return outcome;
 }

@@ -39,12 +39,14 @@ struct CaptureOutcome {
   std::vector<capture::Damage> damages;
 };
 
-/// Opens the capture and returns its reader. Throws UsageError, Failure.
+/// Opens the capture and returns its reader. Throws UsageError for binary data from standard input, Failure if the
+/// capture cannot be opened.
 [[nodiscard]] std::unique_ptr<capture::Reader> open_capture(const CaptureChoices& choices);
 
 class CaptureRun {
  public:
-  /// Opens the capture and assigns its channels. Throws UsageError, Failure.
+  /// Opens the capture. Throws UsageError if the capture's content does not fit the link of `unit`, and the exceptions
+  /// of `open_capture`.
   CaptureRun(const Unit& unit, const Options& options, const CaptureChoices& choices);
   ~CaptureRun();
 
@@ -75,7 +77,7 @@ class CaptureRun {
   /// Decodes at most `characters` characters of the lines.
   CaptureOutcome decode_lines(capture::Reader& reader, Lines lines, Speed speed, std::size_t characters,
                               capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress) const;
-  /// Returns the index of the pause with which the beginning of the capture decodes best.
+  /// Returns the index of the pause length with which the beginning of the capture decodes best.
   [[nodiscard]] std::size_t likely_pause(std::span<const capture::PauseReading> readings,
                                          std::vector<std::string>& notes) const;
   CaptureOutcome run_characters(capture::AnnotationSink& sink, const std::function<void(capture::Tick)>& progress);
@@ -86,7 +88,7 @@ class CaptureRun {
 
   const Unit& unit_;
   Options options_;
-  LineSettings line_;  // line settings of the options
+  LineSettings line_;  // line settings that follow from unit and options
   CaptureChoices choices_;
   std::unique_ptr<capture::Reader> reader_;
 };

@@ -122,7 +122,8 @@ class Stage {
     }
   }
 
-  // Takes the smallest or the greatest value of each argument, because the encoder may not accept numbers in between.
+  // Takes the smallest or the greatest value of each required argument, because the encoder may not accept numbers in
+  // between, and the default of every other argument.
   static std::vector<std::vector<std::int64_t>> arguments_of(const Command& command) {
     std::vector<std::vector<std::int64_t>> all(2);
     for (const Argument& argument : command.arguments) {
@@ -155,15 +156,15 @@ class Stage {
     if constexpr (std::is_same_v<Item, CanFrame>) {
       said.is_verdict = said.error == Error::cross_check_failed;
     } else {
-      // Compares only the last reply with the capture, because a procedure adds a verdict of its own.
+      // If the last reply is good, the failure is a verdict of the procedure, which the capture cannot show.
       const Exchange<Item> last = conversation->exchange();
       const bool has_bytes = address.unit->link != LinkKind::clocked && !last.received.empty();
       said.is_verdict = has_bytes && address.unit->check(address.options, {.bytes = last.sent},
                                                          {.bytes = last.received}) == Error::none;
     }
-    // the error is a verdict about two good replies
+    // `not_still` is always a verdict: it compares two good replies.
     said.is_verdict = said.is_verdict || said.error == Error::not_still;
-    // A clocked reading appears in the capture even if the reading failed.
+    // A capture cannot be decoded after a change of the rate, except on clocked lines, which carry their own clock.
     const bool can_follow = !port.moved || address.unit->link == LinkKind::clocked;
     if (can_follow && said.error != Error::unsupported) live.push_back(std::move(said));
     return true;

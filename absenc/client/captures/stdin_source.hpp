@@ -18,7 +18,8 @@ class StdinSource final : public capture::Source {
 
   /// Returns the greatest number as the size, because the size of standard input is unknown.
   [[nodiscard]] std::uint64_t size() const override { return UINT64_MAX; }
-  /// Copies bytes of the input. Waits until the requested bytes have arrived or the input has ended. Throws Failure.
+  /// Copies bytes of the input and returns their number: fewer if the input ends, or if the bytes are no longer
+  /// buffered. Waits until the requested bytes have arrived or the input has ended. Throws Failure.
   [[nodiscard]] std::size_t read(std::uint64_t offset, std::span<std::uint8_t> into) override;
 
  private:

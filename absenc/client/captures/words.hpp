@@ -23,7 +23,8 @@ class TickClock {
   [[nodiscard]] Time time(capture::Tick ticks) const;
   /// Returns the time of a tick in seconds, with the digits that a tick needs; without times, the number of the tick.
   [[nodiscard]] std::string text(capture::Tick tick) const;
-  /// Returns the format of seconds for `Column::Presentation`, with the digits that a tick needs.
+  /// Returns the format of a time in seconds for `Column::Presentation`, as "{:.6f}", with the digits that a tick
+  /// needs.
   [[nodiscard]] std::string format() const;
 
  private:
@@ -35,13 +36,15 @@ class TickClock {
 /// byte 600, ...".
 [[nodiscard]] std::string to_text(const capture::Damage& damage, const TickClock& clock);
 
-/// Returns the kind of an annotation as rows name it: "exchange".
+/// Returns the kind of an annotation as rows name it: "exchange", "request", "reply" or "noise".
 [[nodiscard]] std::string_view name_of(capture::Annotation::Kind kind);
 
-/// Returns whether the fields of an annotation may be shown.
+/// Returns whether the fields of an annotation may be shown: not if it has an error, is noise, is cut off, or is not
+/// documented.
 [[nodiscard]] bool has_fields(const capture::Annotation& annotation);
 
-/// Returns the error of an annotation in words, with advice; "" for an annotation without an error.
+/// Returns the error of an annotation in words, with advice; without an error, its remark, such as that the frame is
+/// cut off; "" if it has neither.
 [[nodiscard]] std::string message_of(const Unit& unit, const Options& options, const capture::Annotation& annotation);
 
 }  // namespace absenc::client

@@ -15,8 +15,8 @@
 
 namespace absenc::client {
 
-/// Parses the address. If its encoder sends unsolicited frames, selects the first option with which the encoder is
-/// polled.
+/// Parses the address. If its encoder sends unsolicited frames, selects the first value of an option with which the
+/// encoder is polled.
 inline EncoderAddress polled_address(const std::string& text) {
   const EncoderAddress usual = parse_address(text);
   const Unit& unit = *usual.unit;
@@ -41,7 +41,7 @@ inline std::vector<EncoderAddress> variations_of(const Unit& unit) {
       EncoderAddress address = parse_address(text);
       const VirtualDevice device(unit, address.options, address.device);
       all.push_back(std::move(address));
-    } catch (const UsageError&) {  // no such virtual encoder exists
+    } catch (const UsageError&) {  // leaves out a value that no virtual encoder has
     }
   };
   for (const Option& option : unit.options) {
@@ -54,7 +54,7 @@ inline std::vector<EncoderAddress> variations_of(const Unit& unit) {
   }
   return all;
 }
-/// Returns the unit with the option that differs from its default, "UNIT crc_width=0".
+/// Returns the unit's identifier, followed by the first option that differs from its default: "UNIT crc_width=0".
 inline std::string variation_name(const EncoderAddress& address) {
   const EncoderAddress usual = parse_address(fmt::format("sim:{}", address.unit->id));
   for (std::size_t i = 0; i < address.unit->options.size(); ++i) {
@@ -66,7 +66,7 @@ inline std::string variation_name(const EncoderAddress& address) {
   return std::string(address.unit->id);
 }
 
-/// Returns the name of the test of one unit.
+/// Returns the unit's identifier as the name of a test, with '_' in place of '-'.
 inline std::string test_name(const Unit& unit) {
   std::string name(unit.id);
   for (char& letter : name) letter = letter == '-' ? '_' : letter;

@@ -21,9 +21,10 @@ namespace {
 
 // Wait that is longer than the longest busy time of an encoder after a byte write, including its reply.
 constexpr Time settling = std::chrono::milliseconds(50);
-constexpr unsigned tries = 3;                 // attempts to restore one value
-constexpr std::uint32_t beside = 4;           // number of bytes before the written byte that must stay unchanged
-constexpr unsigned position_tolerance = 512;  // tolerance of equal positions: this fraction of a turn
+constexpr unsigned tries = 3;        // attempts to restore one value
+constexpr std::uint32_t beside = 4;  // number of bytes before the written byte that must stay unchanged
+// positions are equal if at most this fraction of a turn, 1/512, is between them
+constexpr unsigned position_tolerance = 512;
 
 /// Thrown when the encoder refuses a command or sends a bad reply, so that the clause is broken.
 struct ClauseBroken {
@@ -97,14 +98,16 @@ void ChangeTester::test_one(const Clause& clause, ClauseResult& result) {
     conclude(result, false, refused.evidence);
   } catch (const os::Failure& failure) {
     if (failure.kind() != os::Failure::Kind::unsupported) throw;
-    result.evidence = failure.what();  // the port failed before the encoder was changed
+    // the port refused a step that it does not support, before the encoder was changed
+    result.evidence = failure.what();
   }
 }
 
 // ---- Clauses about the memory
 
 void ChangeTester::test_byte(const Clause& clause, ClauseResult& result) {
-  if (!clause.setting.empty()) save_setting(clause);  // saves this setting, because reading the memory changes it
+  // saves the clause's setting, because reading the memory changes it
+  if (!clause.setting.empty()) save_setting(clause);
   const std::int64_t written = save_byte(clause.page, clause.address) ^ 0xFF;
   const Saved& byte = saved_.back();
   byte.write(written);
@@ -212,7 +215,7 @@ void ChangeTester::test_direction(const Clause& clause, ClauseResult& result) {
   const auto set = [this, &setter](std::int64_t value) {
     static_cast<void>(run(setter, complete_arguments(setter, std::array{value})));
   };
-  // Tries both directions until the position is the wanted one.
+  // To restore the direction, sets one direction and then the other until the position is mirrored, or not, as wanted.
   save({.look = is_mirrored,
         .write =
             [is_mirrored, set, values = std::array{clause.other, clause.value}](std::int64_t wanted) {
@@ -258,8 +261,9 @@ void ChangeTester::test_pace(const Clause& clause, ClauseResult& result) {
 
 // ---- Clauses that erase values which cannot be restored
 
-// Returns whether the test may erase `what`, a value in words. Returns true if it is "": the test sends the command
-// even if no value can be lost, because the encoder may refuse it or do harm.
+// Returns whether the test may erase `what`, the value in words: with `resets`, or if `what` is "", so that no value
+// can be lost (the test then sends the command too, because the encoder may refuse it or do harm). If not, stores the
+// reason in `result`.
 bool ChangeTester::may_erase(std::string_view what, ClauseResult& result) const {
   if (what.empty() || resets_) return true;
   result.evidence = fmt::format("there is {}, which nothing could bring back: --resets gives it up", what);
@@ -382,7 +386,7 @@ bool ChangeTester::put_back(const Saved& one) {
       interrupted_ = true;
     } catch (const os::Ended&) {
       interrupted_ = true;
-    } catch (const ClauseBroken&) {  // the encoder refused: try again
+    } catch (const ClauseBroken&) {  // the encoder refused or sent a bad reply: tries again
     } catch (const std::exception&) {
     }
   }
@@ -397,7 +401,7 @@ CommandResult ChangeTester::run(const Command& command, Arguments arguments) con
   throw ClauseBroken{fmt::format("{}: {} {}", command.name, text_of(ran.error).name, ran.detail)};
 }
 
-// Returns the decoded reply of the memory; nothing if the reply is bad.
+// Returns the decoded reply of the memory; nothing if the reply is missing or bad.
 std::optional<BusyReply> ChangeTester::busy_reply(const SingleExchange& sent) const {
   if (sent.reply.frame().empty()) return std::nullopt;
   BusySink sink;

@@ -22,14 +22,14 @@ struct CommandResult {
   Error error = Error::none;
   std::string detail{};
   std::uint64_t requests = 0;  // number of requests that the command sent
-  bool heard = false;          // whether anything was received after the last request
+  bool heard = false;          // whether anything but an echo was received after the last request
   Answer answer{};
   std::vector<std::uint8_t> data{};  // bytes that the command read from the memory; empty for other commands
   std::optional<Reading> reading{};
 };
 
-/// A single request and its reply. Both are empty if the request does not exist with these options; the reply is empty
-/// if none came.
+/// A single request and its reply. Both are empty if readings send no request with these options; the reply is empty if
+/// none was received.
 struct SingleExchange {
   capture::ObservedFrame request{};
   capture::ObservedFrame reply{};
@@ -56,8 +56,8 @@ struct UnsolicitedFrames {
   }
 };
 
-/// Access to the line, independent of its link. All functions throw the exceptions of the port, and os::Interrupted
-/// once each time the caller asks the test to end.
+/// Access to the line, independent of its link. All functions throw the exceptions of the port. After the caller asked
+/// the test to end they throw os::Interrupted, but only once, so that values can still be restored.
 struct ChangesLine {
   std::function<CommandResult(const Command&, Arguments)> run;
   // sends a request, encoded by Unit::encode, and returns the exchange

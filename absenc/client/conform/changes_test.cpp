@@ -189,7 +189,8 @@ EncoderAddress address_of_unit(const Unit& unit, std::string_view more = {}) {
   return parse_address(fmt::format("{}{}singleturn={}", text, more.empty() ? "" : "&",
                                    (std::uint64_t{1} << resolution.singleturn_bits) / 3));
 }
-/// Returns the address of an encoder with turns and alarms that a reset must clear.
+/// Returns the address of an encoder that shows the behaviour which the clause demands. For a clause about a reset the
+/// encoder has turns or an alarm that the reset must clear.
 EncoderAddress address_showing_change(const Unit& unit, const Clause& clause) {
   std::string more(clause.shown_with);
   const auto add = [&](const std::string& setting) { more += (more.empty() ? "" : "&") + setting; };
@@ -323,7 +324,8 @@ void check_ends(const EncoderAddress& address) {
   ASSERT_EQ(original.verdict(), Verdict::kept) << original.report();
   const unsigned steps = whole.port->steps;
   const std::string settings = whole.settings();
-  // Ignores the write counter of an encoder, which cannot be restored.
+  // If the memory differs even after a complete test, it counts its writes, which cannot be restored; then only the
+  // settings are compared.
   const bool counts = whole.memory() != before;
   // In tests with many steps, each step is tested with only one of the three kinds of end.
   const unsigned kinds = steps < 1000 ? 3 : 1;
@@ -349,7 +351,8 @@ void check_ends(const EncoderAddress& address) {
     } catch (const Cancelled&) {
       ended = kind == 2;
     }
-    // a short loss of the line is harmless if values are being restored at that time
+    // An interrupt must end the test at every step. A short loss of the line may have no effect, because it is harmless
+    // while values are being restored.
     EXPECT_TRUE(ended || kind != 0) << at;
     if (!counts) {
       ASSERT_EQ(bench.memory(), before) << "end " << kind << " at " << at << " of " << steps;

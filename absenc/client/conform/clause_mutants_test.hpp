@@ -137,8 +137,8 @@ ReplyChanges<Item> frame_mutants(const EncoderAddress& address, const Clause& cl
   return all;
 }
 
-/// Returns mutants with each condition of the encoder at both ends of its range, and mutants whose line always flips
-/// the same bit.
+/// Returns mutants with each condition of the encoder at both ends of its range and 5 above normal, and mutants that
+/// always flip the same bit of their replies.
 template <class Item>
 ReplyChanges<Item> command_mutants(const EncoderAddress& address) {
   ReplyChanges<Item> all;
@@ -161,8 +161,8 @@ ReplyChanges<Item> command_mutants(const EncoderAddress& address) {
   return all;
 }
 
-/// Returns mutants that treat every request except the first kind wrongly: they send the reply to the first request, no
-/// reply, or another reply.
+/// Returns mutants that treat special requests wrongly, which are all requests that differ from the first one. The
+/// mutants send the reply to the first request, no reply, or another reply.
 template <class Item>
 ReplyChanges<Item> special_request_mutants(const Clause& clause) {
   using M = Mutant<Item>;
@@ -257,7 +257,7 @@ ReplyChanges<Item> mutants_of(const EncoderAddress& address, const Clause& claus
     default:
       break;
   }
-  // Sends valid requests that are addressed to other encoders.
+  // Applies each change only to valid requests that are addressed to other encoders.
   if (clause.demand == Demand::foreign_silent) {
     for (const ReplyChange<Item>& change : special_request_mutants<Item>(clause)) {
       all.push_back({.change = [change = change.change, &address](Mutant<Item>& m) {

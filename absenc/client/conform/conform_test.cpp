@@ -87,7 +87,7 @@ void check_kept(const EncoderAddress& address, std::set<std::string>& seen) {
       }
       EXPECT_TRUE(broken) << variation_name(address) << ": " << clause.id << "\n" << good.report();
     }
-  } catch (const UsageError&) {  // no host reads with these options
+  } catch (const UsageError&) {  // skips options with which no host can read the encoder
   }
 }
 
@@ -194,12 +194,13 @@ TEST(Conformance, TapBailsOutIfNoClauseWasJudged) {
   EXPECT_EQ(some.verdict(), Verdict::broken);
 }
 
-// The text for people must name the paragraph after the document.
+// The text for people names the document and then the paragraph, so the document's name must not contain the paragraph
+// too.
 TEST(Clauses, DocumentNameContainsNoParagraph) {
   for (const Unit* unit : all_units()) {
     const auto look = [&](std::string_view id, std::string_view paragraph) {
       const std::string_view number = paragraph.substr(0, paragraph.find(' '));
-      // this paragraph of the document has a name instead of a number
+      // skips paragraphs that have a name instead of a number
       if (number.find_first_not_of("0123456789.") != std::string_view::npos) return;
       EXPECT_EQ(unit->document.find(number), std::string_view::npos) << unit->id << " " << id << ": " << unit->document;
     };

@@ -36,7 +36,8 @@ void resize(ObservedFrame& frame, int by) {
   }
 }
 
-// Returns the request of a command with valid arguments; empty if it does not exist with these options.
+// Returns the request of a command with valid arguments; empty on a clocked link, or if the request does not exist with
+// these options.
 ObservedFrame request_of(const Unit& unit, const Options& options, const Command& command) {
   std::array<std::uint8_t, longest_request> bytes{};
   std::vector<std::int64_t> arguments;

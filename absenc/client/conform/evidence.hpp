@@ -16,7 +16,8 @@
 
 namespace absenc::client {
 
-inline constexpr std::size_t longest_request = 64;  // limit of the bytes of a request, or of the characters of its text
+// greatest number of bytes of a request; on CAN, of characters of its text
+inline constexpr std::size_t longest_request = 64;
 
 inline void conclude(ClauseResult& result, bool kept, std::string evidence) {
   result.verdict = kept ? Verdict::kept : Verdict::broken;

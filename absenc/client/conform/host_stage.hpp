@@ -15,21 +15,21 @@ namespace absenc::client {
 class HostStage {
  public:
   virtual HostTrial::TrialCounts seen() = 0;
-  virtual void set_fault(HostTrial::Fault fault) = 0;  // replaces the previous fault
+  virtual void set_fault(HostTrial::Fault fault) = 0;  // injects `fault` in place of the previous fault
   virtual void play(Time until) = 0;                   // serves the host until the time `until`; throws os::Interrupted
 
  protected:
   ~HostStage() = default;
 };
 
-/// Makes a stage with the unit's virtual encoder. Throws UsageError if the unit has no clauses for hosts, or its
-/// encoder is not polled.
+/// Checks that a host of the unit can be judged. Throws UsageError if the unit has no clauses for hosts, or if its
+/// encoder is not polled with these options.
 void require_host(const Unit& unit, const Options& options);
 
 /// Serves the host until the limits of `choices` end the test, and returns the verdicts on the host.
 [[nodiscard]] Conformance judge_host(const Unit& unit, HostStage& stage, const ConformHostChoices& choices);
 
-/// Adds the counts of the rule about the SPI mode, which only the SPI device can check.
+/// Returns `counts` with the counts of the rule about the SPI mode, which only the SPI device can check.
 [[nodiscard]] inline std::vector<RuleCount> with_mode(std::vector<RuleCount> counts, const os::SpiDevice& device) {
   counts.push_back({.rule = spi_mode_rule, .looked = device.messages(), .broken = device.wrong_modes()});
   return counts;

@@ -151,7 +151,8 @@ std::vector<std::vector<Item>> damaged_requests(const EncoderAddress& address) {
   return all;
 }
 
-/// Returns the verdicts on hosts that send only one damaged request, and on hosts that alternate it with good requests.
+/// Returns the verdicts on hosts that always repeat the same damaged request, and on hosts that alternate it with a
+/// good request.
 template <class Item>
 std::vector<Conformance> judged_with_damaged_requests(const EncoderAddress& address) {
   std::vector<Conformance> all;

@@ -311,7 +311,7 @@ void check(const Unit& unit) {
       check_strangers<Item>(address, choices);
       check_damaged_line<Item>(address, choices);
     } catch (const UsageError&) {
-      EXPECT_FALSE(usual);  // no host reads with these options
+      EXPECT_FALSE(usual);  // only with options other than the defaults may reading be impossible
     }
   }
   std::printf("%s: %zu variations\n", std::string(unit.id).c_str(), variations);
@@ -327,7 +327,7 @@ TEST_P(HostileEncoders, KeepNoClauseWithoutEvidence) {
   }
 }
 
-// Checks the encoder with each option value with which it can be read.
+// Checks that the encoder at the address breaks no clause; does nothing if it cannot be read with its options.
 template <class Item>
 void check_good_one(const EncoderAddress& address) {
   if (reply_of<Item>(address).empty()) return;

@@ -11,7 +11,7 @@
 
 namespace absenc::client {
 
-/// Returns whether all bits of a clocked word are equal, as on a line that nothing drives.
+/// Returns whether all bits of a clocked word are equal, as on a line that nothing drives; false for a frame of bytes.
 [[nodiscard]] bool is_flat(const capture::ObservedFrame& reply);
 
 /// Returns whether the last request of the reading got a reply other than the constant level of an undriven line.
@@ -39,8 +39,8 @@ void judge_streamed(const Readings& readings, ClauseResult& result);
 /// precision of the port's times.
 void judge_time(const Unit& unit, const Options& options, const Readings& readings, Time latency, ClauseResult& result);
 
-/// Stores the verdict on whether no reply has one of `errors`. Concludes `kept` only if a wrong bit in a good reply
-/// would cause one of them.
+/// Stores the verdict on whether no reply has one of `errors`. Concludes `kept` only with evidence that such an error
+/// would be noticed: a change of a good reply causes it, or, for errors of a counter, the counter has moved.
 void judge_frames(const Unit& unit, const Options& options, const Readings& readings, Errors errors,
                   ClauseResult& result);
 

@@ -128,7 +128,7 @@ class Tester {
     AnswerSink sink;
   };
 
-  // Takes one reading with these options, then listens for a late reply.
+  // Takes one reading with these options; if it fails, listens for a late reply.
   Attempted once(const Options& options, Time listen_for = listening) {
     runner_.set_options(options);
     if (!is_streamed(options)) runner_.start_again();
@@ -152,7 +152,8 @@ class Tester {
       const std::uint64_t requests = runner_.port().requests - before;
       const std::uint64_t unanswered = std::min(requests, one.unanswered + (was_answered(one) ? 0 : 1));
       readings.requests += requests;
-      // Counts a reply that came after a repeated request as late, not as missing.
+      // If the last reply is late, counts earlier requests without a reply as answered too: their replies were late,
+      // not missing.
       readings.answered += was_answered(one) && one.is_late() ? requests : requests - unanswered;
       readings.good += one.error == Error::none ? std::max<std::uint64_t>(requests, 1) : 0;
       readings.discarded += one.discarded;
@@ -166,7 +167,8 @@ class Tester {
   }
   // Returns whether the encoder replies to requests. On clocked and SPI links the host clocks the bits instead.
   [[nodiscard]] bool is_polled() const { return unit_.link != LinkKind::clocked && unit_.link != LinkKind::spi; }
-  // Returns whether the encoder replies to a reading: otherwise a missing reply to another request is no evidence.
+  // Returns whether one of up to three readings gets a good reply: otherwise a missing reply to another request is no
+  // evidence.
   [[nodiscard]] bool answers() {
     for (unsigned i = 0; i < times; ++i) {
       if (once(options_).error == Error::none) return true;

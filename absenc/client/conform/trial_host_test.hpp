@@ -172,7 +172,7 @@ class Host {
     device_.set_faults({});
     if (!flaws_.sends.empty()) send_all();
     for (const Command& command : unit_.commands) {
-      // the command changes an option, so the host would have to change its own options
+      // Skips commands that change an option, because the host would have to change its own options after them.
       const bool moves = !command.changes_option.empty();
       if (all && !moves) run(command, complete_arguments(command, required_arguments(command)));
     }
@@ -313,7 +313,7 @@ class Host {
   RuleCounter rules_;
   VirtualDevice device_;
   RequestWatch<Item> watch_;
-  std::shared_ptr<ControllerPort> controller_;  // set on clocked and SPI links only
+  std::shared_ptr<ControllerPort> controller_;  // port of the SPI controller; null unless the link is SPI or clocked
   std::shared_ptr<Port<Item>> line_;
   HastyPort<Item> port_;
   std::vector<std::byte> storage_;

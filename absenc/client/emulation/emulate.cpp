@@ -28,7 +28,7 @@ namespace absenc::client {
 
 namespace {
 
-// period of retries while the CAN interface is down
+// period in which `look` is called while the encoder waits for a lost CAN interface
 constexpr Time between_tries_to_look = std::chrono::milliseconds(20);
 
 EncoderAddress virtual_address(std::string_view text) {
@@ -122,7 +122,8 @@ struct Emulation::Service {
     serve_forever(attended, open, wait, [](PortEvent, std::string_view) {});
   }
 
-  // Runs the orders of other threads between two steps of the encoder.
+  // Runs the function that another thread has passed to `carry_out`, between two steps of the encoder. Throws Cancelled
+  // once the emulation is stopped.
   bool look(Time now) {
     const std::lock_guard lock(mutex);
     if (stopped) throw Cancelled{};
@@ -133,7 +134,8 @@ struct Emulation::Service {
     return true;
   }
 
-  /// Runs `work` in the encoder's thread and returns when it has ended.
+  /// Runs `work` in the encoder's thread and returns when it has ended. Throws the exception that has ended the
+  /// encoder's thread, or Cancelled.
   void carry_out(const std::function<void(Time)>& work) {
     const std::lock_guard turn(wishes);
     std::unique_lock lock(mutex);
@@ -160,13 +162,14 @@ struct Emulation::Service {
   std::shared_ptr<os::EmulatorPort> port;
   std::unique_ptr<os::SocketCan> can;  // the opened CAN interface, until the encoder's thread takes it
 
-  std::mutex wishes;  // lets only one thread at a time give an order
-  std::mutex mutex;   // guards all following members except the thread
+  std::mutex wishes;  // lets only one thread at a time pass a function to the encoder's thread
+  std::mutex mutex;   // guards `wish` and `stopped`; `thrown` is set before `stopped`
   std::condition_variable changed;
   std::function<void(Time)> wish;
   bool stopped = false;
   std::exception_ptr thrown;
-  std::function<RequestCounts()> count_requests;  // returns the present counts; set while the thread runs
+  // returns the counts of requests so far; only the encoder's thread sets and calls it
+  std::function<RequestCounts()> count_requests;
 
   std::jthread thread;  // last member, because the thread uses all other members
 };

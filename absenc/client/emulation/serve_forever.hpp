@@ -47,9 +47,10 @@ class Movable final : public Machine<Item> {
   std::uint32_t rate_ = 0;
 };
 
-/// Serves the encoder until `open`, the port or `wait` throws an exception; never returns. `open()` opens the port.
-/// When the port is lost (os::Failure), calls `wait(time)` and `open()` again. Calls `told(what, why)` for each change
-/// of the port.
+/// Serves the encoder and returns only by an exception: an os::Failure if the port cannot be opened for the first time
+/// or does not support the encoder's rate, and every other exception of `open`, the port or `wait`. `open()` opens the
+/// port. When the port is lost (another os::Failure), calls `wait(time)` and `open()` again. Calls `told(what, why)`
+/// for each change of the port.
 template <class Item, class Open, class Wait, class Told>
 [[noreturn]] void serve_forever(Machine<Item>& machine, const Open& open, const Wait& wait, const Told& told) {
   constexpr Time time_between_tries = std::chrono::milliseconds(250);

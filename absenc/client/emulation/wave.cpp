@@ -103,8 +103,8 @@ struct Conversations {
     while (port.now() < until) static_cast<void>(port.wait({.at = until}));
   }
 
-  // Draws until the last result. A stream never ends by itself, so it ends with its last result; a command that polls
-  // without end is ended after one result.
+  // Runs one command until it ends or the last result is drawn. A stream never ends by itself, so it is stopped after
+  // the last result; a streaming command that sends a request for each result is stopped after one result.
   template <class Item>
   void hold(sim::SimPort<Item>& port, const Spoken& one) {
     std::vector<std::byte> storage(uri.unit->host_storage);

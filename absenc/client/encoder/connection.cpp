@@ -380,7 +380,7 @@ class ConnectionOn final : public Connection {
   ArrivalSpread arrivals_;
   host::LatchTime latch_time_{};  // bounds of the time at which the encoder latched the last position
   Change change_{};
-  std::uint64_t requests_before_ = 0;  // number of requests before the last changing command
+  std::uint64_t requests_before_ = 0;  // number of requests before the last command that `run` ran
 };
 
 }  // namespace

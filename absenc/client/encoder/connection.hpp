@@ -21,8 +21,9 @@ namespace absenc::client {
 struct Outcome {
   Error error = Error::none;
   std::string_view detail{};
-  std::string_view advice{};         // advice of the unit on what to try; "": the general advice for the error applies
-  bool aborted = false;              // whether a signal ended the command early, without a change of the encoder
+  std::string_view advice{};  // advice of the unit on what to try; "": the general advice for the error applies
+  // whether a signal ended the command early, after the command had restored the encoder
+  bool aborted = false;
   const Reading* reading = nullptr;  // the reading; null if the command failed or reads no position
   Change change{};                   // state of the change, for a command that changes the encoder; otherwise none
 };
@@ -44,15 +45,15 @@ class Connection {
   /// Returns hints on how to improve the port's settings, one sentence each.
   [[nodiscard]] virtual const std::vector<std::string>& notes() const = 0;
 
-  // All following members except counters and statistics require an open connection.
+  // `notes`, `read`, `run`, `trouble`, `lend` and `now` require an open connection.
 
   /// Reads the position with all alarms that the unit reports, or runs the command that the address names instead.
   /// `take` selects which frame is used if the encoder sends positions unsolicited. Throws UsageError if the unit has
   /// no position.
   virtual Outcome read(host::Take take = host::Take::newest) = 0;
-  /// Runs a command and returns its outcome. Calls `on_emit` for each result but the last; then `report` returns the
-  /// fields of that result. If the command sets a value by which the encoder is reached, the connection uses the new
-  /// value from then on.
+  /// Runs a command and returns its outcome. Calls `on_emit` for each result but the last; during the call, `report`
+  /// passes on the fields of that result. If the command sets a value by which the encoder is reached, the connection
+  /// uses the new value from then on.
   virtual Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit = {}) = 0;
   /// Passes the value that the next changing command overwrites to the journal, so that the journal need not read it.
   void know_before(std::int64_t value) { known_before_ = value; }

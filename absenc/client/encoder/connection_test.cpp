@@ -16,7 +16,7 @@
 namespace absenc::client {
 namespace {
 
-/// Returns whether the unit's readings report a life counter.
+/// Stores whether a reading reports a life counter.
 class Seen final : public FieldSink {
  public:
   void put(const FieldValue& field) override { any = any || field.info->role == Role::life_counter; }

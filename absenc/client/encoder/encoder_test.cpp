@@ -107,7 +107,7 @@ TEST(ClientEncoder, SettingsAreReadWrittenAndReadBack) {
   EXPECT_THAT(thrown_by<UsageError>(misspelt), HasSubstr("overheat-threshold"));
 }
 
-// After a change of its rate the encoder is reached at the new rate.
+// After a change of its address the encoder is reached at the new address.
 TEST(ClientEncoder, GoesOnWithTheAddressThatItWasSetTo) {
   Encoder encoder = open("sim:raa38-modbus");
   const std::int64_t address[] = {7};
@@ -115,7 +115,8 @@ TEST(ClientEncoder, GoesOnWithTheAddressThatItWasSetTo) {
   EXPECT_TRUE(encoder.read().singleturn_valid());
 }
 
-// The new rate must also be used when the port was lost and is opened again.
+// After a change of its rate the encoder is read at the new rate, and its address has the new rate, with which a lost
+// port is opened again.
 TEST(ClientEncoder, GoesOnAtTheRateThatItWasSetTo) {
   for (const bool by_name : {true, false}) {
     Encoder encoder = open("sim:raa38-modbus");
@@ -184,7 +185,7 @@ TEST(ClientEncoder, DisconnectedEncoderOpensItsPortForTheNextReading) {
   encoder.disconnect();
   const Sample sample = encoder.next();
   EXPECT_EQ(sample.kind, Sample::Kind::back);
-  EXPECT_EQ(sample.message, "the port is open");  // the port was not lost in between
+  EXPECT_EQ(sample.message, "the port is open");  // a port that `disconnect` closed was not lost
   EXPECT_EQ(encoder.losses(), 0u);
 }
 
@@ -253,7 +254,7 @@ TEST(ClientSamples, AreRowsOfNamedValues) {
   EXPECT_EQ(rows.of_gap(Time{}, 12).get<std::uint64_t>("missed"), 12u);
 }
 
-// Two flipped bits of the same weight pass the checksum of T-format, which is an XOR.
+// Two wrong bits at the same place of two bytes pass the checksum of T-Format, which is an exclusive OR of the bytes.
 TEST(ClientEncoder, APositionThatNoShaftReachesIsReadAgain) {
   Encoder encoder = open("sim:tformat?singleturn=1000&fault=corrupt=0.6");
   const std::uint64_t& refused = encoder.counters().errors[static_cast<std::size_t>(Error::cross_check_failed)];

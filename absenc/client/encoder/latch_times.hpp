@@ -27,8 +27,8 @@ template <class Item>
 }
 
 /// Bounds for readings that an encoder sends unsolicited, from the spread of their arrivals. A reading was not latched
-/// before the previous reading arrived, if that arrived in time. The delay of a reading is at most the sum by which
-/// pauses of the last seconds exceeded the usual pause.
+/// before the previous reading arrived, unless the previous reading was delayed itself. The delay of a reading is at
+/// most the sum by which pauses of the last seconds exceeded the usual pause.
 class ArrivalSpread {
  public:
   /// Adds the arrival of the next reading. No byte had arrived until `nothing_until`.

@@ -13,11 +13,13 @@ namespace absenc::client {
 
 class Pace {
  public:
-  /// Takes the number of times per second (0: as fast as possible) and the distance of the first time from now.
+  /// Takes the number of times per second (0: as fast as possible) and the offset of the first time from now. The first
+  /// call of `next` returns the second time, one period later.
   explicit Pace(double rate, Time offset = {})
       : period_(rate > 0 ? static_cast<std::int64_t>(1e9 / rate) : 0), next_(os::now() + offset) {}
 
-  /// Returns the next time that is due; with rate 0 a time in the past.
+  /// Returns the next time; if the caller is late, the last time that has passed, and skips those before it. With rate
+  /// 0 returns a time in the past.
   Time next() {
     if (period_ == Time{}) return {};
     next_ += period_;
@@ -26,7 +28,8 @@ class Pace {
     return next_;
   }
 
-  /// Sleeps until the next time, or until `end` if that is earlier. Throws the exceptions of `sleep_until`.
+  /// Sleeps until the next time, or until `end` if that is earlier; with rate 0 does not sleep. Throws the exceptions
+  /// of `sleep_until`.
   template <class SleepUntil>
   void wait(Time end, SleepUntil sleep_until) {
     if (period_ == Time{}) return;

@@ -164,7 +164,7 @@ Sample Encoder::Parts::sample_of(Reading reading) {
   return sample;
 }
 
-// Called only for a sample with a valid position.
+// Returns the angles of joint and motor that the sample's position yields; the position must be valid.
 JointAngles Encoder::Parts::angles_of(const Sample& sample) const {
   const Joint& one = connection->uri().joint;
   const Reading& reading = sample.reading;

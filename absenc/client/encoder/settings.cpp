@@ -39,7 +39,8 @@ std::size_t place_of(const Answer& answer, std::string_view name) {
                                   answer.columns.begin());
 }
 
-// Runs a command that writes a setting. If the port is lost during the command, reports the state of the encoder.
+// Runs a command that writes a setting. If the port is lost after the setting may have been written, throws a Failure
+// that lists the values with which the encoder may be left.
 void write(Connection& encoder, const Command& setter, Arguments arguments, SettingSink& told) {
   try {
     run_into(encoder, setter, arguments, told);
@@ -71,7 +72,8 @@ void require_same(const Answer& now, const Answer& written, std::string_view nam
   }
 }
 
-// Returns a sentence about the encoder's address if the new setting, such as a rate, is part of it.
+// Returns a sentence about the encoder's new address if the written setting, such as a rate, is part of the address;
+// otherwise "".
 std::string note_of(const Unit& unit, const Options& before, const Command& setter, std::int64_t value) {
   if (options_behind(unit, before, setter, value).values == before.values) return {};
   return fmt::format("from now on it is reached with {}={}", setter.changes_option, value);

@@ -45,7 +45,7 @@ struct ScannedAddresses final : FieldSink {
 
 /// Reason why a conversation was aborted.
 enum class TryEnd : std::uint8_t {
-  silent,   // no reply came, or no valid one
+  silent,   // no valid reply arrived in the allowed time
   harmful,  // the next request would be a changing command for an encoder of another protocol
 };
 
@@ -134,8 +134,8 @@ class Attempt {
     }
   }
 
-  /// Reads the identity of a found encoder with these options and returns it. More requests are allowed than during the
-  /// search.
+  /// Reads the identity of a found encoder with these options and returns it. Runs the unit's commands for the
+  /// identity, if they change nothing and need no argument.
   Introduction introduce(const Options& options) {
     Introduction all;
     IdentitySink identity;
@@ -175,7 +175,7 @@ class Attempt {
     }
     if (step.answer != Time{}) step.answer += allowance_;
     talk.patience.see(step, now);
-    if constexpr (!is_can) {  // skipped on CAN, where identifiers distinguish nodes
+    if constexpr (!is_can) {  // CAN needs no check for harmful requests: identifiers distinguish nodes
       if (step.kind == Kind::transfer && begins_harmful(step.out)) throw TryEnd::harmful;
     }
   }
@@ -308,7 +308,8 @@ class Attempt {
     if (exchanges.empty()) return false;
     ++findings_.searches;
     std::vector<Hypothesis> found = capture::find_hypotheses(unit_, known, exchanges);
-    // Polls again if other options explain more replies than those of the request: their requests may be better, too.
+    // Polls again with the likeliest options if they do not explain all replies and need another request, because that
+    // request may get better replies.
     if (!found.empty() && !found.front().evidence.explains_all() &&
         request_of(unit_, found.front().options, read) != request_of(unit_, options, read)) {
       std::vector<ObservedExchange> again;
@@ -363,7 +364,7 @@ class Attempt {
   std::vector<std::vector<std::uint8_t>> harmful_;  // beginnings of requests that must not be sent; empty on CAN
   Talk* talk_ = nullptr;
   bool cut_ = false;
-  bool asked_ = false;          // whether a request was sent
+  bool asked_ = false;          // whether a conversation was begun, so that a reply to it may still be on the line
   bool is_unanswered_ = false;  // whether the last request has no reply yet
   Time allowance_{};            // time by which each timeout is extended, because replies were late
 };

@@ -122,7 +122,7 @@ CaptureFindings search_capture(const CaptureChoices& choices, const std::functio
       for (Hypothesis& one : search_unit(*unit, choices, searches, findings.damages)) {
         findings.candidates.push_back({unit, std::move(one), {}, false, line_of(*unit)});
       }
-    } catch (const UsageError& error) {  // the protocol needs another kind of capture
+    } catch (const UsageError& error) {  // thrown if the protocol needs another kind of capture
       findings.refusals.emplace_back(error.what());
     } catch (const Failure& failure) {
       findings.refusals.emplace_back(failure.what());

@@ -44,8 +44,8 @@ std::pair<capture::Evidence, std::size_t> asked(const std::string& text, const s
           findings.requests};
 }
 
-/// Takes `readings` readings and returns how many of them the runner judges damaged, and the number of requests it
-/// sends.
+/// Results of `damaged_by_runner`: how many of its `count` readings the runner judges damaged, and the number of
+/// requests that the runner sends.
 struct Counted {
   std::size_t damaged = 0;
   std::size_t requests = 0;
@@ -57,7 +57,7 @@ Counted damaged_by_runner(const std::string& text, const std::vector<std::string
   Runner<std::uint8_t> runner(place.encoder);
   runner.attach(*link.bytes, link.latency);
   std::size_t damaged = 0;
-  // Skips units with a scan, which also collects replies that arrive later.
+  // Runs the unit's scan first, as the search does, so that both send the same requests and meet the same faults.
   if (const Command* scan = find_command(*place.encoder.unit, Verb::scan)) static_cast<void>(runner.once(*scan));
   for (std::size_t i = 0; i < count; ++i) {
     runner.start_again();
@@ -115,8 +115,8 @@ TEST(Identify, GivesLateRepliesMoreTimeAndTakesEachForItsOwnRequest) {
 
 // ---- Distinction of several encoders
 
-/// Returns the setting of the highest address on a bus, "address=31"; "" for a unit without addresses, or whose
-/// encoders are not polled.
+/// Returns the setting of the highest address on a bus, "address=31"; "" for a unit without addresses, without a scan,
+/// or with a scan that disturbs other encoders.
 std::string at_last_number(const Unit& unit) {
   const Option* option = find_role(unit.options, Role::encoder);
   const Command* scan = find_command(unit, Verb::scan);
@@ -130,8 +130,8 @@ TEST_P(Found, TheFirstCandidateIsTheEncoderOfEachModelAndNumber) {
   const Unit& unit = *GetParam();
   if (unit.link == LinkKind::clocked || unit.link == LinkKind::spi) GTEST_SKIP() << "an SPI controller is needed";
   std::vector<std::string> settings{""};
-  // Tests addresses only of encoders that are polled: unsolicited frames have no address, and finding them takes
-  // seconds.
+  // Tests addresses and models only of encoders that are polled: unsolicited frames have no address, and finding them
+  // takes seconds.
   if (!host::sends_unsolicited(unit, parse_address(fmt::format("sim:{}", unit.id)).options)) {
     settings.push_back(at_last_number(unit));
     for (const Model& model : unit.models) settings.push_back(fmt::format("model={}", model.name));

@@ -123,7 +123,8 @@ class Search {
     std::erase_if(all, [](const Candidate& one) { return one.unit == nullptr; });
   }
 
-  // Returns the indexes of the candidate `first` and of all equally likely candidates of the same encoder.
+  // Returns the indexes of the candidate `first` and of equally likely candidates of the same encoder, at most four in
+  // all.
   [[nodiscard]] std::vector<std::size_t> same_as(std::size_t first) const {
     const std::vector<Candidate>& all = findings_.candidates;
     std::vector<std::size_t> alike;
@@ -180,7 +181,8 @@ class Search {
       for (const std::uint32_t one : common_rates) rates.push_back(fmt::format("{}", one));
     }
     for (const std::string& value : rates) {
-      // Skips other rates once an encoder of this unit replies well at one rate.
+      // Skips the remaining rates once an encoder of any unit is found beyond doubt, or an encoder of this unit replies
+      // and all its replies are explained.
       if (is_beyond_doubt() || is_explained(unit)) return;
       SettingTexts settings = search_.settings;
       settings.push_back(fmt::format("{}={}", rate_setting, value));
@@ -194,7 +196,8 @@ class Search {
     attempt_on<std::uint8_t>(unit, settings);
   }
 
-  // Returns whether the unit supports the rate that the user set; true if the user set none.
+  // Returns whether the unit supports the rate that the user set; true if the user set none, or if the unit has no list
+  // of rates.
   [[nodiscard]] bool takes_rate(const Unit& unit) const {
     const Option* rate = find_role(unit.options, Role::rate);
     if (rate == nullptr || rate->choices.empty()) return true;
@@ -286,7 +289,8 @@ class Search {
     }
   }
 
-  // Removes candidates with the same options, and those that only send if an encoder of the same unit replies.
+  // Removes candidates with the same options as a likelier one, and candidates from unsolicited frames if an encoder of
+  // the same unit replies to requests and all its replies are explained.
   void drop_repeated() {
     std::vector<Candidate> kept;
     for (const Candidate& one : findings_.candidates) {

@@ -16,7 +16,7 @@ Medium medium_of(const LineSearch& search) {
   const std::string& place = search.place;
   if (place.starts_with("spi:")) return Medium::spi;
   if (place.starts_with("tcp:")) return Medium::tcp;
-  // Takes a place that is no path for a network interface.
+  // A place without '/' is no path, so it is the name of a CAN interface.
   return place.starts_with("slcan:") || place.find('/') == std::string::npos ? Medium::can : Medium::serial;
 }
 

@@ -36,7 +36,8 @@ class Checksum {
 
 std::string_view model_name(const Options& options) { return options.model != nullptr ? options.model->name : "none"; }
 
-// Returns the header lines that must match the encoder: protocol and model, or the options if no model matches.
+// Returns the header lines of a dump, which must match the encoder: protocol and model; without a model also all
+// options.
 std::vector<std::string> header(const Unit& unit, const Options& options) {
   std::vector<std::string> lines{fmt::format("protocol: {}", unit.id), fmt::format("model: {}", model_name(options))};
   if (options.model != nullptr) return lines;

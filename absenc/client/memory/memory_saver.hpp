@@ -12,7 +12,8 @@ namespace absenc::client {
 template <class Item>
 class MemorySaver final : public Machine<Item> {
  public:
-  /// Takes the machine on the line: `device` itself, or a machine in front of it.
+  /// Takes the machine on the line, which is `device` itself or a machine in front of it, and the file for the device's
+  /// memory.
   MemorySaver(Machine<Item>& line, Device<Item>& device, MemoryFile& file)
       : line_(&line), device_(&device), file_(&file), saved_(device.memory_version()), finished_(saved_) {}
 

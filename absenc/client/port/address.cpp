@@ -297,8 +297,8 @@ void require_once(std::span<const OptionText> settings) {
   }
 }
 
-// Applies settings up to the last one, so that an error is caused by the last. A virtual encoder needs all options
-// first.
+// Checks the last of `settings` after all others, which were checked before, so that the last one causes the error.
+// Makes a virtual encoder only if the last one is no option, because the encoder needs all options first.
 void try_settings(EncoderAddress uri, std::span<const OptionText> settings) {
   take_settings(uri, settings);
   const bool options_are_set = find_link_parameter(settings.back().name) != nullptr;

@@ -61,7 +61,8 @@ std::vector<const Unit*> units_of_bytes() {
   return units;
 }
 
-// Messages about encoders that are set up differently from their host: each choice of each option.
+// Checks the messages about encoders that are set up differently from their host, with each choice of each option: a
+// message names the setting that would help, and only once.
 TEST(Diagnosis, ASettingThatWouldHelpIsNamedOnce) {
   std::set<std::string> named;
   for (const Unit* unit : units_of_bytes()) {
@@ -88,7 +89,7 @@ TEST(Diagnosis, ASettingThatWouldHelpIsNamedOnce) {
   EXPECT_GE(named.size(), 2u);
 }
 
-// Messages about a line with each kind of fault.
+// Checks the messages about exchanges on a line with each kind of fault: no message repeats a clause.
 TEST(Diagnosis, AMessageSaysNothingTwice) {
   unsigned messages = 0;
   for (const Unit* unit : units_of_bytes()) {

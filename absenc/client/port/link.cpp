@@ -117,8 +117,9 @@ Link open_slcan(const EncoderAddress& uri) {
   return link;
 }
 
-// Returns the CAN log file of a link. After a loss of the port its log continues in the same file; a file that another
-// link uses cannot be created again and throws. The caller must hold the lock of connect_link.
+// Returns the CAN log file of a link. After a loss of the port the log continues in the same file. Throws os::Failure
+// if another link uses the file, because a file that exists is not created again. The caller must hold the lock of
+// connect_link.
 std::shared_ptr<os::LineFile> log_file(const std::string& path) {
   static std::map<std::string, std::shared_ptr<os::LineFile>> files;
   std::shared_ptr<os::LineFile>& file = files[path];

@@ -19,7 +19,7 @@ namespace {
 
 using Names = std::vector<std::string_view>;
 
-// name of the setting for `serve` that may stand among the settings of an encoder
+// name of the only setting of `serve` that an encoder's section may contain: its readings per second
 constexpr std::string_view rate_name = "rate_hz";
 
 void add_options(Names& names, const Unit& unit) {

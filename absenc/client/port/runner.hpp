@@ -122,11 +122,13 @@ class Runner {
 
   // ---- Hooks of `run` and `once`; empty: not called. An exception of a hook ends the conversation.
 
-  std::function<void(std::vector<Item>& request)> edit{};     // changes each request before it is sent
-  std::function<void(Step<Item>& step, Time now)> on_step{};  // sees, and may change, each step of the conversation
-  // sees each event of the conversation, without echo
+  std::function<void(std::vector<Item>& request)> edit{};  // hook that changes each request before it is sent
+  // hook that sees, and may change, each step of the conversation
+  std::function<void(Step<Item>& step, Time now)> on_step{};
+  // hook that sees each event of the conversation, without echo
   std::function<void(const Event<Item>& event)> on_event{};
-  std::function<void(const LineExchange<Item>& exchange)> on_exchange{};  // sees each exchange when it has ended
+  // hook that sees each exchange when it has ended
+  std::function<void(const LineExchange<Item>& exchange)> on_exchange{};
 
   // ---- Commands
 
@@ -150,7 +152,8 @@ class Runner {
   /// the unit cannot run the command.
   template <class Use>
   const Conversation<Item>* converse(const Use& use) {
-    // if no request was sent since then, received bytes belong to the command before
+    // If the command before sent no request, the stored exchange is an older one, whose bytes must not be counted
+    // again.
     if (requests_before_ == port_.requests) port_.last.clear();
     requests_before_ = port_.requests;
     received_before_ = port_.last.received.size();

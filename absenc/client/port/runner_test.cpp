@@ -55,7 +55,7 @@ TEST(Runner, SilenceIsATimeoutInEveryUnit) {
 
 // ---- Echo
 
-// The replies of this unit begin with the same bytes as its requests.
+// The replies of T-Format begin with the same bytes as its requests, so an echo resembles the beginning of a reply.
 TEST(Runner, TakesTheEchoFromTheFirstExchangeOn) {
   for (const bool echo : {false, true}) {
     for (const char* const mode : {"auto", "on", "off"}) {
@@ -146,7 +146,7 @@ TEST(Runner, ARequestThatIsRepeatedAtOnceIsUnanswered) {
 // ---- A line that is never silent
 
 TEST(Runner, EndsByTheClockOfItsPort) {
-  // the unit needs a second to find that no good frame comes
+  // raa38 needs a second to find that no good frame arrives
   const EncoderAddress address = parse_address("sim:raa38");
   auto port = std::make_shared<ScriptedPort<std::uint8_t>>();
   port->babble = {0x55, 0x12};
@@ -167,8 +167,8 @@ TEST(Runner, EndsByTheClockOfItsPort) {
 
 // ---- Streams
 
-/// Returns an address at which the unit's encoder sends unsolicited; nothing if there is none, or no such virtual
-/// encoder.
+/// Returns an address at which the unit's encoder sends unsolicited frames; nothing if the unit has no such mode, or no
+/// virtual encoder has it.
 std::optional<EncoderAddress> streaming(const Unit& unit) {
   if (unit.streams == nullptr) return {};
   std::vector<std::vector<OptionText>> settings{{}};
@@ -185,7 +185,8 @@ std::optional<EncoderAddress> streaming(const Unit& unit) {
       address.options = options;
       address.line = line_settings(unit, options);
       if (Bench(address).once().error == Error::none) return address;
-      // If the encoder cannot be polled, damaged frames must be reported.
+      // Some encoders send good frames only with another resolution: tries 16 bits, or the option's maximum if that is
+      // less.
       for (const std::size_t index : capture::resolution_options(unit)) {
         address.options.values[index] = std::min<std::int64_t>(unit.options[index].maximum, 16);
       }

@@ -143,14 +143,15 @@ std::size_t end_of_string(std::string_view text, std::size_t at) {
     } else if (!lines && (text[i] == quote || text[i] == '\n')) {
       return i;
     } else if (lines && text.substr(i).starts_with(std::string(3, quote))) {
-      return std::min(text.find_first_not_of(quote, i), i + 5) - 1;  // up to two more quotes belong to the string
+      // up to two quotes directly before the closing three belong to the string
+      return std::min(text.find_first_not_of(quote, i), i + 5) - 1;
     }
   }
   return text.size();
 }
 
-// Refuses a file with deep nesting, because the library's recursion is as deep; absenc.toml needs only a list in
-// [encoder.NAME]. Throws UsageError.
+// Refuses a file that is nested more than 16 deep, because toml++ calls itself once for each level; absenc.toml needs
+// only a list in [encoder.NAME]. Throws UsageError.
 void check_depth(std::string_view text, const SettingsFileReader& reader) {
   constexpr std::size_t deepest = 16;
   std::size_t brackets = 0;
@@ -237,10 +238,11 @@ std::optional<SettingsFile> load_settings_file() {
     std::error_code ignored;
     if (fs::symlink_status(path, ignored).type() != fs::file_type::not_found) {
       const fs::file_type type = fs::status(path, ignored).type();
-      if (type == fs::file_type::not_found || type == fs::file_type::none) {  // none: the link leads to itself
+      // the file type is `none` for a symbolic link that leads to itself
+      if (type == fs::file_type::not_found || type == fs::file_type::none) {
         throw UsageError(fmt::format("{} is a link that leads to no file: correct it or remove it", path));
       }
-      // reading such a file might wait forever for a writer
+      // reading a FIFO or a socket might wait forever for a writer
       if (type == fs::file_type::fifo || type == fs::file_type::socket) {
         throw UsageError(fmt::format("{} is no regular file: write the encoders' names into a file", path));
       }

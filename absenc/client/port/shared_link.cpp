@@ -22,7 +22,7 @@ fs::path device(const std::string& path) {
   return error ? fs::path(path) : canonical;
 }
 
-// Returns a key that is equal for encoders on the same port; "" if the port cannot be shared.
+// Returns a key that is equal for encoders on the same port; "" for a virtual encoder, which has a port of its own.
 std::string place_key(const EncoderAddress& one) {
   const std::string_view place = port_kind_names[static_cast<std::size_t>(one.port_kind)];
   switch (one.port_kind) {

@@ -59,7 +59,7 @@ class VirtualDevice {
   void set_condition(std::size_t index, std::int64_t value, Time now);
   [[nodiscard]] std::int64_t condition(std::size_t index) const { return conditions_[index]; }
 
-  /// Sets the object that is told how often rules are checked and broken, which must outlive the device; null: none.
+  /// Sets the object that counts how often rules are checked and broken, which must outlive the device; null: none.
   void watch_rules(RuleWatch* watch);
 
   /// Sets the rates of all faults, from the next reply on. Requires `faults_may_come`, or faults at the start.

@@ -29,8 +29,8 @@ struct VirtualPort {
   bool echo = false;                      // whether the adapter echoes requests
   std::optional<std::uint64_t> pauses{};  // seed of random delays before each request; nothing: no delays
   std::optional<sim::RoughRates>
-      // use a line that carries whole frames, which is faster and can have faults, but has no echo; nothing: a line of
-      // bits
+      // fault rates of a line that carries whole frames, which is faster than a line of bits, but has no echo; without
+      // a value the line carries bits and has no faults
       rough{};
   std::uint64_t seed = 1;         // seed of the faults of `rough`
   VirtualClock* clock = nullptr;  // clock of the port; null: time begins with the link and jumps from event to event

@@ -67,7 +67,7 @@ class WatchedPort final : public Port<Item> {
     port_ = &port;
     rate_ = 0;
   }
-  /// Restores the encoder's rate before a conversation, because an aborted conversation may have left another rate.
+  /// Sets the line back to `rate` before a conversation, because an aborted conversation may have left another rate.
   void return_to(std::uint32_t rate) {
     if (rate_ != 0 && rate_ != rate) begin({.kind = Step<Item>::Kind::configure, .rate = rate});
   }
@@ -114,11 +114,12 @@ class WatchedPort final : public Port<Item> {
   [[nodiscard]] bool take_aborted() { return std::exchange(aborted_, false); }
 
   std::function<bool()>
-      // polled during each wait: true ends it with os::Ended; if os::Interrupted is thrown, the conversation is asked
-      // to end early
+      // function that is polled during each wait: if it returns true, the wait ends with os::Ended; if it throws
+      // os::Interrupted, the conversation is asked to end early
       over;
-  std::function<bool()> abort;  // asks the conversation to end early; returns false if it cannot end by itself
-  Time deadline = never;        // time by the port's clock; a wait that reaches it throws OutOfTime
+  // function that asks the conversation to end early; returns false if it cannot end by itself
+  std::function<bool()> abort;
+  Time deadline = never;  // time by the port's clock; a wait that reaches it throws OutOfTime
   LineExchange<Item> last;
   Time nothing_until{};  // time at which the last wait ended without a received item
   std::uint64_t requests = 0;

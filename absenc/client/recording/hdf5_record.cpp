@@ -134,7 +134,7 @@ class Hdf5Record final : public RecordFile {
   }
 
   os::BlockFile file_;
-  Hdf5Table table_;  // used only by the writing thread
+  Hdf5Table table_;  // table in the file; only the writing thread uses it
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;
   Hdf5Rows rows_;        // rows that wait to be written
@@ -142,7 +142,8 @@ class Hdf5Record final : public RecordFile {
   RecordCounts taken_;   // counts of the rows that are being written now
   RecordCounts committed_;
   std::uint64_t size_;
-  // Numbers of syncs: a sync waits for a commit that began after its call.
+  // Numbers of syncs: all calls, those that the running commit serves, and those that are served. A sync waits for a
+  // commit that began after its call.
   std::uint64_t asked_ = 0;
   std::uint64_t serving_ = 0;
   std::uint64_t served_ = 0;

@@ -116,7 +116,8 @@ bool Recording::Parts::run(const std::function<void(const Sample&)>& on_written)
   } catch (const os::Interrupted&) {
   } catch (const Cancelled&) {
   }
-  if (!has_all) pace.leave_out(end);  // `end` may be reached while a reading is taken
+  // also counts readings that were due before `end` while the last reading was taken
+  if (!has_all) pace.leave_out(end);
   note_missed();
   write_gap();
   file_->finish();

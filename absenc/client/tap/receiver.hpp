@@ -40,7 +40,8 @@ class Receiver {
 
   /// Starts the receiving thread, which ends at the time `end`. Called once.
   void start(Time end = never);
-  /// Waits for bytes and returns them in their order; nothing if receiving has ended, or when `deadline` is reached.
+  /// Waits for bytes or for the report of silence, and returns them in their order. Returns nothing when `deadline` is
+  /// reached, after `cancel`, or if receiving has ended and everything was returned.
   [[nodiscard]] std::optional<Received> next(Time deadline = never);
   /// Ends receiving: `next` returns nothing from now on. May be called from any thread.
   void cancel();
@@ -73,7 +74,7 @@ class Receiver {
   std::string place_;
   Time end_time_ = never;
 
-  mutable std::mutex mutex_;  // guards all following members except the thread
+  mutable std::mutex mutex_;  // guards the following members up to `cancelled_`
   std::condition_variable changed_;
   std::deque<Received> waiting_;
   std::size_t waiting_size_ = 0;

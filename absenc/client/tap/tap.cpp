@@ -34,7 +34,7 @@ struct Tap::Parts final : capture::AnnotationSink {
       if (is_over) return end();
       filled = at = 0;
       is_over = !run.advance();
-      --at;  // so that `advance` moves to the first row
+      --at;  // steps back, so that `++at` then moves to the first row
     }
     return &ready[at];
   }

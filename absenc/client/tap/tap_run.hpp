@@ -30,8 +30,9 @@ struct TapOutcome {
 
 class TapRun {
  public:
-  /// Opens `place`: a port without its protocol, with settings behind ?, "/dev/ttyUSB0?baud=115200" or "tcp:HOST:PORT";
-  /// or "-" for standard input. Throws UsageError, os::Failure.
+  /// Opens `place`: a port with settings behind ?, "/dev/ttyUSB0?baud=115200" or "tcp:HOST:PORT"; or "-" for standard
+  /// input. A protocol before the port, "tformat:/dev/ttyUSB0", counts as the given protocol. Throws UsageError,
+  /// os::Failure.
   TapRun(std::string_view place, TapChoices choices);
   ~TapRun();
 

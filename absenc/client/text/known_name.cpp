@@ -13,7 +13,7 @@ namespace absenc::client {
 
 namespace {
 
-// Returns the name in lower case without '-' and spaces, so that names can be compared.
+// Returns the letters, in lower case, and the digits of a name, so that names can be compared.
 std::string letters_and_digits(std::string_view name) {
   std::string text;
   for (const unsigned char c : name) {

@@ -22,8 +22,8 @@ struct KnownName {
   [[nodiscard]] std::string sentence() const;
 };
 
-/// Returns the known name that equals `word`, without regard to case, '-' and spaces; nothing if there is none, or if
-/// `word` is the name of a protocol.
+/// Returns the known name that has the same letters and digits as `word`, without regard to case and other characters;
+/// nothing if there is none, or if `word` is the name of a protocol.
 [[nodiscard]] std::optional<KnownName> find_known_name(std::string_view word);
 
 }  // namespace absenc::client

@@ -24,7 +24,8 @@ inline constexpr std::string_view dump_title = "absenc dump 1";           // dum
 /// replaced.
 void require_replaceable(const std::string& path);
 
-/// Iterates over the lines of a text that are not ignored, without blanks at their end.
+/// Iterates over the lines of a text that are neither empty nor begin with #, and removes blanks at the end of each
+/// line.
 class SignificantLines {
  public:
   explicit SignificantLines(std::string_view text) : rest_(text) {}

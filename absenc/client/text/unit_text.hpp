@@ -75,10 +75,10 @@ struct RoleArgument {
 /// Returns a time as text with a suitable unit: "85 us", "2.1 ms" or "1.5 s".
 [[nodiscard]] std::string to_text(Time time);
 
-/// Returns the possible values of an option as text: "1 to 24" or "true, false".
+/// Returns the possible values of an option as text: "1 to 24", or the names of its choices, "none or odd or even".
 [[nodiscard]] std::string range_of(const Option& option);
 [[nodiscard]] std::string to_text(const Option& option, std::int64_t value);
-/// Returns the value of an option with decimals as the number that the user writes.
+/// Returns the value of an option, stored as an integer, divided by 10^decimals: the number that the user writes.
 [[nodiscard]] double real_value(const Option& option, std::int64_t value);
 
 /// Returns the option `name` with its value as a setting, "baud=57600"; "" if the unit has no such option.
@@ -92,7 +92,8 @@ struct RoleArgument {
 
 /// Returns the flags of the field that have a name and are set in `bits`.
 [[nodiscard]] std::vector<const FlagInfo*> raised(const FieldInfo& field, std::uint64_t bits);
-/// Returns the advice on a flag; "" if there is none, or if the alarms shown beside the flag have the same advice.
+/// Returns the advice on a flag; "" if there is none, or if the flag only sums up alarms and `beside_alarms` states
+/// that these are shown with their own advice.
 [[nodiscard]] std::string_view action_of(const FlagInfo& flag, bool beside_alarms);
 [[nodiscard]] std::vector<std::string_view> flag_names(const FieldInfo& field, std::uint64_t bits);
 [[nodiscard]] std::string to_text(const FieldValue& value);

@@ -13,7 +13,7 @@
 
 namespace absenc::client {
 
-/// Greatest number of bytes that a text may have.
+/// Greatest number of bytes in one line of a dump or of a memory file.
 inline constexpr std::size_t bytes_in_line = 16;
 
 /// A frame that owns its bytes.
