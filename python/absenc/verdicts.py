@@ -66,7 +66,7 @@ class Conformance(NamedTuple):
 
 
 class OptionEvidence(NamedTuple):
-    """Whether the frames permit a value of an option that the document leaves open."""
+    """Evidence for or against one value of an option that the document leaves open: whether the frames permit it."""
 
     option: str
     value: Union[bool, int, str]

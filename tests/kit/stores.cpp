@@ -110,7 +110,7 @@ void try_registers(const Unit& unit, const Configuration& configuration, Finding
 
 constexpr std::byte untouched{0xA5};
 
-/// Storage of a given size, followed by bytes with a known value that reveal writes beyond its end.
+/// Storage of a given size, followed by bytes with a known value: a changed one reveals a write beyond the storage.
 struct Fenced {
   Fenced(std::size_t size_given, std::size_t behind) : bytes(size_given + behind + 64, untouched), size(size_given) {}
   [[nodiscard]] std::span<std::byte> given() { return std::span(bytes).first(size); }

@@ -30,7 +30,7 @@ class FixedReplyDevice final : public Machine<Item> {
   bool reply_due_ = false;
 };
 
-/// Shows which kinds of wrong values a damaged reply decoded to.
+/// Says whether a damaged reply decoded to a wrong position, and to a wrong value of another field.
 struct WrongValues {
   bool position = false;
   bool others = false;

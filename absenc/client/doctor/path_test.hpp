@@ -28,7 +28,8 @@ using ByteList = std::vector<std::uint8_t>;
 /// A function that returns the changed bytes of the reply to a request.
 using Change = std::function<ByteList(const ByteList& request, ByteList reply)>;
 
-/// A machine that changes the bytes between a device and the line, like the receiving side of an adapter.
+/// A machine between a device and the line that changes the device's replies, like the receiving side of an adapter, or
+/// drops them while a contact is open.
 class Adapter final : public Machine<std::uint8_t> {
  public:
   Adapter(Machine<std::uint8_t>& device, Change change, std::function<bool(Time)> is_cut)
@@ -110,7 +111,7 @@ struct Far {
   std::function<std::unique_ptr<Talker>()> other{};
 };
 
-/// Opens links to the devices that `Far` describes, a new one each time doctor opens the port.
+/// Opens links to the devices that `Far` describes. Each call of `open` makes new devices, unless `goes_on` is set.
 class Opener {
  public:
   explicit Opener(Far far) : far_(std::move(far)) {}
@@ -252,7 +253,8 @@ inline std::string asked_mode(const Unit& unit) {
   return "";
 }
 
-/// Returns each rate of the unit as a setting: "rate=9600", or "baud=9600" if the rate belongs to the line.
+/// Returns each rate of the unit as a setting: "rate=9600", or "baud=9600" if the rate belongs to the line. A unit
+/// without a rate of its own gets two usual ones.
 inline std::vector<std::string> rates_of(const Unit& unit) {
   std::vector<std::string> rates;
   if (const Option* option = find_role(unit.options, Role::rate)) {
