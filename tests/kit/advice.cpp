@@ -15,7 +15,7 @@ namespace {
 
 /// A command line that stands in backquotes in the text of an advice.
 struct NamedCommand {
-  std::string text;                  // for example "absenc run ... reset"
+  std::string text;                  // the command line, for example "absenc run ... reset"
   const Command* command = nullptr;  // the unit's command; null if the line suits every unit or is unknown
   bool unknown = false;
 };

@@ -361,7 +361,8 @@ class Campaign {
   std::vector<std::size_t> reads_;  // indexes in `queries_` of the commands that read the position
 };
 
-/// Returns each request of the command's conversation on a line without faults, with its reply.
+/// Returns the first requests, at most four, of the command's conversation on a line without faults, each with its
+/// reply.
 template <class Item>
 std::vector<std::pair<OwnedFrame, OwnedFrame>> Campaign<Item>::frames_of(const Query& query) {
   World<Item> world(unit_, configuration_.options, 1);

@@ -66,8 +66,9 @@ namespace absenc::kit {
 /// they cannot, or report more than the reading. No advice may be circular, and no message may repeat a clause.
 [[nodiscard]] Findings check_advice(const Unit& unit);
 
-/// Checks that each command succeeds on an undamaged line in each configuration of the unit, and that positions equal
-/// the position of the shaft.
+/// Runs each command that changes nothing, in each configuration, on an undamaged line. Positions must equal that of
+/// the shaft. With the options of a model, commands such as `read` and `info` must succeed, and the host must break no
+/// rule.
 [[nodiscard]] Findings check_commands(const Unit& unit);
 
 /// Settings of `check_exchanges`, which runs a host against a virtual encoder in virtual time over a line with every

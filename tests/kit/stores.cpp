@@ -39,8 +39,8 @@ void change(const Unit& unit, const Configuration& configuration, const Command&
     apply_to_host(world, unit, command, values);
     const std::string broken = broken_promise(world, unit, command, values, result.seen);
     findings.require(broken.empty(), [&] { return what() + broken; });
-    // A setting that cannot be read may already have the value that is written. Writing the same value violates the
-    // rules of some encoders, so a violation is accepted then.
+    // The setting may have had the written value already: then it reads the same as before, or cannot be read. Writing
+    // the same value violates the rules of some encoders, so a violation is accepted then.
     const std::string now = to_text(read_setting(world, unit, command).fields);
     findings.require(world.device().violation_count() == 0 || (command.verb == Verb::config_set && now == before),
                      [&] { return what() + std::string(world.device().violations()[0].rule); });

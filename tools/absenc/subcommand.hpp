@@ -12,8 +12,8 @@
 namespace absenc::tool {
 
 struct Parameter {
-  std::string_view name;   // "unit": an argument; "--count": an option
-  std::string_view value;  // placeholder of its value in help; "": a flag without a value
+  std::string_view name;   // "unit" is the name of an argument, "--count" that of an option
+  std::string_view value;  // placeholder of the option's value in help; "": the option has no value
   std::string_view meaning;
   std::string_view fallback{};  // the default in words, for help; "": none
   bool required = false;
@@ -47,7 +47,7 @@ class Invocation {
 };
 
 struct Subcommand {
-  std::string_view name;         // one word, or two as in "memory read"
+  std::string_view name;         // name of the verb: one word, or two as in "memory read"
   std::string_view summary;      // one line about the verb in the list of verbs
   std::string_view description;  // further text in the help of the verb, already broken into lines
   std::span<const Parameter> parameters;

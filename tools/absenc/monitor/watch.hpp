@@ -46,8 +46,9 @@ struct Snapshot {
   // Last readings and failures as text, the newest last; empty unless details were asked for.
   std::vector<std::string> trace{};
   std::vector<BadExchangeText> bad{};  // last bad exchanges, the newest first; empty unless details were asked for
-  std::vector<std::string>
-      fields{};  // only with details: "name value" of the last reply's fields that the reading lacks
+  // "name value" of each field of the last reply that the line of the reading lacks; empty unless details were asked
+  // for.
+  std::vector<std::string> fields{};
 };
 
 [[nodiscard]] std::string_view name_of(Snapshot::State state);
