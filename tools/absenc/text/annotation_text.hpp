@@ -25,8 +25,8 @@ enum class MarkAlarms : std::uint8_t { no, yes };
 /// Returns whether the annotated reply reports a raised alarm.
 [[nodiscard]] bool raises_alarm(const capture::Annotation& annotation);
 
-/// Prints annotations to standard output. Collects lines until they fill 64 KiB or the caller calls `flush`, as live
-/// output does after each line.
+/// Prints annotations to standard output. Collects lines until they fill 64 KiB or the caller calls `flush`, as for
+/// live input after each piece of it.
 class AnnotationPrinter final : public capture::AnnotationSink {
  public:
   AnnotationPrinter(const Unit& unit, const Options& options, const TickClock& clock, AnnotationFormat format,

@@ -103,7 +103,7 @@ class Controls {
 
   Watches* watches_;
   View view_;
-  const Command* asked_ = nullptr;  // command that the shown question is about; null: no question
+  const Command* asked_ = nullptr;  // command that the question is about; used only while a question is shown
 };
 
 void run_on_screen(Screen& screen, Watches& watches, Time end) {
