@@ -159,7 +159,7 @@ def test_records_from_python(tmp_path, name):
         assert recorded.paths == [str(tmp_path / name)]
         assert (recorded.readings, recorded.failures) == (20, 0)
         assert recorded.bytes == (tmp_path / name).stat().st_size
-        assert next(encoder.samples(count=1)).kind == "reading"  # the encoder is still usable
+        assert next(encoder.samples(count=1)).kind == "reading"  # after the recording the encoder can still be read
     recording = absenc.load(tmp_path / name)
     assert recording.good().sum() == 20
     assert recording.header["rate_hz"] == "1000"

@@ -49,7 +49,7 @@ def bad_packet(random_, kind, number):
         return random_.choice(KNOWN)
     if way == 1:
         return random_.randbytes(random_.randrange(1, 64))
-    if way == 2:  # random properties
+    if way == 2:  # a packet with random properties
         start = {CONNACK: b"\0\0", PUBACK: number.to_bytes(2, "big") + b"\0", PUBLISH: b"\0\1a", 9: b"\0\1"}
         return packet(kind, start.get(kind, b"\0") + properties(random_))
     if way == 3:  # a truncated packet: the receiver takes the next packet for its rest

@@ -248,7 +248,7 @@ class Campaign {
     if (!values) return;
     world_.set_rates({});
     world_.device().lower_alarms(0xFFFF'FFFF);
-    world_.pass(std::chrono::seconds(2));  // during this time delayed replies arrive
+    world_.pass(std::chrono::seconds(2));  // replies that were delayed earlier arrive within these two seconds
     world_.move(static_cast<std::int64_t>(random_.next()));
     world_.set_rates(rates);
     const ConversationResult result = world_.run(command, *values);

@@ -137,7 +137,7 @@ void store(const Unit& unit, const Configuration& configuration, const Command& 
                      [&] { return std::string(command.name) + ": needs more than host_storage"; });
     return;
   }
-  std::size_t none = 0;  // largest tried size that the unit refused
+  std::size_t none = 0;  // largest storage size, of those tried, that the unit refused
   std::size_t needed = unit.host_storage;
   findings.require(!made(0), [&] { return std::string(command.name) + ": needs no storage"; });
   while (needed - none > 1) {

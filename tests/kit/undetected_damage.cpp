@@ -8,7 +8,7 @@
 namespace absenc::kit {
 namespace {
 
-/// A device that sends the same reply to every request.
+/// A device that sends the same reply to every request, for a line with faults.
 template <class Item>
 class FixedReplyDevice final : public Machine<Item> {
  public:

@@ -104,7 +104,7 @@ struct Far {
   EncoderAddress encoder;  // address of the virtual encoder, "sim:tformat?model=23-bit"
   std::uint32_t rate = 0;  // rate of the encoder's line in bits per second; 0: the rate of the user's address
   Change change{};         // change of reply bytes by the adapter; empty: none
-  std::optional<EncoderAddress> second{};  // another encoder on the same line
+  std::optional<EncoderAddress> second{};  // second encoder on the same line; nothing: there is none
   std::function<bool(Time now)> is_cut{};  // returns true while a contact of the line is open; empty: never
   bool goes_on = false;                    // whether the time of the encoder continues when the port is opened again
   // makes another device instead of the encoder; empty: the encoder is connected
@@ -283,7 +283,7 @@ inline std::string of_encoder(const Unit& unit, const std::string& setting) {
 }
 
 struct Pair {
-  std::string asked;  // address as the user writes it
+  std::string asked;  // address of the encoder as the user writes it
   Far far;
 };
 

@@ -34,8 +34,8 @@ void JsonFields::put_reading(const Reading& reading) {
 
 namespace {
 
-// Returns the flag's meaning, followed by the user's action if there is one. With `beside_alarms`, the action is not to
-// read the alarms.
+// Returns the flag's meaning, followed by the user's action if there is one. With `beside_alarms`, leaves out the
+// action of a flag that summarises alarms.
 std::string in_words(const FlagInfo& flag, bool beside_alarms) {
   const std::string_view action = action_of(flag, beside_alarms);
   return action.empty() ? std::string(flag.meaning) : fmt::format("{}: {}", flag.meaning, action);

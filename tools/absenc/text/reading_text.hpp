@@ -41,7 +41,7 @@ enum class Doubt : std::uint8_t {
 [[nodiscard]] std::string flags_text(const Unit& unit, const Flags& flags);
 
 /// Returns one line for each set flag, with its meaning and what the user should do; "" if no flag is set. With
-/// `beside_alarms`, no flag advises to read the alarms.
+/// `beside_alarms`, a flag that summarises alarms has no advice.
 [[nodiscard]] std::string flags_in_words(const Flags& flags, bool beside_alarms = false);
 /// Returns the raised alarms in words. With two channels, the channel's name stands before its alarms; if both raise
 /// the same alarms, these are listed once.
