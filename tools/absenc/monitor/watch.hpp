@@ -21,8 +21,8 @@ using namespace client;
 struct Snapshot {
   enum class State : std::uint8_t {
     opening,  // the port could not be opened yet
-    live,     // the last reading is good, and not older than three periods or 0.5 s
-    silent,   // the last reading is good, but older than three periods and than 0.5 s
+    live,     // the last reading is good, and not older than the longer of three periods and 0.5 s
+    silent,   // the last reading is good, but older than the longer of three periods and 0.5 s
     failing,  // the last attempt to read failed
     lost,     // the port was open and was lost
     paused,   // the user has paused the readings
