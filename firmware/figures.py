@@ -63,7 +63,8 @@ def measured(folder):
                 program = os.path.join(folder, f"reader-{reader}-{cpu}.elf")
                 every[reader] = sizes(program) | run(plugin, program, machine)
             base = every.pop("base")
-            base["character"] = base["reply"] = base["reading"]  # the cost of a pair of marks itself
+            # The cost of the two marks themselves, which is subtracted from every figure.
+            base["character"] = base["reply"] = base["reading"]
             for reader, figures in every.items():
                 above = {name: None if figures[name] is None else figures[name] - base[name] for name in FIGURES}
                 table.setdefault(reader, {})[cpu] = above

@@ -15,7 +15,7 @@ struct ExpectedField {
   enum class Kind : std::uint8_t { number, real, text, names } kind;
   std::string_view field;
   std::int64_t number;
-  double real;            // expected number, also if it is whole
+  double real;            // expected value as a real number, also if it is whole
   std::string_view text;  // expected flag names separated by blanks, or bytes in hexadecimal
 };
 

@@ -169,7 +169,7 @@ class BabblingLine(FakeLine):
     def serve(self):
         due = time.monotonic()
         for piece in itertools.cycle(self.pieces):
-            # If sending was delayed, the next period begins now.
+            # If sending was delayed, the next period begins now instead of when it was due.
             due = max(due + self.period, time.monotonic())
             writable = [self.master] if self.period == 0 else []
             timeout = None if self.period == 0 else max(due - time.monotonic(), 0)

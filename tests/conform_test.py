@@ -49,8 +49,8 @@ class Conform(EncoderCase):
         answer = json.loads(result.stdout)
         self.assertEqual((answer["ok"], answer["protocol"], answer["left"]), (True, "tformat", []))
         for clause in answer["clauses"]:
-            # The reply may arrive before the port has its former rate again; conform then reports the clause as
-            # untested.
+            # For this clause the request is sent at another rate. The reply arrives before the port has its former rate
+            # again, so the clause stays untested.
             expected = "untested" if clause["id"] == "bad-delimiter" else "kept"
             self.assertEqual(clause["verdict"], expected, clause)
             self.assertTrue(clause["document"] and clause["paragraph"] and clause["evidence"], clause)

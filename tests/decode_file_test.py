@@ -207,7 +207,7 @@ class Text(Case):
         self.assert_wrong_usage(absenc("decode", "e201", capture, "--bits"), "does not say where")
 
     def test_bit_positions_of_one_frame(self):
-        # A big-endian field has its low byte last.
+        # The field is big-endian: its high bits are in the earlier byte and are printed first.
         result = absenc("decode", "raa38", "--hex", "ff81017f00", "--bits", "--option", "bits=14")
         self.assert_good(result)
         self.assertRegex(result.stdout, r"singleturn +383 counts +bits 16-21 24-31")

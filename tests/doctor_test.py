@@ -131,7 +131,7 @@ class Named(EncoderCase):
                 return
             setpriv = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"]
             command = [ABSENC, "doctor", f"tformat:{line.path}", "--json"]
-            # Users without access to this directory cannot run the command in it either.
+            # A user without access to the folder of the command cannot run it, so the test is skipped then.
             probe = subprocess.run([*setpriv, ABSENC, "list"], capture_output=True, check=False)
             if probe.returncode != 0:
                 self.skipTest("another user cannot run the command here")

@@ -303,7 +303,7 @@ class Behaviour(EmulateCase):
             replies = [client.exchange(3) for _ in range(20)]
         good = bytes([0x1A, 0, 0, 0, 0, 0x11, 0, 0, 0, 0, 0x0B])
         self.assertTrue(all(len(reply) == 11 and reply != good for reply in replies))
-        # The E201's checksum is the XOR of its bytes, so two flipped bits in the same column cancel out.
+        # The checksum of T-format is the XOR of the bytes, so two flipped bits in the same column cancel out.
         self.assertGreater(sum(crc(reply[:-1]) != reply[-1] for reply in replies), 10)
         self.assertIn("faults injected: 20 corrupt\n  replies with faults: 20\n", emulator.end()[2])
 

@@ -176,7 +176,7 @@ class VirtualEncoder(EslCase):
         client = self.client("--singleturn", "1000", "--also", "address=3&singleturn=70000&multiturn=7",
                              "--also", "address=5&alarm=multiturn_error", "--also", "address=6&singleturn=0x5555",
                              "--also", "address=6&singleturn=0xAAAA")
-        for _ in range(3):  # repeats the requests without a pause
+        for _ in range(3):  # requests follow each other without a pause
             self.check_position(client.exchange(POSITION, address=0), 1000, 0)
             self.check_position(client.exchange(POSITION, address=3), 70000, 7, address=3)
             self.check_position(client.exchange(POSITION, address=5), 0, 0, address=5, alarms=2)

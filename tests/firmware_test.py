@@ -88,8 +88,8 @@ class Drive(unittest.TestCase):
         self.assertEqual(counted["requests"], int(re.search(r"(\d+) requests answered", summary)[1]), everything)
         damaged = int(re.search(r"replies with faults: (\d+)", summary)[1])
         noticed = counted["silences"] + counted["implausible"]
-        # The drive must detect every injected fault once. It may detect one more fault, because a reply delayed by a
-        # busy machine is like a missing one.
+        # The drive must detect every injected fault. It may detect a few more, because a reply delayed by a busy
+        # machine is like a missing one.
         self.assertGreaterEqual(noticed, damaged, everything)
         self.assertLessEqual(noticed, damaged + 3 + POSITIONS // 400, everything)
         if POSITIONS >= 1000:

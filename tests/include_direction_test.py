@@ -32,7 +32,7 @@ FREESTANDING_HEADERS = set(
 )
 # Layers all of whose headers are public.
 WHOLLY_PUBLIC = {"core", "link", "protocol", "host", "sim"}
-# Standard headers that cost seconds of compile time in every file that includes them.
+# Headers of other libraries that cost seconds of compile time in every file that includes them.
 HEAVY = ("CLI/", "toml++/", "nlohmann/", "microhttpd.h", "sqlite3.h", "mosquitto.h")
 LIGHT = {"nlohmann/json_fwd.hpp"}
 OS_HEADER = re.compile(

@@ -179,7 +179,7 @@ class LateReply : public ::testing::TestWithParam<std::size_t> {
   const Kind& kind = kinds()[GetParam()];
 };
 
-// Covers delays from 1 ms to 5 s. With some of them a late reply arrives exactly when the next reply is due.
+// Covers delays from 0 to 5 s. With some of them a late reply arrives exactly when the next reply is due.
 TEST_P(LateReply, NeverAnswersLaterRequest) {
   constexpr unsigned readings = 40;
   for (const Time period : {Time{}, Time{1ms}, Time{10ms}, Time{100ms}, Time{500ms}, Time{2s}}) {

@@ -74,7 +74,7 @@ class Recording(Case):
         return path
 
     def assert_motion(self, rows):
-        # Rows without those for gaps, which a busy machine may cause.
+        # Leaves out the rows for gaps, which a busy machine may cause.
         rows = [row for row in rows if row.get("event") != "gap"]
         first = rows[0]
         for row in rows[5:]:

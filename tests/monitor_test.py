@@ -246,7 +246,8 @@ class Screen(MonitorCase):
         self.assertNotRegex(screen, r"(?m)^  .*\bsingleturn \d")
         terminal.resize(64, 16)
         screen = terminal.wait_for(rf"\A(.*\n){{15}}{KEYS}")
-        # The graph of the position stays in its line of the screen.
+        # Even on the smallest screen, the line above the keys is one of the trace, which begins with its time in
+        # seconds.
         self.assertRegex(screen.splitlines()[14], r"^ +\d+\.\d{3}  ")
         terminal.press("e")
         terminal.wait_for("no exchange has failed")

@@ -106,7 +106,7 @@ std::vector<std::int64_t> least_arguments(const Command& command) {
 
 class NeverSilent : public ::testing::TestWithParam<const Unit*> {
  protected:
-  // Runs each command with each option set on a line that is never silent.
+  // Runs each command with these options on a line that is never silent: it must end within 30 s with an error.
   void expect_ends(const Options& options, Time period, const Kind& kind) {
     for (const Command& command : unit.commands) {
       const Any<Conversation> made = unit.host(options, command, least_arguments(command), storage_);

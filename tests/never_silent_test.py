@@ -13,7 +13,7 @@ AT_ONCE = 8  # number of commands that run in parallel: they mostly wait
 
 
 def units():
-    """Returns the names of the units with a character link."""
+    """Returns the entries of `absenc list --json` for the units with a character link."""
     listed = [json.loads(line) for line in absenc("list", "--json").stdout.splitlines()]
     return [unit for unit in listed if unit["link"] in ("half_duplex", "full_duplex")]
 

@@ -50,7 +50,7 @@ class Case(unittest.TestCase):
 
 
 class PlatformIO(Case):
-    # https://docs.platformio.org/en/latest/manifests/library-json/
+    # Keys of library.json and of its entry `build`, from https://docs.platformio.org/en/latest/manifests/library-json/
     KEYS = {"$schema", "name", "version", "description", "keywords", "license", "frameworks", "platforms", "headers",
             "export", "build"}
     BUILD_KEYS = {"includeDir", "srcDir", "srcFilter", "flags", "unflags", "libArchive"}
@@ -136,6 +136,7 @@ endforeach()
 
 
 class EspIdf(Case):
+    # Keys of the manifest, from
     # https://docs.espressif.com/projects/idf-component-manager/en/latest/reference/manifest_file.html
     KEYS = {"version", "description", "license", "tags", "dependencies", "files"}
 
@@ -186,7 +187,7 @@ include({ROOT}/CMakeLists.txt)
 
 
 class Arduino(Case):
-    # https://arduino.github.io/arduino-cli/latest/library-specification/
+    # Keys of library.properties, from https://arduino.github.io/arduino-cli/latest/library-specification/
     REQUIRED = {"name", "version", "author", "maintainer", "sentence", "paragraph", "category", "url", "architectures"}
     OPTIONAL = {"includes", "dot_a_linkage"}
 

@@ -143,7 +143,7 @@ class Damage(SpoolCase):
         wait_until(lambda: os.path.exists(self.spool()), "it is made anew")
         wait_until(lambda: self.taken(server) > goal + 50, "it goes on")
         end(server.process, signal.SIGKILL)
-        # Events may arrive before the readings.
+        # Messages of events may precede those of readings; they have no key `first`.
         first = next(one["first"] for one in waiting_in(self.spool()) if "first" in one)
         self.assertEqual(first, 1, "what the open file had was written again")
 

@@ -300,7 +300,7 @@ TEST(Trigger, RequestsEachFrameWithLongEnoughPulse) {
     toy.push({.kind = Step<Byte>::Kind::pulse, .wire = ExtraWire::trigger, .at = at, .width = width});
   };
   ByteToy host([&](ByteToy& self, const Event<Byte>& event) {
-    // this pulse is too short
+    // A pulse of 9 us, which is too short: the device needs 10 us.
     if (event.kind == Kind::received) pulse(self, event.at + microseconds(60), microseconds(9));
     if (event.kind == Kind::silence) self.finish();
   });

@@ -26,7 +26,7 @@ class EveryUnit(Case):
             alarms = next((names for name, names in flags.items() if name.endswith("alarms")), [])
             for alarm in filter(None, alarms):
                 refused = absenc("read", f"sim:{about['protocol']}?alarm={alarm}")
-                # An error message means that the unit's word cannot carry this alarm.
+                # This error message means that a word of the unit cannot carry the alarm.
                 if "nothing in what" not in refused.stderr:
                     yield about, alarm
 

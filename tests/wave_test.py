@@ -14,7 +14,7 @@ from command_support import ABSENC, PATIENCE, Case, absenc, end
 UNITS = [json.loads(line) for line in absenc("list", "--json").stdout.splitlines()]
 WIRES = {"half_duplex": {"line"}, "full_duplex": {"host", "device"}, "exchange": {"cs", "sck", "mosi", "miso"},
          "clocked": {"clock", "data"}, "can": {"can"}}
-# Units without replies of their own: frames of EncoLink's channels 2 and 3 are spread over several exchanges.
+# Message of `decode` for a frame of EncoLink's channels 2 or 3, whose bytes are spread over several exchanges.
 IN_PARTS = "each of the last exchanges carried a byte of it"
 
 

@@ -27,7 +27,7 @@ constexpr auto filled = []<std::size_t count>(std::array<void (*)(), count> all,
   return all;
 };
 
-// Interrupt vectors. Of the devices, only the UART has its interrupts enabled.
+// Interrupt vectors. Only the UART's device interrupts are enabled, so all device vectors call its handler.
 [[gnu::section(".vectors"), gnu::used]] const Vectors vectors{
     &stack_top, start, filled(std::array<void (*)(), 13>{}, fault), tick, filled(std::array<void (*)(), 32>{}, uart)};
 
@@ -58,7 +58,7 @@ void start_clock(Time period) {
   counts_of_period = static_cast<std::uint32_t>(period.count()) / frequency.nanoseconds * frequency.counts;
   register_at(reload) = counts_of_period - 1;
   register_at(value) = 0;
-  register_at(control) = 7;  // clock of the processor, counter and its interrupt enabled
+  register_at(control) = 7;  // SysTick counts the processor clock, and its interrupt is enabled
 }
 
 Time now() {

@@ -36,7 +36,7 @@ void send(Bytes bytes);
 /// Restarts the measurement of `stack_used`.
 void paint_stack();
 
-/// Disables interrupts while an object of this class exists.
+/// Disables interrupts while an object of this class exists. Its destructor enables them, so locks must not be nested.
 class InterruptLock {
  public:
   InterruptLock() { asm volatile("cpsid i" : : : "memory"); }
@@ -57,7 +57,7 @@ void on_sent();
 /// Calls the emulator's semihosting service `number` and returns its result.
 std::uint32_t call_emulator(std::uint32_t number, const void* parameter);
 
-/// Frequency of the clock that SysTick counts, in hertz and as a number of counts per time.
+/// Frequency of the clock that SysTick counts: in hertz, and as a ratio without rounding (`counts` per `nanoseconds`).
 struct Frequency {
   std::uint32_t hertz;
   std::uint32_t nanoseconds;  // time that `counts` counts take

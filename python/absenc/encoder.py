@@ -186,8 +186,8 @@ class Encoder:
         return self._encoder.run(command, *values, **arguments)
 
     def alarms(self) -> Optional[list[Alarm]]:
-        """Reads the raised alarms, with meaning and action; []: all are reported clear; None: the encoder does not
-        report all."""
+        """Reads the raised alarms, with meaning and action; []: all are reported clear; None: none is raised, but not
+        all are reported."""
         names = self._encoder.read_alarms().alarms
         return None if names is None else [flag for flag in self.protocol.alarms if flag.name in names]
 

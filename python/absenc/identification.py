@@ -18,7 +18,7 @@ class Found(NamedTuple):
     tried: int  #: number of exchanges
     explained: int  #: number of exchanges that this encoder explains
     log10_chance: float  #: log10 of the probability that noise explains as many exchanges
-    sure: bool  #: this probability is small enough
+    sure: bool  #: `log10_chance` is small enough to exclude chance
     identity: dict[str, Any]  #: identification read from the encoder, such as its serial number
 
 

@@ -18,8 +18,8 @@ from .captures import Column, Masked, Table
 from .errors import Failure, UsageError
 from .protocols import Protocol, protocol
 
-FLAG_WORDS = "names, separated by spaces"  # start of the meaning of a flags column in a header
-ALL_CLEAR = "none"  # cell of flags in CSV; an empty cell: not reported
+FLAG_WORDS = "names, separated by spaces"  # with these words begins the meaning of a column of flags
+ALL_CLEAR = "none"  # cell of a flags column in CSV: all are reported clear; an empty cell: not reported
 NOT_ENDED = "18446744073709551615"  # attribute `rows` in HDF5 while the recording is written
 
 #: Values of one row, by column; None: missing or invalid.
@@ -179,7 +179,7 @@ def _load_hdf5(path: Path) -> Recording:
             raise Failure(f"{path} is HDF5, but no recording of absenc")
         names = attributes.pop("columns").split(",")
         ended = attributes.pop("rows", NOT_ENDED)
-        count = len(file["time_s"])  # written last: after a kill the other columns may have more rows
+        count = len(file["time_s"])  # `time_s` is written last: after a kill the other columns may have more rows
         dtypes = {
             name: "O" if type.kind == "S" else "?" if type == np.int8 else f"{type.kind}{type.itemsize}"
             for name, type in ((name, file[name].dtype) for name in names)

@@ -26,7 +26,7 @@ class Finding(NamedTuple):
 class Examination(NamedTuple):
     """The verdict of `absenc doctor --json`."""
 
-    ok: bool  #: no finding needs a repair
+    ok: bool  #: the examination is complete, and no finding needs a repair
     findings: list[Finding]  #: in the order in which to fix them
     readings: int
     good: int  #: readings without an error
@@ -66,7 +66,7 @@ class Conformance(NamedTuple):
 
 
 class OptionEvidence(NamedTuple):
-    """Whether the frames permit a value of an option that the document leaves open."""
+    """Evidence for or against one value of an option that the document leaves open: whether the frames permit it."""
 
     option: str
     value: Union[bool, int, str]
@@ -98,7 +98,7 @@ class Port(NamedTuple):
 
     port: str  #: name of the port: "/dev/ttyUSB0", "can0", "/dev/spidev0.0"
     kind: str  #: kind of port: "serial", "can", "spi"
-    lasting_name: Optional[str] = None  #: name that other adapters do not change: "/dev/serial/by-id/..."
+    lasting_name: Optional[str] = None  #: name that does not depend on other adapters: "/dev/serial/by-id/..."
     maker: Optional[str] = None
     adapter: Optional[str] = None
     serial_number: Optional[str] = None

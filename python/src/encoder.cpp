@@ -73,7 +73,7 @@ class PyEncoder {
     if (!std::exchange(closed_, true)) encoder_.disconnect();
   }
 
-  /// Ends the current loop over samples (true), or permits new ones (false).
+  /// Ends the present loop over samples if `stopping`; otherwise permits new loops.
   void stop(bool stopping) { stopping_ = stopping; }
 
   [[nodiscard]] const client::Encoder& encoder() const { return encoder_; }

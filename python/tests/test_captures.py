@@ -43,7 +43,7 @@ def test_decodes_like_the_command(wave, request):
     assert all(absent) == any(absent) == (request.node.callspec.id == "invalid")
     assert absent == list(np.ma.getmaskarray(capture["angle_deg"]))
     assert absent == [row["singleturn_valid"] == "false" for row in rows] == list(np.ma.getmaskarray(capture["singleturn"]))
-    assert len(set(capture["reply"])) > 250  # the encoder turns
+    assert len(set(capture["reply"])) > 250  # the encoder turns, so most replies differ
     assert [[] if row["alarms"] == "none" else row["alarms"].split() for row in rows] == [
         absenc.protocol["tformat"].flag_names("alarms", int(bits)) for bits in capture["alarms"]]
     assert [float(row["angle_deg"]) for row in rows if row["angle_deg"]] == pytest.approx(capture["angle_deg"].compressed())
@@ -81,7 +81,8 @@ def test_refuses_missing_files_and_unknown_columns(tmp_path):
     with pytest.raises(absenc.AbsencError):
         absenc.decode(tmp_path / "none.sr", "tformat")
     with pytest.raises(absenc.AbsencError):
-        absenc.decode_batches(tmp_path / "none.sr", "tformat")  # raised before the first batch is requested
+        # The exception is raised before the first batch is requested.
+        absenc.decode_batches(tmp_path / "none.sr", "tformat")
     with pytest.raises(KeyError, match="angle_deg"):
         absenc.decode(TEXT, "tformat")["angel"]
 
@@ -96,7 +97,7 @@ def test_encodes_and_decodes_frames():
     assert raised.value.sent == "1A"
     assert tformat.flag_names("alarms", 1 << 4) == ["over_heat"]
     with pytest.raises(TypeError):
-        tformat.decode(3)  # must not be decoded as three zero bytes
+        tformat.decode(3)  # a number must not be decoded as three zero bytes
 
 
 def test_computes_crc_of_bytes_and_arrays():

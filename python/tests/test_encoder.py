@@ -13,7 +13,7 @@ import tty
 import absenc
 import pytest
 
-PATIENCE_MS = 500  # timeout of replies, because a busy machine may delay them
+PATIENCE_MS = 500  # timeout of replies, long because a busy machine may delay them
 
 
 def test_error_has_sent_and_received_bytes_and_advice(absenc_emulate):
@@ -73,7 +73,7 @@ def test_refuses_invalid_numbers_and_options():
     with absenc.open("sim:tformat", model=None) as encoder:
         for numbers in [(0, 10**9), (0, 2**31), (10**6, 1)]:
             with pytest.raises(absenc.UsageError):
-                encoder.memory.read(*numbers)  # refused without allocating memory for all bytes
+                encoder.memory.read(*numbers)  # such a read is refused before memory for all bytes is allocated
         for argument in (2**80, -(2**80), "five", None, 1.5):
             with pytest.raises(absenc.UsageError, match="address is .*must be a whole number"):
                 encoder.run("memory-read", argument)
@@ -191,7 +191,7 @@ def test_asyncio_timeout_cancels_wait(absenc_emulate):
                 async with asyncio.timeout(0.2):
                     async for _ in encoder.samples(rate=0.001):
                         pass
-            return encoder.read().valid  # the encoder is still usable
+            return encoder.read().valid  # after the cancelled wait the encoder can still be read
 
     assert asyncio.run(read())
 
@@ -225,7 +225,7 @@ with absenc.open("tformat:{os.ttyname(slave)}?latency=50000") as encoder:
     tty.setraw(slave)
     with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as process:
         try:
-            assert select.select([master], [], [], 40)[0]  # waits for the request
+            assert select.select([master], [], [], 40)[0]  # waits until the program has sent its request
             os.kill(process.pid, signal.SIGINT)
             assert process.communicate(timeout=40)[0] == "interrupted\n"
         finally:

@@ -59,7 +59,7 @@ def test_encodes_and_decodes_requests(unit):
         try:
             request = unit.encode(command.name)
         except absenc.UsageError:
-            continue  # not encodable with the options of the first model
+            continue  # the command cannot be encoded with the options of the first model
         if request:
             requests.append(request)
     assert requests or unit.link == "clocked"  # on clocked links the clock itself requests a position

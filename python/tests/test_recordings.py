@@ -17,7 +17,7 @@ FAULTY = "sim:tformat?motion=rpm=60&alarm=over_heat&fault=corrupt=0.3"
 
 def record(path, address, count=50):
     subprocess.run([os.environ["ABSENC"], "record", address, "--output", str(path), "--rate", "0", "--count", str(count)],
-                   check=False, capture_output=True)  # status 1 if the last reading failed
+                   check=False, capture_output=True)  # the status is 1 if the last reading failed
     return path
 
 
@@ -159,7 +159,7 @@ def test_records_from_python(tmp_path, name):
         assert recorded.paths == [str(tmp_path / name)]
         assert (recorded.readings, recorded.failures) == (20, 0)
         assert recorded.bytes == (tmp_path / name).stat().st_size
-        assert next(encoder.samples(count=1)).kind == "reading"  # the encoder is still usable
+        assert next(encoder.samples(count=1)).kind == "reading"  # after the recording the encoder can still be read
     recording = absenc.load(tmp_path / name)
     assert recording.good().sum() == 20
     assert recording.header["rate_hz"] == "1000"

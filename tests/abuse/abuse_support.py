@@ -5,7 +5,7 @@ import pathlib
 import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
-ALL = bool(os.environ.get("ABSENC_ABUSE_ALL"))  # full test, requested by run.py --all
+ALL = bool(os.environ.get("ABSENC_ABUSE_ALL"))  # whether to run the full test, which run.py --all requests
 
 
 def often(short, everything):

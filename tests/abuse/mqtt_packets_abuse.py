@@ -17,7 +17,7 @@ from serve_support import BUSY, ServeCase
 ONE = "sim:tformat?motion=rpm=60"
 SEED = int(os.environ.get("ABSENC_ABUSE_SEED", "1"))
 CONVERSATIONS = often(150, 10_000)
-SERVERS = often(20, 60)  # number of `absenc serve`; each pauses for up to 5 s between two conversations
+SERVERS = often(20, 60)  # number of processes `absenc serve`; each pauses for up to 5 s between two conversations
 NOBODYS = 60_000  # a packet number that no message has, because packet numbers count from 1 in each conversation
 KNOWN = [bytes.fromhex(one) for one in ("20050000027f00", "4006000100027f00", "e00487027f00", "30050001615859")]
 # Types of packets that a broker sends: 9 is SUBACK, 15 is AUTH.
@@ -49,7 +49,7 @@ def bad_packet(random_, kind, number):
         return random_.choice(KNOWN)
     if way == 1:
         return random_.randbytes(random_.randrange(1, 64))
-    if way == 2:  # random properties
+    if way == 2:  # a packet with random properties
         start = {CONNACK: b"\0\0", PUBACK: number.to_bytes(2, "big") + b"\0", PUBLISH: b"\0\1a", 9: b"\0\1"}
         return packet(kind, start.get(kind, b"\0") + properties(random_))
     if way == 3:  # a truncated packet: the receiver takes the next packet for its rest
@@ -88,7 +88,8 @@ def acknowledged(stream):
 class Conversation:
     def __init__(self, seed):
         self.random = random.Random(seed)
-        # With 0 good packets, in half of the conversations, the bad packet replaces the CONNACK or follows it directly.
+        # With 0 good packets, in three of eight conversations, the bad packet replaces the CONNACK or follows it
+        # directly.
         self.good_packets = self.random.choice((0, 0, 0, 1, 2, 3, 5, 8))
         self.seen = 0
         self.ends = None

@@ -13,9 +13,9 @@ namespace {
 
 // ---- Commands named in the text of an advice
 
-/// A command line quoted in the text of an advice.
+/// A command line that stands in backquotes in the text of an advice.
 struct NamedCommand {
-  std::string text;                  // for example "absenc run ... reset"
+  std::string text;                  // the command line, for example "absenc run ... reset"
   const Command* command = nullptr;  // the unit's command; null if the line suits every unit or is unknown
   bool unknown = false;
 };
@@ -24,7 +24,7 @@ struct VerbName {
   std::string_view name;
   Verb verb;
 };
-/// Verbs of the tool that a unit implements with exactly one command.
+/// Verbs of the tool, each with the kind of command by which a unit implements it.
 constexpr auto verb_names = std::to_array<VerbName>({{"alarms", Verb::read},
                                                      {"read", Verb::read},
                                                      {"info", Verb::info},
@@ -57,7 +57,7 @@ const Command* find_named(const Unit& unit, std::string_view words) {
   if (words.starts_with(set_setting)) return find_setter(unit, behind(set_setting));
   const bool gets = words.starts_with(get_setting);
   if (!gets && !words.starts_with(run_command)) return nullptr;
-  // Arguments may follow the command's name.
+  // Arguments may follow the command's name in the advice, so only the first word is the name.
   std::string_view name = behind(gets ? get_setting : run_command);
   name = name.substr(0, name.find(' '));
   const Command* const found = find_command(unit, name);
@@ -164,7 +164,8 @@ bool reports_more(const ReportedFields& result, const ReportedFields& reading) {
 }
 
 /// Runs the commands that the advice of alarm `bit` names, in order. Returns whether the alarm has ended; false also if
-/// the encoder does not exist or does not show the alarm.
+/// the encoder does not exist or does not show the alarm. Adds a finding if the commands have no effect and no
+/// explanation.
 template <class Item>
 bool follow_advice(const Unit& unit, const Configuration& configuration, std::size_t bit, Findings& findings) {
   const FlagInfo& flag = unit.alarms->flags[bit];

@@ -11,7 +11,8 @@
 
 namespace absenc::kit {
 
-/// Returns the value of the command's argument with this role, or null if the command has no such argument.
+/// Returns a pointer to the value, in `values`, of the command's argument with this role; null if there is no such
+/// argument.
 [[nodiscard]] inline std::int64_t* argument(const Command& command, Values& values, Role role) {
   const Argument* const found = find_role(command.arguments, role);
   return found != nullptr ? &values[static_cast<std::size_t>(found - command.arguments.data())] : nullptr;

@@ -151,7 +151,8 @@ void request_of(const Unit& unit, const Configuration& configuration, const Comm
   if (error == Error::invalid_argument) return;  // no encoder has this combination of options
   findings.require(error == Error::none && !seen.fields.empty(),
                    [&] { return what() + "is " + std::string(text_of(error).name); });
-  // Every request may have a field with the name of an argument, so another field may carry the argument's value.
+  // A field that belongs to every request may have the name of an argument, and the argument's value stand in another
+  // field. So any field with the value counts.
   for (std::size_t i = 0; i < values.size(); ++i) {
     const Argument& one = command.arguments[i];
     if (!seen.fields.contains(std::string(one.name)) || (!one.required && values[i] == one.default_value)) continue;

@@ -122,7 +122,7 @@ class Decoding {
   }
 
   // Checks that the decoder refuses CAN frames with another identifier, extended frames and remote frames. Other
-  // identifiers are tried only if the request names the node.
+  // identifiers are tried only for vectors with a request, which determines the identifier of its reply.
   void other_frames() {
     for (unsigned bit = 0; bit < 11 && !request_.empty(); ++bit) {
       OwnedFrame other = reply_;

@@ -15,8 +15,9 @@ namespace absenc::kit {
 namespace {
 
 constexpr unsigned places = 8;
-constexpr std::uint64_t exchanges_per_encoder = 4000;  // exchanges per virtual encoder
-constexpr unsigned runs_per_change = 2;                // runs of each changing command per virtual encoder
+constexpr std::uint64_t exchanges_per_encoder = 4000;  // number of exchanges with each virtual encoder
+// Number of runs of each changing command, with each virtual encoder.
+constexpr unsigned runs_per_change = 2;
 
 bool is_repeatable(const Command& command) {
   return !command.changes_encoder &&
@@ -130,7 +131,8 @@ class Campaign {
       if (cost > 20 && !random_.chance(0.1)) continue;
       Query query{&command,
                   command.verb == Verb::memory_read ? least_arguments(command) : random_arguments(command, random_)};
-      // The results at the other positions are recorded on first use, because some commands take a hundred exchanges.
+      // Except for `read`, the results at the other positions are recorded on first use, because some commands take a
+      // hundred exchanges.
       if (!record_truth_at(query, 0)) continue;
       cost = query.cost;
       if (command.verb == Verb::read) {
@@ -171,7 +173,7 @@ class Campaign {
   void run_conversation() {
     const bool reads = !reads_.empty() && random_.chance(0.95);
     Query* chosen = &queries_[reads ? reads_[random_.below(reads_.size())] : random_.below(queries_.size())];
-    // A command is chosen the less often, the more exchanges it has.
+    // The more exchanges a command has, the less often it is chosen.
     if (chosen->cost > 4 && !reads_.empty() && !random_.chance(4.0 / static_cast<double>(chosen->cost))) {
       chosen = &queries_[reads_[random_.below(reads_.size())]];
     }
@@ -181,7 +183,7 @@ class Campaign {
     if (!query.truth[place_]) {
       world_.set_rates({});
       world_.pass(std::chrono::seconds(1));
-      // The encoder's late replies to previous requests arrive during this conversation.
+      // This conversation is ignored: the encoder's late replies to previous requests arrive during it.
       (void)world_.run(*query.command, query.arguments);
       if (!record_truth_at(query, place_)) return;
     }
@@ -198,7 +200,8 @@ class Campaign {
                       [&] { return where(query) + "has a reading before any reply, or with an error"; });
     if (!result.good()) return;
     ++tally_.accepted;
-    // The command `info` sends several requests, and a fault may remove one of the replies
+    // The command `info` sends several requests, and a fault may remove one of the replies: the result may then lack
+    // fields.
     const bool may_miss = query.command->verb == Verb::info && result.faults != 0;
     const Difference wrong = difference(query, result, may_miss);
     if (wrong.text.empty()) return;
@@ -245,7 +248,7 @@ class Campaign {
     if (!values) return;
     world_.set_rates({});
     world_.device().lower_alarms(0xFFFF'FFFF);
-    world_.pass(std::chrono::seconds(2));  // during this time delayed replies arrive
+    world_.pass(std::chrono::seconds(2));  // replies that were delayed earlier arrive within these two seconds
     world_.move(static_cast<std::int64_t>(random_.next()));
     world_.set_rates(rates);
     const ConversationResult result = world_.run(command, *values);
@@ -334,7 +337,7 @@ class Campaign {
   void judge_rules(const Query& query, bool had_faults, std::uint32_t before) {
     const std::uint32_t new_violations = world_.device().violation_count() - before;
     faultless_ = faultless_ && !had_faults;
-    // Options other than a model's allow requests that no host sends by the rules.
+    // With options that no model has, a host may have to send requests that the rules forbid.
     if (new_violations == 0 || !configuration_.is_model) return;
     tally_.rule_violations += new_violations;
     const std::span<const Violation> rules = world_.device().violations();
@@ -358,7 +361,8 @@ class Campaign {
   std::vector<std::size_t> reads_;  // indexes in `queries_` of the commands that read the position
 };
 
-/// Returns each request of the command's conversation on a line without faults, with its reply.
+/// Returns the first requests, at most four, of the command's conversation on a line without faults, each with its
+/// reply.
 template <class Item>
 std::vector<std::pair<OwnedFrame, OwnedFrame>> Campaign<Item>::frames_of(const Query& query) {
   World<Item> world(unit_, configuration_.options, 1);

@@ -11,7 +11,7 @@ namespace absenc::kit {
 
 class Findings {
  public:
-  /// A list of findings. It counts all of them and stores the text of the first 20.
+  /// Adds a finding. Counts all findings, but stores the texts of the first 20 only.
   void add(std::string text) {
     if (texts_.size() < 20) texts_.push_back(std::move(text));
     ++count_;

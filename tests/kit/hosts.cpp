@@ -145,11 +145,11 @@ struct VectorReplay {
         reply.between({}, reply.bytes), [] { return std::string("takes a reply that comes twice"); }, false);
   }
 
-  // Checks that the conversation refuses the frame as a whole and, if `in_pieces`, byte by byte.
+  // Checks that the conversation refuses the frame as a whole and, if `in_pieces`, byte by byte. A frame that the
+  // decoder accepts, because no check covers the change, is skipped.
   template <class Text>
   void refused(const OwnedFrame& frame, Text&& text, bool in_pieces = true) const {
     ReportedFields ignored;
-    // The decoder accepts the frame, because no check covers the changed bit.
     if (decoded(frame, ignored) == Error::none) return;
     require(converse({frame.bytes}).error != Error::none, text);
     if (!in_pieces) return;
@@ -174,7 +174,8 @@ struct VectorReplay {
       stream_with(reply.between(std::array{byte}, {}), [] { return std::string("with garbage between"); });
     }
   }
-  // Sends seven good frames and the frame `odd`, whole and byte by byte. Returns how many positions the host reported.
+  // Sends seven good frames and, as the fifth, the frame `odd`: once frame by frame and once byte by byte. Returns how
+  // many readings the host made in both runs together.
   template <class Text>
   unsigned stream_with(const OwnedFrame& odd, Text&& text) const {
     unsigned good = 0;
@@ -252,7 +253,7 @@ struct VectorReplay {
         return pieces;
       });
     };
-    // Other nodes may send frames like this bad one, and the conversation ignores them.
+    // A vector with an error is skipped: other nodes may send such frames, and the conversation ignores them.
     if (vector.error != Error::none) return;
     const CanFrame other{.id = 0x7A5, .size = 8, .data = {1, 2, 3, 4, 5, 6, 7, 8}};
     std::vector<CanFrame> echo = requests;

@@ -10,8 +10,8 @@
 
 namespace absenc::kit {
 
-/// Decodes every vector with `decode` and `frame_end`: whole, cut after each element, with each checked bit flipped,
-/// and with a second reply appended.
+/// Decodes every vector with `decode` and `frame_end`. A good frame must have the fields of the vector; it must be
+/// refused if cut after any element, with any checked bit flipped, and with a second reply appended.
 [[nodiscard]] Findings check_decoding(const Unit& unit);
 
 /// Checks the bit positions that the unit states for the fields of good replies: the bits at these positions must give
@@ -39,7 +39,8 @@ namespace absenc::kit {
 /// Checks that the commands and arguments exist which the descriptor names for memory, registers and settings.
 [[nodiscard]] Findings check_declarations(const Unit& unit);
 
-/// Writes every setting to the virtual encoder and reads it back.
+/// Runs every command that sets a setting, the zero or the turns, or clears alarms, and checks its effect in the
+/// virtual encoder by reading back.
 [[nodiscard]] Findings check_settings(const Unit& unit);
 
 /// Writes the first and last byte of each memory area and reads them back. Checks that a write to a read-only area is
@@ -65,8 +66,9 @@ namespace absenc::kit {
 /// they cannot, or report more than the reading. No advice may be circular, and no message may repeat a clause.
 [[nodiscard]] Findings check_advice(const Unit& unit);
 
-/// Checks that each command succeeds on an undamaged line in each configuration of the unit, and that positions equal
-/// the position of the shaft.
+/// Runs each command that changes nothing, in each configuration, on an undamaged line. Positions must equal that of
+/// the shaft. With the options of a model, commands such as `read` and `info` must succeed, and the host must break no
+/// rule.
 [[nodiscard]] Findings check_commands(const Unit& unit);
 
 /// Settings of `check_exchanges`, which runs a host against a virtual encoder in virtual time over a line with every

@@ -107,7 +107,7 @@ INSTANTIATE_TEST_SUITE_P(Seeds, KitExchanges,
                                             ::testing::ValuesIn(all_units().begin(), all_units().end())),
                          name_of_series);
 
-// Returns the units that carry bytes. CAN is excluded, because its own checksum detects damage.
+// Returns all units except those on CAN, whose own checksum detects damage.
 std::vector<const Unit*> units_of_bytes() {
   std::vector<const Unit*> units(all_units().begin(), all_units().end());
   std::erase_if(units, [](const Unit* unit) { return unit->link == LinkKind::can; });

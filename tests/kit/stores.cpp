@@ -39,8 +39,8 @@ void change(const Unit& unit, const Configuration& configuration, const Command&
     apply_to_host(world, unit, command, values);
     const std::string broken = broken_promise(world, unit, command, values, result.seen);
     findings.require(broken.empty(), [&] { return what() + broken; });
-    // A setting that cannot be read may already have the value that is written. Writing the same value violates the
-    // rules of some encoders, so a violation is accepted then.
+    // The setting may have had the written value already: then it reads the same as before, or cannot be read. Writing
+    // the same value violates the rules of some encoders, so a violation is accepted then.
     const std::string now = to_text(read_setting(world, unit, command).fields);
     findings.require(world.device().violation_count() == 0 || (command.verb == Verb::config_set && now == before),
                      [&] { return what() + std::string(world.device().violations()[0].rule); });
@@ -110,7 +110,7 @@ void try_registers(const Unit& unit, const Configuration& configuration, Finding
 
 constexpr std::byte untouched{0xA5};
 
-/// Storage of a given size, followed by bytes with a known value that reveal writes beyond its end.
+/// Storage of a given size, followed by bytes with a known value: a changed one reveals a write beyond the storage.
 struct Fenced {
   Fenced(std::size_t size_given, std::size_t behind) : bytes(size_given + behind + 64, untouched), size(size_given) {}
   [[nodiscard]] std::span<std::byte> given() { return std::span(bytes).first(size); }
@@ -137,7 +137,7 @@ void store(const Unit& unit, const Configuration& configuration, const Command& 
                      [&] { return std::string(command.name) + ": needs more than host_storage"; });
     return;
   }
-  std::size_t none = 0;  // largest tried size that the unit refused
+  std::size_t none = 0;  // largest storage size, of those tried, that the unit refused
   std::size_t needed = unit.host_storage;
   findings.require(!made(0), [&] { return std::string(command.name) + ": needs no storage"; });
   while (needed - none > 1) {

@@ -187,7 +187,7 @@ struct Toy {
    private:
     const Shaft& shaft_;
     unsigned sent_position_ = 0;
-    unsigned offset_ = 0;  // value of the condition: added to the position, in counts
+    unsigned offset_ = 0;  // value of the condition, in counts, which is added to the position
     unsigned previous_position_ = 0;
     Time reply_at_{};
     bool reply_due_ = false;

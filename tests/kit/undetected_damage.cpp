@@ -8,7 +8,7 @@
 namespace absenc::kit {
 namespace {
 
-/// A device that sends the same reply to every request.
+/// A device that sends the same reply to every request, for a line with faults.
 template <class Item>
 class FixedReplyDevice final : public Machine<Item> {
  public:
@@ -30,7 +30,7 @@ class FixedReplyDevice final : public Machine<Item> {
   bool reply_due_ = false;
 };
 
-/// Shows which kinds of wrong values a damaged reply decoded to.
+/// Says whether a damaged reply decoded to a wrong position, and to a wrong value of another field.
 struct WrongValues {
   bool position = false;
   bool others = false;

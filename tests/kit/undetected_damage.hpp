@@ -34,7 +34,7 @@ struct UndetectedDamage {
   DamageCount position{};
   DamageCount others{};
 
-  /// Replaces each rate by that of `other` if the latter is higher.
+  /// Replaces each rate by that of `other` unless the latter is lower.
   void add(const UndetectedDamage& other) {
     if (other.position.chance() >= position.chance()) position = other.position;
     if (other.others.chance() >= others.chance()) others = other.others;

@@ -336,7 +336,7 @@ class OtherFrames(VirtualBus):
 class ErrorFrames(VirtualBus):
     BUS_OFF = "20000040#0000000000000000"
     NO_ACKNOWLEDGE = frame(socket.CAN_ERR_FLAG | 0x20, bytes(8))
-    # This message is a warning of the controller and means that no frame is lost.
+    # A warning of the controller about many errors: no frame was lost.
     WARNING = frame(socket.CAN_ERR_FLAG | 0x04, bytes([0, 8, 0, 0, 0, 0, 97, 0]))
 
     def test_destroyed_frames(self):

@@ -11,8 +11,8 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// Returns whether the user must be asked before the action `what`, explained by `meaning`; false with --yes. Throws
-/// UsageError if a question is needed but no terminal is available.
+/// Returns whether the user must be asked before the action `what`, explained by `meaning`; false with --yes and for
+/// sim: encoders. Throws UsageError if a question is needed but no terminal is available.
 [[nodiscard]] bool must_ask(const Invocation& invocation, const EncoderAddress& uri, std::string_view what,
                             std::string_view meaning);
 

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::string_view spaces = " \t\r";
 
-// Removes the first word from `line` and returns it; "" if `line` is empty.
+// Removes the first word, and the blanks before it, from `line` and returns the word; "" if `line` has no word.
 std::string_view take_word(std::string_view& line) {
   line.remove_prefix(std::min(line.find_first_not_of(spaces), line.size()));
   const std::string_view word = line.substr(0, line.find_first_of(spaces));
@@ -123,7 +123,8 @@ std::string Console::alarms(VirtualDevice& device, std::string_view names, bool 
   return fmt::format("{} {}", raise ? "raised" : "lowered", fmt::join(all, ", "));
 }
 
-// Replaces only the fault of the kind in `wanted`; faults of other kinds stay.
+// Sets the rates of the faults named in `wanted`, such as "drop=0.1 bit=0.01"; faults that are not named keep their
+// rates, "none" sets all rates to 0. Returns all faults with a rate above 0.
 std::string Console::faults(VirtualDevice& device, std::string_view wanted) {
   sim::FaultRates rates = device.fault_rates();
   for (std::string_view rest = wanted; !is_blank(rest);) {

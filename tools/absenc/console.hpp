@@ -24,7 +24,8 @@ class Console {
   /// Returns whether standard input has ended or standard output was closed.
   [[nodiscard]] bool ended() const { return lines_.ended() || unheard_; }
 
-  /// Executes `line` and returns the encoder's new state in words. Throws UsageError, which lists the possible words.
+  /// Executes `line` for all encoders, or for the second one if it begins with "2:". Returns the new state in words.
+  /// Throws UsageError, which lists the possible words.
   [[nodiscard]] std::string carry_out(std::string_view line, Time now);
 
  private:

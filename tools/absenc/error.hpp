@@ -9,9 +9,9 @@ namespace absenc::tool {
 using namespace client;  // the command uses the library's names without a prefix
 
 inline constexpr int exit_good = 0;
-inline constexpr int exit_failed = 1;  // the encoder, the line or the system failed
+inline constexpr int exit_failed = 1;  // exit status: the encoder, the line or the system failed
 inline constexpr int exit_usage = 2;
-inline constexpr int exit_nothing_judged = 3;  // no observation was made that a verdict could be based on
+inline constexpr int exit_nothing_judged = 3;  // exit status: nothing was observed that a verdict could be based on
 
 /// Exception thrown when standard output is closed, as after `| head`.
 struct OutputClosed {};

@@ -94,8 +94,9 @@ class ArgumentParser {
     if (!parameter.repeatable) ++taken_;
   }
 
-  // Splits "tformat?model=23-bit&motion=rpm=60", the spelling of sim: addresses: a setting becomes the verb's option of
-  // that name, or else an option of the protocol.
+  // Splits "tformat?model=23-bit&motion=rpm=60", the spelling of sim: addresses, into the protocol and its settings.
+  // The model and settings of the virtual encoder become the verb's option of that name, if the verb has it; all others
+  // become values of --option.
   void take_protocol(std::string_view word) {
     constexpr std::string_view sim = "sim:";
     if (word.starts_with(sim)) word.remove_prefix(sim.size());
@@ -140,7 +141,8 @@ class ArgumentParser {
     throw UsageError(fmt::format("{} has no option {}{}", subcommand_->name, name, suggestion(name, names)));
   }
 
-  // Throws UsageError if arguments are too many or too few, or if an option was given twice.
+  // Throws UsageError if there are too many arguments, if a required parameter is missing, if an option was given twice
+  // that may be given once, or if an option without a value was given one.
   void refuse_numbers() const {
     if (extra_) {
       throw UsageError(fmt::format("\"{}\" is too much: usage is {}", *extra_, usage(*subcommand_)));
@@ -193,16 +195,16 @@ class ArgumentParser {
                                suggestion(name, std::span(options).first(group.empty() ? 2 : 1))));
 }
 
-// Throws UsageError if a word follows --help or --version, which without a verb must be the only word.
+// Throws UsageError if a word follows --help or --version, where these stand in place of a verb.
 void require_last(std::span<char*> words) {
   if (words.size() == 1) return;
   throw UsageError(fmt::format("\"{}\" is too much behind {}", words[1], words[0]));
 }
 
-/// Returns the verb at the beginning of `words` and removes all of its words but the last; null if help or the version
-/// was requested and printed. `understood` receives the recognised part of the verb, also if an exception is thrown.
-/// Throws UsageError. An unknown word is an error and is not skipped, because the next word may be a verb that changes
-/// an encoder.
+/// Returns the verb at the beginning of `words`, and leaves the verb's last word as the first of `words`. Returns null
+/// if the user requested help or the version, which are printed then. `understood` receives the recognised part of the
+/// verb, also if an exception is thrown. Throws UsageError. An unknown word is an error and is not skipped, because the
+/// next word may be a verb that changes an encoder.
 const Subcommand* find_verb(std::span<char*>& words, std::string& understood) {
   for (;;) {
     if (words.empty()) refuse_verb(understood, words);
@@ -244,7 +246,8 @@ Json failure(std::string_view name, const std::exception& failed) {
   return json;
 }
 
-// Runs the verb and returns its exit status. With --json a failure is printed as JSON too.
+// Runs the verb and returns its exit status. With --json a failure is printed as JSON on standard output instead of
+// being thrown.
 int run(const Subcommand& subcommand, const Invocation& invocation) {
   const bool json = invocation.has("--json");
   try {

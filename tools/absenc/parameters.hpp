@@ -19,13 +19,13 @@ inline constexpr Parameter yes{"--yes", "", "do not ask before the encoder is ch
 inline constexpr Parameter force{"--force", "", "write also what the protocol protects, as calibration"};
 inline constexpr Parameter json{"--json", "", "one JSON object"};
 
-// Parameters of verbs that need no encoder:
+// The parameters `protocol`, `model` and `protocol_option` are for verbs that need no encoder.
 inline constexpr Parameter protocol{"protocol", "", "see `absenc list`", "", true};
 inline constexpr Parameter model{"--model", "NAME", "which model of the protocol",
                                  "the first that agrees with the options"};
 inline constexpr Parameter protocol_option{"--option", "NAME=VALUE", "sets an option of the protocol", "", false, true};
 
-// Parameters of verbs that run a command of a protocol:
+// The parameters `command` and `arguments` are for verbs that run a command of a protocol.
 inline constexpr Parameter command{"command", "", "a command of the protocol: see `absenc list <protocol>`", "", true};
 inline constexpr Parameter arguments{
     "arguments", "", "those of the command: decimal numbers, or hexadecimal with 0x", "", false, true};

@@ -28,7 +28,8 @@ std::size_t count_different(std::span<const std::string> names) {
   return std::set<std::string_view>(names.begin(), names.end()).size();
 }
 
-// Returns the names, all cut at the same place near the middle and still distinct; nothing if that is impossible.
+// Returns the names in at most `width` bytes, all cut at the same place, as near to the middle as possible; different
+// names stay different. Returns nothing if no place achieves that.
 Names cut_in_the_middle(std::span<const std::string> names, std::size_t width) {
   const std::size_t different = count_different(names);
   const std::size_t most = width - gap.size();
@@ -40,7 +41,7 @@ Names cut_in_the_middle(std::span<const std::string> names, std::size_t width) {
   return {};
 }
 
-// Length of the beginning that all names have in common, and of their common end behind it.
+// Lengths of the common beginning of all names and of their common end.
 struct Common {
   std::size_t front;
   std::size_t back;
@@ -61,7 +62,7 @@ Common common_parts(std::span<const std::string> names) {
   return common;
 }
 
-// Returns the part in which each name differs, with ".." for the common parts.
+// Returns the names without their common beginning and common end; ".." replaces each.
 Names middles(std::span<const std::string> names) {
   const auto [front, back] = common_parts(names);
   Names cuts;
@@ -72,7 +73,7 @@ Names middles(std::span<const std::string> names) {
   return cuts;
 }
 
-// Returns the names with their numbers before them: "3 tfo..=7" is the third.
+// Returns the names cut to `width` bytes, each with its position in the list before it: "3 tfo..=7" is the third name.
 Names numbered(std::span<const std::string> names, std::size_t width) {
   Names cuts;
   for (const std::string& name : names) {

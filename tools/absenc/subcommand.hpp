@@ -12,8 +12,8 @@
 namespace absenc::tool {
 
 struct Parameter {
-  std::string_view name;   // "unit": an argument; "--count": an option
-  std::string_view value;  // placeholder of its value in help; "": a flag without a value
+  std::string_view name;   // "unit" is the name of an argument, "--count" that of an option
+  std::string_view value;  // placeholder of the option's value in help; "": the option has no value
   std::string_view meaning;
   std::string_view fallback{};  // the default in words, for help; "": none
   bool required = false;
@@ -37,7 +37,7 @@ class Invocation {
   [[nodiscard]] std::string_view text(std::string_view name, std::string_view fallback = {}) const;
   [[nodiscard]] std::span<const std::string> texts(std::string_view name) const;
   /// Returns the last value of a parameter as a number, written in decimal or with 0x, or `fallback` without a value.
-  /// Throws UsageError if the value is no number or out of range.
+  /// Throws UsageError if the value is no number or is outside `minimum` to `maximum`.
   [[nodiscard]] std::int64_t number(std::string_view name, std::int64_t fallback, std::int64_t minimum,
                                     std::int64_t maximum) const;
   [[nodiscard]] double real(std::string_view name, double fallback, double minimum, double maximum) const;
@@ -47,9 +47,9 @@ class Invocation {
 };
 
 struct Subcommand {
-  std::string_view name;         // one word, or two as in "memory read"
-  std::string_view summary;      // one line of text in the list of verbs
-  std::string_view description;  // further text in the help of the verb, with its line ends
+  std::string_view name;         // name of the verb: one word, or two as in "memory read"
+  std::string_view summary;      // one line about the verb in the list of verbs
+  std::string_view description;  // further text in the help of the verb, already broken into lines
   std::span<const Parameter> parameters;
   std::span<const Example> examples;
   int (*run)(const Invocation& invocation);  // runs the verb and returns the exit status

@@ -201,7 +201,8 @@ std::string_view second_word(std::string_view name) {
   return name.substr(std::min(first_word(name).size() + 1, name.size()));
 }
 
-// Returns the kind of value to complete: the placeholder of the value in help, unless the placeholder is too general.
+// Returns the kind of value to complete: "model", "setting", the name of an argument, or the placeholder of an option's
+// value in help.
 std::string_view kind_of(const Subcommand& subcommand, const Parameter& parameter) {
   if (parameter.name == "--model") return "model";
   if (parameter.name == "name" && first_word(subcommand.name) == "config") return "setting";
@@ -257,7 +258,8 @@ std::set<std::string_view> known_names(std::span<const Unit* const> units) {
   return names;
 }
 
-// Returns the names of the settings that `config get` and `config set` accept.
+// Returns the names of the settings that `config get` and `config set` accept: commands that read a setting, and those
+// that write a setting which cannot be read.
 std::vector<std::string_view> setting_names(const Unit& unit) {
   std::vector<std::string_view> names;
   for (const Command& command : unit.commands) {

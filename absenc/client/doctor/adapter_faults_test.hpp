@@ -10,13 +10,14 @@
 
 namespace absenc::client {
 
-/// An expected finding, and a function that examines an encoder with the fault behind it.
+/// An expected finding, and a function that examines an encoder with the fault that causes the finding.
 struct Fault {
   std::string id;
   std::function<Examination()> examine;
 };
 
-/// Returns a fault for each finding, produced with the first unit that can have the fault.
+/// Returns each fault of `faults_of_bytes`, and the faults "another protocol" and "another address", each produced with
+/// the first unit that can have it.
 inline std::vector<Fault> adapter_faults() {
   std::vector<Fault> faults;
   std::vector<path_faults::PathFault> all = path_faults::faults_of_bytes();

@@ -25,29 +25,30 @@ template <class Is>
 /// counts.
 [[nodiscard]] bool decodes(const Case& one, const Frame& request, const Frame& reply);
 
-/// Returns whether the attempt received a good reply together with other bytes: the request before it, a few bytes
-/// before or after it, or the same reply again. Only for lines of characters.
+/// Returns whether the received bytes contain a good reply and other bytes besides: the request before the reply, a
+/// second good reply, or before or after the reply at most half as many bytes as it has. Only for lines of characters.
 [[nodiscard]] bool has_good_part(const Case& one, const Attempted& attempt);
 
 /// Returns whether the attempt received fewer bytes than the beginning of the frame requires. Only for lines of
 /// characters.
 [[nodiscard]] bool is_cut(const Case& one, const Attempted& attempt);
 
-/// Returns how many of the damaged replies become good if one bit is flipped. Returns 0 if random replies of the same
-/// length become good as often, because a short checksum accepts many by chance.
+/// Returns how many of the first 24 damaged replies become good if one bit is flipped. Returns 0 if there are fewer
+/// than five, on CAN, or if random replies of the same length become good about as often, because a short checksum
+/// accepts many by chance.
 [[nodiscard]] std::size_t mended_by_one_bit(const Case& one, const All& all);
 
 /// Finds a change of bytes that an adapter, a driver or a device server made to nearly all these damaged replies, or
-/// bytes that it added to good ones. Undoing the change makes far more replies good than chance would. Returns nothing
-/// if no change explains them. Only for lines of characters.
+/// bytes that it added to the good replies of the examination. Undoing the change makes far more replies good than
+/// chance would. Returns nothing if no change explains the replies. Only for lines of characters.
 [[nodiscard]] std::optional<Finding> damage_by_adapter(const Case& one, const All& all);
 
-/// Finds text of a modem, a console or a GPS receiver in the bytes. Returns nothing if there is none, or if the unit's
-/// own replies are similar text.
+/// Finds text of a modem, a console or a GPS receiver in the bytes: a word such as "login:" or "NO CARRIER", or lines
+/// of printable characters, unless the unit's own replies are text. Otherwise returns nothing.
 [[nodiscard]] std::optional<Finding> text_of_others(const Case& one, Bytes bytes);
 
-/// Finds another model or other options of the unit with which these damaged replies are good; nothing if there are
-/// none.
+/// Finds another model or other options of the unit with which nearly all these damaged replies are good. Returns
+/// nothing if there are none, or fewer than four replies.
 [[nodiscard]] std::optional<Finding> other_settings(const Case& one, const All& all);
 
 /// Returns the settings ("model=23-bit") that change the options `now` into `wanted`; empty if both are equal.
@@ -55,7 +56,8 @@ template <class Is>
 /// Returns options as the settings that give them, "model=23-bit", or "the usual settings".
 [[nodiscard]] std::string said_settings(const Unit& unit, const Options& options);
 
-/// Finds a checksum, other than the unit's, that is right in all these damaged replies; nothing if there is none.
+/// Finds a checksum of another kind than the unit's that is right in all these damaged replies; nothing if there is
+/// none.
 [[nodiscard]] std::optional<Finding> other_checksum(const Case& one, const All& all);
 
 }  // namespace absenc::client

@@ -28,14 +28,14 @@ namespace {
 
 // ---- Functions that examine an encoder or a line
 
-/// Examines an encoder of the address `text` over the links that `open` returns.
+/// Examines the encoder with the address `text` over the links that `open` returns.
 Examination examine_with(std::string_view text, const std::function<Link(const EncoderAddress&)>& open,
                          const os::PortFacts& facts = {}) {
   const Surroundings surroundings{open, [&](const std::string&) { return facts; }};
   return examine(parse_address(text), {.readings = 120, .limit = 20s}, surroundings);
 }
 
-/// Examines a line on which the function `answer` makes the replies.
+/// Examines a line on which the function `answer` returns the reply to each request.
 Examination examine_line(std::function<ByteList(const ByteList&)> answer, ByteList babble = {},
                          const os::PortFacts& facts = {}) {
   return examine_with(
@@ -380,7 +380,8 @@ TEST(Doctor, AThousandHealthyEncodersGiveNoFinding) {
   }
 }
 
-/// A position that moves to and fro by one count, with the shaft at rest, is not noise.
+/// A position that moves to and fro by one count, with the shaft at rest, is not noise; neither is an even or
+/// accelerated motion.
 TEST(Doctor, AFlickeringLastBitIsNoNoise) {
   EXPECT_THAT(ids(judged(positions([](std::size_t i) { return i % 2; }))), IsEmpty());
   EXPECT_THAT(ids(judged(positions([](std::size_t i) { return i * 13; }))), IsEmpty());

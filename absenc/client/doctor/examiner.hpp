@@ -15,7 +15,8 @@ namespace absenc::client {
 template <class Item>
 class Examiner {
  public:
-  /// Takes over an open link. All waiting ends with os::Ended as soon as `over` returns true; empty: never.
+  /// Takes over an open link. Every wait on the link ends with os::Ended as soon as `over` returns true; an empty
+  /// `over` never does.
   Examiner(const EncoderAddress& address, Link link, std::function<bool()> over)
       : link_(std::move(link)),
         runner_(address),
@@ -28,7 +29,7 @@ class Examiner {
     runner_.port().over = std::move(over);
   }
 
-  /// Listens before the first request and records unsolicited bytes or frames.
+  /// Listens before the first request and records unsolicited bytes. Does nothing on CAN, where other nodes may send.
   void listen(Observations& seen) {
     if constexpr (!std::is_same_v<Item, CanFrame>) {
       unsigned busy = 0;
@@ -47,15 +48,16 @@ class Examiner {
     }
   }
 
-  /// Records bytes that arrive after the last timeout, from an encoder that is later than every timeout.
+  /// Listens once more, so that replies which are later than every timeout are recorded.
   void listen_for_late() { runner_.listen(pieces * piece_time); }
 
-  /// Takes up to `count` readings within `limit` and adds them to `into`. Ends early if no reply comes. Throws the
-  /// exceptions of the port.
+  /// Takes up to `count` readings within `limit` and adds them to `into`. Ends early if the first ones bring no good
+  /// reply. Throws the exceptions of the port.
   void read(const Command& command, std::size_t count, Time limit, std::vector<Attempted>& into) {
     const auto attempt = [&] {
       Attempted one = runner_.once(command);
-      // A second encoder's reply follows the first one at once, or collides with the next request.
+      // Listens for three characters after a good reply: a second encoder's reply follows at once, or would collide
+      // with the next request.
       const Time behind = 3 * runner_.character();
       if (one.error == Error::none && behind != Time{} && !streams_) runner_.settle(behind, longest_reply);
       return one;
@@ -63,8 +65,8 @@ class Examiner {
     runner_.repeat({.count = count, .limit = limit, .patience = never, .least = longest_gap}, attempt, into);
   }
 
-  /// Runs a command that is no reading of the position, such as a scan, and passes the fields of its reply to `sink`.
-  /// Throws the exceptions of the port.
+  /// Runs a command that is no reading of the position, such as a scan, and passes the fields of its reply to `sink` if
+  /// the command succeeds. Throws the exceptions of the port.
   void report(const Command& command, Arguments arguments, FieldSink& sink) {
     const Conversation<Item>* conversation = runner_.run(command, arguments);
     if (conversation != nullptr && conversation->error() == Error::none) conversation->report(sink);

@@ -21,7 +21,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr unsigned examinations = 200;  // examinations of each model and mode
+constexpr unsigned examinations = 200;  // number of examinations of each model and mode
 constexpr std::size_t readings = 40;
 
 class HealthyEncoder : public ::testing::TestWithParam<const Unit*> {};

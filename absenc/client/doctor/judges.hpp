@@ -18,9 +18,9 @@ struct Case {
   std::size_t good = 0;
 };
 
-/// Returns whether `some` late or missing replies may be due to this busy computer, which also delays an emulator or an
-/// adapter's driver. That is a single one among many readings, less than one in a thousand, or less than one in a
-/// hundred if the computer stood still for as long as the timeout.
+/// Returns whether this busy computer may be the cause of `some` late or missing replies; it also delays an emulator or
+/// an adapter's driver. It may be if it woke up at least 1 ms late once, and the replies are a single one of at least
+/// 20, less than one in a thousand, or, if it stood still for as long as the timeout, less than one in a hundred.
 [[nodiscard]] inline bool may_be_the_computer(const Observations& seen, std::size_t some) {
   constexpr Time busy = std::chrono::milliseconds(1);
   constexpr std::size_t many = 20;
@@ -34,20 +34,20 @@ struct Case {
 
 void judge_port(const Case& one, std::vector<Finding>& findings);
 void judge_line(const Case& one, std::vector<Finding>& findings);
-/// Adds the finding about damaged replies if no reply, or hardly any, is good.
+/// Adds the finding about damaged replies for an examination in which less than one reading in 20 is good.
 void judge_bad_frames(const Case& one, std::vector<Finding>& findings);
 /// Returns the finding about bursts of failures with good readings between them; nothing if there are no bursts.
 [[nodiscard]] std::optional<Finding> coming_and_going(const Case& one);
-/// Adds the findings about failures if some replies are good.
+/// Adds the findings about failed readings for an examination in which at least one reading in 20 is good.
 void judge_mixed_frames(const Case& one, std::vector<Finding>& findings);
-/// Returns the finding for an encoder that was powered on during the examination: no replies at first, then only good
-/// readings. Otherwise nothing.
+/// Returns the finding for an encoder that was powered on during the examination: at least four readings without any
+/// byte, then only good ones, at least 20. Otherwise returns nothing.
 [[nodiscard]] std::optional<Finding> judge_start(const Case& one);
 void judge_state(const Case& one, std::vector<Finding>& findings);
 void judge_position(const Case& one, const std::vector<Attempted>& readings, bool by_hand,
                     std::vector<Finding>& findings);
 
-/// Returns the received bytes of the attempt as "1A 20 45", cut after a few bytes.
+/// Returns the first 16 received bytes of the attempt as "1A 20 45", or the received CAN frame as text.
 [[nodiscard]] std::string shown(const Attempted& one);
 
 }  // namespace absenc::client

@@ -25,7 +25,7 @@ class ScriptedPort final : public Port<Item> {
   List babble{};  // bytes that another device sends every millisecond; empty: no other device
   Time after = 100us;
   Time latency{};
-  bool destroys = false;  // whether every frame is destroyed, as on a CAN bus without acknowledgement
+  bool destroys = false;  // whether every frame that is sent is destroyed, as on a CAN bus without acknowledgement
 
   Time now() override { return now_; }
   void begin(const Step<Item>& step) override {

@@ -34,7 +34,7 @@ constexpr std::size_t readings = 200;
 /// Setting of a position without a byte 0: with zeros, the rest of a truncated frame could be a good frame.
 constexpr std::string_view at_no_zero = "singleturn=1383&";
 
-/// The examination of a virtual encoder, whose faults and state can be read afterwards.
+/// The result of an examination, and the virtual encoder that was examined, whose faults can be read afterwards.
 struct Watched {
   std::shared_ptr<VirtualDevice> device;
   Examination examination{};
@@ -144,7 +144,7 @@ std::uint64_t ailments_of(const Unit& unit, const Reading& reading) {
   return bits;
 }
 
-/// Findings that may result from a state that the encoder reports.
+/// Ids of the findings that may result from a state that the encoder reports.
 const Ids of_state{"starting", "alarm", "status", "position_invalid", "contradictory", "counter_stands", "refused"};
 
 /// Returns the findings that may result from each kind of fault; damage appears differently in each frame format.

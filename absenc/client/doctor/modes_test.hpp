@@ -18,7 +18,7 @@ namespace absenc::client {
   std::vector<std::string> modes{""};
   for (const Model& model : unit.models) modes.push_back(fmt::format("model={}", model.name));
   for (const Option& option : unit.options) {
-    if (option.role == Role::rate) continue;  // simulated lines have no rate that could be wrong
+    if (option.role == Role::rate) continue;  // in simulations host and encoder have the same rate
     for (const std::string_view choice : option.choices) modes.push_back(fmt::format("{}={}", option.name, choice));
   }
   return modes;

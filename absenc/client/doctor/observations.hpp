@@ -24,7 +24,8 @@ struct Trial {
   std::string setting{};       // the other setting, "baud=9600"
   std::size_t good = 0;
   std::size_t tried = 0;
-  std::size_t good_as_said = 0;  // number of good readings with the user's setting in the same turns
+  // Number of good readings with the user's setting, which take turns with those of the other.
+  std::size_t good_as_said = 0;
   std::size_t tried_as_said = 0;
   std::string command{};  // only for the finding other_protocol: the command that reads the encoder
 };
@@ -49,12 +50,12 @@ struct Observations {
   bool never_silent = false;  // whether the line was never silent while doctor listened
   std::vector<Attempted> readings{};
   std::vector<Attempted> turned{};  // readings that were taken while the user turned the shaft by hand
-  std::uint64_t line_errors = 0;    // number of error frames that the CAN bus reported
-  std::uint64_t late = 0;           // number of replies that began after their timeout
+  std::uint64_t line_errors = 0;    // number of line errors that the port reported; on CAN, of error frames
+  std::uint64_t late = 0;           // number of replies that began after their timeout or answered an older request
   Time lateness{};                  // greatest time from a request to its late reply; 0: no reply was late
-  std::uint64_t overfull = 0;       // number of good replies that were followed by further items
+  std::uint64_t overfull = 0;       // number of good replies with further bytes after them that no request explains
   std::vector<std::uint8_t> overfull_example{};
-  std::size_t most_behind = 0;  // greatest number of items that followed a good reply
+  std::size_t most_behind = 0;  // greatest number of further bytes after a good reply
   std::vector<Trial> trials{};
   host::EchoMode echo_said{};     // echo mode that the user set
   host::EchoMode echo{};          // echo mode that was detected

@@ -16,7 +16,7 @@ using Ids = std::set<std::string>;
 /// Result of examining one unit with one fault.
 struct Outcome {
   Seen seen{};
-  Ids causes{};  // findings that doctor may name first
+  Ids causes{};  // ids of the findings that doctor may name first
 };
 
 struct PathFault {
@@ -43,7 +43,8 @@ inline ByteList with_before(const ByteList& bytes, std::uint8_t value, std::uint
   return all;
 }
 
-/// Returns positions whose replies contain one of these bytes.
+/// Returns settings "singleturn=N" of positions whose counts contain one of these byte values, each value at different
+/// bits.
 inline std::vector<std::string> positions_with(const Unit& unit, const Options& options,
                                                const std::vector<std::uint64_t>& values) {
   std::vector<std::string> all;
@@ -66,7 +67,7 @@ inline bool has_weak_check(const Pair& pair) {
 }
 
 /// Returns a fault that changes these byte values in replies. The shaft swings a little about a position at which most
-/// replies contain them; the fault has no outcome for a unit without such a position.
+/// replies contain them. Units without such a position, or with a weak checksum, cannot have the fault.
 inline PathFault of_bytes(const std::string& name, const std::vector<std::uint64_t>& values, const Change& change,
                           Ids causes = {}) {
   causes.insert(name);
@@ -116,7 +117,7 @@ inline std::vector<PathFault> faults_of_bytes() {
                       if (one.seen.changed != 0) outcome = one;
                       return outcome;
                     }});
-  // A frame of mostly 00 bytes loses nearly all of its bytes, so it may look cut.
+  // A frame of mostly 00 bytes loses nearly all of its bytes, so doctor may take it for a cut frame.
   faults.push_back(of_bytes("nul_lost", {0x00},
                             [](const ByteList&, const ByteList& reply) { return without(reply, {0x00}); },
                             {"bytes_missing"}));
@@ -139,7 +140,7 @@ inline PathFault of_encoder_fault(const std::string& name, const std::string& fa
               pair.far.encoder.device.delay = limit * 5 / 4;
             }
             Outcome one{examined(pair.asked, pair.far, {.readings = 400, .limit = 60s}), causes};
-            // A unit that repeats requests itself may have no failed reading.
+            // The fault has no effect on a unit whose conversation repeats failed requests: every reading is good.
             const bool is_spared =
                 one.seen.first() == "good" && one.seen.examination.good == one.seen.examination.tried;
             if (!is_spared) outcome = one;
@@ -243,7 +244,7 @@ inline std::vector<PathFault> faults_of_state() {
                       Pair pair = pair_of(unit, mode, rate, {"singleturn=1383"});
                       Opener opener(pair.far);
                       const Attempted usual = read_once(parse_address(pair.asked), opener);
-                      // The times are long enough for many good readings and for many timeouts.
+                      // The period and the interruption are long enough for many good readings and for many timeouts.
                       const Time period = std::max({300 * usual.after, 60 * usual.limit, Time(50ms)});
                       pair.far.is_cut = [period](Time now) { return now % period > period * 7 / 10; };
                       const Choices choices{.readings = 100'000, .limit = 5 * period};

@@ -50,7 +50,7 @@ TEST_P(DoctorWays, OtherModelIsNamedInBothDirections) {
       Pair pair = pair_of(unit, said, mode, {});
       pair.far = pair_of(unit, there, mode, {"motion=rpm=20"}).far;
       const Seen seen = examined(pair.asked, pair.far);
-      // If both models have the same frames, doctor must find nothing.
+      // If both models have the same frames, all readings are good and there is nothing to name.
       const bool is_same = seen.examination.good == seen.examination.tried;
       if (is_same) continue;
       EXPECT_EQ(seen.first(), "wrong_settings") << sentences(seen.examination);
@@ -58,7 +58,8 @@ TEST_P(DoctorWays, OtherModelIsNamedInBothDirections) {
   }
 }
 
-/// The finding that `read` names for a single failed reading must be that of doctor, or "".
+/// If a single reading fails, the finding that `read` names must be doctor's first one, or one that names no cause,
+/// such as no_answer.
 TEST_P(DoctorWays, ReadSaysTheSameOrLeavesItOpen) {
   static const Ids open{"no_answer", "always_damaged", "extra_bytes", "bytes_missing", "sometimes_damaged"};
   const Unit& unit = *GetParam();

@@ -28,7 +28,8 @@ using ByteList = std::vector<std::uint8_t>;
 /// A function that returns the changed bytes of the reply to a request.
 using Change = std::function<ByteList(const ByteList& request, ByteList reply)>;
 
-/// A machine that changes the bytes between a device and the line, like the receiving side of an adapter.
+/// A machine between a device and the line that changes the device's replies, like the receiving side of an adapter, or
+/// drops them while a contact is open.
 class Adapter final : public Machine<std::uint8_t> {
  public:
   Adapter(Machine<std::uint8_t>& device, Change change, std::function<bool(Time)> is_cut)
@@ -103,14 +104,14 @@ struct Far {
   EncoderAddress encoder;  // address of the virtual encoder, "sim:tformat?model=23-bit"
   std::uint32_t rate = 0;  // rate of the encoder's line in bits per second; 0: the rate of the user's address
   Change change{};         // change of reply bytes by the adapter; empty: none
-  std::optional<EncoderAddress> second{};  // another encoder on the same line
+  std::optional<EncoderAddress> second{};  // second encoder on the same line; nothing: there is none
   std::function<bool(Time now)> is_cut{};  // returns true while a contact of the line is open; empty: never
   bool goes_on = false;                    // whether the time of the encoder continues when the port is opened again
   // makes another device instead of the encoder; empty: the encoder is connected
   std::function<std::unique_ptr<Talker>()> other{};
 };
 
-/// Opens links to the devices that `Far` describes, a new one each time doctor opens the port.
+/// Opens links to the devices that `Far` describes. Each call of `open` makes new devices, unless `goes_on` is set.
 class Opener {
  public:
   explicit Opener(Far far) : far_(std::move(far)) {}
@@ -252,7 +253,8 @@ inline std::string asked_mode(const Unit& unit) {
   return "";
 }
 
-/// Returns each rate of the unit as a setting: "rate=9600", or "baud=9600" if the rate belongs to the line.
+/// Returns each rate of the unit as a setting: "rate=9600", or "baud=9600" if the rate belongs to the line. A unit
+/// without a rate of its own gets two usual ones.
 inline std::vector<std::string> rates_of(const Unit& unit) {
   std::vector<std::string> rates;
   if (const Option* option = find_role(unit.options, Role::rate)) {
@@ -281,7 +283,7 @@ inline std::string of_encoder(const Unit& unit, const std::string& setting) {
 }
 
 struct Pair {
-  std::string asked;  // address as the user writes it
+  std::string asked;  // address of the encoder as the user writes it
   Far far;
 };
 

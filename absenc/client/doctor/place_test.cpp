@@ -15,7 +15,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-/// Findings that occur only with facts about a serial port.
+/// Ids of findings that result only from facts that the system reports about a serial port.
 const std::set<std::string_view> of_serial_ports{"port_is_modem", "latency_timer", "direction_unswitched"};
 
 std::string advice_of(FindingKind finding_kind, PortKind place) {

@@ -21,24 +21,24 @@ struct Other {
   EncoderAddress address{};
 };
 
-/// Returns the other line settings to try: SPI modes and clocks, echo, and other rates if the port has a rate
-/// (`has_rate`).
+/// Returns the other line settings to try: SPI modes and clocks on SPI, the other echo setting if the user set one, and
+/// other rates if the port has a rate (`has_rate`).
 [[nodiscard]] std::vector<Other> other_lines(const EncoderAddress& address, bool has_rate);
 
-/// Returns each other model, and on lines of characters each other choice of an option, as settings to try. Leaves out
-/// those whose requests would change another encoder on the line. Returns none for a virtual encoder, which always has
-/// the given options.
+/// Returns up to 32 settings to try: each other model, and on lines of characters each other choice of an option.
+/// Leaves out those whose requests could change an encoder of another protocol on the line. Returns none on CAN, and
+/// for a virtual encoder, which always has the given options.
 [[nodiscard]] std::vector<Other> other_models(const EncoderAddress& address);
 
-/// Returns each other address on the line as a setting to try, the lowest first; none if polling would disturb other
-/// devices.
+/// Returns each other address on the line as a setting to try, the lowest first. Returns none if polling would disturb
+/// other devices, on CAN, for encoders that send unsolicited, and for virtual encoders.
 [[nodiscard]] std::vector<Other> other_addresses(const EncoderAddress& address);
 
 /// Returns the search that `identify` runs to find encoders of other protocols. Only for lines of characters.
 [[nodiscard]] LineSearch search_of(const EncoderAddress& address);
 
-/// Returns whether nearly all of the `tried` readings are good, and far more than chance would give in comparison with
-/// `good_as_said` of `tried_as_said` readings with the user's setting (Fisher's exact test).
+/// Returns whether at least 80 % of the `tried` readings are good, and significantly more than of the readings with the
+/// user's setting, of which `good_as_said` of `tried_as_said` are good (Fisher's exact test, 0.1 %).
 [[nodiscard]] bool is_far_better(std::size_t good, std::size_t tried, std::size_t good_as_said,
                                  std::size_t tried_as_said);
 

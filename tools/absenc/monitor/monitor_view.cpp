@@ -40,7 +40,7 @@ bool has_position(const Snapshot& snapshot) {
   return is_live(snapshot) && reading.ready && reading.singleturn_valid();
 }
 
-// Returns " (0.3 s old)" for a reading older than a tenth of a second, otherwise "".
+// Returns the age of a reading as "   (0.3 s old)"; "" for an age below a tenth of a second.
 std::string age(const Snapshot& snapshot) {
   if (snapshot.age < std::chrono::milliseconds(100)) return {};
   return fmt::format("   ({:.1f} s old)", std::chrono::duration<double>(snapshot.age).count());
@@ -51,7 +51,8 @@ double unit_um(const MonitoredEncoder& shown) {
   return uri.unit->resolution(uri.options).unit_um;
 }
 
-// Returns a speed as text, with fewer decimals if the text would not fit into `width` characters.
+// Returns `value` as text with `decimals` decimals, or fewer if the text would be wider than `width` characters; a
+// value that is too wide even without decimals is written with an exponent.
 std::string short_text(double value, int decimals, std::size_t width = 9) {
   while (decimals > 0 && fmt::formatted_size("{:.{}f}", value, decimals) > width) --decimals;
   std::string text = fmt::format("{:.{}f}", value, decimals);
@@ -80,8 +81,8 @@ std::string speed_text(const Snapshot& snapshot) {
   return text.size() <= 9 ? text : short_text(snapshot.last.speed, 1);
 }
 
-// Returns a speed and its uncertainty with `sign` between them, "+/-" for the screen, which only draws ASCII; "-" if
-// the speed is unknown.
+// Returns speed and unit as "12.0 +/- 0.3 rpm", with `sign` before the uncertainty ("+/-" for the screen, which only
+// draws ASCII); "- rpm" if the speed is unknown.
 std::string measured_speed_text(const Snapshot& snapshot, std::string_view sign) {
   const Sample& last = snapshot.last;
   const std::string value =
@@ -113,7 +114,7 @@ std::uint64_t failures(const Snapshot& snapshot) { return snapshot.counters.bad(
 
 constexpr std::size_t turns_width = 7;
 constexpr std::size_t failures_width = 6;
-constexpr int values_width = 43;  // width of all columns behind the column of the state
+constexpr int values_width = 43;  // width of all columns to the right of the column `state`
 
 std::vector<std::string> names_in(const View& view, int width) {
   std::vector<std::string> names;
@@ -121,7 +122,7 @@ std::vector<std::string> names_in(const View& view, int width) {
   return short_names(names, static_cast<std::size_t>(std::max(width, 8)));
 }
 
-// Returns the width of the column of names, which is the room beside the values and the mark of alarms.
+// Returns the width of the column of names, 8 to 40: the part of the screen's width that the other columns leave.
 int name_width(const Screen& screen) { return std::clamp(screen.columns() - values_width - 13, 8, 40); }
 
 void draw_list_line(Screen& screen, int row, const MonitoredEncoder& shown, const std::string& name, bool selected) {
@@ -140,7 +141,7 @@ void draw_list_line(Screen& screen, int row, const MonitoredEncoder& shown, cons
   }
 }
 
-// Returns the headings of the columns position and speed, which name the units.
+// Returns the headings of the columns of positions and speeds, which are their units.
 std::array<std::string_view, 2> units_of(const View& view) {
   const auto linear = std::count_if(view.encoders.begin(), view.encoders.end(),
                                     [](const MonitoredEncoder& one) { return unit_um(one) > 0; });
@@ -149,7 +150,8 @@ std::array<std::string_view, 2> units_of(const View& view) {
   return {"mm", "mm/s"};
 }
 
-// Draws the rows of the list around the selected encoder from `row` on; returns the row behind the last one.
+// Draws the list of encoders from the screen's row `row` on, with its heading; if not all fit, those around the
+// selected encoder. Returns the row after the list.
 int draw_list(Screen& screen, int row, const View& view) {
   const std::size_t most = std::max<std::size_t>(1, static_cast<std::size_t>(screen.rows() - 14));
   const std::size_t count = std::min(view.encoders.size(), most);
@@ -171,7 +173,8 @@ int draw_list(Screen& screen, int row, const View& view) {
 
 // ---- One encoder
 
-// Returns the range that the bar of the position shows: one turn, or the whole range of a linear encoder.
+// Returns the upper end of the bar that shows the position, as text: "360" degrees, or a linear encoder's whole range
+// in mm.
 std::string range_text(const MonitoredEncoder& shown) {
   const EncoderAddress& uri = shown.watch->uri();
   const Resolution resolution = uri.unit->resolution(uri.options);
@@ -198,7 +201,7 @@ void draw_position(Screen& screen, int row, const MonitoredEncoder& shown) {
   const Unit& unit = *shown.watch->uri().unit;
   if (is_live(snapshot)) {
     const bool has_room =
-        // The status of an encoder with two channels is drawn below.
+        // The flags of an encoder with two channels do not fit into this line: they are drawn among the fields below.
         unit.second_status == nullptr && unit.second_alarms == nullptr;
     const Reading& reading = snapshot.last.reading;
     const Doubt doubt = doubt_of(snapshot.last);
@@ -266,13 +269,13 @@ int draw_alarms(Screen& screen, int row, int end, const MonitoredEncoder& shown)
   return row;
 }
 
-// Draws the last reply's fields in columns; a long field takes several columns. Returns the row behind the last one,
-// and leaves the last two rows before `end` free for the section below.
+// Draws the last reply's fields in columns; a long field takes several columns. Draws nothing into the last three rows
+// before `end`, which the section below needs. Returns the row after the fields.
 int draw_fields(Screen& screen, int row, int end, const Snapshot& snapshot) {
   if (!is_live(snapshot)) return row;
   constexpr int between = 3;
   const int room = screen.columns() - 2 + between;
-  int width = 1;  // width of a column: the longest field that fits beside another
+  int width = 1;  // width of a column, from the longest field that is at most half as wide as the screen
   for (const std::string& field : snapshot.fields) {
     const int needed = static_cast<int>(field.size()) + between;
     if (needed <= room / 2) width = std::max(width, needed);
@@ -300,7 +303,7 @@ void draw_trace(Screen& screen, int row, int end, const Snapshot& snapshot) {
   }
 }
 
-// Draws the last bad exchanges with their sent and received bytes, repeated attempts included.
+// Draws the encoder's last bad exchanges with their sent and received bytes; attempts that were repeated count too.
 void draw_errors(Screen& screen, int row, int end, const MonitoredEncoder& shown) {
   if (shown.snapshot.bad.empty()) return screen.put(row, 2, "no exchange has failed");
   for (const BadExchangeText& bad : shown.snapshot.bad) {
@@ -353,7 +356,8 @@ void draw_help(Screen& screen, int row, int end) {
       Style::plain);
 }
 
-// Returns the question to the user with the encoder's name, which is never cut off.
+// Returns the question to the user, followed by the selected encoder's short name. If both do not fit into `columns`,
+// the question is cut, not the name.
 std::string question_in(const View& view, int columns) {
   const std::string name = names_in(view, columns - static_cast<int>(view.question.size()) - 5)[view.selected];
   const std::string who = fmt::format("  ({})", name);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/absenc/monitor/screen.hpp"
 
-#define NCURSES_NOMACROS  // makes erase, timeout and others functions instead of macros
+#define NCURSES_NOMACROS  // makes curses.h declare erase, timeout and others as functions instead of macros
 #include <curses.h>
 
 #include <algorithm>
@@ -83,7 +83,8 @@ KeyPress key_of(int key) {
 }
 
 bool wants_colours() {
-  const char* const no_color = std::getenv("NO_COLOR");  // https://no-color.org
+  // A set and not empty NO_COLOR asks for no colours: https://no-color.org.
+  const char* const no_color = std::getenv("NO_COLOR");
   return no_color == nullptr || *no_color == '\0';
 }
 
@@ -95,7 +96,7 @@ std::unique_ptr<Screen> Screen::open() {
   ::set_escdelay(25);
   terminal->screen = ::newterm(nullptr, stdout, stdin);
   if (terminal->screen == nullptr) return nullptr;
-  if (::tigetstr("cup") == nullptr) {  // the terminal cannot move the cursor, as TERM=dumb
+  if (::tigetstr("cup") == nullptr) {  // the terminal cannot move the cursor, as with TERM=dumb
     ::endwin();
     ::delscreen(terminal->screen);
     return nullptr;

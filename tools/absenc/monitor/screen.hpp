@@ -41,13 +41,14 @@ class Screen {
   [[nodiscard]] int columns() const;
 
   void clear();
-  /// Draws `text`; cuts it at the edge of the screen and draws '?' for bytes that are not ASCII.
+  /// Draws `text`; cuts it at the right edge of the screen and draws '?' for control characters and bytes that are not
+  /// ASCII.
   void put(int row, int column, std::string_view text, Style style = Style::plain);
-  /// Draws `text` and gives the whole row the style `style`.
+  /// Draws `text` from the left edge on, and gives the whole row the style `style`.
   void fill(int row, std::string_view text, Style style);
   void show();
 
-  /// Returns the next key that the user presses; waits at most `limit`.
+  /// Returns the next key that the user presses; waits at most `limit` and then returns KeyPress::none.
   [[nodiscard]] KeyPress key(Time limit);
 
  private:

@@ -26,14 +26,15 @@ using namespace std::chrono_literals;
 
 constexpr std::size_t most_lines = 200;
 constexpr Time between_summaries = 100ms;
-constexpr Time between_lines = 200ms;  // shortest time between two lines of good readings; a failure is printed at once
+// Shortest time between two traced good readings; other alarms and failures are traced at once.
+constexpr Time between_lines = 200ms;
 
-// Converts a time of os::now, which is the steady clock.
+// Converts a time of os::now, which reads the steady clock, for functions of the standard library.
 std::chrono::steady_clock::time_point to_time_point(Time time) {
   return std::chrono::steady_clock::time_point(std::chrono::duration_cast<std::chrono::steady_clock::duration>(time));
 }
 
-/// Collects the fields of a reply that the line of the reading does not contain.
+/// Collects the last reply's fields that the printed line of the reading leaves out.
 class OtherFields final : public FieldSink {
  public:
   explicit OtherFields(const Unit& unit) : unit_(&unit) {}
@@ -248,7 +249,7 @@ std::string Watch::result_of(Encoder& live, const Command& command) {
       return fmt::format("{} failed: {}", command.name, connection.trouble(outcome).message);
     }
     return fmt::format("{}: {}", command.name, outcome.change.text());
-  } catch (const os::Failure& failure) {  // the next reading will report that the port is lost
+  } catch (const os::Failure& failure) {  // the next reading reports that the port was lost
     return fmt::format("{} was broken off, read whether it was done: {}", command.name, failure.what());
   }
 }

@@ -21,32 +21,34 @@ using namespace client;
 struct Snapshot {
   enum class State : std::uint8_t {
     opening,  // the port could not be opened yet
-    live,     // the last reading is recent and good
-    silent,   // no reading has arrived for a while
+    live,     // the last reading is good, and not older than the longer of three periods and 0.5 s
+    silent,   // the last reading is good, but older than the longer of three periods and 0.5 s
     failing,  // the last attempt to read failed
     lost,     // the port was open and was lost
-    paused,   // readings are paused
+    paused,   // the user has paused the readings
     ended,    // the encoder cannot be read; `message` has the reason
   };
 
   State state = State::opening;
-  Time age{};  // age of the last reading; without a reading, time since the state began
+  Time age{};  // age of the last reading; without a reading, time since the watch started
   bool has_reading = false;
   Sample last{};          // last reading; valid if `has_reading`, and the present position only in the state `live`
   std::string message{};  // reason of the states failing, lost, opening and ended
-  std::string notice{};   // result of the last command, or that the command still runs
+  std::string notice{};   // message to the user, as the result of the last command, or that the command still runs
   host::Counters counters{};
   std::uint64_t readings = 0;
   std::uint64_t losses = 0;
   std::uint64_t restarts = 0;  // number of times that the position started again; see Encoder::restarts
-  double rate = 0;             // readings per second
-  Time median{};               // median of the latencies
+  double rate = 0;             // measured number of readings per second
+  Time median{};               // median of the latencies from request to reply
   Time percentile_99{};
   Time longest{};
-  std::vector<std::string> trace{};    // readings as printed text, the newest last; only with details
-  std::vector<BadExchangeText> bad{};  // last bad exchanges, the newest first; only with details
-  std::vector<std::string>
-      fields{};  // only with details: "name value" of the last reply's fields that the reading lacks
+  // Last readings and failures as text, the newest last; empty unless details were asked for.
+  std::vector<std::string> trace{};
+  std::vector<BadExchangeText> bad{};  // last bad exchanges, the newest first; empty unless details were asked for
+  // "name value" of each field of the last reply that the line of the reading lacks; empty unless details were asked
+  // for.
+  std::vector<std::string> fields{};
 };
 
 [[nodiscard]] std::string_view name_of(Snapshot::State state);
@@ -91,10 +93,10 @@ class Watch {
   Time offset_;
   Time start_;
 
-  mutable std::mutex mutex_;  // guards the members from here down to command_
+  mutable std::mutex mutex_;  // guards the members `changed_` to `command_`
   std::condition_variable_any changed_;
   Snapshot known_;
-  Time known_at_{};  // time of the last reading, or of the last change of the state
+  Time known_at_{};  // time of the last reading; before the first one, time of the start
   std::deque<std::string> lines_;
   bool paused_ = false;
   std::optional<Command> command_;
@@ -104,8 +106,8 @@ class Watch {
   Time next_line_{};
   std::uint32_t alarms_ = 0;
   std::uint32_t alarms_reported_ = 0;
-  bool restarted_ = false;     // the position started again at the previous reading
-  bool command_runs_ = false;  // a command is running, which must not be aborted
+  bool restarted_ = false;     // whether the position started again at the previous reading
+  bool command_runs_ = false;  // whether a command is running, which must not be aborted
 
   std::jthread thread_;  // last member, because the thread uses all other members
 };

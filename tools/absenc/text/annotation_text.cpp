@@ -44,7 +44,8 @@ std::string field_words(const capture::Contents& contents) {
   return words;
 }
 
-// Positions of the CSV columns before the fields.
+// Positions of the CSV columns: ColumnPosition counts from the first column, Behind from the first column after those
+// of the reading.
 enum ColumnPosition : std::size_t { at_time, at_kind, at_request, at_reply, at_turnaround, at_reading };
 enum Behind : std::size_t { at_fields, at_error, at_message, behind_all };
 

@@ -16,21 +16,24 @@ namespace absenc::tool {
 using namespace client;
 
 enum class AnnotationFormat : std::uint8_t { text, json, csv };
-enum class ShowBits : std::uint8_t { no, yes };  // whether to print the bits of each field in the reply
+// Whether to print after each reply which of its bits each field occupies.
+enum class ShowBits : std::uint8_t { no, yes };
 
-enum class MarkAlarms : std::uint8_t { no, yes };  // whether to print ! before the time of an error or a raised alarm
+// Whether to print ! after the time of a line that has an error or a raised alarm.
+enum class MarkAlarms : std::uint8_t { no, yes };
 
 /// Returns whether the annotated reply reports a raised alarm.
 [[nodiscard]] bool raises_alarm(const capture::Annotation& annotation);
 
-/// Prints annotations to standard output: each at once on a terminal, otherwise many at a time.
+/// Prints annotations to standard output. Collects lines until they fill 64 KiB or the caller calls `flush`, as for
+/// live input after each piece of it.
 class AnnotationPrinter final : public capture::AnnotationSink {
  public:
   AnnotationPrinter(const Unit& unit, const Options& options, const TickClock& clock, AnnotationFormat format,
                     ShowBits bits = ShowBits::no, MarkAlarms marks = MarkAlarms::no);
 
   void put(const capture::Annotation& annotation) override;
-  /// Prints the annotations that are still buffered. Throws OutputClosed, os::Failure.
+  /// Prints the annotations that are still buffered. Throws OutputClosed, Failure.
   void flush();
 
  private:
@@ -44,7 +47,7 @@ class AnnotationPrinter final : public capture::AnnotationSink {
   AnnotationFormat format_;
   ShowBits bits_;
   MarkAlarms marks_;
-  // The following members are used only for CSV.
+  // The members `time_format_` to `row_` are used only for CSV; `kept_` buffers lines of every format.
   std::string time_format_;
   ReadingColumns reading_;
   std::vector<Column> columns_;

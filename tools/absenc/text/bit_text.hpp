@@ -16,8 +16,8 @@ namespace absenc::tool {
 /// Returns bit ranges as text, the most significant range first: "16-32", "7", "24-31 16-23".
 [[nodiscard]] std::string ranges_text(const BitRanges& ranges);
 
-/// The bits of a good reply that each of its fields occupies, as far as the unit declares them, in the order of the
-/// fields.
+/// The bits that each field of a good reply occupies, in the order of the fields. Fields whose bits the unit does not
+/// declare are missing.
 class FieldPlaces {
  public:
   FieldPlaces(const Unit& unit, const Options& options, const Frame& request, const Frame& reply,
@@ -28,7 +28,8 @@ class FieldPlaces {
   /// Returns the fields with their bits as {"singleturn":[{"first":16,"count":17}]}, the least significant range of a
   /// field first.
   [[nodiscard]] Json json() const;
-  /// Adds a column with the bits of each field to `rows`, after the column of the values.
+  /// Inserts a third column into `rows`, whose first two are name and value: the bits of the field with that name; ""
+  /// if not declared.
   void add_to(std::vector<std::vector<std::string>>& rows) const;
 
  private:

@@ -38,7 +38,8 @@ class TimeHistogram {
     const auto quarter = static_cast<unsigned>(top >= 2 ? value >> (top - 2) & 3 : value << (2 - top) & 3);
     ++counts_[4 * top + quarter];
   }
-  /// Returns the bins from the first one to the last one that is not empty, joined to at most `most` bins.
+  /// Returns the bins between the shortest and the longest duration; neighbouring bins are joined so that at most
+  /// `most` remain. Returns nothing without durations.
   [[nodiscard]] std::vector<Bar> bars(std::size_t most) const;
 
  private:
@@ -63,7 +64,7 @@ class CaptureStatistics final : public capture::AnnotationSink {
   static constexpr std::size_t most_kept = 8;
   static constexpr std::size_t error_kinds = error_texts.size();
 
-  // The beginning of a frame with an error, cut to a fixed length.
+  // A copy of an annotation with an error; of long requests and replies only the beginning is stored.
   struct StoredError {
     capture::Annotation annotation{};
     ByteBuffer<32> request{};
@@ -94,8 +95,8 @@ class CaptureStatistics final : public capture::AnnotationSink {
   std::uint64_t count_ = 0;
   std::uint64_t errors_ = 0;
   std::uint64_t cut_ = 0;
-  std::uint64_t composed_ = 0;            // number of composed frames, of which several exchanges carried the bytes
-  std::array<std::uint64_t, 4> kinds_{};  // number of annotations that are not composed, by kind
+  std::uint64_t composed_ = 0;            // number of frames whose bytes several exchanges carried
+  std::array<std::uint64_t, 4> kinds_{};  // number of annotations of each kind, without composed frames
   std::array<std::uint64_t, error_kinds> by_error_{};
   std::uint64_t echoes_ = 0;
   std::uint64_t repeated_ = 0;

@@ -34,11 +34,12 @@ struct JsonFields final : FieldSink {
   std::vector<ValidatedField> judged_;
 };
 
-/// Returns rows for the function `table`: name, value, and unit or meaning of each column; one row for each flag that
-/// is set.
+/// Returns rows for the function `table`, one for each column of `row`: name, value with unit, and meaning; after a
+/// column of flags, one row for each flag that is set.
 [[nodiscard]] std::vector<std::vector<std::string>> to_table(const Row& row);
 
-/// Makes rows of decoded fields: name, value, and unit or meaning; one row for each flag that is set.
+/// Makes a row for each decoded field: name, value with unit, and meaning; after a field of flags, one row for each
+/// flag that is set.
 struct FieldTable final : FieldSink {
   void put(const FieldValue& value) override;
   void put_reading(const Reading& reading) override;
@@ -53,7 +54,7 @@ struct FieldTable final : FieldSink {
 
   std::vector<ValidatedRow> judged_;
   std::vector<std::pair<std::size_t, const FlagInfo*>>
-      sends_to_alarms_;  // rows of flags whose advice refers to the alarms
+      sends_to_alarms_;  // row number and flag, for flags whose advice is to read the alarms
   bool shows_alarms_ = false;
 };
 

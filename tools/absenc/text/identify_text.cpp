@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::size_t most_shown = 8;
 
-// Returns the probability 10^`log10` as "1 in 16384" or "1 in 10^9".
+// Returns the probability 10^`log10` as "1 in 16384" or "1 in 10^9"; "as likely" if it is nearly 1.
 std::string chance_text(double log10) {
   if (log10 > -0.05) return "as likely";
   if (log10 > -6) return fmt::format("1 in {:.0f}", std::pow(10, -log10));
@@ -86,7 +86,7 @@ std::vector<const Candidate*> encoders(std::span<const Candidate> candidates) {
   return all;
 }
 
-// Returns sentences that explain that the frames fit several candidates of one encoder equally well.
+// Returns a note for each found encoder whose frames several candidates explain equally well.
 std::vector<std::string> ties(std::span<const Candidate> candidates, std::span<const Candidate* const> found) {
   std::vector<std::string> notes;
   for (const Candidate* best : found) {

@@ -12,10 +12,11 @@
 
 namespace absenc::tool {
 
-/// Writes `text` and one line end to standard output, unbuffered. Throws OutputClosed, os::Failure.
+/// Writes `text` to standard output, unbuffered, and a line end unless `text` ends with one. Throws OutputClosed if
+/// nobody reads standard output, Failure if it cannot be written.
 void print_line(std::string_view text);
 
-/// Writes "absenc: <text>" to standard error.
+/// Writes "absenc: <text>" and a line end to standard error.
 void print_message(std::string_view text);
 /// Writes `text` and a line end to standard error.
 void print_note(std::string_view text);

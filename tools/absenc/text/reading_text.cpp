@@ -25,8 +25,8 @@ int decimals(unsigned bits) {
   return std::max(0, static_cast<int>(std::ceil(std::log10(std::ldexp(1.0, static_cast<int>(bits)) / 360))));
 }
 
-// Returns the number of decimals of millimetres that one count of `unit_um` needs; options allow six decimals of a
-// micrometre.
+// Returns the number of decimals of millimetres that positions of an encoder need whose count is `unit_um` micrometres,
+// at most 9: options allow six decimals of a micrometre.
 int linear_decimals(double unit_um) {
   int decimals = 9;
   for (auto nanometres_e3 = std::llround(unit_um * 1e6); decimals > 0 && nanometres_e3 % 10 == 0; --decimals) {
@@ -72,8 +72,8 @@ std::string turns_text(const Reading& reading, Doubt doubt) {
   return fmt::format("{:>{}} turns", reading.turns(), digits(reading.multiturn_bits));
 }
 
-// Returns the alarms for the line of a reading, and the status if the alarms are not complete; of both channels of an
-// encoder with two.
+// Returns the flags for the line of a reading: the alarms alone if the reply reports all of them, otherwise status and
+// alarms. For an encoder with two channels, status and alarms of both.
 std::vector<Flags> flags_in_line(const Unit& unit, const Reading& reading) {
   if (unit.second_status != nullptr || unit.second_alarms != nullptr) return flags_of(unit, reading);
   const std::vector<Flags> alarms = alarms_of(unit, reading);
@@ -81,8 +81,8 @@ std::vector<Flags> flags_in_line(const Unit& unit, const Reading& reading) {
   return flags_of(unit, reading);
 }
 
-// Returns whether both channels report all alarms and raise none: one text then serves both, otherwise each channel is
-// named.
+// Returns whether status and alarms of both channels are reported completely and no set flag requires an action: one
+// text then serves both channels, otherwise the line lists the flags of each.
 bool both_channels_are_well(const Unit& unit, const Reading& reading) {
   if (unit.second_status == nullptr || unit.second_alarms == nullptr || !reading.ready) return false;
   const std::vector<Flags> all = flags_of(unit, reading);

@@ -22,7 +22,8 @@ using namespace client;
 /// Reason why the validity of a position is unknown.
 enum class Doubt : std::uint8_t {
   none,
-  unconfirmed,  // no second reading confirmed the position; none: no reply reports the validity
+  // No second reading confirmed the position. With `none`, the validity is unknown because no reply reports it.
+  unconfirmed,
 };
 [[nodiscard]] inline Doubt doubt_of(const Sample& sample) { return sample.doubtful ? Doubt::unconfirmed : Doubt::none; }
 
@@ -35,17 +36,19 @@ enum class Doubt : std::uint8_t {
 [[nodiscard]] std::string place_text(const Reading& reading, Doubt doubt = Doubt::none);
 
 /// Returns flags as text: "no alarms", "alarms: over_heat", "alarms not reported" or "alarms: counting_error (not
-/// reported: over_speed)"; for flags of a status "status clear" or "status: alarm".
+/// reported: over_speed)"; for flags of a status "status clear" or "status: alarm". At most four unreported flags are
+/// named.
 [[nodiscard]] std::string flags_text(const Unit& unit, const Flags& flags);
 
-/// Returns one line for each set flag, with its meaning and what the user should do; "" if no flag is set.
+/// Returns one line for each set flag, with its meaning and what the user should do; "" if no flag is set. With
+/// `beside_alarms`, a flag that summarises alarms has no advice.
 [[nodiscard]] std::string flags_in_words(const Flags& flags, bool beside_alarms = false);
-/// Returns the raised alarms in words. With two channels each has its name before its alarms; a flag that both raise is
-/// listed once.
+/// Returns the raised alarms in words. With two channels, the channel's name stands before its alarms; if both raise
+/// the same alarms, these are listed once.
 [[nodiscard]] std::string alarms_in_words(const Unit& unit, const Reading& reading);
 
-/// Sets the keys singleturn_valid and multiturn_valid if the reading has these parts, and the alarms of all channels if
-/// the unit has alarms. null means that no reply reports the value.
+/// Sets the keys singleturn_valid and multiturn_valid if the reading has these parts, and "alarms", of all channels
+/// together, if the unit has alarms. null means that no reply reports the value.
 void set_state(Json& json, const Unit& unit, const Reading& reading);
 
 /// Returns millimetres as text "0.125", with no more decimals than one count of `unit_um` micrometres has.

@@ -28,7 +28,8 @@ std::string without_end(std::string text) {
   return text;
 }
 
-// Prints the verdict in the form that the user's options choose; returns the exit status.
+// Prints the verdict as JSON, TAP or text, and writes it to the file of --junit, as the user's options choose; returns
+// the exit status.
 int tell_verdict(const Invocation& invocation, const Conformance& conformance) {
   if (invocation.has("--junit")) {
     const std::string path(invocation.text("--junit"));
@@ -76,7 +77,7 @@ int run_conform(const Invocation& invocation) {
   return tell_verdict(invocation, conformance);
 }
 
-/// Tests a host behind an SPI controller. The class is not in the library, because the library does not need libfuse.
+/// Tests a host behind an SPI controller. The class is part of the command, so that the library does not need libfuse.
 class SpidevStage final : public HostStage {
  public:
   SpidevStage(const EncoderAddress& address, const std::string& name)
@@ -151,7 +152,7 @@ int run_conform_host(const Invocation& invocation) {
   if (invocation.has("--tcp")) place.tcp = static_cast<std::uint16_t>(invocation.number("--tcp", 0, 0, 65535));
   ConformHostChoices choices{.answers = static_cast<std::size_t>(invocation.number("--answers", 100, 2, 1'000'000))};
   choices.patience = Time(static_cast<std::int64_t>(invocation.real("--patience", 10, 0.1, 1e6) * 1e9));
-  // Prints to standard error, because standard output is for the verdict.
+  // The port's name is printed to standard error, because standard output is for the verdict.
   choices.ready = [](const Emulation& encoder) {
     print_message(fmt::format("ready: {}", encoder.path()));
     if (encoder.tcp_port() != 0) print_message(fmt::format("ready: tcp:127.0.0.1:{}", encoder.tcp_port()));

@@ -37,11 +37,11 @@ std::vector<CheckedFrame> frames_of(const Invocation& invocation) {
 
 std::string hex(std::uint32_t value, unsigned width) { return fmt::format("0x{:0{}X}", value, (width + 3) / 4); }
 
-// Returns the polynomial in Koopman's notation, without its last power, which some documents print.
+// Returns the polynomial in Koopman's notation, which some documents use: it contains the highest power and leaves out
+// x^0.
 std::string koopman(const CrcParameters& crc) { return hex((1u << crc.width | crc.poly) >> 1, crc.width); }
 
-/// Returns the covered bytes as "bytes 0 to 7". If the frames differ in length, the end of the covered part is given
-/// relative to the checksum.
+/// Returns the covered bytes as "bytes 0 to 7"; "bytes 0 to before the check" if the frames differ in length.
 std::string covered_text(const FoundCheck& check, const CheckFindings& findings, std::string_view unit) {
   const std::string end = findings.shortest == findings.longest
                               ? fmt::format("{}", findings.shortest - check.trailing - check.check_size - 1)

@@ -96,7 +96,7 @@ struct Counted final : capture::AnnotationSink {
   AnnotationPrinter* printer;
 };
 
-// Prints the damages of the capture file. Returns whether data is missing because of them.
+// Prints each damage of the capture file. Returns whether data is missing because of one.
 bool tell_damages(const CaptureOutcome& outcome, const TickClock& clock) {
   bool damaged = false;
   for (const capture::Damage& damage : outcome.damages) {
@@ -148,8 +148,8 @@ int decode_capture(const Invocation& invocation, const Unit& unit, const Options
   return damaged || statistics.errors() != 0 ? exit_failed : exit_good;
 }
 
-// Identifies the protocol of a capture that the user gave without a protocol, and prints how to decode it. Returns the
-// exit status.
+// Identifies the protocol of a capture that the user gave without a protocol, and prints how to decode it. Returns
+// exit_usage also if a protocol was found.
 int identify_instead(std::string_view file) {
   print_message(fmt::format("the protocol is missing before {}: it is looked for", file));
   Invocation search;

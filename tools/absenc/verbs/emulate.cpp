@@ -73,7 +73,7 @@ std::optional<std::uint16_t> tcp_port(const Invocation& invocation) {
   return static_cast<std::uint16_t>(invocation.number("--tcp", 0, 0, 65535));
 }
 
-// Returns the unit to emulate; with --spidev the unit's variant for SPI.
+// Returns the unit to emulate; with --spidev the unit's variant for SPI, if it has one.
 const Unit& emulated_unit(const Invocation& invocation) {
   const Unit& unit = require_unit(invocation.text("protocol"));
   return invocation.has("--spidev") && unit.over_spi != nullptr ? *unit.over_spi : unit;
@@ -148,8 +148,8 @@ struct EmulationRun {
     if (keeps_memory) file.load(line.first().memory());
   }
 
-  /// Calls `serve(machine)`, which runs the encoders until a signal or the end and returns notes about the line; prints
-  /// counts and notes. Returns the exit status.
+  /// Calls `serve(machine)`, which runs the encoders until a signal arrives or `end` is reached and returns notes about
+  /// the line. Prints counts and notes. Returns the exit status.
   template <class Serve>
   int run(const Serve& serve) {
     const Time start = os::now();

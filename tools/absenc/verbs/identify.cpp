@@ -69,7 +69,8 @@ int identify_frames(const Invocation& invocation) {
       for (capture::Hypothesis& one : capture::find_hypotheses(*unit, {}, exchanges)) {
         candidates.push_back({unit, std::move(one), {}, false, line_of(*unit)});
       }
-    } catch (const UsageError& error) {  // the request may be written for another kind of link
+    } catch (const UsageError& error) {
+      // A request that is written for another kind of link is no request of this unit.
       if (!unreadable) unreadable = error;
     }
   }

@@ -28,8 +28,8 @@ namespace {
 
 using Rows = std::vector<std::vector<std::string>>;
 
-// Describes the range of turns as the encoder counts them; turning backwards from 0, most encoders continue at their
-// greatest number.
+// Returns the range of turns as text, as the encoder counts them. Most encoders count unsigned: turning backwards from
+// 0, they continue at their greatest number.
 std::string turns_text(const Resolution& resolution) {
   const std::int64_t count = std::int64_t{1} << resolution.multiturn_bits;
   const std::int64_t least = resolution.multiturn_signed ? -count / 2 : 0;
@@ -44,7 +44,7 @@ std::string resolution_text(const Resolution& resolution) {
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 
-// Returns the options of the address that differ from their defaults.
+// Returns the options of the address that differ from their defaults, as text.
 std::string options_in_short(const EncoderAddress& uri) {
   const std::vector<std::string> settings = settings_for(*uri.unit, uri.options);
   return settings.empty() ? "all at their defaults" : fmt::format("{}", fmt::join(settings, " "));
@@ -85,7 +85,7 @@ Json identity_json(const EncoderAddress& uri, const Resolution& resolution) {
       .set("options", options_to_json(unit, uri.options));
 }
 
-/// Collects the fields that the card shows: identity, connection and temperature.
+/// Collects the fields that `info` shows without --all: identity, address and rate of the encoder, and temperature.
 class CardRows final : public FieldSink {
  public:
   explicit CardRows(const Command& command) : command_(command) {}
@@ -110,7 +110,7 @@ class CardRows final : public FieldSink {
 /// Reads identity, settings and state of the encoder, and collects them as rows of text and as JSON.
 class Survey {
  public:
-  /// `all`: collect every field and setting; otherwise only those of the card.
+  /// `all`: collect every field and setting as rows; otherwise only those of CardRows.
   Survey(const EncoderAddress& uri, bool all)
       : encoder_(open_connection(uri)), resolution_(uri.unit->resolution(uri.options)), all_(all) {}
 
@@ -129,7 +129,7 @@ class Survey {
     FieldTable table;
     encoder_->report(table);
     for (std::vector<std::string>& row : table.rows) row.front().insert(0, "  ");
-    // Returns whether the table already has this row, because the identity shows the setting too.
+    // A setting that the identity command reports too has the same row in the table already.
     const auto is_shown = [&](const auto& row) { return std::find(rows.begin(), rows.end(), row) != rows.end(); };
     if (command.verb == Verb::config_get && std::all_of(table.rows.begin(), table.rows.end(), is_shown)) return;
     add_heading(command);
@@ -194,7 +194,7 @@ class Survey {
     return a.singleturn_bits == b.singleturn_bits && a.multiturn_bits == b.multiturn_bits && a.unit_um == b.unit_um;
   }
 
-  // Stores the resolution of the first reply, which answers the identity command.
+  // Stores the resolution of the first reply that reports one; later replies do not change it.
   void hear(const Resolution& resolution) {
     if (!heard_) resolution_ = resolution;
     heard_ = true;
@@ -210,7 +210,7 @@ class Survey {
   void fail(const Command& command, const Trouble& trouble) {
     answers.set(command.name, to_json(trouble));
     const std::string why = fmt::format("{}: {}", text_of(trouble.error).name, trouble.message);
-    // If several settings fail for the same reason, only the first is reported.
+    // If several settings fail one after another for the same reason, only the first is reported.
     if (command.verb == Verb::config_get && why == std::exchange(failed_setting_, why)) return;
     rows.push_back({std::string(command.name), "FAILED", why});
     const bool is_known = std::any_of(troubles.begin(), troubles.end(),
@@ -221,7 +221,7 @@ class Survey {
   std::unique_ptr<Connection> encoder_;
   Resolution resolution_;
   bool all_;
-  bool heard_ = false;          // a reply has reported the resolution
+  bool heard_ = false;          // whether a reply has reported the resolution
   std::string failed_setting_;  // reason why the last failed setting failed
 };
 

@@ -48,7 +48,8 @@ std::string section(std::string_view heading, Rows rows) {
 std::string line_of_model(const Unit& unit, const Model& model) {
   Options options;
   static_cast<void>(resolve_options(unit, model.name, {},
-                                    // Cannot fail: the unit itself has this model, and no further options are given.
+                                    // Resolving the options cannot fail: the unit itself has this model, and no further
+                                    // options are given.
                                     options));
   return line_of(unit.link, line_settings(unit, options));
 }

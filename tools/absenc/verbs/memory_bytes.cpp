@@ -41,8 +41,8 @@ std::string hex_dump(const MemoryImage& image) {
   return table(rows);
 }
 
-// Returns the address of a register that is given by name or address. An address that the unit's table does not contain
-// is sent to the encoder all the same.
+// Returns the address of a register that the user gave by name or address. An address that the unit's table does not
+// contain is returned too and sent to the encoder. Throws UsageError for an unknown name.
 std::int64_t register_address(const Invocation& invocation, const Unit& unit, bool for_writing) {
   const std::string_view written = invocation.text("address");
   const Result<std::int64_t> number = parse_number(written);

@@ -31,7 +31,7 @@ Json addresses_json(const MemoryImage& image) {
   });
 }
 
-// Returns the smallest number of writes that one of the bytes endures, in words; "" if the number is unknown.
+// Returns the smallest number of writes that a byte of `image` endures, in words; "" if no number is known.
 std::string write_life(const Unit& unit, const MemoryImage& image) {
   const MemoryArea* least = nullptr;
   for (const auto& [at, value] : image) {
@@ -95,7 +95,7 @@ class MemoryWrite {
       return;
     }
     print_line(difference_table(unit_, "NEW", change_->differing(), change_->found()));
-    if (!asks_) print_note(cost());  // if the user is asked, the question contains the cost
+    if (!asks_) print_note(cost());  // without a question the number of differing bytes and the wear are printed here
   }
 
   int finish() const {

@@ -103,7 +103,7 @@ class Controls {
 
   Watches* watches_;
   View view_;
-  const Command* asked_ = nullptr;  // command that the shown question is about; null: no question
+  const Command* asked_ = nullptr;  // command that the question is about; used only while a question is shown
 };
 
 void run_on_screen(Screen& screen, Watches& watches, Time end) {
@@ -137,7 +137,8 @@ class StateChanges {
 
 void print_lines(const Watches& watches, bool json, Time interval, Time end) {
   StateChanges changes;
-  Time next = os::now() + std::min<Time>(interval, 500ms);  // time of the first lines: encoders need some time to reply
+  // Time of the first lines; the encoders have up to half a second to reply before.
+  Time next = os::now() + std::min<Time>(interval, 500ms);
   try {
     while (os::now() < end) {
       os::sleep_until(std::min({next, end, os::now() + refresh}));

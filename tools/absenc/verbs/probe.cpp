@@ -36,8 +36,8 @@ void show(const Unit& unit, std::span<const OptionEvidence> evidence) {
   print_line(table(rows));
 }
 
-// Returns whether a frame excludes all values of an open option for the same reason, so that the option does not
-// matter.
+// Returns whether one frame excludes all values of all open options for the same reason: then the frame is bad with any
+// options, and says nothing about them.
 bool same_reason(std::span<const OptionEvidence> evidence) {
   return std::all_of(evidence.begin(), evidence.end(), [&](const OptionEvidence& one) {
     return !one.possible && one.capture == evidence.front().capture && one.why == evidence.front().why;

@@ -117,7 +117,8 @@ struct Tally {
   bool last_good = false;
 };
 
-// Reads `count` times and prints each reading; without a count it continues after the port was lost.
+// Reads `count` times and prints each reading; with `count` 0 without end. A lost port throws os::Failure if `count` is
+// not 0; otherwise reading continues when the port is back.
 void read_all(Encoder& live, Display& display, std::uint64_t count, Pace& pace, Tally& tally) {
   for (std::uint64_t i = 0; count == 0 || i < count; ++i) {
     if (i > 0) os::sleep_until(pace.next());
@@ -152,7 +153,7 @@ int run_read(const Invocation& invocation) {
   const Time start = os::now();
   if (count != 0) {
     read_all(live, display, count, pace, tally);
-    // Prints the counts if retries have hidden damaged replies.
+    // Prints the counts if damaged frames of a stream were dropped, which the printed readings do not show.
     if (live.counters().discarded != 0) print_tally(live, tally, os::now() - start);
     return tally.bad == 0 ? exit_good : exit_failed;
   }

@@ -41,7 +41,7 @@ class RecordingProgress {
   Time next_{};
 };
 
-// Prints losses of the port, its returns, and failures, which are also in the file.
+// Prints the first restart of the position, and each loss and return of the port. The file contains them too.
 void tell(const Sample& sample, const Encoder& live, RecordingProgress& report) {
   if (sample.restarted && live.restarts() == 1) {  // printed only for the first restart; the summary has the number
     report.clear();

@@ -19,7 +19,7 @@ namespace {
 constexpr std::string_view usual_host = "127.0.0.1";
 constexpr std::uint16_t usual_port = 8420;
 constexpr std::string_view no_history = "none";
-// Period in which signals are checked: polled, because another thread may receive the signal.
+// Period of checks for a signal: the main thread polls, because another thread may receive the signal.
 constexpr Time between_looks = std::chrono::milliseconds(100);
 
 // Sets host and port of the server from "HOST:PORT", "HOST" or ":PORT". Throws UsageError.
@@ -37,7 +37,8 @@ void set_place(serve::Choices& choices, std::string_view written) {
   choices.port = static_cast<std::uint16_t>(*port);
 }
 
-constexpr std::string_view home_assistant = "--home-assistant";  // the only option for outlets that has no value
+// The only option in `outlet_parameters` that has no value.
+constexpr std::string_view home_assistant = "--home-assistant";
 
 // An option that sets the same value as a setting of absenc.toml.
 struct OutletParameter {

@@ -20,7 +20,8 @@ using namespace client;
 
 /// Prints that the encoder is ready, and runs it on a serial port until a signal or the time `end`. If the port is
 /// lost, it waits for the port; the encoder then continues unchanged. A transfer due within `send_slack` is sent at
-/// once. Throws os::Failure if the port cannot be opened at the start.
+/// once. Throws os::Failure if the port cannot be opened at the start, or does not support a rate that the encoder
+/// sets.
 void serve_port(Machine<std::uint8_t>& device, const EncoderAddress& uri, Time end);
 /// Runs a virtual encoder like `serve_port`, on a CAN interface such as "vcan0".
 void serve_interface(Machine<CanFrame>& device, const std::string& interface, const LineSettings& line, Time end);

@@ -95,7 +95,8 @@ void introduce_tap(const TapRun& run) {
       run.receiver().place(), tool::to_text(run.receiver().latency())));
 }
 
-// Prints the protocol that the tap identified. Returns whether a protocol was found.
+// Identifies the protocol on the tapped line. Returns whether one was found, and prints it unless the user gave it
+// (`is_given`).
 bool settle_tap(TapRun& run, bool is_given) {
   Progress progress;
   const bool settled = run.settle([&](const std::string& text) { progress.show(text); });
