@@ -164,7 +164,7 @@ TEST(Session, ShowsTheSecondOfTwoReadingsThatAgree) {
   bench.faulty->set_rates({});
   const auto before = bench.device->answer_count();
   EXPECT_EQ(bench.read().error(), Error::none);
-  // The first answer could be the late reply to an earlier request, so it is repeated.
+  // The first answer could be the late reply to an earlier request, so the request is repeated: three answers, not two.
   EXPECT_EQ(bench.device->answer_count(), before + 3);
 }
 
@@ -194,7 +194,7 @@ TEST(Session, ReplyWithWrongKindOfIdentifierExplainsTimeout) {
 
 TEST(Session, AnInvalidPositionIsNeverConfirmed) {
   Bench bench(EchoMode::off);
-  bench.device->raise_alarms(0x04);  // counting_error
+  bench.device->raise_alarms(0x04);  // alarm bit counting_error
   const auto& reading = bench.read();
   EXPECT_EQ(reading.error(), Error::none);
   EXPECT_FALSE(reading.reading()->singleturn_valid());
@@ -314,7 +314,7 @@ TEST(SessionGuard, ConfirmsNothingWithoutAgreement) {
 TEST(SessionGuard, ReturnsInvalidPositionOfKnownEncoderAtOnce) {
   Bench bench(EchoMode::off);
   bench.read();
-  bench.device->raise_alarms(0x04);  // counting_error
+  bench.device->raise_alarms(0x04);  // alarm bit counting_error
   EXPECT_EQ(bench.answers_of_a_reading(), 1u);
   EXPECT_FALSE(bench.session->confirmed());
   bench.device->lower_alarms(0x04);

@@ -130,7 +130,8 @@ TEST(Velocity, IsInvalidIfLongestWindowIsTooUncertain) {
 // Position of a shaft in counts as a function of seconds.
 using Motion = std::function<double(double)>;
 
-// Compares each speed with the true mean speed. `since` returns the window; the test knows the true latch times.
+// Compares each speed with the true mean speed over its window, which begins at the true latch time that belongs to
+// Velocity::since.
 void expect_bounds(const Motion& motion, Time period, Time longest_jitter, unsigned seed, std::size_t least_valid) {
   std::mt19937_64 random(seed);
   const auto within = [&](Time most) {

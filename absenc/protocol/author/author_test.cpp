@@ -245,11 +245,11 @@ TEST(Procedures, StopFromAnyDepth) {
 TEST(Procedures, ReportStorageThatIsTooSmall) {
   const std::array<std::int64_t, 1> depth{12};
   const std::size_t needed = Case<many_parts>(echo, {}, depth).host.frames_size();
-  // The storage is too small for so many nested parts.
+  // This storage is just large enough for all nested parts: the procedure ends itself with out_of_range.
   EXPECT_EQ(Case<many_parts>(echo, {}, depth, needed).host.error(), Error::out_of_range);
-  // The storage is too small for a part.
+  // One byte less is too small for the frame of the last part.
   EXPECT_EQ(Case<many_parts>(echo, {}, depth, needed - 1).host.error(), Error::buffer_too_small);
-  // The storage is too small for the procedure.
+  // 16 bytes are too small for the frame of the procedure.
   EXPECT_EQ(Case<many_parts>(echo, {}, depth, 16).host.error(), Error::buffer_too_small);
 }
 

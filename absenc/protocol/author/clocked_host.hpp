@@ -57,7 +57,7 @@ class ClockedHostOf : public ClockedEngine {
   [[nodiscard]] static constexpr bool is_alone() { return false; }
 
  protected:
-  /// Constructs a host that begins a transfer of one reading at once.
+  /// Constructs a host whose first transfer is one reading.
   explicit ClockedHostOf(const Format& format) : ClockedHostOf(format, later) { ask(); }
   /// Constructs a host that begins no transfer until its subclass does.
   ClockedHostOf(const Format& format, Later) : ClockedEngine(P::host_times(format), storage_), format_(format) {}
@@ -106,7 +106,7 @@ class ReadClocked : public ClockedHostOf<P> {
   void clocked(BitView bits) final { this->conclude(this->take(bits)); }
 };
 
-/// Returns the declaration of a command on a clocked line that the conversation `Reader` executes, which is constructed
+/// Returns the declaration of a command on a clocked line. The conversation `Reader` executes it, and is constructed
 /// from the format.
 template <const auto& unit_report, class Reader = ReadClocked<ReportedProtocol<unit_report>>>
 [[nodiscard]] constexpr CommandOf<ReportedProtocol<unit_report>> clocked_reading(const Command& info) {

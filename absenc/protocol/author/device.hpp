@@ -48,8 +48,8 @@ class Responder : public EncoderOn<std::uint8_t> {
   void transmit(Bytes bytes, Time at);
   /// Returns whether the encoder is sending, or is about to send a reply.
   [[nodiscard]] bool is_transmitting() const { return transmitting_; }
-  /// Returns the earliest time at which bytes delivered at `at` may have arrived, because the carrier may have been
-  /// delayed. Times that a host must wait are measured from this time.
+  /// Returns the earliest time at which bytes delivered at `at` may have arrived, because the program that delivers
+  /// them may have been delayed. Times that a host must wait are measured from this time.
   [[nodiscard]] Time earliest(Time at) const { return at - late_; }
 
   /// Returns the length of the request that begins with the bytes `begin`, or how many bytes are needed to know the

@@ -103,7 +103,7 @@ class ReadPosition : public HostOf<P> {
   }
   /// Returns the position that is the result; null after an error, or if there is none.
   [[nodiscard]] const Reading* reading() const final {
-    return reading_.singleturn_bits + reading_.multiturn_bits != 0 ? &reading_ : nullptr;  // only after a good end
+    return reading_.singleturn_bits + reading_.multiturn_bits != 0 ? &reading_ : nullptr;  // `reading_` is set only if no error occurred
   }
 
  private:
@@ -115,8 +115,8 @@ class ReadPosition : public HostOf<P> {
   Reading reading_{};
 };
 
-/// A conversation that a procedure (a coroutine) controls: the procedure awaits replies to its requests, and its frames
-/// are in the given storage.
+/// A conversation that a procedure (a coroutine) controls: the procedure awaits replies to its requests. The coroutine
+/// frames are in storage that the constructor gets.
 template <class P>
 class DialogOf : public HostOf<P>, public Routine {
  public:
@@ -219,7 +219,7 @@ class DialogOf : public HostOf<P>, public Routine {
   }
   /// Result of awaiting `heard`: bytes received while listening, or the end of the time.
   struct Heard {
-    /// Received bytes, valid until the next await; empty, while not `over`: a damaged character was received.
+    /// Received bytes, valid until the next await. Empty although `over` is false: a damaged character was received.
     Bytes bytes{};
     bool over = false;  ///< whether the time of `listen` is over
   };
@@ -310,8 +310,8 @@ struct ProcedureDialog<P> {
 };
 }  // namespace detail
 
-/// Type of the dialog of a protocol's procedures: `P::Dialog` if the protocol has it, because it does not answer each
-/// request with one reply; otherwise DialogOf. `P::Dialog` is an Engine and Routine constructed from (format, arena).
+/// Type of the dialog of a protocol's procedures: `P::Dialog` if the protocol declares it, because its requests do not
+/// have one reply each; otherwise DialogOf. `P::Dialog` is an Engine and Routine constructed from (format, arena).
 template <class P>
 using ProcedureDialog = typename detail::ProcedureDialog<P>::Type;
 
@@ -337,7 +337,7 @@ class Run : public ProcedureDialog<P> {
   [[nodiscard]] const Found& found() const { return found_; }
   /// Returns the counts of a procedure that streams; null: it ends by itself.
   [[nodiscard]] const StreamCounts* stream() const final { return goes_on ? &counts_ : ProcedureDialog<P>::stream(); }
-  /// Returns whether the procedure streams, and so sends a request for each result.
+  /// Returns whether `Found` has a member `streams`; the procedure then sends a request for each result.
   [[nodiscard]] bool asks() const final { return goes_on; }
   /// Returns the position that is the result; null after an error, or if there is none.
   [[nodiscard]] const Reading* reading() const final {

@@ -133,8 +133,8 @@ struct FrameInRoutine {
   static void* operator new(std::size_t size, Routine& routine, const Parameters&...) noexcept {
     return routine.take(size);
   }
-  /// Does nothing: a part returns its storage to the routine itself, and the storage of the procedure belongs to the
-  /// caller.
+  /// Does nothing: Part::await_resume returns the storage of a part to the routine, and the storage of the procedure
+  /// belongs to the caller.
   static void operator delete(void*, std::size_t) {}
 
   /// Constructs the frame of a coroutine that the routine `carrier` runs.

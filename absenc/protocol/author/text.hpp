@@ -29,9 +29,9 @@ struct VectorText {
 /// Reports a wrong text of fields: it is neither constexpr nor defined, so a call at compile time is an error whose
 /// message contains the function's name.
 void fields_of_a_vector_are_name_equals_value_or_the_name_of_an_error();
-/// Is never defined: its name is the error of the compiler.
+/// Is declared but never defined: a call at compile time is an error whose message contains this function's name.
 void a_frame_of_a_vector_is_hexadecimal_and_has_at_most_128_bytes();
-/// Is never defined: its name is the error of the compiler.
+/// Is declared but never defined: a call at compile time is an error whose message contains this function's name.
 void this_model_has_an_option_or_a_value_that_the_unit_does_not_have();
 
 /// Calls `take(name, value)` for each "name=value" of a text until it returns false. Returns whether the whole text has
@@ -39,7 +39,7 @@ void this_model_has_an_option_or_a_value_that_the_unit_does_not_have();
 template <class Take>
 constexpr bool for_each_value(std::string_view text, Take&& take) {
   while (!text.empty()) {
-    const std::size_t equals = text.find('=');  // npos if this is the last value
+    const std::size_t equals = text.find('=');  // npos: no other value follows
     const std::size_t next = text.find('=', equals + 1);
     const std::size_t end = next == std::string_view::npos ? text.size() : text.rfind(' ', next);
     if (end < equals || end > text.size()) return false;

@@ -216,7 +216,8 @@ struct Descriptor {
   /// Returns the settings of the line with these options.
   static constexpr LineSettings settings(const Options& values) { return line_of(declared.format(values)); }
 
-  /// Returns whether the encoder answers a request, as Protocol::manner states; true for an invalid request.
+  /// Returns whether the encoder answers a request, as Protocol::manner states; false if any reply is accepted, true
+  /// for an invalid request.
   static bool is_answered(const Options& values, Frame asked) {
     const Format f = declared.format(values);
     const Result<Request> request = P::decode_request(f, asked.bytes);
@@ -241,7 +242,7 @@ struct Descriptor {
     }
   }
 
-  /// Returns the document's explanation of a reply that is refused with `error`.
+  /// Returns the document's explanation of an invalid reply, whose error is `error`.
   static Explanation explain(const Options& values, Error error, Frame asked, Frame reply) {
     return declared.report.explain(declared.format(values), error, items(asked), items(reply));
   }
