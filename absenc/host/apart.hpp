@@ -18,7 +18,7 @@ enum class Times : std::uint8_t { latched, arrived };
   return unit.link == LinkKind::can || (unit.streams != nullptr && unit.streams(options));
 }
 
-/// The longest possible time between two consecutive readings of one encoder.
+/// Calculates an upper limit of the time between two consecutive readings of one encoder.
 class Apart {
  public:
   /// `times` is the meaning of the times that are added.

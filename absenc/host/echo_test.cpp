@@ -25,7 +25,7 @@ TEST_P(Echo, IsRemovedByCount) {
   for (int i = 0; i < 3; ++i) {
     EXPECT_EQ(bench.read().error() == Error::none, GetParam().good);
   }
-  // The exchanges are a temperature read, a page select (whose reply equals its request) and a memory read.
+  // This command reads memory and selects pages; the reply to a page select equals its request.
   const auto* temperature = bench.session->run(*find_command(bench.unit, Verb::temperature));
   EXPECT_EQ(temperature->error() == Error::none, GetParam().good);
 }

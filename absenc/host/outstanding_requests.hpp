@@ -100,7 +100,7 @@ class OutstandingRequests {
   Time longest_interval_{};  // longest time between two consecutively added requests since the list was empty
 };
 
-/// Removes the first `count` items of `buffer`, which must exist.
+/// Removes the first `count` items of `buffer`, which must have at least as many.
 template <class Buffer>
 void drop_first(Buffer& buffer, std::size_t count = 1) {
   const Buffer all = buffer;

@@ -421,7 +421,7 @@ void ReplyGuard<Item>::drop_late_reply(Entry* entry, Time at) {
   Time& until = delaying ? delaying_.until : listening_.until;
   if (delaying && outstanding_.empty()) {
     until = std::max(at + pending_.step.gap, pending_.step.at);
-  // On CAN the reply may have been unsolicited, so it does not prolong the phase.
+    // On CAN the reply may have been unsolicited, so it does not prolong the phase.
   } else if (!is_can) {
     until = std::min(std::max(until, at + required_silence()), pending_.deadline);
   }

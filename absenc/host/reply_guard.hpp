@@ -95,9 +95,9 @@ class ReplyGuard final : public Machine<Item> {
   struct Matching {
     // End of the time limit for the reply, which starts at the end of the request.
     Time until = never;
-    Time first_at{};                  // when the first of the stored items was received
-    Time received_at{};               // when the last of the stored items was received
-    bool damaged = false;             // a line error was received with the stored items
+    Time first_at{};       // when the first of the stored items was received
+    Time received_at{};    // when the last of the stored items was received
+    bool damaged = false;  // a line error was received with the stored items
     // CAN: a frame that would be the reply if its identifier had 11 bits instead of 29; it explains a timeout.
     Buffer<Item, 1> foreign_frame{};
   };

@@ -63,8 +63,8 @@ struct OneRequest final : Machine<std::uint8_t> {
   Wire heard;
 };
 
-// The reply to an outstanding request may arrive before the reply to the next request; ten seconds later it counts as
-// lost.
+// For ten seconds a reply may belong to the earlier, unanswered request, and is dropped. After that the earlier request
+// counts as lost.
 TEST(ReplyGuard, RequestsAreOutstandingForTenSeconds) {
   using Kind = Step<std::uint8_t>::Kind;
   const Bench bench(EchoMode::off);

@@ -74,7 +74,7 @@ class Velocity {
   static constexpr std::size_t none = ~std::size_t{0};
   // Before the longest window: least distance in counts, and least ratio of the window to its uncertainty.
   static constexpr int enough = 20;
-  static constexpr int least = 4;    // least ratio of the longest window to its uncertainty
+  static constexpr int least = 4;  // least ratio of the longest window to its uncertainty
 
   [[nodiscard]] constexpr const Sample& newest() const { return positions_[size_ - 1]; }
   [[nodiscard]] constexpr Time span(std::size_t start) const {

@@ -76,7 +76,7 @@ struct Report {
   /// own. Null: none.
   Explanation (*explain)(const Format&, Error, Items request, Items reply) = nullptr;
   /// Returns the explanation of the error of a conversation that ended, for units in which only the conversation knows
-  /// the reason. If set, it replaces `explain` there.
+  /// the reason. If set, it replaces `explain` for conversations.
   Explanation (*explain_host)(const Host&) = nullptr;
   /// Writes the explanation of a failed last exchange of `host` into the sentence, for units that put explanations
   /// together from parts. If set, it replaces the detail that `explain` gives for conversations.

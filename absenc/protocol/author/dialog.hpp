@@ -103,7 +103,8 @@ class ReadPosition : public HostOf<P> {
   }
   /// Returns the position that is the result; null after an error, or if there is none.
   [[nodiscard]] const Reading* reading() const final {
-    return reading_.singleturn_bits + reading_.multiturn_bits != 0 ? &reading_ : nullptr;  // `reading_` is set only if no error occurred
+    // `reading_` is set only if no error occurred.
+    return reading_.singleturn_bits + reading_.multiturn_bits != 0 ? &reading_ : nullptr;
   }
 
  private:

@@ -16,7 +16,7 @@
 #include "absenc/core/time.hpp"
 #include "absenc/protocol/conversation.hpp"
 
-// Without optimisation g++ 12 warns in every coroutine that the frame's own operators do not match.
+// Without optimisation g++ 12 warns in every coroutine that the frame's operators new and delete do not match.
 #pragma GCC diagnostic ignored "-Wmismatched-new-delete"
 
 namespace absenc::author {

@@ -20,7 +20,8 @@ using Wire = std::vector<std::uint8_t>;
 constexpr LineSettings line_settings{.rate = 19'200};
 const Time character = line_settings.character();
 
-/// A server at address 7: answers function 03 with two fixed bytes, refuses 04, and changes its rate after function 41.
+/// A server at address 7: answers with two fixed bytes, but refuses function 04, and changes its rate after function
+/// 41.
 class ToyServer final : public Server {
  public:
   ToyServer() : Server(line_settings) {}
@@ -43,7 +44,7 @@ class ToyServer final : public Server {
   }
 };
 
-/// A client that sends the same frame `count` times.
+/// A client that sends the same frame `count` times, or until an error occurs.
 class ToyClient final : public author::Engine {
  public:
   explicit ToyClient(Bytes body, unsigned count = 1, std::uint32_t rate = line_settings.rate)
@@ -206,7 +207,8 @@ TEST(ModbusLine, ServerReportsGapsInsideFrame) {
 TEST(ModbusLine, ServerReportsRequestThatComesTooSoon) {
   Bench bench;
   bench.raw(good_request);
-  bench.raw(good_request, {}, 50ms, 1us);  // the exchange ends as soon as the reply is complete
+  // The gap limit of 1 us ends the exchange as soon as the reply is complete.
+  bench.raw(good_request, {}, 50ms, 1us);
   EXPECT_EQ(bench.server.violation_count(), 0u) << "the one before waited 3 ms";
   EXPECT_EQ(bench.raw(good_request, character), good_reply);
   EXPECT_TRUE(says(bench.broken_rule(), "3.5 characters"));
