@@ -22,8 +22,8 @@ namespace absenc::host {
 template <class Item, class Line>
 class Carrier {
  public:
-  /// `latency`: delay that the path to the encoder adds to its answer time; for a UART on the chip at most one
-  /// character.
+  /// `latency`: delay of the path to the encoder, which is added to each limit of silence; for a UART on the chip at
+  /// most one character.
   explicit Carrier(Line& line, Time latency = {}) : line_(&line), latency_(latency) {}
 
   /// Starts the conversation `machine`, which must live until it has ended. A conversation that still runs is

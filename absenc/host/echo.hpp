@@ -68,7 +68,7 @@ class EchoFilter final : public Machine<std::uint8_t> {
   EchoMode mode_;
   const Unit* unit_ = nullptr;
   const Options* options_ = nullptr;
-  EchoMode detected_ = EchoMode::automatic;  // echo mode detected in this conversation
+  EchoMode detected_ = EchoMode::automatic;  // echo mode detected in this conversation; automatic: not yet
   Machine<std::uint8_t>* inner_ = nullptr;
   ByteBuffer<capacity> sent_;
   ByteBuffer<capacity> held_;  // automatic mode: received bytes that may be the echo

@@ -46,8 +46,9 @@ class FirstReading {
   /// Returns whether a position is stored, with which the next one is compared.
   [[nodiscard]] constexpr bool has_last() const { return last_.bits != 0; }
 
-  /// Returns whether the shaft can have moved from the stored position to that of `reading` in the time `between`.
-  /// False if no position is stored, if `reading` has none, or if their numbers of bits differ.
+  /// Returns whether the shaft can have moved from the stored position to that of `reading` in the time `between`, or
+  /// moves too fast but evenly (see the class). False if no position is stored, if `reading` has none, or if their
+  /// numbers of bits differ.
   [[nodiscard]] constexpr bool is_near(const Reading& reading, Time between) const {
     const Place place = place_of(reading);
     if (!is_like_last(place)) return false;

@@ -56,7 +56,7 @@ TEST(FirstReading, RefusesHalfATurn) {
   }
 }
 
-// The shaft turns at 12 000 rpm, twice the limit, which are 200 turns a second: 0.2 of a turn in 1 ms.
+// 12 000 rpm, twice the limit, are 200 turns a second: 0.2 of a turn in 1 ms.
 TEST(FirstReading, ConfirmsFasterShaftAtThirdPosition) {
   FirstReading first(6000);
   EXPECT_FALSE(first.confirms(of_bits(13, 0, 0ms)));

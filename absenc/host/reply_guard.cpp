@@ -10,11 +10,11 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// A request is repeated after a silence of this many timeouts.
+// Silence that is required before the same request is sent again, in timeouts.
 constexpr int silent_timeouts = 4;
 // Longest usual lateness of a reply: only lines that delay every reply exceed it.
 constexpr Time longest_silence = 2500ms;
-// After this silence, the replies that a stalled line delayed count as lost.
+// Least silence after which the replies that a stalled line delayed count as lost.
 constexpr Time stall_silence = 500ms;
 constexpr Time longest_lateness = 10s;  // a reply later than this counts as lost
 // Items that arrive for longer than this are noise: no reply lasts so long.
@@ -421,8 +421,7 @@ void ReplyGuard<Item>::drop_late_reply(Entry* entry, Time at) {
   Time& until = delaying ? delaying_.until : listening_.until;
   if (delaying && outstanding_.empty()) {
     until = std::max(at + pending_.step.gap, pending_.step.at);
-    // On CAN the reply may have been unsolicited, so it does not prolong the phase.
-  } else if (!is_can) {
+  } else if (!is_can) {  // a reply on CAN may have been unsolicited, so it prolongs nothing
     until = std::min(std::max(until, at + required_silence()), pending_.deadline);
   }
 }

@@ -243,7 +243,7 @@ class Session {
       Conversation<Item>* conversation = streaming_ ? current_ : make(command, arguments);
       if (conversation == nullptr) return nullptr;
       const bool again = streaming_;
-      streaming_ = false;  // until the conversation gives its next result
+      streaming_ = false;  // set again when the conversation has given its next result
       streaming_ = !drive_one(command, *conversation, on_emit, again) && conversation->streams();
       const Error error = conversation->error();
       echo_.conclude(error == Error::none);

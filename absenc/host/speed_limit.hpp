@@ -54,8 +54,7 @@ inline constexpr unsigned most_excess = 4;
 /// processor has no floating point.
 class Reach {
  public:
-  /// Returns the reach of a shaft of at most `rpm` revolutions per minute; values above 1 830 000 count as about 1 830
-  /// 000.
+  /// Returns the reach of a shaft of at most `rpm` revolutions per minute; `rpm` is limited to about 1 830 000.
   [[nodiscard]] static constexpr Reach of_shaft(std::uint32_t rpm) {
     constexpr std::uint32_t turns_a_ns_of_1_rpm = 2346;  // 2^47 / 60e9, rounded up by 0.016 %
     constexpr std::uint32_t fastest = 0xFFFF'FFFF / turns_a_ns_of_1_rpm;

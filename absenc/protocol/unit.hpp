@@ -19,8 +19,8 @@
 
 namespace absenc {
 
-/// Purpose of a unit's command. The verbs of the command line (`absenc read`, `absenc zero` ...) find the command by
-/// it.
+/// Purpose of a unit's command, by which the verbs of the command line (`absenc read`, `absenc zero` ...) find the
+/// command.
 enum class Verb : std::uint8_t {
   read,  ///< reads the position, with all alarms that the unit can report; `absenc read` uses the first such command
   read_part,

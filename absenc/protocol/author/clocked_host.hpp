@@ -43,7 +43,7 @@ class ClockedHostOf : public ClockedEngine {
 
   /// Returns the format of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
-  /// Returns the last valid reply.
+  /// Returns the last valid reply; an empty one if there was none.
   [[nodiscard]] const Reply& last() const { return last_; }
   /// Returns an empty request, because hosts of clocked links send none.
   [[nodiscard]] static constexpr NoRequest request() { return {}; }
@@ -84,7 +84,8 @@ class ClockedHostOf : public ClockedEngine {
 
  private:
   void keep() {
-    new (&reading_) Reading(P::reading(format_, last_));  // constructed in place, not copied
+    // The reading is constructed in place, because a copy costs time.
+    new (&reading_) Reading(P::reading(format_, last_));
     reading_.latched = begun_at();
     reading_.received = received_at();
   }

@@ -47,9 +47,9 @@ class HostOf : public Engine {
   [[nodiscard]] const Format& format() const { return format_; }
   /// Returns the last request.
   [[nodiscard]] const Request& request() const { return request_; }
-  /// Returns the last valid reply.
+  /// Returns the last valid reply; an empty one if there was none.
   [[nodiscard]] const Reply& last() const { return last_; }
-  /// Returns the position in the last valid reply, with the times of its exchange.
+  /// Returns position and turns in the last valid reply, with the times of its exchange.
   [[nodiscard]] Reading last_reading() const {
     Reading reading = P::reading(format_, request_, last_);
     reading.latched = P::latched(format_, sent_at());
@@ -109,7 +109,8 @@ class ReadPosition : public HostOf<P> {
 
  private:
   void concluded(Error error) final {
-    if (error == Error::none) new (&reading_) Reading(this->last_reading());  // constructed in place, not copied
+    // The reading is constructed in place, because a copy costs time.
+    if (error == Error::none) new (&reading_) Reading(this->last_reading());
     this->finish(error, error == Error::none ? Time{} : this->manner().hold);
   }
 

@@ -151,7 +151,7 @@ void Engine::end_noise(State before) {
   if (is_awaited() || (before == State::ready && state_ == State::ready)) {
     conclude();
   } else if (state_ != State::sending) {
-    item_received_ = noisy_ = false;  // the valid reply has ended the exchange
+    item_received_ = noisy_ = false;  // a valid reply has ended the exchange, so this noise does not matter
   }
 }
 
@@ -180,7 +180,8 @@ void Engine::conclude() {
     if (disturbed_) return conclude_with(Error::bad_framing);
     return conclude_with(manner_.any_reply ? Error::none : Error::timeout);
   }
-  // Some of the received bytes do not belong to this reply.
+  // After damaged or early characters, or on a line that is never silent, some of the received bytes do not belong to
+  // the reply.
   if (disturbed_ || noisy_) return conclude_with(Error::wrong_length);
   conclude_with(manner_.any_reply ? Error::none : check());
 }

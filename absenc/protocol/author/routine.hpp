@@ -152,7 +152,7 @@ struct FrameInRoutine {
 /// Return type of a coroutine that executes a whole command: `Procedure name(Dialog& dialog, Found& found, ...)`. Such
 /// a coroutine ends with `co_return done;` or `co_return {Error::..., "..."};`.
 struct Procedure {
-  /// Functions that the compiler calls for a coroutine of this return type.
+  /// Functions that the compiler calls for a coroutine that returns a Procedure.
   struct promise_type : FrameInRoutine {
     using FrameInRoutine::FrameInRoutine;
     /// Returns the procedure object of the new coroutine.
@@ -171,7 +171,7 @@ struct Procedure {
 /// look(dialog);`. Only one part runs at a time.
 template <class T>
 struct [[nodiscard]] Part {
-  /// Functions that the compiler calls for a coroutine of this return type.
+  /// Functions that the compiler calls for a coroutine that returns a Part.
   struct promise_type : FrameInRoutine {
     using FrameInRoutine::FrameInRoutine;
     /// Returns the part object of the new coroutine.

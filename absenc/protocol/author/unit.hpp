@@ -155,7 +155,8 @@ struct Descriptor {
     return P::request_size(declared.format(values), begin);
   }
 
-  /// Returns the length in bytes of the reply that begins with the bytes `begin`; 0 if no reply does.
+  /// Returns the length in bytes of the reply that begins with the bytes `begin`, 0 if no reply does; always
+  /// P::longest_reply if the declaration has no `reply_size`.
   static constexpr std::size_t reply_size(const Options& values, Bytes begin) {
     if constexpr (declared.reply_size != nullptr) {
       return declared.reply_size(declared.format(values), begin);

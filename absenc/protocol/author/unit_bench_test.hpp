@@ -159,7 +159,7 @@ struct HostedLine : sim::Line<std::uint8_t> {
     if (node) return replace(*node, host);
     node = attach(sim::NodeRole::host, host, [this] { return !on_emit || on_emit(); });
   }
-  /// Runs a host, and returns whether its conversation ended.
+  /// Runs a host, and returns whether its conversation ended within 60 s of virtual time.
   bool converse(Machine<std::uint8_t>& host) {
     put_on(host);
     const bool ended = run(*node, now() + 60s);

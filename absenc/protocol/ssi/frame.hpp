@@ -47,7 +47,8 @@ struct Format {
   std::uint32_t clock_khz = 200;  ///< Clock rate in kHz.
   /// Monoflop time Tm of the virtual encoder, at most `pause`; 0: equal to `pause`. Other encoders have 9 to 41 us.
   Time monoflop = 20us;
-  /// Slowest clock that the virtual encoder allows, in kHz. The document's time Tcs also permits 250 kHz at most.
+  /// Slowest clock that the virtual encoder allows, in kHz. The document's Tcs, more than 4 us, is the period of the
+  /// fastest.
   std::uint32_t slowest_khz = 100;
   std::uint32_t fastest_khz = 250;  ///< Fastest clock that the virtual encoder allows, in kHz.
 };
