@@ -175,7 +175,7 @@ class Carrier {
   bool item_received_ = false;  // an item arrived since the last transfer
   bool silence_reported_ = true;
   Time silent_since_{};
-  std::array<Item, room> items_;  // gathered characters
+  std::array<Item, room> items_;  // characters gathered and not yet delivered
   Line* line_;
   Machine<Item>* machine_ = nullptr;
   Time latency_;

@@ -115,7 +115,7 @@ RC_GTEST_PROP(VelocityProperty, OfUnwrappedTurnIsValidUpToHalfATurnPerStep, ()) 
   constexpr unsigned bits = 17;
   constexpr double revolution = 1 << bits;
   const auto period = *rc::gen::inRange<std::int64_t>(100'000, 20'000'000);
-  const double limit = revolution / 2 * 1e9 / static_cast<double>(period);  // highest valid speed in counts/s
+  const double limit = revolution / 2 * 1e9 / static_cast<double>(period);  // counts/s at half a turn per reading
   const auto measured = [&](double speed) {
     Unwrapper unwrapper(SpeedLimit{.rpm = 0});
     Velocity velocity;

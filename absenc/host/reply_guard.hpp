@@ -77,7 +77,7 @@ class ReplyGuard final : public Machine<Item> {
   struct Report {
     bool sent = false;
     bool line_error = false;
-    bool reply = false;  // a `received` event with the items of `received_`
+    bool reply = false;  // whether to feed a `received` event with the items of `received_`
     bool timeout = false;
     Time received_at{};
   };

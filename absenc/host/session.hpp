@@ -334,11 +334,11 @@ class Session {
   Options options_;
   Port<Item>* port_;
   std::span<std::byte> storage_;
-  Conversation<Item>* current_ = nullptr;  // conversation in `storage_`
-  const Command* command_ = nullptr;       // command of `current_`
+  Conversation<Item>* current_ = nullptr;  // present conversation, constructed in `storage_`
+  const Command* command_ = nullptr;       // command that `current_` executes
   ReplyGuard<Item> own_guard_;
   ReplyGuard<Item>* guard_ = &own_guard_;
-  bool guarded_ = false;  // the guard serves the present conversation
+  bool guarded_ = false;  // whether the guard serves the present conversation
   Filter<Item>* filter_ = nullptr;
   Time lateness_{};
   EchoFilter echo_;

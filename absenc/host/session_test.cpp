@@ -119,7 +119,7 @@ TEST(Session, RepeatsRepeatableCommands) {
   EXPECT_EQ(bench.session->counters().repeated, 2u);
   EXPECT_EQ(bench.session->counters().errors[static_cast<std::size_t>(Error::wrong_length)], 3u);
   bench.session->run(*find_command(bench.unit, Verb::zero));
-  EXPECT_EQ(bench.device->answer_count(), 6u);  // one position, tried three times; the reset is never sent
+  EXPECT_EQ(bench.device->answer_count(), 6u);  // 3 more position requests; the reset of the zero command is never sent
 }
 
 // The document permits 51 us for a reading: request, 3 us, 11 characters.

@@ -56,14 +56,14 @@ class Reach {
  public:
   /// Returns the reach of a shaft of at most `rpm` revolutions per minute; `rpm` is limited to about 1 830 000.
   [[nodiscard]] static constexpr Reach of_shaft(std::uint32_t rpm) {
-    constexpr std::uint32_t turns_a_ns_of_1_rpm = 2346;  // 2^47 / 60e9, rounded up by 0.016 %
+    constexpr std::uint32_t turns_a_ns_of_1_rpm = 2346;  // 1 rpm in turns per ns, times 2^47, rounded up by 0.016 %
     constexpr std::uint32_t fastest = 0xFFFF'FFFF / turns_a_ns_of_1_rpm;
     return {turns_a_ns_of_1_rpm * (rpm < fastest ? rpm : fastest), 47, true};
   }
   /// Returns the reach of a carriage of at most `mm_s` mm/s whose encoder counts `unit_um` micrometres. Uses floating
   /// point, once.
   [[nodiscard]] static constexpr Reach of_carriage(std::uint32_t mm_s, double unit_um) {
-    double factor = mm_s / unit_um / 1e6;  // counts per nanosecond
+    double factor = mm_s / unit_um / 1e6;  // speed limit in counts per nanosecond
     std::int8_t shift = 0;
     for (; factor < 0x8000'0000 && shift < 100; factor *= 2) ++shift;
     return {factor < 0xFFFF'FFFF ? static_cast<std::uint32_t>(factor) + 1 : 0xFFFF'FFFF, shift, false};

@@ -115,7 +115,7 @@ class Rate {
   bool seen_ = false;
   Time last_{};
   double events_ = 0;
-  double nanoseconds_ = 0;  // time in which the events of `events_` arrived, faded like them
+  double nanoseconds_ = 0;  // time in which the counted events arrived; both fade with age
 };
 
 /// A failed exchange with its bytes, which are cut at the size of the buffers.

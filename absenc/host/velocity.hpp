@@ -145,7 +145,7 @@ class Velocity {
   }
 
   Time window_;
-  std::array<Sample, most_positions> positions_{};  // the oldest first
+  std::array<Sample, most_positions> positions_{};  // last positions with their latch times, the oldest first
   std::size_t size_ = 0;
   std::size_t start_ = none;  // index of the position that begins the selected window
 };

@@ -138,7 +138,7 @@ void expect_bounds(const Motion& motion, Time period, Time longest_jitter, unsig
     return Time(std::uniform_int_distribution<Time::rep>(0, most.count())(random));
   };
   Velocity velocity;
-  std::map<Time, Time> truths;  // true latch time by the earliest latch time of a position
+  std::map<Time, Time> truths;  // key: earliest latch time of a position; value: its true latch time
   const auto place = [&](Time at) { return motion(std::chrono::duration<double>(at).count()); };
   std::size_t valid = 0;
   for (int i = 0; i < 3000; ++i) {

@@ -146,7 +146,7 @@ TEST(Procedures, EndWithoutAValidReply) {
   Case<two_questions> bad([](std::uint8_t request, unsigned n) { return request == 2 ? Wire{} : echo(request, n); });
   EXPECT_EQ(bad.host.error(), Error::timeout);
   EXPECT_EQ(bad.host.detail(), "the second");
-  ASSERT_EQ(bad.bench.sent.size(), 4u);  // the first request once, and the second three times
+  ASSERT_EQ(bad.bench.sent.size(), 4u);  // the first request is sent once, and the second three times
   // The silence that shows the missing reply is part of the pause.
   EXPECT_EQ(bad.bench.sent[3] - bad.bench.sent[2], 1ms + 2ms - 1ms);
   EXPECT_EQ(bad.bench.now, bad.bench.sent[3] + 5ms);  // the conversation ends after the hold time of 5 ms
@@ -218,7 +218,7 @@ Part<unsigned> deeper(ToyDialog& dialog, unsigned depth) {
 }
 
 Procedure many_parts(ToyDialog& dialog, Found& found, Arguments arguments) {
-  for (int i = 0; i < 500; ++i) {  // more parts in turn than the storage could hold at once
+  for (int i = 0; i < 500; ++i) {  // 500 parts one after the other: more than the storage could hold at once
     const unsigned sum = co_await deeper(dialog, static_cast<unsigned>(arguments[0]));
     found.sum = sum;
   }

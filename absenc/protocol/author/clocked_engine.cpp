@@ -28,7 +28,7 @@ ByteStep ClockedEngine::next(Time now) {
   const bool begins = state_ != State::over && !begun_;
   if (begins) {
     begun_ = true;
-    rested_at_ = now + times_.rest;  // another host may have clocked just before
+    rested_at_ = now + times_.rest;  // the pause counts from now, because another host may have clocked just before
   }
   if (state_ == State::over) {
     step.kind = ByteStep::Kind::done;

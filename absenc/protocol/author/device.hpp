@@ -105,9 +105,9 @@ class Responder : public EncoderOn<std::uint8_t> {
   ByteBuffer<64> reply_;
   Time reply_at_{};
   Time longer_{};
-  ByteBuffer<64> stored_;                // bytes received during the transmission
-  unsigned interrupted_ = 0;             // requests received during the transmission
-  unsigned interruptions_in_a_row_ = 0;  // consecutive transmissions during which requests were received
+  ByteBuffer<64> stored_;                // bytes received during the present transmission, if they are kept
+  unsigned interrupted_ = 0;             // number of requests received during the present transmission
+  unsigned interruptions_in_a_row_ = 0;  // number of consecutive transmissions during which requests were received
   bool reply_pending_ = false;
   bool transmitting_ = false;
   Interruption interruption_;

@@ -295,7 +295,7 @@ class DialogOf : public HostOf<P>, public Routine {
   Error failure_ = Error::none;
   Heard heard_{};
   bool must_ = false;
-  bool changing_ = false;  // the present request changes the encoder if it is executed
+  bool changing_ = false;  // whether the present request changes the encoder if it is executed
   bool restores_ = false;
   bool aborted_ = false;
 };

@@ -80,7 +80,7 @@ class PagedMemoryDevice : public Responder {
 
   const PagedMemory* memory_;
   std::uint8_t page_ = 0;
-  bool page_changed_ = false;  // since the last page change no access was received after its busy time
+  bool page_changed_ = false;  // no access was received yet after the busy time of the last page change
   Time page_ready_at_{};
   Time written_at_{};                              // end of the busy time of the last write; 0: none
   std::optional<std::uint8_t> refused_address_{};  // address of the last request, if it was a read during a write

@@ -55,7 +55,7 @@ constexpr bool to_real(std::string_view text, double& number) {
   const bool negative = text.starts_with('-');
   if (negative) text.remove_prefix(1);
   std::int64_t digits = 0;
-  long double divisor = 0;  // 0: no point yet
+  long double divisor = 0;  // power of ten by which the digits are divided; 0: no point yet
   for (const char c : text) {
     if (c == '.' && divisor == 0) {
       divisor = 1;

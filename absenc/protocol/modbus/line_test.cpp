@@ -224,7 +224,7 @@ TEST(ModbusLine, LateServerReportsNoMissingSilence) {
       server.feed({.kind = Kind::received, .at = 50ms, .items = good_request});
       Time now = 50ms + frame_silence(line_settings) + late;
       server.feed({.kind = Kind::silence, .at = now});
-      static_cast<void>(server.next(now));  // processes the configure step
+      static_cast<void>(server.next(now));  // takes the configure step that power on requested
       ASSERT_EQ(server.answer_count(), 1u);
       if (replied) server.feed({.kind = Kind::sent, .at = now});
       server.feed({.kind = Kind::received, .at = now + 100us, .items = good_request});
