@@ -31,7 +31,7 @@ struct Format {
 
   /// Returns the line settings with the baud rate of the format.
   [[nodiscard]] constexpr LineSettings line() const { return {.rate = rates[rate]}; }
-  /// Returns the number of bits of position and turns.
+  /// Returns the numbers of bits of position and turns.
   [[nodiscard]] constexpr Resolution resolution() const { return {singleturn_bits, multiturn_bits, 0, true}; }
 };
 

@@ -67,7 +67,7 @@ constexpr bool to_real(std::string_view text, double& number) {
     }
   }
   if (divisor == 0) return false;
-  // Divided as long double, so that the value is rounded only once.
+  // Divided as long double, because the digits may need more bits than a double has.
   number = static_cast<double>(static_cast<long double>(negative ? -digits : digits) / divisor);
   return true;
 }

@@ -34,11 +34,11 @@ inline constexpr std::uint32_t fixed_times_above = 19'200;
 
 /// Returns the timeouts of a client on a line; a reply must begin within `answer_limit` after its request.
 [[nodiscard]] constexpr author::HostTimes client_times(const LineSettings& line, Time answer_limit) {
-  return {
-      .answer_limit = answer_limit + line.character(),
-      .gap_limit = frame_silence(line),
-      .silence = request_silence(line),
-      .patience = 1s};  // 1 s: longer than any reply, and longer than the delay with which an adapter reports silence
+  return {.answer_limit = answer_limit + line.character(),
+          .gap_limit = frame_silence(line),
+          .silence = request_silence(line),
+          // This is longer than any reply, and longer than the delay with which an adapter reports silence.
+          .patience = 1s};
 }
 
 }  // namespace absenc::modbus

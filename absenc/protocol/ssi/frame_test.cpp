@@ -40,7 +40,7 @@ TEST(SsiFrame, RejectsTooManyClocks) {
 
 TEST(SsiFrame, ReadingTwiceDetectsAnyWrongBit) {
   const Format format{.extra_clocks = 12};
-  // without extra clocks, the word twice is accepted too
+  // Without extra clocks, the host also accepts the word read twice.
   EXPECT_EQ(decode({}, "000111101111000111101111")->position, 495u);
   std::string text = "000111101111000111101111";
   for (char& c : text) {
