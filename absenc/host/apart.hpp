@@ -12,19 +12,21 @@ namespace absenc::host {
 /// arrived. Readings that waited in a buffer arrive together.
 enum class Times : std::uint8_t { latched, arrived };
 
-/// Returns whether readings of this encoder have arrival times only, because it transmits unsolicited.
+/// Returns whether only the arrival times of this encoder's readings are known, because it transmits unsolicited:
+/// always on a CAN bus, otherwise if Unit::streams says so.
 [[nodiscard]] constexpr bool sends_unsolicited(const Unit& unit, const Options& options) {
   return unit.link == LinkKind::can || (unit.streams != nullptr && unit.streams(options));
 }
 
-/// The longest possible time between two consecutive readings of one encoder.
+/// Calculates an upper limit of the time between two consecutive readings of one encoder.
 class Apart {
  public:
   /// `times` is the meaning of the times that are added.
   explicit constexpr Apart(Times times) : times_(times) {}
 
-  /// Returns the longest time that can lie between the last added reading and one latched at `latched`. Readings that
-  /// arrive together were latched during the wait before, or during their delivery, which takes less time.
+  /// Returns the longest time that can lie between the last added reading and a reading with the time `latched`. With
+  /// Times::arrived: readings that arrive together may have been latched anywhere in the wait before them, so the time
+  /// is at least that wait until as much time again has passed.
   [[nodiscard]] constexpr Time since_last(Time latched) const { return has_waited(latched) ? latched - last_ : wait_; }
 
   /// Adds a reading that was latched at `latched`.

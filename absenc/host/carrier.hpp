@@ -22,8 +22,8 @@ namespace absenc::host {
 template <class Item, class Line>
 class Carrier {
  public:
-  /// `latency`: delay that the path to the encoder adds to its answer time; for a UART on the chip at most one
-  /// character.
+  /// `latency`: delay of the path to the encoder, which is added to each limit of silence; for a UART on the chip at
+  /// most one character.
   explicit Carrier(Line& line, Time latency = {}) : line_(&line), latency_(latency) {}
 
   /// Starts the conversation `machine`, which must live until it has ended. A conversation that still runs is
@@ -59,7 +59,7 @@ class Carrier {
   }
 
   /// Begins the pending transfer, or reports a silence or timer, if its time is reached. Call it at `due()`; more calls
-  /// do no harm. A tick slower than the encoder's limits makes silences longer, but never wrong.
+  /// do no harm. Calls that are late make the reports late, but do not report a silence that there was not.
   void tick(Time now) {
     if (now < due()) return;
     deliver_gathered();
@@ -82,7 +82,8 @@ class Carrier {
     if (!is_busy()) return never;
     return waiting_ ? step_.at : std::min(at_, silence_end());
   }
-  /// Returns how many silences were reported: a reply was missing, incomplete, or invalid.
+  /// Returns how many silences were reported to machines. Each shows that a reply was missing, incomplete or invalid,
+  /// or ends a reply whose end only silence shows.
   [[nodiscard]] std::uint32_t silences() const { return silences_; }
 
  private:
@@ -124,8 +125,8 @@ class Carrier {
     return silence_reported_ || limit == Time{} ? never : silent_since_ + limit + latency_;
   }
 
-  // Takes the machine's steps until it waits. A transfer is stored until its time; its limits of silence are in the
-  // wait step after it.
+  // Takes the machine's steps until it waits. A transfer or pulse that begins later is stored in `step_`; the limits of
+  // the silence after it are in the wait step that follows.
   void take_steps(Time now) {
     for (;;) {
       const Step<Item> step = machine_->next(now);
@@ -166,7 +167,7 @@ class Carrier {
   // Room for the characters of most replies; longer replies are delivered in pieces. CAN: room for one frame.
   static constexpr std::size_t room = sizeof(Item) == 1 ? 16 : 1;
 
-  // Members that are used for every received character come first, for short instructions.
+  // Members that are used for every received character come first, so that short instructions reach them.
   std::uint8_t expected_ = 0;  // number of characters to deliver in one piece; below 2: each character at once
   std::uint8_t gathered_ = 0;
   bool waiting_ = false;
@@ -174,7 +175,7 @@ class Carrier {
   bool item_received_ = false;  // an item arrived since the last transfer
   bool silence_reported_ = true;
   Time silent_since_{};
-  std::array<Item, room> items_;  // gathered characters
+  std::array<Item, room> items_;  // characters gathered and not yet delivered
   Line* line_;
   Machine<Item>* machine_ = nullptr;
   Time latency_;

@@ -120,7 +120,7 @@ TEST_F(CarrierTest, DeliversCharactersWhenAllExpectedOnesArrived) {
                   characters(one, 2, 11ns);
                 },
                 0us),
-            "1 at 11; 1 at 12; ");  // without a gap limit no silence would deliver gathered characters
+            "1 at 11; 1 at 12; ");  // without a gap limit characters are not gathered: no silence would deliver them
   EXPECT_EQ(fed_by(
                 [&](auto& one) {
                   one.sent(10ns);

@@ -10,7 +10,8 @@ namespace absenc::host {
 /// when the machine is done, false when `on_emit` stopped it. Exceptions of the port pass through.
 template <class Item, class OnEmit>
 bool drive(Machine<Item>& machine, Port<Item>& port, OnEmit&& on_emit) {
-  // The machine's time stands still between events: reading the clock more often costs time and gains nothing.
+  // Between two events the machine is given the time of the last event: reading the clock more often costs time and
+  // gains nothing.
   for (Time now = port.now();;) {
     const Step<Item> step = machine.next(now);
     switch (step.kind) {
@@ -41,9 +42,10 @@ void catch_up(Machine<Item>& machine, Port<Item>& port) {
   for (Time now = port.now();;) {
     Step<Item> step = machine.next(now);
     if (step.kind == Step<Item>::Kind::emit) continue;
-    if (step.kind != Step<Item>::Kind::wait) return;  // `drive` executes this step
+    if (step.kind != Step<Item>::Kind::wait) return;  // the machine is done, and returns `done` again to `drive`
     const Time due = step.at;
-    step.at = port.now() + Time{1};  // items that have already arrived are delivered first
+    // A port delivers items that have already arrived before it reports the timer at this time.
+    step.at = port.now() + Time{1};
     const Event<Item> event = port.wait(step);
     now = event.at;
     if (event.kind != Event<Item>::Kind::timer) {

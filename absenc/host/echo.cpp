@@ -35,7 +35,7 @@ ByteStep EchoFilter::next(Time now) {
   if (step.expect != 0) {
     step.expect += working_mode() == EchoMode::on ? echo_due_ : sent_.size() - std::min(sent_.size(), held_.size());
   }
-  // The echo is no reply, so the answer limit still applies.
+  // While only the echo was received, the encoder may still take its answer time: the gap limit must not be shorter.
   if (!passed_) step.gap = std::max(step.gap, step.answer);
   return step;
 }
@@ -52,7 +52,7 @@ void EchoFilter::feed(const ByteEvent& event) {
 }
 
 void EchoFilter::received(const ByteEvent& event) {
-  if (sent_.empty()) return inner_->feed(event);  // nothing was sent, so nothing is echoed
+  if (sent_.empty()) return inner_->feed(event);  // no request is stored whose echo could arrive
   switch (working_mode()) {
     case EchoMode::off:
       inner_->feed(event);
@@ -92,8 +92,8 @@ bool EchoFilter::is_reply(Bytes bytes) const {
   return unit_ != nullptr && unit_->check(*options_, {.bytes = sent_}, {.bytes = bytes}) == Error::none;
 }
 
-// The held bytes begin like the request: they are an echo, or a reply that begins like it. Their number decides, or
-// which of the two is a valid reply.
+// Decides whether the held bytes, which begin like the request, begin with its echo. Their number decides; if they are
+// enough for echo and reply, there is no echo if the first part is a valid reply and the part after the echo is not.
 void EchoFilter::decide(Time at) {
   const std::size_t echo = sent_.size();
   const bool echo_and_reply = held_.size() >= reply_due_ + echo;
@@ -111,7 +111,8 @@ void EchoFilter::decide(Time at) {
   }
   detected_ = EchoMode::off;
   if (!has_no_echo) return pass(at, bytes);
-  pass(at, bytes.first(reply));  // the bytes behind the reply do not belong to it
+  // Bytes after the length of the reply do not belong to it, so they are passed separately.
+  pass(at, bytes.first(reply));
   pass(at, bytes.subspan(reply));
 }
 

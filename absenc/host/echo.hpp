@@ -39,7 +39,7 @@ class EchoFilter final : public Machine<std::uint8_t> {
     held_.clear();
   }
   /// Ends the exchange; `good`: without an error. In automatic mode only a good conversation makes the detected mode
-  /// final: a reply that is one byte too long looks like an echo at first.
+  /// final: a reply with extra bytes can look like an echo that a reply follows.
   void conclude(bool good);
 
   /// Processes an event that the port reports.
@@ -68,13 +68,13 @@ class EchoFilter final : public Machine<std::uint8_t> {
   EchoMode mode_;
   const Unit* unit_ = nullptr;
   const Options* options_ = nullptr;
-  EchoMode detected_ = EchoMode::automatic;  // echo mode detected in this conversation
+  EchoMode detected_ = EchoMode::automatic;  // echo mode detected in this conversation; automatic: not yet
   Machine<std::uint8_t>* inner_ = nullptr;
   ByteBuffer<capacity> sent_;
-  ByteBuffer<capacity> held_;  // automatic: received bytes that may be echo
-  std::size_t echo_due_ = 0;   // on: number of echo bytes still to be received
+  ByteBuffer<capacity> held_;  // automatic mode: received bytes that may be the echo
+  std::size_t echo_due_ = 0;   // mode on: number of echo bytes still to be received
   std::size_t echoed_ = 0;     // number of echo bytes received after the last request
-  std::size_t reply_due_ = 0;  // number of reply bytes that the conversation expects
+  std::size_t reply_due_ = 0;  // number of reply bytes that the conversation expects; 0: unknown
   bool passed_ = false;        // bytes of the reply were passed to the conversation
   bool only_echo_ = false;
 };

@@ -25,7 +25,7 @@ TEST_P(Echo, IsRemovedByCount) {
   for (int i = 0; i < 3; ++i) {
     EXPECT_EQ(bench.read().error() == Error::none, GetParam().good);
   }
-  // The exchanges are a temperature read, a page select (whose reply equals its request) and a memory read.
+  // This command reads memory and selects pages; the reply to a page select equals its request.
   const auto* temperature = bench.session->run(*find_command(bench.unit, Verb::temperature));
   EXPECT_EQ(temperature->error() == Error::none, GetParam().good);
 }
@@ -99,7 +99,8 @@ TEST(EchoFilter, DetectsDisturbedEcho) {
   }
 }
 
-// The echo ends long before the encoder answers: the silence behind the echo is no gap.
+// The silence between the echo and the reply is the encoder's answer time: the gap limit must not end the exchange in
+// it.
 TEST(EchoFilter, AnswerLimitAppliesAfterEcho) {
   Bench port_like(EchoMode::on);  // on a real port the echo is received after the `sent` event
   std::vector<std::byte> storage(port_like.unit.host_storage);

@@ -11,10 +11,11 @@
 
 namespace absenc::host {
 
-/// A check that compares each position with the position before: the shaft must be able to move from one to the other
-/// in the time between them. If that speed covers more than 15/32 of the counted range, only positions farther away
-/// than 15/32 are refused. A shaft that is faster, by a factor of `most_excess` at most, is accepted at its third
-/// position, if it is as far from the second as the second from the first.
+/// A check that compares each position with the position before: at its highest speed the shaft must be able to move
+/// from one to the other in the time between them. If it can move farther than 15/32 of the counted range in that time,
+/// every position up to 15/32 away is accepted. A shaft that is too fast by a factor of `most_excess` at most is
+/// accepted at its third position, if the distances from the first to the second and from the second to the third are
+/// nearly equal.
 class FirstReading {
  public:
   /// Makes a check for a shaft of at most `maximum_rpm` revolutions per minute; 0: unknown, so the default of
@@ -30,8 +31,8 @@ class FirstReading {
     has_step_ = false;
   }
 
-  /// Returns whether `reading` is ready, valid and as near to the stored position as the highest speed allows. Stores
-  /// its position for the next comparison.
+  /// Returns whether `reading` is ready and valid, and near enough to the stored position; false if no position is
+  /// stored. Then stores the position of `reading` for the next comparison.
   constexpr bool confirms(const Reading& reading) {
     const bool agrees = is_near(reading);
     keep(reading);
@@ -45,8 +46,9 @@ class FirstReading {
   /// Returns whether a position is stored, with which the next one is compared.
   [[nodiscard]] constexpr bool has_last() const { return last_.bits != 0; }
 
-  /// Returns whether the stored position and that of `reading` can be so far apart if the time `between` lies between
-  /// them.
+  /// Returns whether the shaft can have moved from the stored position to that of `reading` in the time `between`, or
+  /// moves too fast but evenly (see the class). False if no position is stored, if `reading` has none, or if their
+  /// numbers of bits differ.
   [[nodiscard]] constexpr bool is_near(const Reading& reading, Time between) const {
     const Place place = place_of(reading);
     if (!is_like_last(place)) return false;
@@ -58,13 +60,14 @@ class FirstReading {
     if (!has_step_ || moved / most_excess > reached || distance(step_, place.bits) <= allowed) return false;
     return distance(step - step_, place.bits) <= least(allowed, most_judged(place.bits) / 8);
   }
-  /// Returns whether the shaft can have moved from the stored position to `reading` in the time between them.
+  /// Returns whether the shaft can have moved from the stored position to that of `reading` in the time between their
+  /// latch times.
   [[nodiscard]] constexpr bool is_near(const Reading& reading) const {
     return is_near(reading, reading.latched - latched_);
   }
 
-  /// Returns whether the speed limit excludes any position nearer than 15/32 of the counted range after the time
-  /// `between`. If not, a wrong position can hardly be detected.
+  /// Returns whether the shaft can move less than 15/32 of the counted range in the time `between` at its highest
+  /// speed. If not, or if `reading` has no position, a wrong position can hardly be detected.
   [[nodiscard]] constexpr bool can_judge(const Reading& reading, Time between) const {
     const Place place = place_of(reading);
     return place.bits != 0 && reach(place, between) < most_judged(place.bits);
@@ -105,7 +108,7 @@ class FirstReading {
   [[nodiscard]] static constexpr std::uint64_t least(std::uint64_t one, std::uint64_t other) {
     return one < other ? one : other;
   }
-  // Returns the shorter of the two distances between two positions around the counted range.
+  // Returns the length of the movement `step` in a counted range of 2^bits counts, in the shorter of both directions.
   [[nodiscard]] static constexpr std::uint64_t distance(std::uint64_t step, unsigned bits) {
     return least(step & low_mask(bits), (0 - step) & low_mask(bits));
   }
@@ -124,7 +127,7 @@ class FirstReading {
   Reach reach_;
   Place last_{};
   bool has_step_ = false;
-  std::uint64_t step_ = 0;  // counts from the position before the last one to the last one
+  std::uint64_t step_ = 0;  // counts from the second last position to the last one
   Time latched_{};
 };
 

@@ -33,7 +33,8 @@ TEST(FirstReading, AllowsNoMoreThanTheFastestShaft) {
   };
   EXPECT_TRUE(confirmed(13'107, 0));
   EXPECT_FALSE(confirmed(13'120, 0));
-  EXPECT_TRUE(confirmed(131'072 - 13'107, 65'535));  // backwards across the ends of turn and turn counter
+  // A movement of 13 107 counts backwards passes zero of the turn and of the turn counter.
+  EXPECT_TRUE(confirmed(131'072 - 13'107, 65'535));
   EXPECT_FALSE(confirmed(0, 1));
   EXPECT_FALSE(confirmed(0, 32'768));
 }
@@ -55,7 +56,7 @@ TEST(FirstReading, RefusesHalfATurn) {
   }
 }
 
-// The shaft turns at 12 000 rpm, twice the limit, which are 200 turns a second: 0.2 of a turn in 1 ms.
+// 12 000 rpm, twice the limit, are 200 turns a second: 0.2 of a turn in 1 ms.
 TEST(FirstReading, ConfirmsFasterShaftAtThirdPosition) {
   FirstReading first(6000);
   EXPECT_FALSE(first.confirms(of_bits(13, 0, 0ms)));
@@ -67,7 +68,8 @@ TEST(FirstReading, ConfirmsFasterShaftAtThirdPosition) {
 }
 
 TEST(FirstReading, RefusesMuchFasterShaft) {
-  for (const std::uint64_t step : {1638u, 3276u, 3500u}) {  // the limit allows 819 counts in 1 ms
+  // Steps in counts of 13 bits: the limit allows 819 in 1 ms, and four times as many at the third position.
+  for (const std::uint64_t step : {1638u, 3276u, 3500u}) {
     FirstReading first(6000);
     EXPECT_FALSE(first.confirms(of_bits(15, 0, 0ms)));
     EXPECT_FALSE(first.confirms(of_bits(15, 4 * step, 1ms)));

@@ -19,8 +19,9 @@ class GuardedHost {
     valid_ = resolve_options(unit, {}, options, options_).kind == OptionError::Kind::none;
   }
 
-  /// Runs `conversation`. Returns whether the conversation ended within the time `limit`, or gave its first result if
-  /// it streams. `may_repeat`: whether its requests may be repeated because they only read.
+  /// Runs `conversation`. Returns whether the conversation ended within the time `limit`; one that sends a request for
+  /// each result without end counts as ended at its first result. `may_repeat`: whether its requests may be repeated
+  /// because they only read.
   [[nodiscard]] bool run(Conversation<Item>& conversation, Time limit, bool may_repeat = true) {
     streams_ = conversation.asks();
     emitted_ = false;

@@ -67,7 +67,7 @@ RC_GTEST_PROP(UnwrapProperty, TheLongestGapKeepsWithinThatLimit, ()) {
   const auto [singleturn_bits, multiturn_bits] = any_resolution();
   const auto rpm = *rc::gen::inRange<std::uint32_t>(1, 100'000);
   const Time gap = longest_gap({singleturn_bits, multiturn_bits}, {.rpm = rpm});
-  // Counts that pass in a nanosecond at the limit.
+  // Counts that the shaft moves in a nanosecond at the speed limit.
   const double counts = std::ldexp(1.0, static_cast<int>(singleturn_bits)) * rpm / 60e9;
   const auto half = static_cast<double>(Counter{singleturn_bits, multiturn_bits}.half());
   RC_ASSERT(counts * static_cast<double>(gap.count()) < half);
@@ -115,7 +115,7 @@ RC_GTEST_PROP(VelocityProperty, OfUnwrappedTurnIsValidUpToHalfATurnPerStep, ()) 
   constexpr unsigned bits = 17;
   constexpr double revolution = 1 << bits;
   const auto period = *rc::gen::inRange<std::int64_t>(100'000, 20'000'000);
-  const double limit = revolution / 2 * 1e9 / static_cast<double>(period);  // highest valid speed in counts/s
+  const double limit = revolution / 2 * 1e9 / static_cast<double>(period);  // counts/s at half a turn per reading
   const auto measured = [&](double speed) {
     Unwrapper unwrapper(SpeedLimit{.rpm = 0});
     Velocity velocity;

@@ -79,8 +79,8 @@ void OutstandingRequests<Item>::mark_lost(Items request, Time longest) {
   entry->sent_at.clear();
 }
 
-// Removes the oldest request of an entry. A late reply may belong to a request that counts as lost; the replies of
-// later requests are then still outstanding.
+// Removes the oldest request of an entry, first those that count as lost: a late reply may belong to one of them, and
+// then the replies to later requests may still arrive.
 template <class Item>
 void OutstandingRequests<Item>::remove_oldest(Entry& entry) {
   if (entry.lost != 0) {

@@ -19,7 +19,7 @@ template <class Item>
 class OutstandingRequests {
  public:
   static constexpr bool is_can = std::is_same_v<Item, CanFrame>;  ///< Whether items are CAN frames, not bytes.
-  /// Items of a request; longer requests are not stored.
+  /// Items of a request: at most 16 bytes or one CAN frame. ReplyGuard does not guard longer requests.
   using Request = Buffer<Item, is_can ? 1 : 16>;
   /// Items as they were sent or received.
   using Items = std::span<const Item>;
@@ -55,7 +55,8 @@ class OutstandingRequests {
   [[nodiscard]] Time pause_after(Items request) const;
   /// Returns whether `reply` is a valid reply to `request`.
   [[nodiscard]] bool is_reply(Items request, Items reply) const;
-  /// Returns whether `reply`, valid or not, may belong to `request`. On a CAN bus other nodes send, too.
+  /// Returns whether `reply`, valid or not, may belong to `request`. Always true for bytes; on a CAN bus other nodes
+  /// send frames, too.
   [[nodiscard]] bool may_answer(Items request, Items reply) const;
 
   /// Returns whether no reply is outstanding.
@@ -96,10 +97,10 @@ class OutstandingRequests {
   const Options* options_ = nullptr;
   Buffer<Entry, most> entries_{};
   Time newest_{};            // when the newest outstanding request was sent
-  Time longest_interval_{};  // longest time between two consecutively added requests
+  Time longest_interval_{};  // longest time between two consecutively added requests since the list was empty
 };
 
-/// Removes the first `count` items of `buffer`, which must exist.
+/// Removes the first `count` items of `buffer`, which must have at least as many.
 template <class Buffer>
 void drop_first(Buffer& buffer, std::size_t count = 1) {
   const Buffer all = buffer;

@@ -10,12 +10,15 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr int silent_timeouts = 4;  // timeouts of silence before a request is repeated
-// Longest usual lateness of a reply; replies were only later on a line that delays every reply.
+// Silence that is required before the same request is sent again, in timeouts.
+constexpr int silent_timeouts = 4;
+// Longest usual lateness of a reply: only lines that delay every reply exceed it.
 constexpr Time longest_silence = 2500ms;
-constexpr Time stall_silence = 500ms;   // silence after which the replies that a stalled line delayed are lost
+// Least silence after which the replies that a stalled line delayed count as lost.
+constexpr Time stall_silence = 500ms;
 constexpr Time longest_lateness = 10s;  // a reply later than this counts as lost
-constexpr Time noise_limit = 100ms;     // longer than any reply lasts
+// Items that arrive for longer than this are noise: no reply lasts so long.
+constexpr Time noise_limit = 100ms;
 constexpr Time tick{1};
 
 }  // namespace
@@ -50,7 +53,8 @@ Time ReplyGuard<Item>::longest_wait() const {
 
 // ---- Transitions between phases
 
-// Ends the exchange. The last request becomes outstanding if no valid reply to it was received.
+// Ends the exchange. The last request becomes outstanding if no reply to it was received. If older requests are
+// outstanding, an invalid reply does not count as one.
 template <class Item>
 void ReplyGuard<Item>::end_exchange() {
   const bool unmatched = phase_ == Phase::matching || phase_ == Phase::listening;
@@ -73,13 +77,14 @@ void ReplyGuard<Item>::enter_delaying(const Step<Item>& request, Time now) {
   received_.clear();
   outstanding_.remove_older(now - longest_lateness);
   pending_ = {.step = request, .deadline = std::max(now, request.at) + 4 * longest_wait()};
-  // Late replies are also awaited during a pause that the request demands. A short pause is left to the port, which is
-  // more exact than its timer.
+  // During a pause of more than 1 ms that the request demands the guard waits for late replies. A shorter pause is left
+  // to the port, which keeps it more exactly than a timer.
   delaying_ = {.until = request.at > now + 1ms ? request.at : now + tick, .received_at = now - request.gap};
-  if (outstanding_.full()) {  // the delay makes all outstanding requests lost, so that new ones can be stored
+  // If the list is full, all outstanding requests count as lost after this silence, and `send` removes them.
+  if (outstanding_.full()) {
     delaying_.until = std::max(delaying_.until, last_.sent_at + required_silence());
   } else if (const Entry* entry = outstanding_.find(request.out)) {
-    // An encoder that did not answer twice is absent, if no reply was ever late on this line.
+    // An encoder that left the same request unanswered twice is absent, if no reply was ever late on this line.
     const bool absent = expected_lateness_ == Time{} && entry->count() > 1;
     const Time silence = expected_lateness_ == Time{} ? required_silence() / 2 : required_silence();
     if (!absent) delaying_.until = std::max(delaying_.until, entry->newest() + silence);
@@ -116,9 +121,9 @@ void ReplyGuard<Item>::enter_listening(const Entry& entry) {
   listening_ = {.until = until, .suspected = suspected};
 }
 
-// Returns how long to listen. If the line delays every reply, the reply after one that was late by `suspected` follows
-// at the interval of their requests. If that interval passes in silence, and no earlier reply was nearly as late, the
-// line had stalled, and its delayed replies are lost. A CAN bus delays no frames.
+// Returns how long to listen, from the end of the request: normally 5/4 of the lateness `suspected`. If no earlier
+// reply was nearly as late, the line may only have stalled. A line that delays every reply keeps the interval of the
+// requests, so after a silence of that interval the delayed replies are lost. On a CAN bus the time is not shortened.
 template <class Item>
 Time ReplyGuard<Item>::listening_time(Time suspected) const {
   const Time always_late = std::clamp(suspected * 5 / 4, required_silence(), longest_wait());
@@ -163,7 +168,8 @@ Step<Item> ReplyGuard<Item>::next(Time now) {
   }
 }
 
-// The conversation's step is returned in place, because steps are large and this runs for each event.
+// Returns the conversation's next step; if that is a request, enters delaying. The step is constructed in place,
+// because steps are large and this runs for each event.
 template <class Item>
 Step<Item> ReplyGuard<Item>::forward(Time now) {
   Step<Item> step = next_of_conversation(now);
@@ -176,7 +182,8 @@ Step<Item> ReplyGuard<Item>::forward(Time now) {
   return step;
 }
 
-// Feeds the events of `Report` to the conversation, which makes a step after each event, and returns its next step.
+// Feeds the events of `Report` to the conversation one by one. Returns the first step after an event that is not
+// `wait`, or the next step after all events.
 template <class Item>
 Step<Item> ReplyGuard<Item>::next_of_conversation(Time now) {
   while (report_event()) {
@@ -240,7 +247,7 @@ void ReplyGuard<Item>::feed_forwarding(const Event<Item>& event) {
     exchange.received = exchange.received || outstanding_.may_answer(last_.items, event.items);
   }
   if constexpr (is_can) {
-    // A listener sends nothing, so a matching reply belongs to an earlier request.
+    // While a conversation only listens, a frame that answers an outstanding request belongs to that earlier request.
     if (event.kind == Kind::received && !exchange.answerable && !outstanding_.empty()) {
       if (Entry* const entry = outstanding_.find_by_reply(event.items)) return count_late(entry, event.at);
     }
@@ -364,7 +371,7 @@ void ReplyGuard<Item>::conclude_noise() {
 
 // ---- Delaying and listening
 
-// Drops received items, and counts those that are a late reply to an outstanding request.
+// Drops received items, and counts late replies to outstanding requests and second replies to the last request.
 template <class Item>
 void ReplyGuard<Item>::drop_items(Items items, Time at) {
   if (phase_ == Phase::delaying) delaying_.received_at = at;
@@ -382,7 +389,8 @@ void ReplyGuard<Item>::drop_items(Items items, Time at) {
   }
 }
 
-// Drops a late reply of unknown length, which ends with silence.
+// Handles silence: drops the received items, which may be a late reply of unknown length, because such a reply ends
+// with silence.
 template <class Item>
 void ReplyGuard<Item>::drop_at_silence(Time at) {
   if (received_.empty()) return;
@@ -413,7 +421,7 @@ void ReplyGuard<Item>::drop_late_reply(Entry* entry, Time at) {
   Time& until = delaying ? delaying_.until : listening_.until;
   if (delaying && outstanding_.empty()) {
     until = std::max(at + pending_.step.gap, pending_.step.at);
-  } else if (!is_can) {  // on CAN the reply may also have been unsolicited
+  } else if (!is_can) {  // a reply on CAN may have been unsolicited, so it prolongs nothing
     until = std::min(std::max(until, at + required_silence()), pending_.deadline);
   }
 }
@@ -423,12 +431,12 @@ void ReplyGuard<Item>::count_late(Entry* entry, Time at) {
   Time sent_at = last_.sent_at;
   if (entry != nullptr) {
     sent_at = entry->sent_at.empty() ? entry->lost_last : entry->sent_at[0];
-    // The first late reply may answer any of several outstanding requests; the next late reply shows which. On CAN the
-    // reply may also have been unsolicited.
+    // The first late reply may answer any of several equal requests, so the lateness is measured from the newest one;
+    // the next late reply corrects it. On CAN the reply may also have been unsolicited.
     if (!is_can && expected_lateness_ == Time{}) sent_at = entry->newest();
   }
   expected_lateness_ = std::max(expected_lateness_, std::min(at - sent_at, longest_lateness));
-  // If no reply was late before, a second reply to the last request is more likely a duplicate.
+  // If no reply was late before, a second reply to the last request is more likely a duplicate, and not counted.
   if (entry == nullptr && late_replies_ == 0) return;
   ++late_replies_;
   // Another reply was received while listening, so the stored reply was late.

@@ -47,8 +47,8 @@ namespace absenc::host {
 template <class Item>
 class ReplyGuard final : public Machine<Item> {
  public:
-  /// Serves the conversation `inner` from now on; `unit` and `options` must outlive it. `may_repeat`: whether each
-  /// request of the conversation may be sent once more.
+  /// Serves the conversation `inner` from now on; `inner`, `unit` and `options` must live until another one is
+  /// attached. `may_repeat`: whether each request of the conversation may be sent once more.
   void attach(Machine<Item>& inner, const Unit& unit, const Options& options, bool may_repeat);
   /// Returns whether this guard serves the conversation `inner`.
   [[nodiscard]] bool serves(const Machine<Item>& inner) const { return inner_ == &inner; }
@@ -77,7 +77,7 @@ class ReplyGuard final : public Machine<Item> {
   struct Report {
     bool sent = false;
     bool line_error = false;
-    bool reply = false;  // a `received` event with the items of `received_`
+    bool reply = false;  // whether to feed a `received` event with the items of `received_`
     bool timeout = false;
     Time received_at{};
   };
@@ -93,11 +93,13 @@ class ReplyGuard final : public Machine<Item> {
     Time noise_end = never;  // when the request is sent even if items still arrive
   };
   struct Matching {
-    Time until = never;               // time limit of the reply, from the end of the request
-    Time first_at{};                  // when the first of the stored items was received
-    Time received_at{};               // when the last of the stored items was received
-    bool damaged = false;             // a line error was received with the stored items
-    Buffer<Item, 1> foreign_frame{};  // CAN: a reply except for its identifier of 29 bits, which explains a timeout
+    // End of the time limit for the reply, which starts at the end of the request.
+    Time until = never;
+    Time first_at{};       // when the first of the stored items was received
+    Time received_at{};    // when the last of the stored items was received
+    bool damaged = false;  // a line error was received with the stored items
+    // CAN: a frame that would be the reply if its identifier had 11 bits instead of 29; it explains a timeout.
+    Buffer<Item, 1> foreign_frame{};
   };
   struct Listening {
     Time until{};      // end of listening: the request is then repeated, or a timeout reported
@@ -161,8 +163,10 @@ class ReplyGuard final : public Machine<Item> {
   Pending pending_{};
   LastRequest last_{};
   OutstandingRequests<Item> outstanding_;
-  Time longest_timeout_{};    // longest time without a reply after a request
-  Time expected_lateness_{};  // time by which a reply may be late; each reply in time reduces it
+  // Longest time from a request to the silence that showed that its reply is missing.
+  Time longest_timeout_{};
+  // Time by which a reply may be late. Listening that ends without another reply reduces it.
+  Time expected_lateness_{};
   Time greatest_lateness_{};
   std::uint64_t late_replies_ = 0;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a unit's commands on a port: repeats requests that may be repeated, removes echo, validates the first position,
-// counts errors.
+// Runs a unit's commands on a port: repeats commands that may be repeated, removes echo, confirms positions by further
+// readings, counts errors.
 #pragma once
 
 #include <array>
@@ -38,8 +38,8 @@ struct Counters {
   }
 };
 
-/// A filter between a conversation and the echo filter: it sees each transfer and all received items, late replies
-/// included, and may change them.
+/// A filter between the conversation (or its reply guard) and the echo filter: it sees each transfer and all received
+/// items but echo, late replies included, and may change them.
 template <class Item>
 struct Filter : Machine<Item> {
   /// Sets the machine to which the filter passes events from now on.
@@ -75,13 +75,14 @@ class Session {
         apart_(times()) {}
 
   /// Runs one command to its end, a repeatable one up to `attempts` times. `on_emit(conversation)` is called for each
-  /// result but the last and returns whether to continue. The returned conversation has the result or the error and is
-  /// valid until the next call; null: the unit cannot run the command.
+  /// result but the last and returns whether to continue; a conversation that streams stops at its first result. The
+  /// returned conversation has the result or the error and is valid until the next call; null: the unit cannot run the
+  /// command.
   template <class OnEmit>
   const Conversation<Item>* run(const Command& command, Arguments arguments, OnEmit&& on_emit) {
     streaming_ = false;
     const Conversation<Item>* conversation = attempt(command, arguments, on_emit);
-    streaming_ = false;  // only readings continue a stream
+    streaming_ = false;  // `run` always begins anew; only `next` and `read` continue a stream
     return conversation;
   }
   /// Runs `command` to its end and ignores all results but the last. Returns the conversation, or null if the unit
@@ -90,7 +91,8 @@ class Session {
     return run(command, arguments, [](const Conversation<Item>&) { return true; });
   }
 
-  /// Runs `command` as `run` does, but a conversation that streams continues where it stopped.
+  /// Runs `command` as `run` does, but a conversation that streams continues where it stopped, if `command` is the last
+  /// one.
   const Conversation<Item>* next(const Command& command, Arguments arguments = {}) {
     if (command_ != &command) streaming_ = false;
     return attempt(command, arguments, [](const Conversation<Item>&) { return true; });
@@ -195,7 +197,7 @@ class Session {
   [[nodiscard]] const EchoFilter& echo() const { return echo_; }
 
  private:
-  // With another resolution or other units no earlier position can be compared.
+  // Forgets all positions: with other options or another speed limit they cannot be compared with the next one.
   void follow_options() {
     first_ = FirstReading(reach());
     apart_ = Apart(times());
@@ -203,14 +205,16 @@ class Session {
   [[nodiscard]] Reach reach() const { return Reach::of(limit_, unit_->resolution(options_)); }
   [[nodiscard]] Times times() const { return sends_unsolicited(*unit_, options_) ? Times::arrived : Times::latched; }
 
-  // Returns whether this position and the one before contradict each other.
+  // Returns whether the speed limit excludes that the shaft moved from the last position to that of `reading`; false if
+  // there is no last position, or the time between is too long to judge.
   [[nodiscard]] bool contradicts(const Reading& reading) const {
     const Time between = apart_.since_last(reading.latched);
     return first_.has_last() && first_.can_judge(reading, between) && !first_.is_near(reading, between);
   }
 
-  // After a pause that is too long to judge, a second reading made at once (`follows`) confirms the position. If that
-  // reading takes too long as well, the speed limit alone decides what can be excluded.
+  // Returns whether the last position confirms that of `reading`; `follows`: it was read directly after the last one.
+  // After a pause that is too long to judge, only a directly following reading confirms. If even that one takes too
+  // long to judge, the speed limit alone decides.
   bool confirms(const Reading& reading, bool follows) {
     const Time between = apart_.since_last(reading.latched);
     bool near = first_.is_near(reading, between);
@@ -239,7 +243,7 @@ class Session {
       Conversation<Item>* conversation = streaming_ ? current_ : make(command, arguments);
       if (conversation == nullptr) return nullptr;
       const bool again = streaming_;
-      streaming_ = false;  // until the conversation gives its next result
+      streaming_ = false;  // set again when the conversation has given its next result
       streaming_ = !drive_one(command, *conversation, on_emit, again) && conversation->streams();
       const Error error = conversation->error();
       echo_.conclude(error == Error::none);
@@ -252,14 +256,15 @@ class Session {
       ++counters_.errors[static_cast<std::size_t>(error)];
       if (error == Error::timeout) doubt();  // after a timeout the encoder may have been switched off
       if (number >= attempts || error == Error::invalid_argument || error == Error::not_still) return conversation;
-      if (error == Error::timeout && late() != late_before) return conversation;  // another attempt would be late again
+      // The reply was late, and that of another attempt would be, too.
+      if (error == Error::timeout && late() != late_before) return conversation;
       ++counters_.repeated;
     }
   }
 
   [[nodiscard]] std::uint64_t late() const { return guard_ != nullptr ? guard_->late() : 0; }
 
-  // `catch_up` drops the frames of a stream, but the damaged ones are counted.
+  // Counts the damaged frames that the stream has discarded since the last call, also those that `catch_up` dropped.
   void count_discarded(const Conversation<Item>& conversation) {
     const StreamCounts* stream = conversation.stream();
     if (stream == nullptr) return;
@@ -272,15 +277,17 @@ class Session {
     return current_ = unit_->host(options_, command, arguments, storage_).template of<Item>();
   }
 
-  // Returns whether the reply guard is needed for `command`. On a link whose clock the host drives no reply is late. On
-  // a CAN bus other nodes send too, and a listener receives all frames.
+  // Returns whether the reply guard is used for `command`; false without a guard. On a link whose clock the host drives
+  // no reply is late. On a CAN bus only commands that read are guarded: other nodes send too, and a listener receives
+  // all frames.
   [[nodiscard]] bool guarded(const Command& command) const {
     if (guard_ == nullptr) return false;
     if (unit_->link == LinkKind::can) return command.verb == Verb::read || command.verb == Verb::read_part;
     return unit_->link != LinkKind::spi && unit_->link != LinkKind::clocked;
   }
 
-  // Returns the machine that runs on the port: the conversation, its reply guard, and the echo filter around them.
+  // Returns the machine that runs on the port: the conversation, inside its reply guard, the filter and the echo
+  // filter, as far as each is used.
   Machine<Item>& machine() {
     if constexpr (std::is_same_v<Item, std::uint8_t>) {
       if (echo_.mode() != EchoMode::off) return echo_;
@@ -296,11 +303,12 @@ class Session {
     return *current_;
   }
 
-  // Returns whether the conversation came to its end. A conversation that streams stops at its next result instead.
+  // Runs the conversation and returns whether it came to its end. A conversation that streams stops at its next result
+  // instead.
   template <class OnEmit>
   bool drive_one(const Command& command, Conversation<Item>& conversation, OnEmit&& on_emit, bool again) {
     if (!again) guarded_ = guarded(command);
-    // The guard may have served other encoders on the line meanwhile.
+    // The guard is attached again if it has served another encoder on the line meanwhile.
     if (guarded_ && !(again && guard_->serves(conversation))) {
       guard_->attach(conversation, *unit_, options_, !command.changes_encoder);
     }
@@ -326,11 +334,11 @@ class Session {
   Options options_;
   Port<Item>* port_;
   std::span<std::byte> storage_;
-  Conversation<Item>* current_ = nullptr;  // conversation in `storage_`
-  const Command* command_ = nullptr;       // command of `current_`
+  Conversation<Item>* current_ = nullptr;  // present conversation, constructed in `storage_`
+  const Command* command_ = nullptr;       // command that `current_` executes
   ReplyGuard<Item> own_guard_;
   ReplyGuard<Item>* guard_ = &own_guard_;
-  bool guarded_ = false;  // the guard serves the present conversation
+  bool guarded_ = false;  // whether the guard serves the present conversation
   Filter<Item>* filter_ = nullptr;
   Time lateness_{};
   EchoFilter echo_;
@@ -340,7 +348,7 @@ class Session {
   Apart apart_;
   Time shortest_interval_ = never;      // shortest time between a reading and one that was read directly after it
   bool confirmed_ = false;              // the last reading was confirmed
-  bool known_ = false;                  // a reading was confirmed since the last doubt
+  bool known_ = false;                  // a reading was confirmed since the last call of `doubt`
   bool streaming_ = false;              // `current_` has stopped at a result and can continue
   std::uint64_t discarded_before_ = 0;  // number of discarded frames of the present stream when it stopped last
   Counters counters_;

@@ -63,8 +63,8 @@ struct OneRequest final : Machine<std::uint8_t> {
   Wire heard;
 };
 
-// The reply to an outstanding request may arrive before the reply to the next request; ten seconds later it counts as
-// lost.
+// For ten seconds a reply may belong to the earlier, unanswered request, and is dropped. After that the earlier request
+// counts as lost.
 TEST(ReplyGuard, RequestsAreOutstandingForTenSeconds) {
   using Kind = Step<std::uint8_t>::Kind;
   const Bench bench(EchoMode::off);
@@ -119,7 +119,7 @@ TEST(Session, RepeatsRepeatableCommands) {
   EXPECT_EQ(bench.session->counters().repeated, 2u);
   EXPECT_EQ(bench.session->counters().errors[static_cast<std::size_t>(Error::wrong_length)], 3u);
   bench.session->run(*find_command(bench.unit, Verb::zero));
-  EXPECT_EQ(bench.device->answer_count(), 6u);  // one position, tried three times; the reset is never sent
+  EXPECT_EQ(bench.device->answer_count(), 6u);  // 3 more position requests; the reset of the zero command is never sent
 }
 
 // The document permits 51 us for a reading: request, 3 us, 11 characters.
@@ -164,7 +164,7 @@ TEST(Session, ShowsTheSecondOfTwoReadingsThatAgree) {
   bench.faulty->set_rates({});
   const auto before = bench.device->answer_count();
   EXPECT_EQ(bench.read().error(), Error::none);
-  // The first answer could be the late reply to an earlier request, so it is repeated.
+  // The first answer could be the late reply to an earlier request, so the request is repeated: three answers, not two.
   EXPECT_EQ(bench.device->answer_count(), before + 3);
 }
 
@@ -194,7 +194,7 @@ TEST(Session, ReplyWithWrongKindOfIdentifierExplainsTimeout) {
 
 TEST(Session, AnInvalidPositionIsNeverConfirmed) {
   Bench bench(EchoMode::off);
-  bench.device->raise_alarms(0x04);  // counting_error
+  bench.device->raise_alarms(0x04);  // alarm bit counting_error
   const auto& reading = bench.read();
   EXPECT_EQ(reading.error(), Error::none);
   EXPECT_FALSE(reading.reading()->singleturn_valid());
@@ -314,7 +314,7 @@ TEST(SessionGuard, ConfirmsNothingWithoutAgreement) {
 TEST(SessionGuard, ReturnsInvalidPositionOfKnownEncoderAtOnce) {
   Bench bench(EchoMode::off);
   bench.read();
-  bench.device->raise_alarms(0x04);  // counting_error
+  bench.device->raise_alarms(0x04);  // alarm bit counting_error
   EXPECT_EQ(bench.answers_of_a_reading(), 1u);
   EXPECT_FALSE(bench.session->confirmed());
   bench.device->lower_alarms(0x04);

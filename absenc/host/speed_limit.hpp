@@ -9,8 +9,8 @@
 
 namespace absenc::host {
 
-/// Highest speed that a shaft or carriage is assumed to have. A limit always exists: without one, a bridged pause
-/// showed 0.40 turns for 10.40.
+/// Highest speed that a shaft or carriage is assumed to have. A limit always exists: without one, turns during a pause
+/// between readings were lost unnoticed (0.40 turns were shown instead of 10.40).
 struct SpeedLimit {
   /// Speed limit of rotary encoders in revolutions per minute. Default: the specified speed of the fastest supported
   /// encoders.
@@ -35,9 +35,9 @@ inline constexpr unsigned most_excess = 4;
   return limit.rpm / 60.0 * (bits >= 63 ? 9.2e18 : static_cast<double>(std::uint64_t{1} << bits));
 }
 
-/// Returns the upper limit for the time between two readings: at the speed limit the position then changes by half of
-/// the counted range, less 1/16 for noise and for latch times that are not known to the microsecond. `never` for a
-/// speed limit of 0.
+/// Returns the upper limit for the time between two readings: at the speed limit the position then changes by 15/32 of
+/// the counted range. That is half of it, less a margin for noise and for latch times that are not known to the
+/// microsecond. `never` for a speed limit of 0.
 [[nodiscard]] constexpr Time longest_gap(const Resolution& resolution, const SpeedLimit& limit) {
   const bool linear = resolution.unit_um > 0;
   const unsigned bits = linear ? resolution.singleturn_bits : resolution.multiturn_bits;
@@ -54,16 +54,16 @@ inline constexpr unsigned most_excess = 4;
 /// processor has no floating point.
 class Reach {
  public:
-  /// Returns the reach of a shaft of at most `rpm` revolutions per minute; above 1 830 000 they are treated as that.
+  /// Returns the reach of a shaft of at most `rpm` revolutions per minute; `rpm` is limited to about 1 830 000.
   [[nodiscard]] static constexpr Reach of_shaft(std::uint32_t rpm) {
-    constexpr std::uint32_t turns_a_ns_of_1_rpm = 2346;  // 2^47 / 60e9, rounded up by 0.016 %
+    constexpr std::uint32_t turns_a_ns_of_1_rpm = 2346;  // 1 rpm in turns per ns, times 2^47, rounded up by 0.016 %
     constexpr std::uint32_t fastest = 0xFFFF'FFFF / turns_a_ns_of_1_rpm;
     return {turns_a_ns_of_1_rpm * (rpm < fastest ? rpm : fastest), 47, true};
   }
   /// Returns the reach of a carriage of at most `mm_s` mm/s whose encoder counts `unit_um` micrometres. Uses floating
   /// point, once.
   [[nodiscard]] static constexpr Reach of_carriage(std::uint32_t mm_s, double unit_um) {
-    double factor = mm_s / unit_um / 1e6;  // counts per nanosecond
+    double factor = mm_s / unit_um / 1e6;  // speed limit in counts per nanosecond
     std::int8_t shift = 0;
     for (; factor < 0x8000'0000 && shift < 100; factor *= 2) ++shift;
     return {factor < 0xFFFF'FFFF ? static_cast<std::uint32_t>(factor) + 1 : 0xFFFF'FFFF, shift, false};

@@ -32,7 +32,7 @@ class Latencies {
   [[nodiscard]] constexpr std::uint64_t count() const { return count_; }
   /// Returns the longest latency.
   [[nodiscard]] constexpr Time longest() const { return longest_; }
-  /// Returns the sum of all latencies.
+  /// Returns the sum of all latencies, each limited to 0 to 68 s.
   [[nodiscard]] constexpr Time sum() const { return sum_; }
 
   /// Returns, for each of the ascending limits, how many latencies surely do not exceed it. Latencies in the last 1/32
@@ -63,7 +63,7 @@ class Latencies {
   static constexpr unsigned most_bits = 36;
   static constexpr std::int64_t most = (std::int64_t{1} << most_bits) - 1;
 
-  // Each value below 2^fine_bits has a bucket of its own.
+  // Returns the number of the bucket for a latency of `value` ns. Each value below 2^fine_bits has a bucket of its own.
   [[nodiscard]] static constexpr std::size_t bucket(std::uint64_t value) {
     const auto width = static_cast<unsigned>(std::bit_width(value));
     if (width <= fine_bits) return static_cast<std::size_t>(value);
@@ -115,7 +115,7 @@ class Rate {
   bool seen_ = false;
   Time last_{};
   double events_ = 0;
-  double nanoseconds_ = 0;  // time in which the counted events arrived
+  double nanoseconds_ = 0;  // time in which the counted events arrived; both fade with age
 };
 
 /// A failed exchange with its bytes, which are cut at the size of the buffers.
@@ -130,9 +130,9 @@ struct BadExchange {
 
   Error error = Error::none;  ///< Error with which the exchange failed.
   Time at{};                  ///< time at which the last item of the exchange was received, or sent
-  /// First bytes of the request.
+  /// First items of the request, at most 64 bytes.
   Buffer<Item, 64 / sizeof(Item)> sent{};
-  /// First bytes of the reply.
+  /// First items of the reply, at most 64 bytes.
   Buffer<Item, 64 / sizeof(Item)> received{};
 };
 
@@ -142,7 +142,7 @@ class Statistics {
  public:
   static constexpr std::size_t most_stored = 8;  ///< Number of failed exchanges that are stored, the last ones.
 
-  /// Adds a conversation that ended.
+  /// Adds a conversation that ended: its latency, or after an error its exchange.
   void add(const Conversation<Item>& conversation) {
     const Exchange<Item> exchange = conversation.exchange();
     if (conversation.error() == Error::none) {
@@ -151,7 +151,7 @@ class Statistics {
       add({conversation.error(), exchange});
     }
   }
-  /// Adds a failed exchange; it replaces the oldest.
+  /// Adds a failed exchange, which replaces the oldest one if `most_stored` are stored.
   void add(const BadExchange<Item>& bad) { bad_[bad_count_++ % most_stored] = bad; }
 
   /// Returns the distribution of the times from the end of the request to the end of the reply, of good exchanges.

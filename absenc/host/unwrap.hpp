@@ -13,8 +13,8 @@ namespace absenc::host {
 
 /// A continuous position: adds the shorter of the two distances from each reading to the next. That is right while the
 /// position changes by less than half of the counted range: half a revolution for a single-turn encoder. The counted
-/// range follows from the readings, not from the options. If the speed limit allows more than half the range, the
-/// position starts again.
+/// range follows from the readings, not from the options. If the position can have changed by more at the speed limit,
+/// it is read from the encoder again.
 class Unwrapper {
  public:
   /// How a reading joins the positions before it.
@@ -48,11 +48,11 @@ class Unwrapper {
 
   /// Returns whether the position of `reading` is farther from the last added one than `most_excess` times the speed
   /// limit allows: a speed a little over the limit is no jump. A jump is damage that the checksum does not detect, or a
-  /// moved zero.
+  /// moved zero. False if nothing can be compared or the time between is too long to judge.
   [[nodiscard]] constexpr bool jumps(const Reading& reading) const {
     if (!started_ || !has_position(reading) || !is_near(reading)) return false;
-    constexpr Time vague{1'000'000};  // uncertainty of the latch time
-    constexpr double noise = 4;       // in counts
+    constexpr Time vague{1'000'000};  // uncertainty of the latch time: 1 ms
+    constexpr double noise = 4;       // noise of a position, in counts
     const double seconds = static_cast<double>((apart(reading) + vague).count()) / 1e9;
     const auto moved = static_cast<double>(way(reading));
     return (moved < 0 ? -moved : moved) >
@@ -86,7 +86,7 @@ class Unwrapper {
     return turn_bits(reading) != 0 && turn_bits(last_) != 0;
   }
 
-  // Returns the resolution with the turns that both readings have.
+  // Returns the resolution of `reading`, without its turns if they or those of the last reading are invalid.
   [[nodiscard]] constexpr Resolution resolution_of(const Reading& reading) const {
     return {reading.singleturn_bits, have_turns(reading) ? reading.multiturn_bits : 0, reading.unit_um};
   }
@@ -95,8 +95,8 @@ class Unwrapper {
   }
 
   // Returns whether the time between the last reading and `reading` is short enough to know the distance, even if their
-  // latch times lie at the outer ends of their intervals. The 1/16 that `longest_gap` reserves for unknown times is
-  // included here.
+  // latch times lie at the outer ends of their intervals. The margin of `longest_gap` for unknown latch times is added
+  // again, because the intervals state them. Always true for arrival times.
   [[nodiscard]] constexpr bool are_surely_near(const Reading& reading, const LatchTime& at) const {
     const Time gap = longest_gap(resolution_of(reading), limit_);
     return times_ == Times::arrived || gap == never || at.latest - last_at_.earliest < gap / 15 * 16;
@@ -117,7 +117,7 @@ class Unwrapper {
   Apart apart_;
   bool started_ = false;
   bool counts_turns_ = false;
-  std::uint64_t position_ = 0;  // unsigned, because it wraps after 2^63 counts
+  std::uint64_t position_ = 0;  // unsigned, so that a wrap after 2^63 counts is defined
   Reading last_{};
   LatchTime last_at_{};
 };

@@ -57,7 +57,7 @@ TEST(Unwrapper, ContinuesThroughZeroOfSignedTurns) {
   EXPECT_EQ(unwrapper.position(), 1 * 1024 + 8);
   unwrapper.add(signed_turns(-1, 1023, 2ms));
   EXPECT_EQ(unwrapper.position(), -1);
-  // This position is beyond the end of the turn counter.
+  // The shaft passes the negative end of the turn counter, where -8 turns are followed by 7.
   unwrapper.add(signed_turns(-7, 0, 3ms));
   unwrapper.add(signed_turns(7, 0, 4ms));
   EXPECT_EQ(unwrapper.position(), -9 * 1024);
@@ -70,7 +70,7 @@ TEST(Unwrapper, UsesTurnAloneIfTurnsAreInvalid) {
   lost.multiturn_valid = false;
   EXPECT_EQ(unwrapper.add(lost), Joined::continued);
   EXPECT_EQ(unwrapper.position(), 6 * 1024 + 8);
-  // The position is valid again, but with other turns, which no motion explains.
+  // The turns are valid again, but have another value, which no motion explains.
   EXPECT_EQ(unwrapper.add(multiturn(0, 20, 2ms)), Joined::continued);
   EXPECT_EQ(unwrapper.position(), 6 * 1024 + 20);
 }
@@ -143,7 +143,7 @@ TEST(Unwrapper, ReadingsThatArriveTogetherMayBeFarApart) {
 }
 
 TEST(Unwrapper, DetectsJumpOfShaft) {
-  // The limit allows a tenth of a turn in 1 ms, plus 1 ms because the latch times are uncertain.
+  // The limit allows a tenth of a turn per ms; 1 ms is added to the time, because the latch times are uncertain.
   Unwrapper unwrapper(SpeedLimit{.rpm = 6000});
   EXPECT_FALSE(unwrapper.jumps(multiturn(9, 0, 0ms))) << "nothing is known yet";
   unwrapper.add(multiturn(5, 0, 0ms));

@@ -17,19 +17,21 @@ namespace absenc::host {
 /// The true mean speed between the two latch times differs from `counts_per_second` by at most `uncertainty`, which
 /// covers unknown latch times and one count of each position, but not the noise and errors of the encoder.
 ///
-/// The time between the two positions is `window` if that is enough. It is extended, up to `longest_windows` times,
-/// until the latch times leave at most 1/20 of the speed uncertain and the distance is 20 counts. With the longest time
-/// any number of counts is accepted, and 1/4 of the speed may be uncertain. Otherwise no speed is valid.
+/// The time between the two positions is about `window` if that is enough. It is extended, up to `longest_windows`
+/// times, until the latch times leave at most 1/20 of the speed uncertain and the distance is 0, or at least 20 counts.
+/// With the longest time any number of counts is accepted, and 1/4 of the speed may be uncertain. Otherwise no speed is
+/// valid.
 class Velocity {
  public:
   static constexpr std::size_t most_positions = 48;  ///< Greatest number of positions that are stored.
   static constexpr int longest_windows = 20;         ///< Longest window, as a multiple of the shortest one.
 
   /// `window` is the shortest time over which the speed is measured. If readings are farther apart, it is the time
-  /// between two readings.
+  /// between two readings. Until readings span `window`, a shorter time is used if the shaft has moved far enough.
   explicit constexpr Velocity(Time window = std::chrono::milliseconds(50)) : window_(window) {}
 
-  /// Adds a position of `Unwrapper`. A position that was not latched after the one before is ignored.
+  /// Adds a position of `Unwrapper`. A position that was not latched after the one before is ignored, and no speed is
+  /// valid then.
   constexpr void add(std::int64_t position, const LatchTime& at) {
     start_ = none;
     if (size_ != 0 && at.middle() <= newest().at.middle()) return;
@@ -70,8 +72,9 @@ class Velocity {
     LatchTime at;
   };
   static constexpr std::size_t none = ~std::size_t{0};
-  static constexpr int enough = 20;  // least ratio of speed to uncertainty to report a speed before the longest window
-  static constexpr int least = 4;    // least ratio of speed to uncertainty with the longest window
+  // Before the longest window: least distance in counts, and least ratio of the window to its uncertainty.
+  static constexpr int enough = 20;
+  static constexpr int least = 4;  // least ratio of the longest window to its uncertainty
 
   [[nodiscard]] constexpr const Sample& newest() const { return positions_[size_ - 1]; }
   [[nodiscard]] constexpr Time span(std::size_t start) const {
@@ -142,7 +145,7 @@ class Velocity {
   }
 
   Time window_;
-  std::array<Sample, most_positions> positions_{};  // the oldest first
+  std::array<Sample, most_positions> positions_{};  // last positions with their latch times, the oldest first
   std::size_t size_ = 0;
   std::size_t start_ = none;  // index of the position that begins the selected window
 };

@@ -130,14 +130,15 @@ TEST(Velocity, IsInvalidIfLongestWindowIsTooUncertain) {
 // Position of a shaft in counts as a function of seconds.
 using Motion = std::function<double(double)>;
 
-// Compares each speed with the true mean speed. `since` returns the window; the test knows the true latch times.
+// Compares each speed with the true mean speed over its window, which begins at the true latch time that belongs to
+// Velocity::since.
 void expect_bounds(const Motion& motion, Time period, Time longest_jitter, unsigned seed, std::size_t least_valid) {
   std::mt19937_64 random(seed);
   const auto within = [&](Time most) {
     return Time(std::uniform_int_distribution<Time::rep>(0, most.count())(random));
   };
   Velocity velocity;
-  std::map<Time, Time> truths;  // true latch time by the earliest latch time of a position
+  std::map<Time, Time> truths;  // key: earliest latch time of a position; value: its true latch time
   const auto place = [&](Time at) { return motion(std::chrono::duration<double>(at).count()); };
   std::size_t valid = 0;
   for (int i = 0; i < 3000; ++i) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The only file that includes every unit. A new protocol needs its folder and one line here.
+// The only file that includes every unit. A new protocol needs its folder, and here its includes and a line in
+// `listed`.
 #include "absenc/protocol/all.hpp"
 
 #include <array>

@@ -124,7 +124,7 @@ enum class HostDemand : std::uint8_t {
   row
 };
 
-/// One kind of request of a host that ignores replies. Tests build hosts that break a clause from such steps.
+/// One kind of request of a host that ignores replies. Tests build hosts that break or keep a clause from such steps.
 struct HostStep {
   Time pause{};  ///< pause before the request, after the last sent character
   /// Name of the command whose one request is sent, without the other steps of its procedure; or bytes to send: "1a
@@ -144,8 +144,8 @@ struct HostClause {
   HostDemand demand;           ///< Kind of the clause, which selects its test.
   /// Name of the rule that the virtual encoder checks; the clause is untested until the encoder has checked this rule.
   std::string_view rule{};
-  // Test hosts for this clause. The common test steps do not break it (two commands in a row, pauses left out, a
-  // controller that is too fast, too early or in another mode), so it has hosts of its own.
+  // Test hosts for this clause, if the hosts that all tests use do not break it: those send two commands in a row,
+  // leave pauses out, or clock too fast, too early or in another mode.
   std::array<HostScript, 2> breaks{};  ///< two scripted hosts that break this clause and no other
   HostScript keeps{};                  ///< a host that does the same as `breaks` and keeps this clause
   /// Options of the virtual encoder for the hosts `breaks` and `keeps`: "acquisition_us=20000".

@@ -30,7 +30,7 @@ struct Explanation {
   std::string_view advice{};  ///< what to try, instead of the error's own advice
 };
 
-/// Counts of a conversation with an encoder that transmits unsolicited.
+/// Counts of a conversation that streams.
 struct StreamCounts {
   /// Number of received frames that were damaged or cannot be distinguished from damaged ones, whether an error
   /// reported them or not.
@@ -57,8 +57,8 @@ struct Conversation : Machine<Item> {
   [[nodiscard]] virtual std::string_view advice() const { return {}; }
   /// Returns the position that is the result; null after an error, or if the command does not read a position.
   [[nodiscard]] virtual const Reading* reading() const { return nullptr; }
-  /// Returns the counts of a conversation that streams. Such a conversation never ends by itself: each `emit` is a
-  /// result, and the next one follows when it is run further. Null: the conversation ends with `done`.
+  /// Returns the counts of a conversation that streams. Such a conversation ends by itself only after an error: each
+  /// `emit` is a result, and the next one follows when it is run further. Null: the conversation ends with `done`.
   [[nodiscard]] virtual const StreamCounts* stream() const { return nullptr; }
   /// Returns whether the conversation delivers one result after the other without end, as `stream` describes.
   [[nodiscard]] bool streams() const { return stream() != nullptr; }
@@ -130,7 +130,8 @@ struct Device : Machine<Item> {
   [[nodiscard]] virtual std::uint32_t violation_count() const = 0;
   /// Sets the observer of rule checks, which must outlive the encoder; null: none. By default does nothing.
   virtual void watch_rules(RuleWatch* /*watch*/) {}
-  /// Returns how many requests the encoder has answered.
+  /// Returns how many answers the encoder has given. Unsolicited frames, and requests executed without a reply, may
+  /// count too.
   [[nodiscard]] virtual std::uint64_t answer_count() const = 0;
 
  protected:

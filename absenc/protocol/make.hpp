@@ -17,7 +17,8 @@ Machine* make_in(std::span<std::byte> storage, const Parameters&... parameters) 
   return storage.size() < sizeof(Machine) ? nullptr : new (storage.data()) Machine(parameters...);
 }
 
-// Returns `machine` as Any: among CAN frames or bytes, by the item that the machine handles.
+// Returns an Any that points to `machine`: with its member for CAN frames or that for bytes, by the items of the
+// machine.
 template <template <class> class Role, class Made>
 Any<Role> any_of(Made* machine) {
   if constexpr (std::is_base_of_v<Machine<CanFrame>, Made>) {

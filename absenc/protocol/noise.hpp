@@ -9,8 +9,8 @@ namespace absenc {
 
 using namespace std::chrono_literals;
 
-/// A line without silence for this long is treated as never silent. It is long enough for a reply that a carrier
-/// delivers in pieces; slow characters need a longer limit.
+/// A line without silence for this long is treated as never silent. The limit is long enough for a reply that arrives
+/// in pieces; slow characters need a longer one.
 inline constexpr Time noise_limit = 100ms;
 
 /// Texts that explain the error of a conversation on a line that is never silent.

@@ -101,9 +101,9 @@ struct OptionError {
 struct Unit;
 
 /// Computes the values of all options from a model and single settings, which override the model, and stores them in
-/// `resolved`. Returns why it is impossible, or an error of kind `none`. Without a model name the first model whose
-/// values match all settings is used, so that the length of a position also selects its id; if no model matches, the
-/// unit's defaults apply. With a word format no model is used.
+/// `resolved`. Returns why it is impossible, or an error of kind `none`. Without a model name the first model that
+/// contradicts no setting is used, so a setting that fits one model only also gives the other values of that model; if
+/// no model fits, the unit's defaults apply. With a word format no model is used.
 [[nodiscard]] OptionError resolve_options(const Unit& unit, std::string_view model,
                                           std::span<const OptionText> settings, Options& resolved);
 

@@ -19,8 +19,8 @@
 
 namespace absenc {
 
-/// Purpose of a unit's command. The verbs of the command line (`absenc read`, `absenc zero` ...) find the command by
-/// it.
+/// Purpose of a unit's command, by which the verbs of the command line (`absenc read`, `absenc zero` ...) find the
+/// command.
 enum class Verb : std::uint8_t {
   read,  ///< reads the position, with all alarms that the unit can report; `absenc read` uses the first such command
   read_part,
@@ -69,7 +69,7 @@ struct Command {
   /// Possible effect of the command's requests on other devices on the line, a sentence without its full stop; "":
   /// none. Users are asked before the command is sent.
   std::string_view disturbs{};
-  /// For verb read_part: the reading of this command has all alarms, although that of Verb::read may not.
+  /// Whether, for verb read_part, the reading of this command has all alarms, although that of Verb::read may not.
   bool reads_alarms = false;
 };
 
@@ -316,7 +316,8 @@ struct Unit {
   /// Returns where the frame ends that begins with the first of `bytes`.
   FrameEnd (*frame_end)(const Options& options, Direction direction, Bytes bytes);
   /// Constructs the conversation of a command in `storage`, which has `host_storage` bytes. Returns an empty Any if the
-  /// options or arguments contradict the command.
+  /// options or arguments contradict the command. A command that the encoder lacks, or an argument outside its range,
+  /// gives a conversation that ends at once with an error.
   Any<Conversation> (*host)(const Options& options, const Command& command, Arguments arguments,
                             std::span<std::byte> storage);
   /// Constructs a virtual encoder in `storage`, which has `device_storage` bytes; `shaft` must outlive it. Returns an
@@ -339,7 +340,7 @@ struct Unit {
   /// Returns the settings of the line with these options. Null: they are always `line`. Silences measured in characters
   /// follow the rate of these settings, and a conversation that changes the rate must know the old one.
   LineSettings (*settings)(const Options& options) = nullptr;
-  /// The unit of the same encoder behind an SPI controller, if that is another unit; null: it is this one.
+  /// The unit of the same encoder behind an SPI controller, if that is another unit; null: there is no such unit.
   const Unit* over_spi = nullptr;
   /// Puts the evidence about every value of the probeable options into `sink`. Returns whether some combination of
   /// values explains all captures, which are in the order of time. If so, the probeable options in `options` get these

@@ -49,7 +49,7 @@ struct VectorCheck final : FieldSink {
 }
 
 /// Returns the CAN frame of a test vector's text such as "1ff:022b": identifier and data in hexadecimal. An identifier
-/// of more than three digits has 29 bits. Any other text gives an empty frame.
+/// of more than three digits has 29 bits. Texts of another form are not detected.
 [[nodiscard]] constexpr CanFrame can_frame_of_text(Bytes text) {
   CanFrame frame;
   std::size_t at = 0;

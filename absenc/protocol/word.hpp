@@ -172,8 +172,9 @@ class GrayFields {
   bool odd_ = false;
 };
 
-// The `count` bits of a frame from bit `first` on, for a format known at run time only. At most 64 bits are loaded as
-// one number, which is faster, and one piece of code serves all formats. All bits must exist.
+// The `count` bits of a frame from bit `first` on, for a format known at run time only. If they are 64 or fewer, they
+// are loaded once as one number, which is faster; one piece of code serves all formats. The frame must have all these
+// bits.
 class SomeBits {
  public:
   constexpr SomeBits(BitView bits, std::size_t first, unsigned count)
@@ -251,7 +252,8 @@ constexpr bool encode_word(const WordFormat& format, const Word& word, BitBuffer
   return true;
 }
 
-/// Puts every field of the word into `sink`, in the order of the wire.
+/// Puts the fields of the word into `sink`, in the order of the wire, without parity and skipped bits. The position is
+/// also put as an angle, or as a distance if the length of a count is known.
 constexpr void put_word(FieldSink& sink, const WordFormat& format, const Word& word, const Scale& scale) {
   for (std::size_t i = 0; i < format.fields().size(); ++i) {
     const WordField& field = format.fields()[i];
@@ -320,7 +322,7 @@ template <std::size_t size>
   return to_reading(contents_of(format), word, scale);
 }
 
-/// Puts every field of the word, and then the reading of the word, into `sink`.
+/// Puts the fields of the word as `put_word` does, and then the reading of the word, into `sink`.
 constexpr void put_position(FieldSink& sink, const WordFormat& format, const Word& word, const Scale& scale) {
   put_word(sink, format, word, scale);
   sink.put_reading(to_reading(format, word, scale));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A position word described as text, for encoders without a driver: its fields from the MSB on.
+// A position word described as text, for encoders that have no unit of their own: its fields from the MSB on.
 //
 //   word    = item { " " item }
 //   item    = [ name "=" ] meaning ":" bits [ "!" ]  |  "gray"
@@ -236,7 +236,7 @@ constexpr bool is_taken(std::string_view name, std::span<const FieldInfo> taken)
 }
 
 namespace detail {
-void this_is_no_word_format();  // not constexpr: a call does not compile
+void this_is_no_word_format();  // not constexpr: a call at compile time is an error with this name
 
 consteval WordFormat word_format_or_stop(std::string_view text) {
   WordFormat format;

@@ -28,8 +28,8 @@ constexpr Request request(const Format& format, Arguments = {}) {
 constexpr Request request_to(std::size_t node) { return {Ask::position, static_cast<std::uint8_t>(4 * node)}; }
 constexpr std::size_t addresses = 64;
 
-// Reads position, turns and position. The turns are valid only if the shaft did not pass zero between the two
-// positions.
+// Reads the position, the turns and the position again, up to three times. The turns are valid only if the shaft did
+// not pass zero between the two positions.
 Procedure read_both(Dialog& dialog, PositionAndTurns& found) {
   const Format format = dialog.format();
   std::uint64_t before = co_await look(dialog, found, request<Ask::position>(format));
@@ -70,7 +70,7 @@ Procedure restart(Dialog& dialog, PositionAndTurns& found, Ask command_kind) {
 
 // ---- The virtual encoder
 
-class Encoder final : public BusDevice<Protocol, Encoder, 4> {  // 4: bytes of its memory, which holds its zero
+class Encoder final : public BusDevice<Protocol, Encoder, 4> {  // 4 bytes of memory, which hold its zero
  public:
   using BusDevice::BusDevice;
   [[nodiscard]] bool is_mine(const Request& asked) const { return asked.address == format().address; }
@@ -242,7 +242,7 @@ constexpr Declaration<Protocol, Encoder> declaration{
     .bits = bits_of_field,
     .conditions = conditions,
     .timing = {.turnaround = turn_around[0],
-               // answer time at the slowest rate
+               // Time after which the host reports a missing reply, at the slowest rate.
                .turnaround_limit = Protocol::host_times({.rate = rates.size() - 1}).answer_limit},
 };
 

@@ -31,7 +31,7 @@ struct Format {
 
   /// Returns the line settings with the baud rate of the format.
   [[nodiscard]] constexpr LineSettings line() const { return {.rate = rates[rate]}; }
-  /// Returns the number of bits of position and turns.
+  /// Returns the numbers of bits of position and turns.
   [[nodiscard]] constexpr Resolution resolution() const { return {singleturn_bits, multiturn_bits, 0, true}; }
 };
 
@@ -43,7 +43,7 @@ struct Request {
   Ask ask = Ask::position;      ///< Purpose of the request.
   std::uint8_t address = 0x54;  ///< Address of the encoder, a multiple of 4.
 
-  /// Returns whether the request has a reply. The encoder executes the other two without a reply, and restarts.
+  /// Returns whether the request has a reply. The encoder executes zero and reset without a reply, and restarts.
   [[nodiscard]] constexpr bool is_answered() const { return ask == Ask::position || ask == Ask::turns; }
 };
 
@@ -73,12 +73,13 @@ struct Protocol {
     const Time character = format.line().character();
     return {.answer_limit = 2 * turn_around[format.rate] + 2 * character, .gap_limit = 2 * character};
   }
-  /// One wrong reply in four passes the two parity bits, so a reply must have exactly two bytes and end with silence.
+  /// Returns how a request is sent: zero and reset once and without a reply. One wrong reply in four passes the two
+  /// parity bits, so a reply must have exactly two bytes and end with silence.
   static constexpr author::Manner manner(const Format&, const Request& request) {
     return {
         .repeats = request.is_answered() ? 2u : 0u, .expects_reply = request.is_answered(), .ends_by_silence = true};
   }
-  /// Returns the length of the request that begins with `begin`, in bytes; 0 if that is no request.
+  /// Returns the length of the request that begins with `begin`, in bytes: 1 or 2; 0 if no request begins so.
   static constexpr std::size_t request_size(const Format&, Bytes begin) {
     return std::array<std::size_t, 4>{1, 1, 2, 0}[begin[0] & 3];
   }
@@ -100,15 +101,16 @@ struct Protocol {
     const bool known = bytes.size() == 1 || request.ask == Ask::zero || request.ask == Ask::reset;
     return known ? Result<Request>(request) : Error::unexpected_reply;
   }
-  /// Returns the length of the reply to `request`, in bytes.
+  /// Returns the length of the reply to `request`, in bytes: 2, or 0 if it has no reply.
   static constexpr std::size_t reply_size(const Format&, const Request& request) {
     return request.is_answered() ? 2 : 0;
   }
-  /// Returns the length of a reply in bytes, judged by its first bytes; 0 if they do not determine it.
+  /// Returns the length of the reply to `request`, in bytes: 2, or 0 if it has no reply. The received bytes do not
+  /// matter.
   static constexpr std::size_t expected(const Format& format, const Request& request, Bytes) {
     return reply_size(format, request);
   }
-  /// Returns whether a reply that has this error is complete, so that the host awaits no more bytes.
+  /// Returns false: no error shows that a reply is complete, because replies end with silence.
   static constexpr bool is_whole(const Format&, Error) { return false; }
   /// Returns the bytes of `reply` as they are sent.
   static constexpr ByteBuffer<2> encode_reply(const Format& format, const Request& request, const Reply& reply) {
@@ -138,7 +140,7 @@ struct Protocol {
     if (request.ask == Ask::turns) return author::turns_reading(reply.value, {0, turns_bits, 0, true});
     return author::position_reading(static_cast<std::uint64_t>(reply.value), format.singleturn_bits);
   }
-  /// Returns when the encoder latched the position that answers a request sent at `sent_at`.
+  /// Returns when the encoder latched the position that answers a request sent at `sent_at`: at the end of the request.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
   /// Returns the times of the virtual encoder: duration of a character, time until a reply, time to start.
   static constexpr author::DeviceTimes device_times(const Format& format) {

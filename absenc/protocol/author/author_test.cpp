@@ -146,7 +146,7 @@ TEST(Procedures, EndWithoutAValidReply) {
   Case<two_questions> bad([](std::uint8_t request, unsigned n) { return request == 2 ? Wire{} : echo(request, n); });
   EXPECT_EQ(bad.host.error(), Error::timeout);
   EXPECT_EQ(bad.host.detail(), "the second");
-  ASSERT_EQ(bad.bench.sent.size(), 4u);  // the first request once, and the second three times
+  ASSERT_EQ(bad.bench.sent.size(), 4u);  // the first request is sent once, and the second three times
   // The silence that shows the missing reply is part of the pause.
   EXPECT_EQ(bad.bench.sent[3] - bad.bench.sent[2], 1ms + 2ms - 1ms);
   EXPECT_EQ(bad.bench.now, bad.bench.sent[3] + 5ms);  // the conversation ends after the hold time of 5 ms
@@ -218,7 +218,7 @@ Part<unsigned> deeper(ToyDialog& dialog, unsigned depth) {
 }
 
 Procedure many_parts(ToyDialog& dialog, Found& found, Arguments arguments) {
-  for (int i = 0; i < 500; ++i) {  // more parts in turn than the storage could hold at once
+  for (int i = 0; i < 500; ++i) {  // 500 parts one after the other: more than the storage could hold at once
     const unsigned sum = co_await deeper(dialog, static_cast<unsigned>(arguments[0]));
     found.sum = sum;
   }
@@ -245,11 +245,11 @@ TEST(Procedures, StopFromAnyDepth) {
 TEST(Procedures, ReportStorageThatIsTooSmall) {
   const std::array<std::int64_t, 1> depth{12};
   const std::size_t needed = Case<many_parts>(echo, {}, depth).host.frames_size();
-  // The storage is too small for so many nested parts.
+  // This storage is just large enough for all nested parts: the procedure ends itself with out_of_range.
   EXPECT_EQ(Case<many_parts>(echo, {}, depth, needed).host.error(), Error::out_of_range);
-  // The storage is too small for a part.
+  // One byte less is too small for the frame of the last part.
   EXPECT_EQ(Case<many_parts>(echo, {}, depth, needed - 1).host.error(), Error::buffer_too_small);
-  // The storage is too small for the procedure.
+  // 16 bytes are too small for the frame of the procedure.
   EXPECT_EQ(Case<many_parts>(echo, {}, depth, 16).host.error(), Error::buffer_too_small);
 }
 

@@ -48,7 +48,7 @@ void CanEngine::keep(const CanFrame& frame, Time at) {
 }
 
 void CanEngine::end() {
-  state_ = State::over;  // unless the subclass continues
+  state_ = State::over;  // the conversation ends, unless `over` continues it
   over();
 }
 

@@ -53,7 +53,7 @@ class CanEngine : public Conversation<CanFrame> {
   CanEngine() = default;
   ~CanEngine() = default;
 
-  /// Sends `frame`, `pause` after the last answer or request, and receives until the bus is silent for
+  /// Sends `frame`, not before `pause` after the last answer or request, and receives until the bus is silent for
   /// `times.answer_limit`, or until `times.busy_limit` has passed.
   void ask(const CanFrame& frame, const CanHostTimes& times, Time pause = {});
   /// Sends `frame` at once and receives frames for exactly `duration`.
@@ -95,7 +95,7 @@ class CanEngine : public Conversation<CanFrame> {
   CanFrame relevant_{};
   Time silence_{};   // receiving ends after this time without any frame; 0: receiving lasts exactly `duration_`
   Time duration_{};  // longest duration of receiving
-  Time since_{};     // frames that were complete before this time are not delivered
+  Time since_{};     // frames that were complete before this time are early (see `overhear`)
   Time until_{};     // end of receiving; before the request is sent: earliest time to send it
   Time sent_at_{};
   Time relevant_at_{};

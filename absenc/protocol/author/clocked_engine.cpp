@@ -22,12 +22,13 @@ void ClockedEngine::finish(Error error) {
 // ---- Steps
 
 ByteStep ClockedEngine::next(Time now) {
-  // A function makes the step, because the compiler would first zero a variable by a call.
+  // A lambda makes the step, because for a plain variable the compiler would call a function that first fills it with
+  // zeros.
   ByteStep step = [this]() -> ByteStep { return {.expect = (count_ + 7) / 8, .bits = count_, .at = never}; }();
   const bool begins = state_ != State::over && !begun_;
   if (begins) {
     begun_ = true;
-    rested_at_ = now + times_.rest;  // another host may have clocked just before
+    rested_at_ = now + times_.rest;  // the pause counts from now, because another host may have clocked just before
   }
   if (state_ == State::over) {
     step.kind = ByteStep::Kind::done;
@@ -70,7 +71,7 @@ void ClockedEngine::received(const ByteEvent& event) {
     for (const std::uint8_t byte : storage_.first(size_)) any |= byte;
     if (any == 0) return finish(Error::line_stuck);
   }
-  state_ = State::over;  // unless the subclass continues
+  state_ = State::over;  // the conversation ends, unless `clocked` begins another transfer
   clocked({Bytes(storage_).first(size_), count_});
 }
 

@@ -43,7 +43,7 @@ class ClockedHostOf : public ClockedEngine {
 
   /// Returns the format of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
-  /// Returns the last valid reply.
+  /// Returns the last valid reply; an empty one if there was none.
   [[nodiscard]] const Reply& last() const { return last_; }
   /// Returns an empty request, because hosts of clocked links send none.
   [[nodiscard]] static constexpr NoRequest request() { return {}; }
@@ -57,7 +57,7 @@ class ClockedHostOf : public ClockedEngine {
   [[nodiscard]] static constexpr bool is_alone() { return false; }
 
  protected:
-  /// Constructs a host that begins a transfer of one reading at once.
+  /// Constructs a host whose first transfer is one reading.
   explicit ClockedHostOf(const Format& format) : ClockedHostOf(format, later) { ask(); }
   /// Constructs a host that begins no transfer until its subclass does.
   ClockedHostOf(const Format& format, Later) : ClockedEngine(P::host_times(format), storage_), format_(format) {}
@@ -84,7 +84,8 @@ class ClockedHostOf : public ClockedEngine {
 
  private:
   void keep() {
-    new (&reading_) Reading(P::reading(format_, last_));  // constructed in place, not copied
+    // The reading is constructed in place, because a copy costs time.
+    new (&reading_) Reading(P::reading(format_, last_));
     reading_.latched = begun_at();
     reading_.received = received_at();
   }
@@ -106,7 +107,7 @@ class ReadClocked : public ClockedHostOf<P> {
   void clocked(BitView bits) final { this->conclude(this->take(bits)); }
 };
 
-/// Returns the declaration of a command on a clocked line that the conversation `Reader` executes, which is constructed
+/// Returns the declaration of a command on a clocked line. The conversation `Reader` executes it, and is constructed
 /// from the format.
 template <const auto& unit_report, class Reader = ReadClocked<ReportedProtocol<unit_report>>>
 [[nodiscard]] constexpr CommandOf<ReportedProtocol<unit_report>> clocked_reading(const Command& info) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of the engine and the device of clocked lines, with a counter as protocol: the first byte of a transfer is the
-// number of bytes that follow.
+// Tests of the engine and the device of clocked lines, with a toy protocol: the first byte of each transfer decides
+// whether another transfer follows, and how many clocks that has.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -32,7 +32,8 @@ struct Toy {
   static Reading reading(const Format&, const Reply& reply) { return {.singleturn = reply, .singleturn_bits = 8}; }
 };
 
-/// A host whose second transfer has as many bytes as the first byte of the first transfer states.
+/// A host that adds transfers until there are more than the first byte of the last one states. Each added transfer has
+/// 16 clocks more than that byte states.
 class Host final : public ClockedHostOf<Toy> {
  public:
   explicit Host(const Toy::Format& format) : ClockedHostOf(format) {}
@@ -122,7 +123,7 @@ TEST(ClockedEngine, EndsIfStorageIsTooSmall) {
   EXPECT_EQ(few.reading(), nullptr);
   EXPECT_EQ(few.exchange().received.size(), 2u);
 
-  Host many({.first_clocks = 25});  // 25 clocks need four bytes of storage
+  Host many({.first_clocks = 25});  // 25 clocks need four bytes, and the storage has three
   EXPECT_EQ(run(many, {}), "done");
   EXPECT_EQ(many.error(), Error::invalid_argument);
   Host silent({.first_clocks = 24});

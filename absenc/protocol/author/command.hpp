@@ -76,10 +76,10 @@ struct Report {
   /// own. Null: none.
   Explanation (*explain)(const Format&, Error, Items request, Items reply) = nullptr;
   /// Returns the explanation of the error of a conversation that ended, for units in which only the conversation knows
-  /// the reason. If set, it replaces `explain` there.
+  /// the reason. If set, it replaces `explain` for conversations.
   Explanation (*explain_host)(const Host&) = nullptr;
   /// Writes the explanation of a failed last exchange of `host` into the sentence, for units that put explanations
-  /// together from parts. If set, it replaces `explain` for conversations.
+  /// together from parts. If set, it replaces the detail that `explain` gives for conversations.
   void (*tell)(Sentence&, const Host& host) = nullptr;
   /// Advice for the error that the line is never silent.
   std::string_view noise_advice = endless_noise.advice;
@@ -210,7 +210,8 @@ struct CommandOf {
   /// Returns the request that does the work of the command, although a procedure may send more. It returns an error, or
   /// a request that P::encode refuses, if the arguments allow none. Null: the requests are not known beforehand.
   Result<Request> (*request)(const Format&, Arguments);
-  /// Constructs the conversation of the command in storage of at least `size` bytes, plus coroutine frames.
+  /// Constructs the conversation of the command at the start of the storage, which has at least `size` bytes; the rest
+  /// holds coroutine frames.
   Any<Conversation> (*make)(const Format&, Arguments, std::span<std::byte>);
   std::size_t size;  ///< bytes of storage that the conversation needs, without the frames of coroutines
   /// Returns why an encoder of this format lacks the command; "": it has the command. Null: every encoder has it.

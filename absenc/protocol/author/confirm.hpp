@@ -21,7 +21,7 @@ class ReadConfirmed : public HostOf<P> {
     this->ask(request);
   }
   [[nodiscard]] const Reading* reading() const final {
-    return reading_.singleturn_bits != 0 ? &reading_ : nullptr;  // only after a good end
+    return reading_.singleturn_bits != 0 ? &reading_ : nullptr;  // `reading_` is set only if no error occurred
   }
 
  private:

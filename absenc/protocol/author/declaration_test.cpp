@@ -287,7 +287,8 @@ TEST(Declaration, SizesReplies) {
   EXPECT_EQ(end.size, 9u);
 }
 
-// In a declaration with a `decode` of its own, nothing is known about requests.
+// A declaration with a `decode` of its own makes a Unit that does not know which requests are answered, or their
+// pauses.
 TEST(Declaration, DecodesByItself) {
   NoFields sink;
   constexpr Unit made = Descriptor<decoding>::make();

@@ -8,7 +8,7 @@ namespace absenc::author {
 
 namespace {
 constexpr std::string_view turn_rule = "request during the encoder's transmission";
-// Shortest timeout of a host that talks to a virtual encoder: a pseudo-terminal delays the bytes by this time.
+// Shortest time that a host is assumed to wait for a reply: a pseudo-terminal alone delays the bytes by this time.
 constexpr Time least_patience = std::chrono::milliseconds(1);
 // Greatest number of consecutive replies during which the host may send without a violation, because a delay of this
 // program can explain it.
@@ -77,7 +77,7 @@ void Responder::damage(Time at) {
   refusing_ = is_refused(Flaw::damaged, request_) || refusing_;
 }
 
-// Handles silence of the line, which ends an incomplete request.
+// Handles silence of the line, which ends an incomplete request. A request that was refused is answered now.
 void Responder::end_run(Time at) {
   reply_.clear();
   if (is_on(at) && !transmitting_) {
@@ -124,8 +124,9 @@ void Responder::search_again(Time at) {
   for (const std::uint8_t byte : heard.view().subspan(1)) receive_byte(byte, at);
 }
 
-// Handles a byte received while the encoder sends, which breaks a rule. It is excused if this program was delayed so
-// long that the host may have repeated the request after its timeout: longer than the host waits for each request.
+// Handles a byte received while the encoder sends. A request breaks a rule then. It is excused, in at most
+// `most_excuses` consecutive replies, if this program was delayed so long that the host may have repeated the request
+// after its timeout: longer than the host waits for each request.
 void Responder::receive_while_transmitting(std::uint8_t byte, Time at) {
   if (!interruption_.begins_request(request_size({&byte, 1}), at, times_.character)) return;
   ++interrupted_;

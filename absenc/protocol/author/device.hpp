@@ -48,8 +48,8 @@ class Responder : public EncoderOn<std::uint8_t> {
   void transmit(Bytes bytes, Time at);
   /// Returns whether the encoder is sending, or is about to send a reply.
   [[nodiscard]] bool is_transmitting() const { return transmitting_; }
-  /// Returns the earliest time at which bytes delivered at `at` may have arrived, because the carrier may have been
-  /// delayed. Times that a host must wait are measured from this time.
+  /// Returns the earliest time at which bytes delivered at `at` may have arrived, because the program that delivers
+  /// them may have been delayed. Times that a host must wait are measured from this time.
   [[nodiscard]] Time earliest(Time at) const { return at - late_; }
 
   /// Returns the length of the request that begins with the bytes `begin`, or how many bytes are needed to know the
@@ -105,9 +105,9 @@ class Responder : public EncoderOn<std::uint8_t> {
   ByteBuffer<64> reply_;
   Time reply_at_{};
   Time longer_{};
-  ByteBuffer<64> stored_;                // bytes received during the transmission
-  unsigned interrupted_ = 0;             // requests received during the transmission
-  unsigned interruptions_in_a_row_ = 0;  // consecutive transmissions during which requests were received
+  ByteBuffer<64> stored_;                // bytes received during the present transmission, if they are kept
+  unsigned interrupted_ = 0;             // number of requests received during the present transmission
+  unsigned interruptions_in_a_row_ = 0;  // number of consecutive transmissions during which requests were received
   bool reply_pending_ = false;
   bool transmitting_ = false;
   Interruption interruption_;

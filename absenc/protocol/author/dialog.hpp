@@ -47,9 +47,9 @@ class HostOf : public Engine {
   [[nodiscard]] const Format& format() const { return format_; }
   /// Returns the last request.
   [[nodiscard]] const Request& request() const { return request_; }
-  /// Returns the last valid reply.
+  /// Returns the last valid reply; an empty one if there was none.
   [[nodiscard]] const Reply& last() const { return last_; }
-  /// Returns the position in the last valid reply, with the times of its exchange.
+  /// Returns position and turns in the last valid reply, with the times of its exchange.
   [[nodiscard]] Reading last_reading() const {
     Reading reading = P::reading(format_, request_, last_);
     reading.latched = P::latched(format_, sent_at());
@@ -103,20 +103,22 @@ class ReadPosition : public HostOf<P> {
   }
   /// Returns the position that is the result; null after an error, or if there is none.
   [[nodiscard]] const Reading* reading() const final {
-    return reading_.singleturn_bits + reading_.multiturn_bits != 0 ? &reading_ : nullptr;  // only after a good end
+    // `reading_` is set only if no error occurred.
+    return reading_.singleturn_bits + reading_.multiturn_bits != 0 ? &reading_ : nullptr;
   }
 
  private:
   void concluded(Error error) final {
-    if (error == Error::none) new (&reading_) Reading(this->last_reading());  // constructed in place, not copied
+    // The reading is constructed in place, because a copy costs time.
+    if (error == Error::none) new (&reading_) Reading(this->last_reading());
     this->finish(error, error == Error::none ? Time{} : this->manner().hold);
   }
 
   Reading reading_{};
 };
 
-/// A conversation that a procedure (a coroutine) controls: the procedure awaits replies to its requests, and its frames
-/// are in the given storage.
+/// A conversation that a procedure (a coroutine) controls: the procedure awaits replies to its requests. The coroutine
+/// frames are in storage that the constructor gets.
 template <class P>
 class DialogOf : public HostOf<P>, public Routine {
  public:
@@ -219,7 +221,7 @@ class DialogOf : public HostOf<P>, public Routine {
   }
   /// Result of awaiting `heard`: bytes received while listening, or the end of the time.
   struct Heard {
-    /// Received bytes, valid until the next await; empty, while not `over`: a damaged character was received.
+    /// Received bytes, valid until the next await. Empty although `over` is false: a damaged character was received.
     Bytes bytes{};
     bool over = false;  ///< whether the time of `listen` is over
   };
@@ -293,7 +295,7 @@ class DialogOf : public HostOf<P>, public Routine {
   Error failure_ = Error::none;
   Heard heard_{};
   bool must_ = false;
-  bool changing_ = false;  // the present request changes the encoder if it is executed
+  bool changing_ = false;  // whether the present request changes the encoder if it is executed
   bool restores_ = false;
   bool aborted_ = false;
 };
@@ -310,8 +312,8 @@ struct ProcedureDialog<P> {
 };
 }  // namespace detail
 
-/// Type of the dialog of a protocol's procedures: `P::Dialog` if the protocol has it, because it does not answer each
-/// request with one reply; otherwise DialogOf. `P::Dialog` is an Engine and Routine constructed from (format, arena).
+/// Type of the dialog of a protocol's procedures: `P::Dialog` if the protocol declares it, because its requests do not
+/// have one reply each; otherwise DialogOf. `P::Dialog` is an Engine and Routine constructed from (format, arena).
 template <class P>
 using ProcedureDialog = typename detail::ProcedureDialog<P>::Type;
 
@@ -337,7 +339,7 @@ class Run : public ProcedureDialog<P> {
   [[nodiscard]] const Found& found() const { return found_; }
   /// Returns the counts of a procedure that streams; null: it ends by itself.
   [[nodiscard]] const StreamCounts* stream() const final { return goes_on ? &counts_ : ProcedureDialog<P>::stream(); }
-  /// Returns whether the procedure streams, and so sends a request for each result.
+  /// Returns whether `Found` has a member `streams`; the procedure then sends a request for each result.
   [[nodiscard]] bool asks() const final { return goes_on; }
   /// Returns the position that is the result; null after an error, or if there is none.
   [[nodiscard]] const Reading* reading() const final {

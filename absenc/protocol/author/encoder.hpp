@@ -38,7 +38,8 @@ class EncoderOn : public Device<Item> {
   [[nodiscard]] std::uint32_t violation_count() const final { return rules_.violation_count(); }
   /// Sets the observer of rule checks; null: none.
   void watch_rules(RuleWatch* watch) final { rules_.watch(watch); }
-  /// Returns how many requests the encoder has answered.
+  /// Returns how many answers the encoder has given: replies, unsolicited transmissions, and requests executed without
+  /// a reply.
   [[nodiscard]] std::uint64_t answer_count() const final { return answer_count_; }
 
  protected:
@@ -69,7 +70,7 @@ class EncoderOn : public Device<Item> {
   [[nodiscard]] std::uint32_t raised() const { return raised_; }
   /// Increments `memory_version`; to be called after each change of the memory.
   void change_memory() { ++memory_version_; }
-  /// Counts an answered request.
+  /// Counts an answer; see `answer_count`.
   void count_answer() { ++answer_count_; }
 
   /// Is called after the start-up of the encoder has ended, with the time of that end.

@@ -43,11 +43,13 @@ void Engine::finish(Error error, Time hold) {
 // ---- Steps
 
 ByteStep Engine::next(Time now) {
-  // A function makes the step, because the compiler would first zero a variable by a call.
+  // A lambda makes the step, because for a plain variable the compiler would call a function that first fills it with
+  // zeros.
   ByteStep step = [this]() -> ByteStep {
     return {.expect = due_, .at = never, .answer = manner_.answer_limit, .gap = times_.gap_limit};
   }();
-  if (state_ == State::receiving) return step;  // the rest is left out: between two characters there is little time
+  // While a reply is received, the checks below are left out: between two characters there is little time.
+  if (state_ == State::receiving) return step;
   step.expect = 0;
   // The traffic before this conversation is unknown, so pauses are measured from now.
   if (!started_) received_at_ = now;
@@ -74,7 +76,7 @@ void Engine::wake(Time now) {
     if (state_ == State::listening && earliest_ == never) earliest_ = now + listening_;
     if (now < earliest_) return;
     if (state_ == State::listening) received_at_ = earliest_;
-    state_ = State::over;  // unless the subclass continues
+    state_ = State::over;  // the conversation ends, unless `woken` continues it
     woken();
   }
 }
@@ -149,7 +151,7 @@ void Engine::end_noise(State before) {
   if (is_awaited() || (before == State::ready && state_ == State::ready)) {
     conclude();
   } else if (state_ != State::sending) {
-    item_received_ = noisy_ = false;  // the valid reply has ended the exchange
+    item_received_ = noisy_ = false;  // a valid reply has ended the exchange, so this noise does not matter
   }
 }
 
@@ -178,7 +180,8 @@ void Engine::conclude() {
     if (disturbed_) return conclude_with(Error::bad_framing);
     return conclude_with(manner_.any_reply ? Error::none : Error::timeout);
   }
-  // Some of the received bytes do not belong to this reply.
+  // After damaged or early characters, or on a line that is never silent, some of the received bytes do not belong to
+  // the reply.
   if (disturbed_ || noisy_) return conclude_with(Error::wrong_length);
   conclude_with(manner_.any_reply ? Error::none : check());
 }
@@ -188,7 +191,7 @@ void Engine::conclude_with(Error error) {
     --manner_.repeats;
     return start(received_at_ + manner_.pause);
   }
-  state_ = State::over;  // unless the subclass continues
+  state_ = State::over;  // the conversation ends, unless `concluded` continues it
   concluded(error);
 }
 

@@ -43,7 +43,7 @@ struct Manner {
 /// class from a protocol. CAN and clocked lines have engines of their own, because replies end differently there.
 ///
 /// After an invalid reply the engine waits for silence before it ends or sends again: sending while an encoder sends
-/// can destroy the encoder's driver. A valid reply ends the exchange at once.
+/// can destroy the encoder's driver. A valid reply ends the exchange at once, unless Manner demands silence after it.
 class Engine : public Conversation<std::uint8_t> {
  public:
   /// Not copyable: requests and replies are views into the conversation itself.
@@ -63,7 +63,7 @@ class Engine : public Conversation<std::uint8_t> {
 
   /// Returns the time at which the last request began; an SPI device answers with its state at that time.
   [[nodiscard]] Time begun_at() const { return begun_at_; }
-  /// Returns the time at which the last bit of the last request was sent.
+  /// Returns the time at which the last bit of the last request was sent; for a pulse, the time at which it began.
   [[nodiscard]] Time sent_at() const { return sent_at_; }
   /// Returns the time at which the last byte was received, or the last request ended, whichever is later.
   [[nodiscard]] Time received_at() const { return received_at_; }
@@ -108,7 +108,7 @@ class Engine : public Conversation<std::uint8_t> {
   /// Checks the complete reply in `reply()`, and stores its content if it is valid. Returns the first error, or none.
   [[nodiscard]] virtual Error check() = 0;
   /// Returns whether a reply with this error is complete, as a refusal is, so that nothing follows it. After any other
-  /// error more bytes may follow, which must not meet the next request.
+  /// error more bytes may follow, which must not collide with the next request.
   [[nodiscard]] virtual bool is_whole(Error error) const = 0;
   /// Handles the end of an exchange. `error`: none, or the error of the last repetition. Calls `send`, `sleep`,
   /// `listen` or `finish`.

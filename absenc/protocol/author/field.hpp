@@ -42,7 +42,7 @@ T held_by(const std::optional<T>&);
 template <auto member>
 using Held = decltype(held_by(shown_by(member)));
 
-/// Returns the kind of field for a value of this type.
+/// Returns the kind of field for a value of the type `T`.
 template <class T>
 constexpr FieldInfo::Kind kind_of() {
   if (std::is_same_v<T, bool>) return FieldInfo::Kind::boolean;

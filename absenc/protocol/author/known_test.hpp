@@ -11,8 +11,8 @@
 
 namespace absenc::author::testing {
 
-/// Returns as text the request of a conversation, the time of its end and its result, for a `reply` that is delivered
-/// in one piece or byte by byte and followed by silence.
+/// Runs a conversation whose requests are answered with `reply`, in one piece if `whole`, otherwise byte by byte, and
+/// then silence. Returns the bytes of its requests.
 template <class Reader>
 std::vector<std::vector<std::uint8_t>> talk(Reader& reader, const std::vector<std::uint8_t>& reply, bool whole) {
   using Kind = Event<std::uint8_t>::Kind;
@@ -37,7 +37,8 @@ std::vector<std::vector<std::uint8_t>> talk(Reader& reader, const std::vector<st
   return sent;
 }
 
-/// Compares both readers for a valid reply, for the reply with each of its bits wrong, and for each incomplete reply.
+/// Expects that ReadKnownPosition and ReadPosition give the same result for the valid reply `good`, for the reply with
+/// each of its bits wrong, and for each incomplete reply.
 template <class P, const typename P::Format& format, const typename P::Request& request>
 void expect_known_as_any(const std::vector<std::uint8_t>& good) {
   std::vector<std::vector<std::uint8_t>> replies{good};

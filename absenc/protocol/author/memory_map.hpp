@@ -19,7 +19,7 @@ namespace absenc::author {
   return area == areas.end() ? nullptr : &*area;
 }
 
-/// Returns whether any of the areas is on this page.
+/// Returns whether any of the areas includes the page `page`.
 [[nodiscard]] constexpr bool has_page(std::span<const MemoryArea> areas, unsigned page) {
   return std::any_of(areas.begin(), areas.end(), [&](const MemoryArea& each) { return page - each.page < each.pages; });
 }

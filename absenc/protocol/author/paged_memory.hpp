@@ -25,7 +25,8 @@ struct PagedMemory {
   Time fetch_time{};
   /// Whether page changes and writes exclude each other: only one of the two busy times runs, that of the last change.
   bool exclusive = true;
-  /// Returns whether the byte is read and written at once, without busy time or fetching. Null: no byte is.
+  /// Returns whether the byte at `address` of `page` is read and written at once, without busy time or fetching. Null:
+  /// no byte is.
   bool (*is_immediate)(unsigned page, unsigned address) = nullptr;
   std::string_view page_rule;          ///< Rule for the host: access waits for `page_time`.
   std::string_view write_rule;         ///< Rule for the host: a write waits for `write_time`.
@@ -61,12 +62,13 @@ class PagedMemoryDevice : public Responder {
   /// Executes a request that was received at `at`, and returns the content of the reply; nothing if no area has the
   /// byte, or if it is not writable. Busy times are measured from `since`, which may be earlier than `at`.
   std::optional<MemoryAnswer> access(const Access& request, Time at, Time since);
-  /// Returns whether the request can be executed: an area has the byte, writable if it is written, or has the page to
-  /// be selected.
+  /// Returns whether the request can be executed: an area has the byte (a writable area, to write it), or has the page
+  /// that is to be selected. The selected page can always be read.
   [[nodiscard]] bool exists(const Access& request) const;
   /// Makes the memory busy until the time `until`, as a write does.
   void write_lasts(Time until);
-  /// Returns the time at which the busy time of the last write ends; 0: nothing was written.
+  /// Returns the time at which the busy time of the last write ends; 0: nothing was written since power on, or since a
+  /// page change that ended the busy time.
   [[nodiscard]] Time written_at() const { return written_at_; }
   /// Selects the start page and ends all busy times; to be called at power on.
   void restart_memory();
@@ -78,7 +80,7 @@ class PagedMemoryDevice : public Responder {
 
   const PagedMemory* memory_;
   std::uint8_t page_ = 0;
-  bool page_changed_ = false;  // since the last page change no access was received after its busy time
+  bool page_changed_ = false;  // no access was received yet after the busy time of the last page change
   Time page_ready_at_{};
   Time written_at_{};                              // end of the busy time of the last write; 0: none
   std::optional<std::uint8_t> refused_address_{};  // address of the last request, if it was a read during a write

@@ -16,7 +16,7 @@
 #include "absenc/core/time.hpp"
 #include "absenc/protocol/conversation.hpp"
 
-// Without optimisation g++ 12 warns in every coroutine that the frame's own operators do not match.
+// Without optimisation g++ 12 warns in every coroutine that the frame's operators new and delete do not match.
 #pragma GCC diagnostic ignored "-Wmismatched-new-delete"
 
 namespace absenc::author {
@@ -133,8 +133,8 @@ struct FrameInRoutine {
   static void* operator new(std::size_t size, Routine& routine, const Parameters&...) noexcept {
     return routine.take(size);
   }
-  /// Does nothing: a part returns its storage to the routine itself, and the storage of the procedure belongs to the
-  /// caller.
+  /// Does nothing: Part::await_resume returns the storage of a part to the routine, and the storage of the procedure
+  /// belongs to the caller.
   static void operator delete(void*, std::size_t) {}
 
   /// Constructs the frame of a coroutine that the routine `carrier` runs.
@@ -152,7 +152,7 @@ struct FrameInRoutine {
 /// Return type of a coroutine that executes a whole command: `Procedure name(Dialog& dialog, Found& found, ...)`. Such
 /// a coroutine ends with `co_return done;` or `co_return {Error::..., "..."};`.
 struct Procedure {
-  /// Functions that the compiler calls for a coroutine of this return type.
+  /// Functions that the compiler calls for a coroutine that returns a Procedure.
   struct promise_type : FrameInRoutine {
     using FrameInRoutine::FrameInRoutine;
     /// Returns the procedure object of the new coroutine.
@@ -171,7 +171,7 @@ struct Procedure {
 /// look(dialog);`. Only one part runs at a time.
 template <class T>
 struct [[nodiscard]] Part {
-  /// Functions that the compiler calls for a coroutine of this return type.
+  /// Functions that the compiler calls for a coroutine that returns a Part.
   struct promise_type : FrameInRoutine {
     using FrameInRoutine::FrameInRoutine;
     /// Returns the part object of the new coroutine.

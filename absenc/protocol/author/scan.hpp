@@ -13,7 +13,8 @@ namespace absenc::author {
 template <std::size_t addresses>
 struct Nodes {
   std::array<bool, addresses> there{};  ///< Whether an encoder answered, for each address.
-  /// Whether every answer was damaged, for each address: two encoders share the address, or the line is bad.
+  /// Whether no answer was valid and at least one was damaged, for each address: two encoders share the address, or the
+  /// line is bad.
   std::array<bool, addresses> clash{};
 };
 

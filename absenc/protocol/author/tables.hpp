@@ -78,7 +78,7 @@ struct Tables {
       const ModelText& text = declared.models[i];
       const std::size_t size = values_of(text).size();
       made[i] = {text.name, text.meaning, text.maximum_rpm, {}};
-      // G++ 12 cannot make a view of an empty buffer.
+      // G++ 12 cannot make a view of an empty buffer at compile time.
       if (size != 0) made[i].values = model_values.view().subspan(first, size);
       first += size;
     }

@@ -29,9 +29,9 @@ struct VectorText {
 /// Reports a wrong text of fields: it is neither constexpr nor defined, so a call at compile time is an error whose
 /// message contains the function's name.
 void fields_of_a_vector_are_name_equals_value_or_the_name_of_an_error();
-/// Is never defined: its name is the error of the compiler.
+/// Is declared but never defined: a call at compile time is an error whose message contains this function's name.
 void a_frame_of_a_vector_is_hexadecimal_and_has_at_most_128_bytes();
-/// Is never defined: its name is the error of the compiler.
+/// Is declared but never defined: a call at compile time is an error whose message contains this function's name.
 void this_model_has_an_option_or_a_value_that_the_unit_does_not_have();
 
 /// Calls `take(name, value)` for each "name=value" of a text until it returns false. Returns whether the whole text has
@@ -39,7 +39,7 @@ void this_model_has_an_option_or_a_value_that_the_unit_does_not_have();
 template <class Take>
 constexpr bool for_each_value(std::string_view text, Take&& take) {
   while (!text.empty()) {
-    const std::size_t equals = text.find('=');  // npos if this is the last value
+    const std::size_t equals = text.find('=');  // npos: there is no equals sign, which is refused below
     const std::size_t next = text.find('=', equals + 1);
     const std::size_t end = next == std::string_view::npos ? text.size() : text.rfind(' ', next);
     if (end < equals || end > text.size()) return false;
@@ -55,7 +55,7 @@ constexpr bool to_real(std::string_view text, double& number) {
   const bool negative = text.starts_with('-');
   if (negative) text.remove_prefix(1);
   std::int64_t digits = 0;
-  long double divisor = 0;  // 0: no point yet
+  long double divisor = 0;  // power of ten by which the digits are divided; 0: no point yet
   for (const char c : text) {
     if (c == '.' && divisor == 0) {
       divisor = 1;
@@ -67,7 +67,7 @@ constexpr bool to_real(std::string_view text, double& number) {
     }
   }
   if (divisor == 0) return false;
-  // Divided as long double, so that the value is rounded only once.
+  // Divided as long double, because the digits may need more bits than a double has.
   number = static_cast<double>(static_cast<long double>(negative ? -digits : digits) / divisor);
   return true;
 }

@@ -155,7 +155,8 @@ struct Descriptor {
     return P::request_size(declared.format(values), begin);
   }
 
-  /// Returns the length in bytes of the reply that begins with the bytes `begin`; 0 if no reply does.
+  /// Returns the length in bytes of the reply that begins with the bytes `begin`, 0 if no reply does; always
+  /// P::longest_reply if the declaration has no `reply_size`.
   static constexpr std::size_t reply_size(const Options& values, Bytes begin) {
     if constexpr (declared.reply_size != nullptr) {
       return declared.reply_size(declared.format(values), begin);
@@ -216,7 +217,8 @@ struct Descriptor {
   /// Returns the settings of the line with these options.
   static constexpr LineSettings settings(const Options& values) { return line_of(declared.format(values)); }
 
-  /// Returns whether the encoder answers a request, as Protocol::manner states; true for an invalid request.
+  /// Returns whether the encoder answers a request, as Protocol::manner states; false if any reply is accepted, true
+  /// for an invalid request.
   static bool is_answered(const Options& values, Frame asked) {
     const Format f = declared.format(values);
     const Result<Request> request = P::decode_request(f, asked.bytes);
@@ -241,7 +243,7 @@ struct Descriptor {
     }
   }
 
-  /// Returns the document's explanation of a reply that is refused with `error`.
+  /// Returns the document's explanation of an invalid reply, whose error is `error`.
   static Explanation explain(const Options& values, Error error, Frame asked, Frame reply) {
     return declared.report.explain(declared.format(values), error, items(asked), items(reply));
   }

@@ -26,7 +26,7 @@ using Numbers = std::map<std::string, std::int64_t>;
 
 inline Wire wire(Bytes bytes) { return {bytes.begin(), bytes.end()}; }
 
-/// Result and fields of a command. Real numbers are rounded and stored with the integers.
+/// Result and fields of a command. Real numbers are truncated to integers and stored with them.
 struct RunResult : FieldSink {
   void put(const FieldValue& value) override {
     const std::string name(value.info->name);
@@ -55,7 +55,7 @@ struct RunResult : FieldSink {
   Time received_at{};
   bool finished = false;
   unsigned emits = 0;
-  std::uint64_t frames = 0;  // number of requests that the encoder answered
+  std::uint64_t frames = 0;  // number of answers that the encoder gave during the command
   Time took{};
 };
 
@@ -81,7 +81,7 @@ Options options_of(const Declared& declared, const Format& format) {
   return options;
 }
 
-/// Returns the rules that a virtual encoder reports as broken, in order of time.
+/// Collects the rules that a virtual encoder reports as broken, in order of time.
 struct BrokenRules final : RuleWatch {
   void looked(std::string_view rule, bool kept) override {
     if (!kept) rules.emplace_back(rule);
@@ -89,7 +89,7 @@ struct BrokenRules final : RuleWatch {
   std::vector<std::string> rules;
 };
 
-/// A conversation for a command of a unit, with its storage; trailing arguments may be left out.
+/// A conversation for a command of a unit, with its storage. Arguments left out at the end have their default values.
 template <class Item>
 class Talk {
  public:
@@ -109,11 +109,11 @@ class Talk {
   Conversation<Item>* made_ = nullptr;
 };
 
-/// Function that changes frame number n (from 0) that the encoder receives or sends. A sent frame without bytes is
-/// lost.
+/// Function that changes the bytes of number n (from 0) of the `received` events, or of the sent frames, of the
+/// encoder. A sent frame that it leaves without bytes is lost.
 using Tamper = std::function<void(unsigned nth, Wire& bytes)>;
 
-/// Functions that change the frames that the encoder receives and sends; by default none is changed.
+/// A virtual encoder with functions that change the bytes that it receives and sends; by default none is changed.
 class Tampered final : public Machine<std::uint8_t> {
  public:
   explicit Tampered(Machine<std::uint8_t>& encoder) : encoder_(encoder) {}
@@ -159,7 +159,7 @@ struct HostedLine : sim::Line<std::uint8_t> {
     if (node) return replace(*node, host);
     node = attach(sim::NodeRole::host, host, [this] { return !on_emit || on_emit(); });
   }
-  /// Runs a host, and returns whether its conversation ended.
+  /// Runs a host, and returns whether its conversation ended within 60 s of virtual time.
   bool converse(Machine<std::uint8_t>& host) {
     put_on(host);
     const bool ended = run(*node, now() + 60s);
@@ -188,8 +188,8 @@ struct UnitBench {
     line.attach(sim::NodeRole::device, tampered);
   }
 
-  /// Runs a command of the unit to its end with these `options`, one that streams to its first result. `on_emit` is
-  /// called at every emit.
+  /// Runs a command of the unit to its end with these `options`; one that sends a request for each result without end,
+  /// only to its first result. `on_emit` is called at every emit.
   RunResult run(std::string_view name, const std::vector<std::int64_t>& arguments = {}, const OnEmit& on_emit = {}) {
     const Talk<std::uint8_t> talk(unit, options, name, arguments);
     return run(*talk, on_emit);

@@ -30,7 +30,7 @@ TEST(ModbusFrame, RecognizesCrcOfOtherByteOrder) {
   EXPECT_EQ(crc_order({}), CrcOrder::wrong);
 }
 
-// S 6.2.2: errors that the checksum must detect at these lengths.
+// S 6.2.2: the checksum must detect one wrong bit, or two, anywhere in a frame of this length.
 TEST(ModbusFrame, DetectsAnyTwoWrongBits) {
   const std::vector<std::uint8_t> good(hex<"010304001fabcd7550">.begin(), hex<"010304001fabcd7550">.end());
   for (std::size_t one = 0; one < good.size() * 8; ++one) {
@@ -62,7 +62,7 @@ TEST(ModbusFrame, ExplainsEachRefusalCode) {
 }
 
 TEST(ModbusTiming, SilencesShrinkWithCharactersUpTo19200) {
-  EXPECT_EQ(frame_silence({.rate = 2400}), Time(14'583'334));  // 35 bits
+  EXPECT_EQ(frame_silence({.rate = 2400}), Time(14'583'334));  // 3.5 characters of 10 bits
   EXPECT_EQ(character_gap({.rate = 2400}), Time(6'250'000));
   EXPECT_EQ(frame_silence({.rate = 19'200}).count() / 1000, 1822);
   EXPECT_EQ(frame_silence({.rate = 57'600}), Time(1'750'000));

@@ -20,7 +20,8 @@ using Wire = std::vector<std::uint8_t>;
 constexpr LineSettings line_settings{.rate = 19'200};
 const Time character = line_settings.character();
 
-/// A server at address 7: answers function 03 with two fixed bytes, refuses 04, and changes its rate after function 41.
+/// A server at address 7: answers with two fixed bytes, but refuses function 04, and changes its rate after function
+/// 41.
 class ToyServer final : public Server {
  public:
   ToyServer() : Server(line_settings) {}
@@ -43,7 +44,7 @@ class ToyServer final : public Server {
   }
 };
 
-/// A client that sends the same frame `count` times.
+/// A client that sends the same frame `count` times, or until an error occurs.
 class ToyClient final : public author::Engine {
  public:
   explicit ToyClient(Bytes body, unsigned count = 1, std::uint32_t rate = line_settings.rate)
@@ -190,7 +191,7 @@ class PausingHost final : public Machine<std::uint8_t> {
 };
 
 TEST(ModbusLine, ServerReportsGapsInsideFrame) {
-  const std::tuple<int, Wire, std::string_view> rows[]{// the pause makes two frames, which are both invalid
+  const std::tuple<int, Wire, std::string_view> rows[]{// 4 characters of pause make two invalid frames
                                                        {1, good_reply, ""},
                                                        {2, good_reply, "1.5 characters"},
                                                        {4, {}, ""}};
@@ -206,7 +207,8 @@ TEST(ModbusLine, ServerReportsGapsInsideFrame) {
 TEST(ModbusLine, ServerReportsRequestThatComesTooSoon) {
   Bench bench;
   bench.raw(good_request);
-  bench.raw(good_request, {}, 50ms, 1us);  // the exchange ends as soon as the reply is complete
+  // The gap limit of 1 us ends the exchange as soon as the reply is complete.
+  bench.raw(good_request, {}, 50ms, 1us);
   EXPECT_EQ(bench.server.violation_count(), 0u) << "the one before waited 3 ms";
   EXPECT_EQ(bench.raw(good_request, character), good_reply);
   EXPECT_TRUE(says(bench.broken_rule(), "3.5 characters"));
@@ -222,7 +224,7 @@ TEST(ModbusLine, LateServerReportsNoMissingSilence) {
       server.feed({.kind = Kind::received, .at = 50ms, .items = good_request});
       Time now = 50ms + frame_silence(line_settings) + late;
       server.feed({.kind = Kind::silence, .at = now});
-      static_cast<void>(server.next(now));  // processes the configure step
+      static_cast<void>(server.next(now));  // takes the configure step that power on requested
       ASSERT_EQ(server.answer_count(), 1u);
       if (replied) server.feed({.kind = Kind::sent, .at = now});
       server.feed({.kind = Kind::received, .at = now + 100us, .items = good_request});

@@ -40,7 +40,7 @@ ByteStep Server::next(Time) {
   }
   ByteStep step{.at = never};
   if (!frame_.empty() || damaged_) step.gap = frame_silence(line_);
-  // The frame is not complete yet, so at least one more byte is expected.
+  // Until its last two bytes are its CRC, the frame is not complete, so at least one more byte is expected.
   if (!frame_.empty() && crc_order(frame_) != CrcOrder::low_first) step.expect = 1;
   return step;
 }
@@ -90,7 +90,8 @@ void Server::receive(const ByteEvent& event) {
 }
 
 void Server::frame_ended(Time at) {
-  // A real line reports the silence in time; a pseudo-terminal only when this program is scheduled.
+  // A real line reports the silence in time; a pseudo-terminal reports it when this program is scheduled, which may be
+  // late.
   ended_late_ = at - quiet_since_ > frame_silence(line_) + late;
   if (!damaged_ && crc_order(frame_) == CrcOrder::low_first) {
     reply_.clear();

@@ -71,7 +71,8 @@ class Server : public Device<std::uint8_t> {
   bool began_too_soon_ = false;   // the silence before the present frame was shorter than 3.5 characters
   bool has_gap_ = false;          // two characters of the present frame were more than 1.5 characters apart
   bool line_was_used_ = false;    // anything was received or sent since power on
-  bool ended_late_ = false;       // the last frame ended so long ago that its client may have timed out
+  // The silence after the last frame was reported so late that the client may have timed out.
+  bool ended_late_ = false;
   bool expects_collision_ = false;
   Time quiet_since_{};
   FrameBytes reply_;

@@ -15,19 +15,19 @@ using namespace std::chrono_literals;
 /// Above this baud rate the silences are constant instead of a number of characters.
 inline constexpr std::uint32_t fixed_times_above = 19'200;
 
-/// Returns the silence that ends a frame, which is also the shortest between two frames: 3.5 characters. `rate` of the
-/// line must not be 0.
+/// Returns the silence that ends a frame, which is also the shortest between two frames: 3.5 characters, or 1750 us at
+/// high rates. `rate` of the line must not be 0.
 [[nodiscard]] constexpr Time frame_silence(const LineSettings& line) {
   return line.rate > fixed_times_above ? 1750us : line.character() * 7 / 2;
 }
 
-/// Returns the silence that a client keeps before a request: 4 characters, because some servers measure slightly too
-/// long.
+/// Returns the silence that a client keeps before a request: half a character more than `frame_silence`, because some
+/// servers measure slightly too long.
 [[nodiscard]] constexpr Time request_silence(const LineSettings& line) {
   return frame_silence(line) + line.character() / 2;
 }
 
-/// Returns 1.5 characters: the longest silence between two characters of a frame.
+/// Returns the longest silence between two characters of a frame: 1.5 characters, or 750 us at high rates.
 [[nodiscard]] constexpr Time character_gap(const LineSettings& line) {
   return line.rate > fixed_times_above ? 750us : line.character() * 3 / 2;
 }
@@ -37,7 +37,8 @@ inline constexpr std::uint32_t fixed_times_above = 19'200;
   return {.answer_limit = answer_limit + line.character(),
           .gap_limit = frame_silence(line),
           .silence = request_silence(line),
-          .patience = 1s};  // longer than any reply, and longer than the delay with which an adapter reports silence
+          // This is longer than any reply, and longer than the delay with which an adapter reports silence.
+          .patience = 1s};
 }
 
 }  // namespace absenc::modbus

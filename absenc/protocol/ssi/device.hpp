@@ -28,7 +28,7 @@ class VirtualEncoder final : public author::ClockedDevice {
   const Shaft* shaft_;
   Word latched_{};
   std::size_t shifted_ = 0;  // number of bits of `latched_` that were clocked out
-  Time free_at_{};           // end of the pause after the last clock
+  Time free_at_{};           // end of the monoflop time after the last clock
 };
 
 }  // namespace absenc::ssi

@@ -19,8 +19,8 @@ using namespace std::chrono_literals;
 inline constexpr LineSettings line_settings{.rate = 200'000, .spi_mode = 3, .idle_clocks = 1};
 inline constexpr Time pause_margin = 10us;  ///< Time that the host adds to the pause between two words.
 
-/// Bits that the encoder sends if the clock continues after the word: the word again, zeros, ones, or the word
-/// separated.
+/// Bits that the encoder sends if the clock continues after the word: the word again, zeros, ones, or a zero and the
+/// word again.
 enum class AfterWord : std::uint8_t {
   repeat,
   zero,
@@ -32,7 +32,8 @@ enum class AfterWord : std::uint8_t {
 struct Format {
   WordFormat word = "position:12"_word;      ///< Layout of the position word: its fields in the order of the line.
   AfterWord after_word = AfterWord::repeat;  ///< What the encoder sends after its word.
-  /// Number of clocks after the word, to compare the bits; with as many as the word has bits, the word is read twice.
+  /// Number of clocks after the word, whose bits are compared with `after_word`; with as many as the word has bits, the
+  /// word is read twice.
   unsigned extra_clocks = 0;
   Scale scale{};  ///< Whether the encoder is linear, and the length of a count.
   /// Whether the last bit is a parity bit that the encoder inverts if its position is wrong.
@@ -46,7 +47,8 @@ struct Format {
   std::uint32_t clock_khz = 200;  ///< Clock rate in kHz.
   /// Monoflop time Tm of the virtual encoder, at most `pause`; 0: equal to `pause`. Other encoders have 9 to 41 us.
   Time monoflop = 20us;
-  /// Slowest clock that the virtual encoder allows, in kHz. Tcs in the document also gives 250 kHz.
+  /// Slowest clock that the virtual encoder allows, in kHz. The document's Tcs, more than 4 us, is the period of the
+  /// fastest.
   std::uint32_t slowest_khz = 100;
   std::uint32_t fastest_khz = 250;  ///< Fastest clock that the virtual encoder allows, in kHz.
 };
@@ -125,8 +127,9 @@ constexpr Result<typename Source::Word> decode_by(const Source& source, BitView 
 }  // namespace detail
 
 /// Decodes the word in `bits` from `first` on; all further bits must be those that the encoder sends after a word.
-/// Errors: line_stuck (all bits alike although the bits after the word must differ), bad_checksum (parity),
-/// cross_check_failed (wrong bits after the word).
+/// Errors: wrong_length (too few bits), line_stuck (all bits alike although the bits after the word must differ),
+/// bad_checksum (parity), out_of_range (a skipped bit that must be zero is one), cross_check_failed (wrong bits after
+/// the word).
 [[nodiscard]] constexpr Result<Word> decode_clocked_on(const Format& format, BitView bits, std::size_t first = 0) {
   return detail::decode_clocked_on(Given<Format>{format, format.word}, bits, first);
 }
@@ -138,14 +141,15 @@ constexpr Result<typename Source::Word> decode_by(const Source& source, BitView 
   return detail::decode_by(Given<Format>{format, format.word}, bits);
 }
 
-/// Decodes a word whose format is known at compile time, as fast as code written for this format by hand. The result
-/// has the member `values` only if the format has further fields.
+/// Decodes a word whose format is known at compile time, as fast as code written for this format by hand. The array
+/// `values` of the result is empty if the format has no fields with Meaning::value.
 template <const Format& format>
 [[nodiscard]] constexpr Result<typename Known<format>::Word> decode(BitView bits) {
   return detail::decode_by(Known<format>{}, bits);
 }
 
-/// Encodes the word in `word`. With `error_parity`, an error inverts the parity bit.
+/// Appends the encoded `word` to `out`; with `error_parity`, an error inverts the parity bit. Returns false if `out` is
+/// too small.
 template <std::size_t Capacity>
 constexpr bool encode_whole(const Format& format, const Word& word, BitBuffer<Capacity>& out) {
   BitBuffer<Capacity> right;

@@ -27,7 +27,8 @@ TEST(SsiFrame, RejectsTooFewClocks) {
   }
 }
 
-// Paragraph 3.5: 14 clocks of 12 bits, read as one number, are thousands of degrees.
+// Paragraph 3.5: 14 clocks of 12 bits, read as one number, can be thousands of degrees. A number that could be a
+// position has the wrong length.
 TEST(SsiFrame, RejectsTooManyClocks) {
   for (std::uint64_t position = 0; position < 4096; ++position) {
     BitBuffer<64> read;
@@ -39,7 +40,7 @@ TEST(SsiFrame, RejectsTooManyClocks) {
 
 TEST(SsiFrame, ReadingTwiceDetectsAnyWrongBit) {
   const Format format{.extra_clocks = 12};
-  // without extra clocks, the word twice is accepted too
+  // Without extra clocks, the host also accepts the word read twice.
   EXPECT_EQ(decode({}, "000111101111000111101111")->position, 495u);
   std::string text = "000111101111000111101111";
   for (char& c : text) {
@@ -73,7 +74,7 @@ TEST(SsiFrame, ChecksBitsAfterWord) {
   EXPECT_EQ(decode(one, "00011110111101").error(), Error::cross_check_failed);
   EXPECT_EQ(decode(zero, "11111111111111").error(), Error::line_stuck);
   EXPECT_EQ(decode(one, "00000000000000").error(), Error::line_stuck);
-  EXPECT_TRUE(decode(zero, "00000000000000"));  // position 0
+  EXPECT_TRUE(decode(zero, "00000000000000"));  // all bits 0 are the position 0
 }
 
 TEST(SsiFrame, EncodeFailsWithoutRoom) {

@@ -53,7 +53,7 @@ struct Protocol {
 /// Reads one word, and after it the number of bits that `format.extra_clocks` states.
 using ReadPosition = author::ReadClocked<Protocol>;
 
-/// Reads two words and reports the second. Error also: cross_check_failed (the shaft cannot have moved that far).
+/// Reads two words and reports the second. Further error: cross_check_failed (the shaft cannot have moved that far).
 class ConfirmPosition : public author::ClockedHostOf<Protocol> {
  public:
   /// Creates a conversation that reads an encoder of this format twice.

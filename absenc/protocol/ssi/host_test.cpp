@@ -104,7 +104,7 @@ TEST(SsiHost, RejectsSecondWordThatIsTooFarAway) {
   EXPECT_NE(read.reading(), nullptr);
   EXPECT_EQ(bench.encoder.answer_count(), 2u);
 
-  // The shaft moves half a turn between the two words, as on a noisy line.
+  // The shaft moves half a turn between the two words: wrong bits on a noisy line look like this.
   bench.line.observe_transfers([&](const auto&) { bench.shaft.state.position += std::int64_t{1} << 31; });
   ConfirmPosition jumped(format);
   EXPECT_EQ(bench.run(jumped).error(), Error::cross_check_failed);
