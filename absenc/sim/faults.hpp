@@ -97,8 +97,9 @@ class FaultyDevice final : public Machine<std::uint8_t> {
   std::vector<std::uint8_t> reply_;
   std::vector<std::uint8_t> received_;  // received bytes that were passed on to the device
   bool request_damaged_ = false;        // the request was damaged, so the device may answer while the host still sends
-  bool ignores_line_ = false;  // the device receives nothing: a stretched reply, or one to a damaged request, is
-                               // pending or being sent
+  // The device receives nothing while a reply that a fault stretched, or a reply to a damaged request, is pending or
+  // being sent.
+  bool ignores_line_ = false;
   Time last_ignored_at_ = -std::chrono::hours(1);  // time of the last byte received while `ignores_line_`
   Time device_gap_{};                              // pause after which the device considers a request complete
   Time silent_until_ = never;                      // time at which a suppressed reply counts as sent
