@@ -58,7 +58,8 @@ struct Annotation {
   std::optional<Tick> turnaround{};  // ticks from the end of the request to the beginning of its reply
 };
 
-/// Receives annotations in the order of their end times.
+/// Receives annotations in the order of their end times, except that an unanswered request may follow later
+/// annotations, when its reply is no longer expected.
 struct AnnotationSink {
   virtual void put(const Annotation& annotation) = 0;
 
