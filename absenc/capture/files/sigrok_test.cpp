@@ -79,7 +79,7 @@ TEST(Sigrok, OnePieceThatIsLargeComesInParts) {
 }
 
 TEST(Sigrok, SamplesOfThreeBytesAreSpread) {
-  // One piece that is a single block, and one that is read in parts.
+  // The piece of the first session is a single block, that of the second session is read in parts.
   for (const std::size_t count : {std::size_t{1000}, std::size_t{6'000'000}}) {
     const FileBytes samples = wave(3 * count);
     const auto reader = open_bytes(session(sigrok_metadata("1 MHz", 24, 3), {{"logic-1-1", samples}}));
@@ -246,7 +246,7 @@ TEST(Sigrok, ReadsEverythingBeforeACut) {
       const FileBytes file = cut_at(good, size);
       if (size < first + 39) {  // the first piece is completely missing
         const std::string why = problem(file);
-        // Number of bytes needed for all samples: the last byte of deflated data only marks the end.
+        // The last byte of deflated data only marks the end: without it, the data is complete all the same.
         const std::size_t seen = size + (deflate ? 1 : 0);
         EXPECT_NE(why.find("cut off at byte "), std::string::npos) << why;
         EXPECT_NE(why.find(seen < metadata - 30 ? "version:"
@@ -338,7 +338,7 @@ TEST(Sigrok, SamplesOfThreeBytesMayBeCut) {
     EXPECT_EQ(reader->damages().size(), 1u);
     return contents.samples.size() / 4;
   };
-  EXPECT_EQ(count(second - 40), 333u);  // the damage is within the first piece, between its sample 333 and the rest
+  EXPECT_EQ(count(second - 40), 333u);  // the first piece, 333 samples and one byte, loses that byte
   EXPECT_EQ(count(second - 1), 333u);
   EXPECT_EQ(count(second + 1), 333u);
   EXPECT_EQ(count(second + 2), 334u);
