@@ -130,7 +130,7 @@ std::vector<Burst> bursts_until(Tick last, const std::vector<Levels>& parts, con
   return bursts;
 }
 
-// Returns whether the data line changed in each rest between two of the bursts, independently of clock edges.
+// Returns whether the data line changed in each rest between two of the bursts, later than `settle` behind the burst.
 bool changes_in_rests(const std::vector<Burst>& bursts, const std::vector<Levels>& parts, const WireIndices& wires,
                       Tick settle) {
   if (!wires.in || bursts.size() < 2) return false;

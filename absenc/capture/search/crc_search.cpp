@@ -86,7 +86,7 @@ class CrcSearch {
     });
   }
 
-  // Returns how many checksums the frames determine: one for each length of frames, and one for each linearly
+  // Returns how many independent checksums the frames contain: one for each length of frames, and one for each linearly
   // independent difference of frames of equal length.
   [[nodiscard]] double known_checks(const Shape& shape, std::size_t first) {
     Shape plain;
