@@ -91,12 +91,12 @@ struct Block {
   // the previous block, because the data between them is missing.
   Tick first = 0;
   Tick end = 0;                       // tick behind the last tick of the block
-  std::vector<std::uint8_t> samples;  // samples: `bytes_per_sample` bytes each, little endian, channel 0 in bit 0
+  std::vector<std::uint8_t> samples;  // samples, `bytes_per_sample` bytes each, little endian, channel 0 in bit 0
   unsigned bytes_per_sample = 1;      // size of a sample in bytes: 1, 2, 4 or 8
   std::vector<Changes> changes;       // for captures of kind changes: one entry for each channel
   std::vector<Character> bytes;       // for captures of kind bytes: the characters
   std::vector<CanRecord> frames;      // for captures of kind frames: the CAN frames
-  std::uint64_t file_offset = 0;      // offset in the file, used only by the reader between `claim` and `fill`
+  std::uint64_t file_offset = 0;      // place of the block in the file, which only the reader uses, in `fill`
   std::uint64_t file_size = 0;
 };
 

@@ -71,7 +71,7 @@ struct Event {
     /// Device side: chip select or first clock edge. The next step should be the reply that the device drives.
     selected,
     triggered,   ///< device side: a pulse on `wire` has begun
-    line_error,  ///< a character with a wrong stop or parity bit, or sent at another rate, was received
+    line_error,  ///< a damaged character (stop bit, parity, other rate) or CAN frame was received
   };
 
   Kind kind = Kind::timer;        ///< kind of the event

@@ -95,7 +95,7 @@ class FaultyDevice final : public Machine<std::uint8_t> {
 
   std::vector<std::uint8_t> request_;  // bytes received since the last reply
   std::vector<std::uint8_t> reply_;
-  std::vector<std::uint8_t> received_;  // received bytes that were passed on to the device
+  std::vector<std::uint8_t> received_;  // bytes of the last received event as passed on to the device
   bool request_damaged_ = false;        // the request was damaged, so the device may answer while the host still sends
   // The device receives nothing while a reply that a fault stretched, or a reply to a damaged request, is pending or
   // being sent.

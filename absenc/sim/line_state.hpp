@@ -43,16 +43,16 @@ struct Line<Item>::State {
   std::vector<Item> out;               ///< items of the transfer that the node sends
   std::size_t bits = 0;                ///< clocked: number of bits of the transfer
   std::size_t expect = 0;              ///< number of items that the node expects
-  Time width{};                        ///< duration of the pulse
-  std::uint8_t behind_out = 0xFF;      ///< clocked link: byte that the host samples after `out` has ended
-  bool hold_low = false;               ///< clocked: the host holds the clock line low before the transfer
-  Time accepted_at{};                  ///< time at which the machine requested the transfer
-  Time lead{};                         ///< spi: time from chip select to the first clock
-  ExtraWire pulse_wire{};              ///< wire of the pulse
-  Time start{};                        ///< start of the transfer; CAN: start of the frame
-  std::size_t index = 0;               ///< index of the item of `out` that is on the wire
-  std::size_t on_wire = 0;             ///< number of items of `out` that have been, are or will be on the wire
-  Time each{};                         ///< duration of one character
+  Time width{};  ///< `width` of the step: duration of the pulse, or time for which a device drives low
+  std::uint8_t behind_out = 0xFF;  ///< clocked link: byte that the host samples after `out` has ended
+  bool hold_low = false;           ///< clocked: the host holds the clock line low before the transfer
+  Time accepted_at{};              ///< time at which the machine requested the transfer
+  Time lead{};                     ///< spi: time from chip select to the first clock
+  ExtraWire pulse_wire{};          ///< wire of the pulse
+  Time start{};                    ///< start of the transfer; CAN: start of the frame
+  std::size_t index = 0;           ///< index of the item of `out` that is on the wire
+  std::size_t on_wire = 0;         ///< number of items of `out` that have been, are or will be on the wire
+  Time each{};                     ///< duration of one character
 
   /// Returns whether a transfer of this node has begun and has items left to send.
   [[nodiscard]] bool frame_pending() const {

@@ -96,9 +96,9 @@ class Waveform {
   Sink* sink_;
   std::vector<Wire> wires_;
   std::vector<int> drivers_;  // number of active drives of each wire
-  // Changes and comments that the sink has not received yet.
+  // Level changes that the sink has not received yet, the earliest on top.
   std::priority_queue<LevelChange, std::vector<LevelChange>, std::greater<>> changes_;
-  std::vector<Comment> comments_;  // in the order of time
+  std::vector<Comment> comments_;  // comments that the sink has not received, in the order of time
   Time end_{};
 };
 

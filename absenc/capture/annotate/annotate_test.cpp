@@ -301,7 +301,7 @@ TEST(Can, NodesAnswerInAnyOrder) {
   CanAnnotator annotator(unit, {}, {.limit = 1000}, collector);
   annotator.put(record(0, 0x201, 7));
   annotator.put(record(10, 0x202, 8));
-  annotator.put(record(20, 0x102, 9));  // an unsolicited frame of node 2, not the reply
+  annotator.put(record(20, 0x102, 9));  // an unsolicited frame of node 2, not the reply to its request
   annotator.put(record(30, 0x102, 8));
   annotator.put(record(40, 0x101, 7));
   annotator.put(record(50, 0x333, 0));

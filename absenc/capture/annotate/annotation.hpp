@@ -42,7 +42,7 @@ struct Annotation {
     exchange,  // a request and its reply
     request,   // a request without its reply
     reply,     // a reply without its request
-    noise,     // bytes that are neither request nor reply; they are in `reply`
+    noise,     // bytes that are neither request nor reply, stored in the member `reply`
   };
 
   Kind kind = Kind::noise;

@@ -59,7 +59,7 @@ bool is_text_of(std::string_view text, Bytes bytes) {
   std::string letters;
   for (const char c : text) {
     const auto byte = static_cast<unsigned char>(c);
-    if ((byte & 0xC0) != 0x80) letters += byte < 0x80 ? c : '.';  // a UTF-8 sequence is one character
+    if ((byte & 0xC0) != 0x80) letters += byte < 0x80 ? c : '.';  // each UTF-8 sequence counts as one character
   }
   if (letters.empty() || letters.size() > bytes.size()) return false;
   for (std::size_t i = 0; i < letters.size(); ++i) {

@@ -239,7 +239,7 @@ TEST(Sigrok, ReadsEverythingBeforeACut) {
   for (const bool deflate : {true, false}) {
     const FileBytes good = session(sigrok_metadata("1 MHz", 8, 1), pieces, "2", deflate);
     const std::size_t metadata = place_of(good, "metadata");
-    const std::size_t first = place_of(good, "logic-1-1") - 30;  // beginning of the local header before the name
+    const std::size_t first = place_of(good, "logic-1-1") - 30;  // offset of the local header, 30 bytes before the name
     const std::size_t directory = place_of(good, "PK\x01\x02");
     for (std::size_t size = 4; size < good.size(); ++size) {
       SCOPED_TRACE(size);
@@ -268,7 +268,7 @@ TEST(Sigrok, ReadsEverythingBeforeACut) {
       EXPECT_EQ(damage.note, size >= directory + 4);
       EXPECT_NE(damage.what.find("cut off"), std::string::npos);
       if (deflate) continue;
-      std::size_t expected = 0;  // samples expected before the cut; exactly known for stored data only
+      std::size_t expected = 0;  // number of samples before the cut, exactly known only for stored data
       for (const auto& [name, bytes] : pieces) {
         const std::size_t begin = place_of(good, name) + name.size();
         expected += std::min(std::max(size, begin) - begin, bytes.size());

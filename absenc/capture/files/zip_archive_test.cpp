@@ -34,7 +34,7 @@ constexpr std::size_t unpacked_size = 24;
 struct Expanded {
   bool whole = false;
   FileBytes bytes;
-  bool found_by_reading = false;  // result of `open`, `read` and the checks at the end
+  bool found_by_reading = false;  // `open` and `read` gave the right content and a good end
   std::string problem;
 };
 

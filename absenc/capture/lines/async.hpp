@@ -18,7 +18,7 @@ struct AsyncFormat {
   double bit = 0;  // duration of a bit in ticks, at least 2.5; need not be a whole number
   bool idle_high = true;
   Parity parity = Parity::none;
-  unsigned stop_bits = 1;  // 1 or 2; only the first stop bit is checked, as in a receiver
+  unsigned stop_bits = 1;  // number of stop bits, 1 or 2; only the first is checked, as in a receiver
   Tick glitch = 0;         // a level shorter than this is noise; 0: no filter
 };
 

@@ -98,8 +98,8 @@ void set_streaming(const Unit& unit, Options& options, double frames_per_second)
 std::vector<ObservedExchange> split_stream(const Unit& unit, const Options& options, Bytes bytes) {
   std::vector<ObservedExchange> replies;
   std::size_t longest = 0;        // size of the longest good reply in the stream, in bytes
-  std::size_t begin_of_good = 0;  // index of the first good reply
-  std::size_t end_of_good = 0;    // index behind the last good reply
+  std::size_t begin_of_good = 0;  // index in `replies` of the first good reply
+  std::size_t end_of_good = 0;    // index in `replies` behind the last good reply
   for (std::size_t at = 0; at < bytes.size();) {
     const std::size_t size = reply_size(unit, options, bytes.subspan(at));
     const auto from = bytes.begin() + static_cast<std::ptrdiff_t>(at);
