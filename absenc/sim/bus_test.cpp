@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compares sim::Bus with sim::Line: the host must receive the same bytes from devices that answer one byte each.
+// Compares sim::Bus with sim::Line: the host must receive the same bytes from devices of which each
+// answers one request byte.
 #include "absenc/sim/bus.hpp"
 
 #include <gtest/gtest.h>

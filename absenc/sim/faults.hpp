@@ -60,8 +60,8 @@ struct FaultRate {
 /// the same faults.
 ///
 /// On character links whole replies are damaged, on clocked links the bits that the device drives. A reply that a fault
-/// makes longer or later does not follow the device's own timing. Until it is sent, the device receives nothing (like a
-/// real one), so it does not report a protocol violation by the host.
+/// makes longer or later does not follow the device's own timing. Until such a reply is sent, the device receives
+/// nothing (like a real one), so it does not report a protocol violation by the host.
 class FaultyDevice final : public Machine<std::uint8_t> {
  public:
   /// Injects faults between `device` and its line. The same seed gives the same faults.

@@ -56,7 +56,7 @@ class Line {
   Line(const Line&) = delete;
   Line& operator=(const Line&) = delete;
 
-  /// Attaches a machine and takes its first step at once. `machine` must outlive the line or be replaced.
+  /// Attaches a machine and takes its first steps at once. `machine` must outlive the line or be replaced.
   Node attach(NodeRole role, Machine<Item>& machine, const OnEmit& on_emit = {});
   /// Replaces the machine of `node`, from now on. A transfer of the old machine is cut off.
   void replace(Node node, Machine<Item>& machine);

@@ -44,7 +44,7 @@ struct Line<Item>::State {
   std::size_t bits = 0;                ///< clocked: number of bits of the transfer
   std::size_t expect = 0;              ///< number of items that the node expects
   Time width{};  ///< `width` of the step: duration of the pulse, or time for which a device drives low
-  std::uint8_t behind_out = 0xFF;  ///< clocked link: byte that the host samples after `out` has ended
+  std::uint8_t behind_out = 0xFF;  ///< spi, clocked: byte that the host samples after `out` has ended
   bool hold_low = false;           ///< clocked: the host holds the clock line low before the transfer
   Time accepted_at{};              ///< time at which the machine requested the transfer
   Time lead{};                     ///< spi: time from chip select to the first clock

@@ -20,9 +20,9 @@ namespace absenc::capture {
 /// is known.
 [[nodiscard]] std::string hex_text_problem(std::string_view head);
 
-/// Reads lines of one of the forms below; the first line decides which. Empty lines, and text behind `#` or `//`, are
-/// ignored. HEX is any number of bytes: pairs of digits, adjacent or separated by blanks, commas or semicolons, each
-/// group optionally with `0x`, `\x` or `$` before it, in which case a single digit is allowed too.
+/// Reads lines of one of the forms below; the first line decides which. Empty lines and, except in dumps, text behind
+/// `#` or `//` are ignored. HEX is any number of bytes: pairs of digits, adjacent or separated by blanks, commas or
+/// semicolons, each group optionally with `0x`, `\x` or `$` before it, in which case a single digit is allowed too.
 ///
 /// - Lines that people type and terminal programs log, see log_line.hpp: a time, a port and a direction in any order,
 ///   the bytes, and their text. All lines must be of one port.

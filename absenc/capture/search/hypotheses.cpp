@@ -85,8 +85,8 @@ class HypothesisSearch {
     add(options);
   }
 
-  /// Adds `base` with every change of a single option, and with every number of bits for each, because no model
-  /// explains all exchanges.
+  /// Adds `base` with every change of a single option, and of each the numbers of bits that fit best, because no
+  /// model explains all exchanges.
   void vary(const Options& base) {
     vary_bits(base);
     for (std::size_t i = 0; i < unit_.options.size(); ++i) {
