@@ -25,8 +25,8 @@ enum class Content : std::uint8_t {
 
 struct Layout {
   Content content = Content::samples;
-  std::vector<std::string> channels;   // names by index; for bytes and frames: of the directions or lines
-  std::uint64_t ticks_per_second = 0;  // 0: the file has no times
+  std::vector<std::string> channels;   // names of the channels; for bytes and frames: of the directions or lines
+  std::uint64_t ticks_per_second = 0;  // rate of the ticks; 0: the file has no times
   std::uint64_t ticks = 0;  // length of the capture in ticks; 0: not known before the capture was read to its end
   // By-arrival gap: not 0 if the times of bytes are those of their arrival at a program, see Annotator::Settings::gap.
   // 0: times on the line.
@@ -86,17 +86,17 @@ struct Damage {
 
 /// A part of a capture that is decoded on its own. It owns its storage, which is used again for the next part.
 struct Block {
-  std::uint64_t index = 0;  // 0, 1, 2 ... in the order of time
+  std::uint64_t index = 0;  // number of the block: 0, 1, 2 ... in the order of time
   // Tick of the first sample, or time from which the changes are valid; after damage it may be later than the end of
   // the previous block, because the data between them is missing.
   Tick first = 0;
   Tick end = 0;                       // tick behind the last tick of the block
-  std::vector<std::uint8_t> samples;  // samples: `bytes_per_sample` bytes each, little endian, channel 0 in bit 0
-  unsigned bytes_per_sample = 1;      // 1, 2, 4 or 8
+  std::vector<std::uint8_t> samples;  // samples, `bytes_per_sample` bytes each, little endian, channel 0 in bit 0
+  unsigned bytes_per_sample = 1;      // size of a sample in bytes: 1, 2, 4 or 8
   std::vector<Changes> changes;       // for captures of kind changes: one entry for each channel
   std::vector<Character> bytes;       // for captures of kind bytes: the characters
   std::vector<CanRecord> frames;      // for captures of kind frames: the CAN frames
-  std::uint64_t file_offset = 0;      // offset in the file, used only by the reader between `claim` and `fill`
+  std::uint64_t file_offset = 0;      // place of the block in the file, which only the reader uses, in `fill`
   std::uint64_t file_size = 0;
 };
 

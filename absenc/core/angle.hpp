@@ -32,11 +32,11 @@ struct Reading {
   unsigned multiturn_bits = 0;         ///< width of `multiturn` in bits; 0: the reply carries no revolutions
   unsigned singleturn_valid_bits = 0;  ///< number of valid bits of `singleturn`, counted from the top; 0: do not use it
   bool multiturn_valid = false;        ///< Whether `multiturn` can be trusted.
-  /// false: no reply so far reports whether `singleturn` is valid; it is then treated as invalid.
+  /// false: no reply so far reports whether `singleturn` is valid, so it must not be used.
   bool singleturn_known = true;
-  bool multiturn_known = true;        ///< false: no reply so far reports whether `multiturn` is valid
-  bool multiturn_signed = false;      ///< the encoder counts turns below zero: `multiturn` is two's complement of
-                                      ///< `multiturn_bits`
+  bool multiturn_known = true;  ///< false: no reply so far reports whether `multiturn` is valid
+  /// The encoder counts turns below zero: `multiturn` is a two's complement number of `multiturn_bits` bits.
+  bool multiturn_signed = false;
   double unit_um = 0;                 ///< linear encoders: micrometres per count of `singleturn`; 0: rotary encoder
   bool ready = true;                  ///< false while the encoder reports that it is starting
   std::uint32_t status = 0;           ///< bits named by the unit's status field, then those of its second status field

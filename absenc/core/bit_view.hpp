@@ -51,8 +51,8 @@ struct BitView {
   static constexpr unsigned register_bits = sizeof(std::size_t) * 8;
   static constexpr unsigned window_bits = register_bits - 7;
 
-  // Returns one machine word whose top bit is bit `first`: at least `window_bits` bits are usable, zeros follow the
-  // end.
+  // Returns one machine word whose top bit is the view's bit `first`. At least its top `window_bits` bits are the
+  // view's bits from `first` on; bits behind the last byte are 0.
   [[nodiscard, gnu::always_inline]] constexpr std::size_t window(std::size_t first) const {
     if (bytes.size() < sizeof(std::size_t)) return short_window(first);
     const std::size_t at = std::min(first / 8, bytes.size() - sizeof(std::size_t));
@@ -83,7 +83,7 @@ struct BitNumber {
   std::uint64_t number;  ///< The bits as a number, the first bit highest.
   unsigned size;         ///< number of bits in `number`, 1 to 64
 
-  /// Returns `count` bits from `first` as a number, the first bit highest.
+  /// Returns `count` bits from index `first` as a number; index 0 is the most significant bit of `number`.
   [[nodiscard]] constexpr std::uint64_t load(std::size_t first, unsigned count) const {
     return count == 0 ? 0 : number >> (size - first - count) & low_mask(count);
   }
@@ -122,7 +122,7 @@ class BitBuffer {
 };
 
 /// Returns the CRC of the `count` bits of `bits` that begin at index `first`. If `count` is no multiple of 8, zeros are
-/// put before the bits; they change nothing because the remainder begins at 0.
+/// put before the bits; they do not change the CRC, because its register begins at 0.
 template <CrcParameters parameters, CrcTable table = CrcTable::byte, class Bits>
 [[nodiscard]] constexpr auto crc_of(const Bits& bits, std::size_t first, std::size_t count) {
   static_assert(parameters.init == 0 && !parameters.refin);

@@ -31,8 +31,9 @@ class Buffer {
   /// Appends `items`. Returns false, and stores nothing, if the buffer has no room for all of `items`.
   constexpr bool append(std::span<const Item> items) {
     if (items.size() > Capacity - size_) return false;
-    std::size_t size = size_;  // local copy: a stored byte might alias `size_`, which would then be loaded again for
-                               // each item
+    // Counts in a local copy: the compiler must assume that a stored byte may alias `size_`, and would load `size_`
+    // again for each item.
+    std::size_t size = size_;
     for (const Item& item : items) items_[size++] = item;
     size_ = size;
     return true;

@@ -136,7 +136,7 @@ class Crc {
 
   template <unsigned bits>
   constexpr void step(std::uint32_t input) {
-    // A remainder narrower than the input is shifted out completely: >> and << on 32 bits then yield 0.
+    // If the remainder has no more bits than the input, the shift removes all of them. 32 bits make the shift defined.
     const std::uint32_t remainder = remainder_;
     if constexpr (parameters.refin) {
       const std::uint32_t index = (remainder ^ input) & low_mask(bits);

@@ -22,8 +22,8 @@ constexpr bool checks(std::uint16_t expected) {
 constexpr CrcParameters modbus{16, 0x8005, 0xFFFF, true, true, 0x0000};
 constexpr CrcParameters biss{6, 0x03, 0x00, false, false, 0x3F};
 
-// Checksums of the supported encoders give the published check values. The (msb) variants are the ESL ones before the
-// bit order on the line is applied.
+// The CRCs of the supported encoders give the published check values. The lines with (msb) check ESL's polynomials
+// without reflection, that is, before the bit order on the line is applied.
 static_assert(checks<CrcParameters{8, 0x01, 0x00, true, true, 0x00}>(0x31), "T-format");
 static_assert(checks<CrcParameters{8, 0x97, 0x00, false, false, 0xFF}>(0x6B), "RLS EncoLink");
 static_assert(checks<biss>(0x2E), "BiSS-C");
@@ -84,7 +84,7 @@ template <CrcParameters parameters>
 constexpr Engines engines{parameters, [](Bytes bytes) -> std::uint16_t { return Crc<parameters>::of(bytes); },
                           [](Bytes bytes) -> std::uint16_t { return Crc<parameters, CrcTable::nibble>::of(bytes); }};
 
-// Pairs of refin and refout that differ are only another final step, so fewer samples suffice for them.
+// A refout different from refin changes only the final step, so one sample of each such pair suffices.
 template <unsigned width>
 constexpr std::array engines_of_width{
     engines<sampled(width, 0, false, false)>, engines<sampled(width, 1, false, false)>,

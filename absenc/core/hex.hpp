@@ -63,7 +63,7 @@ consteval auto hex_bytes() {
 }
 }  // namespace detail
 
-/// Static bytes that a literal contains as hexadecimal text, at most 256.
+/// Static bytes, at most 256, that a literal contains as hexadecimal text: `hex<"1A 00">` is two bytes.
 template <HexLiteral literal>
 inline constexpr auto hex = detail::hex_bytes<literal>();
 

@@ -68,7 +68,7 @@ inline constexpr std::array<ErrorText, 17> error_texts{{
 }};
 
 /// Returns whether `error` means that the received bytes are damaged: they are no whole frame with a right checksum.
-/// Other errors mean that a frame has unexpected content, or that no bytes arrived.
+/// The other errors mean no reply, a sound frame with unexpected content, a refusal, or a mistake of the caller.
 [[nodiscard]] constexpr bool is_damage(Error error) {
   return (error >= Error::line_stuck && error <= Error::wrong_length) || error == Error::bad_checksum;
 }

@@ -2,10 +2,10 @@
 // The only clock type: nanoseconds since a start that the caller chooses. No layer below `os` reads a clock.
 #pragma once
 
-// The include below has only the durations of <chrono>, without calendars and time zones, which would cost half a
-// second in every file.
+// libstdc++'s <bits/chrono.h> has only the durations of <chrono>, without calendars and time zones, which would cost
+// half a second of compile time in every file.
 #if __has_include(<bits/chrono.h>)
-#include <bits/chrono.h>  // header of libstdc++ with only the durations
+#include <bits/chrono.h>
 #else
 #include <chrono>
 #endif

@@ -13,8 +13,9 @@ enum class LinkKind : std::uint8_t {
   half_duplex,  ///< one pair for both directions (RS-485): never send while the other side sends
   full_duplex,  ///< a pair for each direction (RS-422, RS-232, USB serial)
   spi,          ///< the host's clock moves one byte in each direction at once
-  clocked,      ///< the host clocks bits out of the encoder (SSI, BiSS); bits are packed MSB first, the last byte
-                ///< left-aligned; the clock idles high, its rising edge brings the next bit
+  /// The host clocks bits out of the encoder (SSI, BiSS). Bits are packed MSB first, the last byte left-aligned. The
+  /// clock idles high; at its rising edge the encoder outputs the next bit.
+  clocked,
   can,
 };
 
@@ -24,7 +25,7 @@ enum class Parity : std::uint8_t { none, odd, even };
 /// Wires beside the data wires; the host drives them.
 enum class ExtraWire : std::uint8_t { trigger, clear };
 
-/// Default bit rate of virtual encoders whose protocol does not define one.
+/// Default bit rate, in bits per second, of virtual encoders whose protocol does not define one.
 inline constexpr std::uint32_t assumed_rate = 115'200;
 
 /// Settings of a line. For SPI and clocked links they describe how to configure a controller; sim draws waveforms from
@@ -36,7 +37,8 @@ struct LineSettings {
   std::uint8_t spi_mode = 0;     ///< spi, clocked: 2 * CPOL + CPHA
   std::uint8_t idle_clocks = 0;  ///< clocked: number of clocks before the first bit, during which the line stays idle
   Time select_lead{};            ///< spi: minimum time from chip select to the first clock
-  /// Highest rate in bits per second that the document allows, if a controller could be faster; 0: not stated.
+  /// Highest rate in bits per second that the encoder's document allows, if a controller could be faster; 0: not
+  /// stated.
   std::uint32_t highest_rate = 0;
 
   /// Returns these settings, with `assumed_rate` if `rate` is 0.

@@ -66,8 +66,8 @@ constexpr std::int64_t digits_of(Bytes text) {
 }
 }  // namespace detail
 
-/// Returns `frame` encoded as a line with CR. `time` is in milliseconds (0 to 59999) and is appended if the other side
-/// requested timestamps with Z1.
+/// Returns `frame` encoded as a line with CR. A `time`, in milliseconds (0 to 59999), is appended as timestamp; give
+/// it only if the other side requested timestamps with Z1.
 [[nodiscard]] constexpr LineText encode(const CanFrame& frame, std::optional<std::uint16_t> time = {}) {
   LineText text;
   text.push_back(frame.remote ? (frame.extended ? 'R' : 'r') : (frame.extended ? 'T' : 't'));
@@ -108,8 +108,8 @@ constexpr std::int64_t digits_of(Bytes text) {
   return frame;
 }
 
-/// A reader that splits received bytes into lines. After garbage or a lost CR it resumes at the next letter that begins
-/// a frame: none of the four letters occurs within a frame or a command.
+/// A reader that splits received bytes into lines. After garbage or a lost CR it resumes behind the next CR, or at the
+/// next letter that begins a frame (t, T, r, R): none of these letters occurs within a frame or a command.
 class LineReader {
  public:
   /// Event that a received byte completes.
@@ -137,7 +137,7 @@ class LineReader {
     return LineEvent::nothing;
   }
 
-  /// Returns the last complete line, without the CR.
+  /// Returns the complete line, without the CR; valid only directly after `feed` has returned `line`.
   [[nodiscard]] constexpr Bytes line() const { return line_; }
 
  private:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Feeds arbitrary bytes as an adapter's output: each line that decodes to a frame must equal the line encoded from that
-// frame.
+// frame, apart from the case of digits and the timestamp.
 #include "absenc/link/slcan.hpp"
 
 #include <cstddef>
@@ -26,7 +26,7 @@ void check(Bytes line) {
   if (!frame) return;
   require(frame->size <= 8 && frame->id <= (frame->extended ? 0x1FFFFFFFu : 0x7FFu));
   const slcan::LineText again = slcan::encode(*frame);
-  // The two lines have equal length, or the first has 4 digits of time at its end.
+  // Without its CR, the encoded line is as long as `line`, or 4 digits shorter if `line` ends with a timestamp.
   require(again.size() - 1 == line.size() || again.size() + 3 == line.size());
   for (std::size_t i = 0; i + 1 < again.size(); ++i) require(again[i] == upper(line[i]));
 }
@@ -41,7 +41,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     require(reader.line().size() <= slcan::line_capacity);
     check(reader.line());
   }
-  // A valid frame that follows arbitrary bytes must be found.
+  // The reader must find a valid frame that follows arbitrary bytes.
   const CanFrame frame{.id = 0x120, .size = 1, .data = {0x47}};
   slcan::LineReader::LineEvent found{};
   const slcan::LineText text = slcan::encode(frame);

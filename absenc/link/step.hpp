@@ -20,7 +20,7 @@ namespace absenc {
 /// A transfer is returned once; after it the machine returns `wait`. `expect`, `answer` and `gap` are set in both
 /// steps: in the transfer because a microcontroller must prepare its receiver before the last bit is out, in the wait
 /// because they change while items arrive. A machine that may be fed another event at the exact time of its timer
-/// compares the time in `next` itself.
+/// must compare the timer's time with `now` in `next` itself.
 template <class Item>
 struct Step {
   /// Actions that a machine requests from its port.
@@ -38,18 +38,20 @@ struct Step {
   bool hold_low = false;   ///< transfer on a clocked link: the clock line, which idles high, is held low until `at`
   std::span<const Item> out{};  ///< transfer: items to send; valid until the next feed
   std::size_t expect = 0;       ///< transfer, wait: number of items still expected; 0: unknown, or none
-  std::size_t bits = 0;    ///< transfer on a clocked link: number of clocks; a device sets how many of its bits hosts
-                           ///< read, if it drives more
+  /// Transfer on a clocked link: number of clocks. A device that drives more bits than hosts read sets the number of
+  /// bits that hosts read.
+  std::size_t bits = 0;
   std::uint32_t rate = 0;  ///< configure: new rate in bits per second
-  Time at{};      ///< transfer, pulse: earliest time to begin; wait: time of the `timer` event, if it is in the future
-  Time answer{};  ///< transfer, wait: `silence` is reported when nothing is received for this time after `sent`; 0: no
-                  ///< limit
-  Time gap{};     ///< transfer, wait: `silence` is reported when the line is quiet this long after an item; 0: no limit
-  Time width{};   ///< pulse: its duration; transfer of a device on a clocked link: after `out` the device drives the
-                  ///< data line low until this time after the last clock edge
+  Time at{};  ///< transfer, pulse: earliest time to begin; wait: time of the `timer` event, if it is in the future
+  /// Transfer, wait: `silence` is reported when nothing is received for this time after `sent`; 0: no limit.
+  Time answer{};
+  Time gap{};  ///< transfer, wait: `silence` is reported when the line is quiet this long after an item; 0: no limit
+  /// Pulse: its duration. Transfer of a device on a clocked link: after `out` the device drives the data line low until
+  /// this time after the last clock edge.
+  Time width{};
 
-  /// Transfer of a device on an SPI or clocked link: returns the byte that the host samples after `out` has ended. A
-  /// line that no side drives is pulled up.
+  /// Transfer of a device on an SPI or clocked link: returns the byte that the host samples after `out` has ended, 0x00
+  /// if the device then drives the line low (`width` is not 0), else 0xFF, because an undriven line is pulled up.
   [[nodiscard]] constexpr std::uint8_t behind_out() const { return width > Time{} ? 0x00 : 0xFF; }
 };
 
@@ -62,14 +64,14 @@ template <class Item>
 struct Event {
   /// Kinds of events at a port.
   enum class Kind : std::uint8_t {
-    sent,        ///< the transfer is complete (device side of spi and clocked: the host has stopped clocking)
-    received,    ///< `items` were received from the line
-    silence,     ///< the `answer` or `gap` limit of the last step has passed
-    timer,       ///< the time `at` of the last wait step was reached
-    selected,    ///< device side: chip select or first clock edge; the next step should be the reply that the device
-                 ///< drives
+    sent,      ///< the transfer is complete (device side of spi and clocked: the host has stopped clocking)
+    received,  ///< `items` were received from the line
+    silence,   ///< the `answer` or `gap` limit of the last step has passed
+    timer,     ///< the time `at` of the last wait step was reached
+    /// Device side: chip select or first clock edge. The next step should be the reply that the device drives.
+    selected,
     triggered,   ///< device side: a pulse on `wire` has begun
-    line_error,  ///< a character with a wrong stop or parity bit, or sent at another rate, was received
+    line_error,  ///< a damaged character (stop bit, parity, other rate) or CAN frame was received
   };
 
   Kind kind = Kind::timer;        ///< kind of the event
@@ -79,9 +81,10 @@ struct Event {
   ExtraWire wire{};               ///< triggered: the wire of the pulse
   bool held_low = false;  ///< selected on a clocked link: the clock line was held low before the transfer, not idle
   bool idle_low = false;  ///< received on a clocked link: the data line was low already before the first bit
-  Time width{};  ///< triggered: duration of the pulse; device side, selected on a clocked link and sent on an SPI link:
-                 ///< the period of the clock, 0 if not known
-  Time lead{};   ///< sent, device side of an SPI link: time from chip select to the first clock
+  /// Triggered: duration of the pulse. Device side, selected on a clocked link and sent on an SPI link: the period of
+  /// the clock, 0 if not known.
+  Time width{};
+  Time lead{};  ///< sent, device side of an SPI link: time from chip select to the first clock
   /// Uncertainty of `at`. received: `items` may have arrived earlier by this time, because the port could not look
   /// sooner; sent: the transfer may have ended earlier by this time; 0: none, or not known.
   Time late{};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Helpers for the tests of units: a shaft with a settable position, a host that sends any bytes, and the fault rates of
-// the campaigns.
+// Helpers for the tests of units: a shaft with a settable position, a host that sends any bytes, and fault rates
+// for campaigns, which are long runs with injected faults.
 #pragma once
 
 #include <cstdint>
@@ -71,7 +71,7 @@ class RawHost : public Machine<std::uint8_t> {
   bool done_ = false;
 };
 
-/// Returns rates that corrupt `share` of the replies, and that apply each other reply fault to a fifth of `share`.
+/// Returns rates that corrupt `share` of the replies; every other reply fault has a fifth of that probability.
 inline FaultRates damaged_replies(double share) {
   FaultRates rates;
   for (const FaultKind kind : {FaultKind::drop, FaultKind::truncate, FaultKind::delay, FaultKind::echo,

@@ -8,8 +8,8 @@ namespace absenc::sim {
 
 namespace {
 
-// Time before its beginning at which a transfer is passed to the port. Earlier, the transfer would block the other
-// devices.
+// A device's transfer is passed to the port this long before it begins. Passed earlier, it would block the transfers of
+// the other devices.
 constexpr Time soon = std::chrono::milliseconds(1);
 
 // Returns the shorter of two limits; 0 means no limit.
@@ -38,7 +38,8 @@ void Bus::feed(const ByteEvent& event) {
   }
 }
 
-// The line is idle behind a transfer, so every device gets `silence` at once instead of waiting for its limit.
+// Reports `sent` to the devices whose bytes were sent. The other devices receive the bytes, and `silence` at once,
+// without waiting for their limits: the line is idle behind a transfer.
 void Bus::report_sent(const ByteEvent& event) {
   sending_ = false;
   for (Node& node : nodes_) {
@@ -92,14 +93,14 @@ ByteStep Bus::next(Time now) {
 }
 
 Time Bus::first_begin() const {
-  Time first = never - soon;  // never - soon: callers may add `soon` without overflow
+  Time first = never - soon;  // no pending transfer; a caller may add `soon` to it without overflow
   for (const Node& node : nodes_) {
     if (node.send_state == SendState::pending) first = std::min(first, node.at);
   }
   return first;
 }
 
-// Combines into one transfer the pending transfer that begins first and all that begin before it ends.
+// Combines the pending transfer that begins first, and all that begin before the combined transfer ends, into one.
 void Bus::merge() {
   std::vector<Node*> pending;
   for (Node& node : nodes_) {

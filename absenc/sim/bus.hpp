@@ -10,13 +10,13 @@
 
 namespace absenc::sim {
 
-/// Several devices on one half-duplex line, without bit timing. Not a Line, which simulates time bit by bit.
+/// Several devices on one half-duplex line, without bit timing. Not a Line, which is exact to the nanosecond.
 ///
 /// Every device receives the host's bytes and those of the other devices. Characters that are sent at the same time
 /// reach the line as their AND, as in Line, but aligned to whole characters.
 class Bus final : public Machine<std::uint8_t> {
  public:
-  /// `devices` must outlive the bus. `character` is the time of one character on the line.
+  /// `devices` must outlive the bus. `character` is the duration of one character on the line.
   Bus(const std::vector<Machine<std::uint8_t>*>& devices, Time character);
 
   /// Processes an event that the port reports.
@@ -36,8 +36,8 @@ class Bus final : public Machine<std::uint8_t> {
     SendState send_state = SendState::waiting;
     Step<std::uint8_t> wait{};        // last wait step of the device
     Time timer = never;               // time of the device's next `timer` event
-    Time at{};                        // pending: time at which the transfer begins
-    std::vector<std::uint8_t> out{};  // pending, sending: bytes of the transfer
+    Time at{};                        // while pending: time at which the device's transfer begins
+    std::vector<std::uint8_t> out{};  // while pending or sending: bytes of the device's transfer
   };
 
   void report_sent(const Event<std::uint8_t>& event);

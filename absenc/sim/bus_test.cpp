@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compares sim::Bus with sim::Line: the host must receive the same bytes from devices that answer one byte each.
+// Compares sim::Bus with sim::Line: the host must receive the same bytes from devices of which each
+// answers one request byte.
 #include "absenc/sim/bus.hpp"
 
 #include <gtest/gtest.h>
@@ -17,7 +18,7 @@ using Wire = std::vector<std::uint8_t>;
 
 constexpr LineSettings settings{.rate = 1'000'000};
 
-/// A device that sends `reply` at the time `after` behind its `key`, if the key is the first byte after silence.
+/// A device that sends `reply` a time `after` it received the byte `key`, if `key` is the first byte after silence.
 struct Responder final : Machine<std::uint8_t> {
   Responder(std::uint8_t its_key, Wire its_reply, Time its_after = 5us)
       : key(its_key), reply(std::move(its_reply)), after(its_after) {}
@@ -100,7 +101,7 @@ TEST(Bus, DeliversSameBytesAsLine) {
     std::vector<std::unique_ptr<Responder>> made;
     made.push_back(std::make_unique<Responder>(1, Wire{0x11, 0x22, 0x33}));
     made.push_back(std::make_unique<Responder>(2, Wire{0xF0, 0xAA, 0x55}));
-    // This device answers the same request at the same time as another one.
+    // This device answers request 2 at the same time as the device before it.
     made.push_back(std::make_unique<Responder>(2, Wire{0x3C, 0xFF}));
     return made;
   };

@@ -47,7 +47,7 @@ void FaultyDevice::feed(const Event<std::uint8_t>& event) {
       if (ignores_line_) return;
       break;
     case Kind::silence:
-      if (silent_until_ != never) return;  // the device expects `sent`: the reply that a fault suppressed still lasts
+      if (silent_until_ != never) return;  // the device waits for the `sent` of a suppressed reply
       break;
     case Kind::sent:
       ignores_line_ = false;
@@ -120,7 +120,7 @@ bool FaultyDevice::damage(Step<std::uint8_t>& reply, Time now) {
   if (strikes(FaultKind::silence)) reply_.clear();
   if (!reply_.empty()) {
     if (strikes(FaultKind::repeat)) reply_.insert(reply_.end(), reply.out.begin(), reply.out.end());
-    // Faults apply only to bits that the host reads; damage behind them would have no effect.
+    // corrupt, truncate and drop hit only bytes that the host clocks out: damage behind them would have no effect.
     const auto taken = [&] { return reply.bits == 0 ? reply_.size() : std::min(reply_.size(), (reply.bits + 7) / 8); };
     if (strikes(FaultKind::corrupt)) flip_bits(std::span(reply_).first(taken()));
     if (taken() > 1 && strikes(FaultKind::truncate)) reply_.resize(1 + random_.below(taken() - 1));

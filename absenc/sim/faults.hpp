@@ -60,8 +60,8 @@ struct FaultRate {
 /// the same faults.
 ///
 /// On character links whole replies are damaged, on clocked links the bits that the device drives. A reply that a fault
-/// makes longer or later does not follow the device's own timing. Until it is sent, the device receives nothing (like a
-/// real one), so it does not report a protocol violation by the host.
+/// makes longer or later does not follow the device's own timing. Until such a reply is sent, the device receives
+/// nothing (like a real one), so it does not report a protocol violation by the host.
 class FaultyDevice final : public Machine<std::uint8_t> {
  public:
   /// Injects faults between `device` and its line. The same seed gives the same faults.
@@ -95,10 +95,11 @@ class FaultyDevice final : public Machine<std::uint8_t> {
 
   std::vector<std::uint8_t> request_;  // bytes received since the last reply
   std::vector<std::uint8_t> reply_;
-  std::vector<std::uint8_t> received_;  // received bytes that were passed on to the device
+  std::vector<std::uint8_t> received_;  // bytes of the last received event as passed on to the device
   bool request_damaged_ = false;        // the request was damaged, so the device may answer while the host still sends
-  bool ignores_line_ = false;  // the device receives nothing: a stretched reply, or one to a damaged request, is
-                               // pending or being sent
+  // The device receives nothing while a reply that a fault stretched, or a reply to a damaged request, is pending or
+  // being sent.
+  bool ignores_line_ = false;
   Time last_ignored_at_ = -std::chrono::hours(1);  // time of the last byte received while `ignores_line_`
   Time device_gap_{};                              // pause after which the device considers a request complete
   Time silent_until_ = never;                      // time at which a suppressed reply counts as sent

@@ -24,13 +24,13 @@ using StepKind = Step<std::uint8_t>::Kind;
 const ByteVector request{0x32, 0x05};
 const ByteVector reply{0x11, 0x22, 0x33, 0x44};
 
-// A device that answers every two bytes 3 us later, and counts the bytes received while it sends or is about to send.
+// A device that answers every two bytes 3 us later, and counts as violations what it receives before its reply ends.
 class Device final : public Machine<std::uint8_t> {
  public:
   void feed(const Event<std::uint8_t>& event) override {
     if (event.kind == Kind::sent) sending = false;
     if (event.kind == Kind::timer) ++timers;
-    // This counts as a violation by the port, which must not report `silence` during a transfer.
+    // A `silence` during a transfer is a violation by the port.
     if (event.kind == Kind::silence && sending) ++violations;
     if (event.kind != Kind::received) return;
     if (sending) ++violations;
@@ -181,7 +181,7 @@ TEST_F(Faults, GarbageComesBeforeTheReply) {
 
 TEST_F(Faults, DeviceContinuesAfterSuppressedReply) {
   damage(FaultKind::silence);
-  device.timer_at = microseconds(500);  // a timer of the device, which must still run
+  device.timer_at = microseconds(500);  // the device's timer must still expire
   EXPECT_TRUE(exchange().empty());
   EXPECT_FALSE(device.sending);
   EXPECT_EQ(device.timers, 1);
@@ -199,8 +199,8 @@ TEST_F(Faults, RequestCorruptReachesTheDeviceOnly) {
   EXPECT_EQ(faulty->count(FaultKind::request_corrupt), 2u);
 }
 
-// The next request of the host, after 150 us, is sent during the added delay of the reply. The device must not count
-// that as a violation by the host.
+// The host's next request, 70 us or 150 us after the first, may arrive before the delayed or repeated reply has ended.
+// The device must not count that as a violation by the host.
 TEST_F(Faults, StretchedReplyCausesNoViolation) {
   damage(FaultKind::delay);
   for (const FaultKind kind : {FaultKind::delay, FaultKind::repeat}) {
@@ -220,7 +220,7 @@ TEST_F(Faults, StretchedReplyCausesNoViolation) {
   EXPECT_EQ(device.violations, 0);
 }
 
-// The device takes half of a damaged request for a whole request and answers while the host still sends.
+// The device takes the first half of a damaged request for a whole request and answers while the host still sends.
 TEST_F(Faults, DamagedRequestCausesNoViolation) {
   damage(FaultKind::request_corrupt);
   host.request_bytes = {1, 2, 3, 4};
@@ -230,7 +230,7 @@ TEST_F(Faults, DamagedRequestCausesNoViolation) {
   EXPECT_FALSE(device.sending);
 }
 
-// The repeated reply ends at 103 us, between the two bytes of a request that begins at 90 us.
+// The repeated reply ends at 103 us, during the second byte of a request that begins at 90 us.
 TEST_F(Faults, RequestWithIgnoredBeginningIsIgnored) {
   damage(FaultKind::repeat);
   device.gap = microseconds(15);

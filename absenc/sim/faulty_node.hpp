@@ -9,9 +9,9 @@
 namespace absenc::sim {
 
 /// A machine between a CAN bus and a device that injects faults. The device must outlive it. The faults are those of
-/// FaultRates with a frame in place of a reply: `drop` removes the last byte of a frame, `truncate` any number of
-/// bytes, `echo` sends the last received frame, `garbage` sends a frame of random identifier and data first. On a real
-/// bus the CAN checksum would discard frames damaged on the wire: these faults model a node with faulty software.
+/// FaultRates with a frame in place of a reply: `drop` removes the last byte of a frame, `truncate` one or
+/// more bytes at its end; before the frame, `echo` sends the last received frame and `garbage` a random frame. On a
+/// real bus the CAN checksum would discard frames damaged on the wire: these faults model a node with faulty software.
 class FaultyNode final : public Machine<CanFrame> {
  public:
   /// Injects faults between `device` and its bus. The same seed gives the same faults.
@@ -26,7 +26,7 @@ class FaultyNode final : public Machine<CanFrame> {
   void set_rates(const FaultRates& rates) { rates_ = rates; }
   /// Returns the number of injected faults of each kind, indexed by FaultKind.
   [[nodiscard]] const FaultCounts& counts() const { return counts_; }
-  /// Returns the number of frames with at least one fault.
+  /// Returns the number of transfers, of one or more frames, with at least one fault.
   [[nodiscard]] std::uint64_t damaged_frames() const { return damaged_; }
 
  private:

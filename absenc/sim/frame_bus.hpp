@@ -11,12 +11,12 @@
 namespace absenc::sim {
 
 /// Several nodes on one CAN bus, without bit timing. Every node receives the host's frames and those of the other
-/// nodes. Arbitration and collisions are not simulated: frames that are due at the same time are sent by identifier,
-/// and two frames of one identifier one after the other. A node whose `configure` step requests another bit rate than
+/// nodes. Arbitration and collisions are not simulated: frames that are due at the same time are sent one after
+/// the other, the lowest identifier first. A node whose `configure` step requests another bit rate than
 /// the bus has neither receives nor sends.
 class FrameBus final : public Machine<CanFrame> {
  public:
-  /// `nodes` must outlive the bus. `rate` is the bit rate of the port, until the first node changes it.
+  /// `nodes` must outlive the bus. `rate` is the bit rate at which the port and all nodes begin.
   FrameBus(const std::vector<Machine<CanFrame>*>& nodes, std::uint32_t rate);
 
   /// Processes an event that the port reports.
@@ -36,8 +36,8 @@ class FrameBus final : public Machine<CanFrame> {
     std::uint32_t rate;
     SendState send_state = SendState::waiting;
     Time timer = never;
-    Time at{};                   // pending: time at which the frame begins
-    std::deque<CanFrame> out{};  // pending, sending: frames not yet sent
+    Time at{};                   // while pending: time at which the node's next frame begins
+    std::deque<CanFrame> out{};  // while pending or sending: frames not yet sent
   };
 
   void serve(Node& node, Time now);
@@ -47,7 +47,7 @@ class FrameBus final : public Machine<CanFrame> {
   std::vector<Node> nodes_;
   std::uint32_t rate_;
   bool configuring_ = false;
-  Node* sender_ = nullptr;  // node whose first frame is being sent
+  Node* sender_ = nullptr;  // node whose frame is being sent; null: none
   CanFrame out_{};
 };
 

@@ -118,8 +118,8 @@ bool Line<Item>::step() {
   const Time time = next_event();
   if (time == never) return false;
   now_ = time;
-  // At equal times timers and silences come after events that end then (a character has arrived) and before the
-  // arbitration.
+  // At equal times, timers and silences come after the scheduled events (the end of a character, for example) and
+  // before the arbitration of CAN frames.
   const Node late = next_deadline();
   if (scheduled_.empty() || scheduled_.top().at > time ||
       (scheduled_.top().kind == Kind::arbitrate && nodes_[late]->due == time)) {
@@ -208,7 +208,7 @@ void Line<Item>::serve(Node node) {
   state.due = never;  // the machine is done: no later event wakes it
 }
 
-// Accepts a transfer or pulse of a node; it begins at once or at its time `at`.
+// Accepts a transfer or pulse of a node. It begins at its time `at`, or now if that time has passed.
 template <class Item>
 void Line<Item>::accept_step(Node node, const Step<Item>& step) {
   State& state = *nodes_[node];
@@ -249,7 +249,7 @@ void Line<Item>::deadline(Node node) {
     feed(node, {.kind = Event<Item>::Kind::timer, .at = now_});
     return;
   }
-  // The silence limit does not pass during a character: the end of the character starts it again.
+  // No silence is reported while another node sends: the end of its character starts the limit again.
   if (busy_towards(state)) {
     state.due = std::min(now_ + state.settings.character(), state.timer_due);
     return;

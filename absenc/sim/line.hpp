@@ -36,16 +36,16 @@ class Line {
   /// One transfer of SPI bytes or of `bits` clocks: the items that the host sent and received, the last byte
   /// left-aligned. `lead` is the time from `start`, when the chip was selected, to the first clock.
   struct Transfer {
-    Time start;                 ///< Time of the first bit.
+    Time start;                 ///< spi: time of chip select; clocked: time of the first clock edge
     Time end;                   ///< End of the last bit.
-    std::size_t bits;           ///< clocked: number of clocks; 0: whole items
+    std::size_t bits;           ///< number of clocks; spi: eight per byte
     std::span<const Item> out;  ///< Items that the host sent.
     std::span<const Item> in;   ///< Items that the host received.
     Time lead{};                ///< Time from chip select to the first clock.
     Time held_low = never;  ///< clocked: time from which the clock line was held low before `start`; never: it was not
     Time low_after{};       ///< clocked: time for which the device drives the data line low after the last clock edge
   };
-  /// Called at the end of every transfer of SPI bytes or clocked bits.
+  /// Called at the end of every transfer of SPI bytes or clocked bits that has at least one bit.
   using TransferObserver = std::function<void(const Transfer& transfer)>;
   /// Called at the beginning of every pulse.
   using PulseObserver = std::function<void(ExtraWire wire, Time start, Time end)>;
@@ -56,11 +56,12 @@ class Line {
   Line(const Line&) = delete;
   Line& operator=(const Line&) = delete;
 
-  /// Attaches a machine and takes its first step at once. `machine` must outlive the line or be replaced.
+  /// Attaches a machine and takes its first steps at once. `machine` must outlive the line or be replaced.
   Node attach(NodeRole role, Machine<Item>& machine, const OnEmit& on_emit = {});
   /// Replaces the machine of `node`, from now on. A transfer of the old machine is cut off.
   void replace(Node node, Machine<Item>& machine);
-  /// Takes the next step of the node's machine, after something other than an event has changed the machine.
+  /// Takes the steps of the node's machine until it waits. Needed after something other than an event has changed the
+  /// machine.
   void wake(Node node);
   /// Sets whether a node receives what it sends.
   void set_echo(Node node, bool echo);
@@ -77,7 +78,7 @@ class Line {
   [[nodiscard]] NodeRole role(Node node) const;
   /// Returns whether the machine of a node has ended.
   [[nodiscard]] bool done(Node node) const;
-  /// Returns the time before which all items that began were reported to the observers.
+  /// Returns a time such that all items that began before it have been reported to the observers.
   [[nodiscard]] Time settled() const;
   /// Returns the time of the next scheduled event, or `never` if none is scheduled.
   [[nodiscard]] Time next_event() const;

@@ -30,21 +30,21 @@ struct Line<Item>::State {
   Silence silence;         ///< Silence timer of the node.
   Time due = never;        ///< time of the next `timer` or `silence` event
 
-  /// The sender whose character this node's receiver is synchronised to; a character that begins before its end is not
-  /// received separately.
+  /// The sender whose character this node's receiver is synchronised to. A character that begins before the end of that
+  /// character is not received separately.
   Node framed_sender = 0;
   Time framed_from = never;  ///< Time at which the character of `framed_sender` begins.
   Time framed_until{};       ///< Time at which the character of `framed_sender` ends.
 
-  typename Step<Item>::Kind active_step = Step<Item>::Kind::wait;  ///< kind of the transfer or pulse that is pending or
-                                                                   ///< in progress
-  std::uint64_t begin_generation = 0;                              ///< number of transfers and pulses so far
-  bool begun = false;              ///< false while the transfer's `at` lies in the future
-  std::vector<Item> out;           ///< items of the transfer that the node sends
-  std::size_t bits = 0;            ///< clocked: number of bits of the transfer
-  std::size_t expect = 0;          ///< number of items that the node expects
-  Time width{};                    ///< duration of the pulse
-  std::uint8_t behind_out = 0xFF;  ///< clocked link: byte that the host samples after `out` has ended
+  /// Kind of the step that is pending or in progress, transfer or pulse; wait: none.
+  typename Step<Item>::Kind active_step = Step<Item>::Kind::wait;
+  std::uint64_t begin_generation = 0;  ///< number of transfers and pulses so far
+  bool begun = false;                  ///< false while the transfer's `at` lies in the future
+  std::vector<Item> out;               ///< items of the transfer that the node sends
+  std::size_t bits = 0;                ///< clocked: number of bits of the transfer
+  std::size_t expect = 0;              ///< number of items that the node expects
+  Time width{};  ///< `width` of the step: duration of the pulse, or time for which a device drives low
+  std::uint8_t behind_out = 0xFF;  ///< spi, clocked: byte that the host samples after `out` has ended
   bool hold_low = false;           ///< clocked: the host holds the clock line low before the transfer
   Time accepted_at{};              ///< time at which the machine requested the transfer
   Time lead{};                     ///< spi: time from chip select to the first clock
@@ -54,7 +54,7 @@ struct Line<Item>::State {
   std::size_t on_wire = 0;         ///< number of items of `out` that have been, are or will be on the wire
   Time each{};                     ///< duration of one character
 
-  /// Returns whether a transfer of this node has begun and not ended.
+  /// Returns whether a transfer of this node has begun and has items left to send.
   [[nodiscard]] bool frame_pending() const {
     return active_step == Step<Item>::Kind::transfer && begun && index < out.size();
   }

@@ -122,7 +122,7 @@ TEST(FullDuplex, HasOneWirePerDirection) {
   line.run_until(microseconds(100));
   EXPECT_EQ(items, "0:0 2:6 1:0 0:2 1:2 ");  // the bytes of the two devices are ANDed, the byte of the host is intact
   EXPECT_EQ(host.log, "10000 received 10000 sent 20000 received ");
-  // This device received the byte of the host, not the one of the other device.
+  // The first device received the host's byte, and nothing from the other device.
   EXPECT_EQ(one.log, "10000 received 20000 sent ");
 }
 

@@ -79,7 +79,7 @@ void Line<Item>::begin_characters(Node node) {
   frame_character(node);
 }
 
-// Synchronises the receiver of every idle node to the character that begins now.
+// Synchronises every node that `sender` reaches and that is not receiving a character to the character beginning now.
 template <class Item>
 void Line<Item>::frame_character(Node sender) {
   for (const auto& receiver : nodes_) {
@@ -215,7 +215,7 @@ void Line<Item>::end_frame(Node node) {
     State& sender = *nodes_[node];
     const CanFrame frame = sender.out[sender.index];
     if (observer_) observer_(node, sender.start, now_, frame);
-    // Nodes that began with the same arbitration field sent at the same time. If the rest of the frames is equal too,
+    // Nodes whose frames have the same arbitration field sent at the same time. If the rest of the frames is equal too,
     // none of the nodes notices; otherwise all frames are lost. No node repeats its frame, because the clash would
     // never end.
     std::vector<Node> senders;

@@ -26,7 +26,7 @@ struct Quotient {
 };
 
 // Returns a * b / divisor, whose 128-bit product has no type in standard C++: long multiplication modulo the divisor,
-// one bit of b at a time. The divisor is below 2^63; The quotient `whole` wraps as a position does.
+// one bit of b at a time. The divisor must be below 2^63. `whole` wraps at 2^64, as a position does.
 Quotient multiply_divide(std::uint64_t a, std::uint64_t b, std::uint64_t divisor) {
   const std::uint64_t a_whole = a / divisor;
   const std::uint64_t a_remainder = a % divisor;
@@ -63,7 +63,7 @@ std::int32_t saturated(double value) {
   return static_cast<std::int32_t>(std::lround(std::clamp(value, -limit, limit)));
 }
 
-// Parses text that is exactly one number, with blanks around it allowed.
+// Returns the number that the whole of `text` is, blanks around it allowed; nothing for other text.
 std::optional<double> number(std::string_view text) {
   const auto first = text.find_first_not_of(" \t\r");
   if (first == std::string_view::npos) return {};
@@ -113,7 +113,7 @@ Motion Motion::sine(std::int64_t start, double amplitude_degrees, double frequen
 
 Motion Motion::path(std::int64_t start, std::istream& csv, std::string_view name) {
   constexpr std::size_t longest_line = 1024;
-  // Greatest number of points of a path: one hour with a thousand points per second.
+  // Greatest number of points of a path: more than one hour with a thousand points per second.
   constexpr std::size_t most_knots = 4'000'000;
   Path path;
   std::array<char, longest_line + 1> buffer;
@@ -152,9 +152,9 @@ ShaftState Motion::at(Time time) const {
 ShaftState Motion::offset_at(const Still&, Time) { return {}; }
 
 ShaftState Motion::offset_at(const ConstantSpeed& speed, Time time) {
-  // position = micro_rpm * ns * 2^32 / (60 * 1e6 * 1e9), both sides divided by 2^17.
+  // position = micro_rpm * ns * 2^32 / (60 * 1e6 * 1e9); numerator and denominator are both divided by 2^17.
   constexpr std::int64_t numerator = std::int64_t{1} << 15;
-  constexpr std::uint64_t denominator = 457'763'671'875;  // the divisor 60e15, divided by 2^17
+  constexpr std::uint64_t denominator = 457'763'671'875;  // 60e15 / 2^17, exact
   return {scale(speed.micro_rpm * numerator, time.count(), denominator),
           saturated(static_cast<double>(speed.micro_rpm) / 1e3), 0};
 }

@@ -24,8 +24,8 @@ class Motion final : public Shaft {
 
   /// Returns a shaft that stands at `start`, unit 2^-32 revolution.
   [[nodiscard]] static Motion still(std::int64_t start);
-  /// Returns a motion at -1 000 000 to 1 000 000 revolutions per minute, rounded to 1e-6. Throws std::invalid_argument
-  /// outside this range.
+  /// Returns a motion at -1 000 000 to 1 000 000 revolutions per minute, rounded to 1e-6 rpm. Throws
+  /// std::invalid_argument outside this range.
   [[nodiscard]] static Motion constant_speed(std::int64_t start, double rpm);
   /// Returns the motion start + amplitude * sin(2 pi frequency t): up to 36 000 000 degrees and 10 000 Hz, rounded to
   /// 1e-6 Hz. Throws std::invalid_argument outside this range.

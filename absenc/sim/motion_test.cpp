@@ -69,10 +69,10 @@ TEST(Motion, BeginsAtSetTime) {
 TEST(Motion, SineHasExactPhaseAndDerivatives) {
   const Motion motion = Motion::sine(0, 90, 0.5);
   EXPECT_EQ(motion.at(0s).position, 0);
-  EXPECT_EQ(motion.at(0s).speed_millirpm, 47'124);  // pi/2 * pi rad/s = 47.1239 rpm
+  EXPECT_EQ(motion.at(0s).speed_millirpm, 47'124);  // amplitude pi/2 rad * pi rad/s = 47.1239 rpm
   EXPECT_EQ(motion.at(500ms).position, revolution / 4);
   EXPECT_EQ(motion.at(500ms).speed_millirpm, 0);
-  EXPECT_EQ(motion.at(500ms).acceleration, -16);  // pi/2 * pi^2 rad/s^2 = 15.50
+  EXPECT_EQ(motion.at(500ms).acceleration, -16);  // amplitude pi/2 rad * (pi rad/s)^2 = 15.50 rad/s^2
   EXPECT_EQ(motion.at(24h + 500ms).position, revolution / 4);
   EXPECT_EQ(motion.at(-500ms).position, -revolution / 4);
   EXPECT_EQ(motion.at(-500ms).acceleration, 16);
@@ -87,9 +87,8 @@ TEST(Motion, DerivativesAgreeWithPositions) {
       const double rpm = (after - before) / static_cast<double>(revolution) / 10e-6 * 60;
       EXPECT_NEAR(motion.at(time).speed_millirpm, rpm * 1e3, 2);
       const double radians = (after - 2 * here + before) / static_cast<double>(revolution) * 6.283185307;
-      EXPECT_NEAR(motion.at(time).acceleration, radians / 25e-12, 120);  // positions are whole units, so an
-                                                                         // acceleration error of up to 58 rad/s^2 per
-                                                                         // position remains
+      // Positions are whole units, so each of the positions may add an error of up to 58 rad/s^2.
+      EXPECT_NEAR(motion.at(time).acceleration, radians / 25e-12, 120);
     }
   }
 }

@@ -18,7 +18,8 @@ namespace absenc::sim {
   return (bits <= 32 ? fraction >> (32 - bits) : static_cast<std::uint64_t>(position) << (bits - 32)) & low_mask(bits);
 }
 
-/// Returns the revolutions that an encoder with `bits` bits for them counts at `position`, unit 2^-32 revolution.
+/// Returns the number of revolutions that an encoder with a turn counter of `bits` bits reports at `position`, unit
+/// 2^-32 revolution; 0 if `bits` is 0.
 [[nodiscard]] constexpr std::uint64_t turns_at(std::int64_t position, unsigned bits) {
   return bits == 0 ? 0 : static_cast<std::uint64_t>(position >> 32) & low_mask(bits);
 }
@@ -32,7 +33,8 @@ namespace absenc::sim {
   return !reading.multiturn_valid || reading.multiturn == turns_at(position, reading.multiturn_bits);
 }
 
-/// Returns whether two readings are equal in every part that is valid in both; true if a reading is missing.
+/// Returns whether two readings are equal in every part (single-turn position, turns) of which both have valid bits;
+/// true if a reading is missing.
 [[nodiscard]] constexpr bool same_place(const std::optional<Reading>& one, const std::optional<Reading>& other) {
   if (!one || !other) return true;
   if (one->singleturn_valid_bits != 0 && other->singleturn_valid_bits != 0 && one->singleturn != other->singleturn) {

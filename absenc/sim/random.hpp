@@ -24,8 +24,8 @@ class Random {
 
   /// Returns a number from 0 to limit - 1, each equally likely; `limit` must not be 0.
   constexpr std::uint64_t below(std::uint64_t limit) {
-    const std::uint64_t uneven = (0 - limit) % limit;  // 2^64 mod limit: the lowest `uneven` values are rejected, or
-                                                       // some results would be more likely
+    // 2^64 mod limit: the lowest `uneven` values are rejected, because they would make some results more likely.
+    const std::uint64_t uneven = (0 - limit) % limit;
     std::uint64_t value = next();
     while (value < uneven) value = next();
     return value % limit;

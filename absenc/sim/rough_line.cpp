@@ -88,7 +88,7 @@ void RoughLine<Item>::deliver_request(std::span<const Item> request) {
   feed({.kind = Kind::received, .at = time_, .items = request});
 }
 
-// Performs a transfer that the host clocks (SPI, clocked): the device's reply is complete at its end.
+// Performs a transfer that the host clocks (SPI, clocked): the device's reply is complete at the end of the transfer.
 template <class Item>
 void RoughLine<Item>::transfer(const Step<Item>& step) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
@@ -296,7 +296,7 @@ void RoughLine<Item>::draw_skip() {
     skip_ = 0;
     return;
   }
-  // One is added so that the random chance is never 0.
+  // One is added so that `chance` is never 0, whose logarithm is infinite.
   const double chance = static_cast<double>((random_.next() >> 11) + 1) * 0x1p-53;
   skip_ = static_cast<std::uint64_t>(std::log(chance) / std::log1p(-rates_.bit));
 }

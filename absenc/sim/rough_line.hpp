@@ -15,14 +15,14 @@ namespace absenc::sim {
 /// Probability, 0 to 1, of each kind of damage to data that is sent to the host: `bit` per data bit, all others per
 /// frame. Faults of the device itself are FaultRates, applied between the device and this line.
 struct RoughRates {
-  double bit = 0;    ///< probability that a data bit is flipped
-  double burst = 0;  ///< 2 to 16 adjacent bits are damaged: the first and last are flipped, each bit between them with
-                     ///< probability 1/2
-  double doubled = 0;  ///< one byte arrives twice; where the host is the clock, one bit arrives twice and the last bit
-                       ///< is lost
-  double talker = 0;   ///< another sender sends random bytes during the frame or beyond its end; the host receives the
-                       ///< AND of both
-  double late = 0;     ///< the frame is 10 us to 10 s late, each decade equally likely; later frames do not overtake it
+  double bit = 0;  ///< probability that a data bit is flipped
+  /// 2 to 16 adjacent bits are damaged: the first and last are flipped, each bit between them with probability 1/2.
+  double burst = 0;
+  /// One byte arrives twice. On SPI and clocked links one bit arrives twice and the last bit is lost.
+  double doubled = 0;
+  /// Another sender sends random bytes during the frame or beyond its end; the host receives the AND of both.
+  double talker = 0;
+  double late = 0;  ///< the frame is 10 us to 10 s late, each decade equally likely; later frames do not overtake it
 };
 
 /// Counts of the disturbances of a rough line.
@@ -63,13 +63,13 @@ class RoughLine final : public Port<Item> {
   [[nodiscard]] const RoughCounts& counts() const { return counts_; }
   /// Returns the last request of the host.
   [[nodiscard]] std::span<const Item> request() const { return request_; }
-  /// Returns the last reply of the device, of any length, before it was damaged.
+  /// Returns the last reply of the device, as it was before the line damaged it.
   [[nodiscard]] std::span<const Item> reply() const { return out_; }
-  /// Returns the number of bits of the last transfer on a clocked link.
+  /// Returns the number of bits of the last transfer on an SPI or clocked link.
   [[nodiscard]] std::size_t bits() const { return bits_; }
 
  private:
-  // A frame in transit to the host. No items: characters that cannot be read (a `line_error`).
+  // A frame in transit to the host. Without items it arrives as a `line_error`, because the host cannot read it.
   struct InTransit {
     Time sent;   // time at which its transmission began
     Time first;  // arrival time of the first item
@@ -127,7 +127,7 @@ class RoughLine final : public Port<Item> {
   std::vector<Item> out_;  // items that the device sent last
   std::uint8_t behind_out_ = 0xFF;
   std::size_t bits_ = 0;
-  std::vector<InTransit> in_transit_;  // frames from front_ to back_ are in transit; entries before front_ are reused
+  std::vector<InTransit> in_transit_;  // entries front_ to back_ - 1 are in transit; the others are reused
   std::size_t front_ = 0;
   std::size_t back_ = 0;
   std::vector<Item> reported_items_;

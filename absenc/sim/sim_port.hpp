@@ -65,7 +65,7 @@ class SimPort final : public Port<Item> {
 
   RealTime real_time_;
   Time start_{};          // start of virtual time, on the caller's clock
-  Time last_event_at_{};  // time of the last reported event
+  Time last_event_at_{};  // time of the last reported event, or of a later call of `now`
   Line<Item> line_;
   HostEnd host_end_;
   typename Line<Item>::Node host_node_;

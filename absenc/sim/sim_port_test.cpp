@@ -183,7 +183,7 @@ TEST(SimPort, LimitsRunOnlyDuringWaits) {
   EXPECT_EQ(port.wait(impatient).kind, Kind::silence);
 }
 
-// A configure step is carried out at the present time, not at the time of the last event.
+// A configure step advances the line to the present, past the timer's time; `wait` then still reports the timer.
 TEST(SimPort, ReportsTimerThatPassedMeanwhile) {
   SlowWorld world;
   Mute mute;

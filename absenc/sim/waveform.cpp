@@ -19,7 +19,7 @@ constexpr std::size_t cs = 0, sck = 1, mosi = 2, miso = 3;
 constexpr std::size_t clock = 0, data = 1;
 constexpr std::size_t can = 0;
 
-// Division of `length` into equal parts; the call operator returns the boundary after `part`, to the nearest
+// Division of `length` into equal parts; the call operator returns the end of the first `part` parts, to the nearest
 // nanosecond.
 struct EvenDivision {
   Time start;
@@ -129,11 +129,11 @@ void Waveform::draw_clocked(const Line<std::uint8_t>::Transfer& seen) {
   const auto bits = static_cast<std::int64_t>(seen.bits);
   const std::int64_t idle = settings_.idle_clocks;
   const EvenDivision half{seen.start, seen.end - seen.start, 2 * bits};
-  // The clock line rises again half a period before the first edge.
+  // A clock line that the host held low rises half a period before the first clock edge.
   if (seen.held_low != never) drive(clock, seen.held_low + half(1) - half(0), half(-1));
   for (std::int64_t i = 0; i < bits + idle; ++i) drive(clock, half(2 * i), half(2 * i + 1));
   for (std::int64_t i = 0; i < bits; ++i) {
-    // If the encoder answers without idle clocks, its first bit is on the line before the first edge.
+    // Without idle clocks, the encoder's first bit is on the line from the first clock edge on.
     const Time from = i + idle == 0 ? seen.start : half(2 * (i + idle) - 1);
     if (!BitView{seen.in, seen.bits}[static_cast<std::size_t>(i)]) drive(data, from, half(2 * (i + idle) + 1));
   }

@@ -15,9 +15,9 @@
 
 namespace absenc::sim {
 
-/// A drawing of the wires of a line: draws the items that are passed to it or that it observes, with logic levels: an
-/// idle line and a mark are 1. It stores only changes that are not settled yet: characters of two pairs overlap, and
-/// files need their times in order.
+/// A drawing of the wires of a line, as logic levels (an idle line and a mark are 1), from items that are passed to it
+/// or observed on a Line. It passes changes to its sink in the order of time, and stores only those that a later item
+/// may still precede, because characters of two pairs overlap.
 ///
 /// - half duplex: `line`; full duplex: `host` and `device`, named by the sender that drives the pair
 /// - additional wires after the first pulse: `trigger`, `clear`, which a pulse pulls to 0
@@ -47,10 +47,10 @@ class Waveform {
   /// Makes a waveform without items. `sink` must outlive it.
   Waveform(LinkKind kind, const LineSettings& settings, Sink& sink);
 
-  /// Draws all items on `line`, of the same kind and settings, from now on. Replaces the observers of the line; the
-  /// waveform must outlive the line.
+  /// Draws all items on `line`, which has the waveform's kind and settings, from now on. Replaces the observers of the
+  /// line; the waveform must outlive the line.
   void observe(Line<std::uint8_t>& line);
-  /// Draws all frames on `line`, of the same settings, from now on. Replaces the observers of the line.
+  /// Draws all frames on `line`, which has the waveform's settings, from now on. Replaces the observers of the line.
   void observe(Line<CanFrame>& line);
 
   /// Draws one asynchronous character.
@@ -96,9 +96,9 @@ class Waveform {
   Sink* sink_;
   std::vector<Wire> wires_;
   std::vector<int> drivers_;  // number of active drives of each wire
-  // Changes and comments that the sink has not received yet.
+  // Level changes that the sink has not received yet, the earliest on top.
   std::priority_queue<LevelChange, std::vector<LevelChange>, std::greater<>> changes_;
-  std::vector<Comment> comments_;  // in the order of time
+  std::vector<Comment> comments_;  // comments that the sink has not received, in the order of time
   Time end_{};
 };
 

@@ -165,8 +165,8 @@ TEST(Waveform, DataIsLowForTheTimeoutBehindTheLastEdge) {
   picture.transfer(seen);
   EXPECT_THAT(body(picture), ::testing::EndsWith("#3000\n0!\n#3500\n1!\n0\"\n#23500\n1\"\n#33500\n"));
 
-  // After the last bit the device holds the data line low. BiSS: for 20 us or one and a half periods. SSI: for the
-  // monoflop time, from the edge behind the last bit.
+  // After the last bit the device holds the data line low. BiSS: for its fixed timeout (20 us by default) or one and a
+  // half clock periods. SSI: for the monoflop time, from the edge behind the last bit.
   biss::Format biss{};
   const auto biss_low = [&] {
     biss::testing::Bench bench(biss::line_settings, biss);
@@ -204,7 +204,7 @@ TEST(Waveform, PulsesHaveWiresOfTheirOwn) {
   EXPECT_EQ(body(waveform), "#0\n1!\n1\"\n1#\n1$\n#1000\n0#\n#3000\n1#\n#5000\n0$\n#6000\n1$\n#16000\n");
 }
 
-// A sink that receives everything only at the end would run out of memory.
+// The waveform must pass changes to its sink while the line runs: stored until the end, they would fill the memory.
 TEST(Waveform, PassesSettledChangesToSink) {
   struct Counter final : Waveform::Sink {
     void change(Time at, std::size_t) override {
@@ -235,7 +235,7 @@ TEST(Waveform, PassesSettledChangesToSink) {
   EXPECT_EQ(counter.last, 53us);
 }
 
-// Compares with independent decoders, those of sigrok-cli.
+// Compares drawn waveforms with independent decoders, those of sigrok-cli.
 struct Sigrok : ::testing::Test {
   Sigrok() {
     std::string name = std::filesystem::temp_directory_path() / "absenc-vcd-XXXXXX";
@@ -244,7 +244,7 @@ struct Sigrok : ::testing::Test {
   }
   ~Sigrok() override { std::filesystem::remove_all(directory); }
 
-  // Returns the annotations of a sigrok decoder, one per line, without its name.
+  // Returns the annotations of a sigrok decoder, one after the other, without the decoder's name.
   [[nodiscard]] std::string decode(Picture& waveform, const std::string& decoder, const std::string& what) const {
     const std::filesystem::path file = directory / "waveform.vcd";
     std::ofstream(file) << waveform.vcd();
@@ -267,7 +267,7 @@ struct Sigrok : ::testing::Test {
   std::filesystem::path directory;
 };
 
-// Returns `bits` as the sigrok decoder prints them: each word backwards.
+// Returns `bits` as sigrok's SPI decoder prints the bits of one word: the last bit first.
 std::string bits_of(BitView bits) {
   std::string text;
   for (std::size_t i = bits.size; i-- > 0;) text += bits[i] ? "1 " : "0 ";

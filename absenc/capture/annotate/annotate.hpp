@@ -82,18 +82,18 @@ class Annotator {
     std::size_t stream_size = 0;  // size of the last good unsolicited frame in any run
   };
 
-  // Detection of the channels' directions.
+  // These functions find which channel carries requests and which carries replies.
   void store_undecided(const Character& character);
   void find_roles();
 
-  // Splitting of the characters into runs.
+  // These functions split the characters into runs, which have no pause between their characters.
   void take(const Character& character);
   [[nodiscard]] Tick pause_of(const Channel& channel) const;
   void close(Channel& channel, bool cut);
   void parse(Channel& channel, bool whole, bool cut);
 
-  // Parsing of the run from `at_` on. Functions that return a number return how many characters they consumed or would
-  // consume, 0 for none.
+  // These functions parse the run from index `at_` on. Those that return a number return how many characters they
+  // consumed or would consume, 0 for none.
   std::size_t next_frame();
   std::size_t whole_frame();
   std::size_t match_reply();
@@ -126,7 +126,7 @@ class Annotator {
   std::array<std::size_t, 256> reply_sizes_{};  // size of the last good reply, by the first byte of its request
   std::vector<Character> undecided_;            // characters stored until the channels' directions are known
 
-  bool is_first_ = true;  // no frame was parsed yet: the first part of the first frame may lie before the capture
+  bool is_first_ = true;  // no frame was parsed yet: the beginning of the first frame may lie before the capture
 
   // State while a run is parsed.
   Channel* channel_ = nullptr;

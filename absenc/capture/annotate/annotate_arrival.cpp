@@ -33,7 +33,8 @@ bool Annotator::stands_alone(std::size_t size) const {
   return has_gap(at_) && (is_end || has_gap(at_ + size));
 }
 
-// Returns the size of the good frame at `at_`, or 0 if the next characters may belong to it.
+// Reports the good frame at `at_` and returns its size. Returns 0, and reports nothing, if there is none, or if the
+// next characters may belong to it.
 std::size_t Annotator::whole_frame() {
   if (!channel_->at_frame_start) return 0;
   const auto answered = [&](std::size_t size) {
@@ -41,7 +42,7 @@ std::size_t Annotator::whole_frame() {
     return reply_at(request, at_ + size, reply_sizes_[request[0]]) != 0;
   };
   const std::size_t size = request_at(at_);
-  // Returns whether the request at `at_` is sent again: its host had a timeout.
+  // Returns whether the request at `at_` stands alone and the same bytes follow: its host had a timeout.
   const auto repeats = [&] {
     if (size == 0 || !stands_alone(size) || rest(at_ + size).size() < size) return false;
     const Bytes behind = rest(at_ + size);

@@ -58,7 +58,8 @@ std::string hex(const Wire& wire) {
   return text;
 }
 
-// Returns the first difference between found and expected exchanges, "" if there is none; both lists have hundreds.
+// Returns the first difference between found and expected exchanges, "" if there is none; the lists are too long to
+// print.
 std::string difference(const std::vector<Exchange>& found, const std::vector<Exchange>& exchanges) {
   const auto text = [](const std::vector<Exchange>& all, std::size_t i) {
     return i < all.size() ? hex(all[i].request) + " > " + hex(all[i].reply) : std::string("nothing");
@@ -82,8 +83,8 @@ class Arrival : public ::testing::TestWithParam<const Unit*> {
     annotator = std::make_unique<Annotator>(unit, options, settings, collector);
   }
 
-  // Returns `count` exchanges of one request and one reply between host and virtual encoder; none if the encoder only
-  // sends unsolicited frames.
+  // Returns about `count` good exchanges of one request and one reply between host and virtual encoder; none if the
+  // encoder only sends unsolicited frames.
   std::vector<Exchange> talk(std::size_t count, std::uint64_t seed) {
     Talker talker(unit, options, {}, seed);
     std::vector<Exchange> exchanges;
@@ -151,7 +152,7 @@ TEST_P(Arrival, ExchangesInPartsAndSeveralAtOnce) {
     const std::size_t size = std::min<std::size_t>(all.size() - at, 1 + random.below(random.below(4) == 0 ? 60 : 6));
     receive({all.begin() + static_cast<std::ptrdiff_t>(at), all.begin() + static_cast<std::ptrdiff_t>(at + size)});
     at += size;
-    now += random.below(10) == 0 ? 5 * gap : 1;  // the pauses also lie within frames
+    now += random.below(10) == 0 ? 5 * gap : 1;  // pauses of 5 * gap, many of them within frames
   }
   annotator->report_after_silence();
   EXPECT_EQ(difference(good(), exchanges), "");
@@ -171,7 +172,7 @@ TEST_P(Arrival, ReportsExchangeWhenComplete) {
     late += good().size() <= i ? 1u : 0u;
   }
   EXPECT_EQ(difference(good(), exchanges), "");
-  EXPECT_LE(late, exchanges.size() / 20);  // an exchange is late if its length differs from that of the previous one
+  EXPECT_LE(late, exchanges.size() / 20);  // a reply of another length than the last one is reported late
 }
 
 TEST_P(Arrival, CaptureBeginsWithinAnExchange) {
@@ -187,7 +188,7 @@ TEST_P(Arrival, CaptureBeginsWithinAnExchange) {
     annotator->report_after_silence();
     const std::vector<Exchange> found = good();
     ASSERT_GE(found.size() + 3, exchanges.size()) << from << " " << hex(collector.found[0].reply) << " " << hex(all);
-    // Each found exchange was really sent, and the last found exchanges are in the order in which they were sent.
+    // The found exchanges are the last ones that were sent, in the order in which they were sent.
     for (std::size_t i = 1; i <= found.size(); ++i) {
       ASSERT_EQ(found[found.size() - i], exchanges[exchanges.size() - i]) << from;
     }

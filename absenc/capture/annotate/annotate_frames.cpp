@@ -8,9 +8,9 @@ namespace absenc::capture {
 
 // ---- Bursts
 
-// Returns the word in a burst without the clocks that show the idle line before the first bit, and without the edge
-// with which a clock that was held low rises again. With `with_last` the word includes the level of the data line
-// behind the last clock.
+// Returns the word in a burst, without the bits of the idle line that the first clocks sample, and without the bit that
+// is sampled when a clock that was held low rises again. With `with_last` the word also includes the level of the data
+// line behind the last clock.
 Frame BurstAnnotator::word_of(const Burst& burst, bool with_last) {
   const bool rises = burst.low_before && judge_.unit().control_bit != nullptr;
   const std::size_t idle = judge_.unit().line.idle_clocks + (rises ? 1u : 0u);
@@ -43,8 +43,8 @@ void BurstAnnotator::put(const Burst& burst) {
   sink_.put(annotation);
 }
 
-// Decodes the word in `burst`; returns its error. `word` receives the decoded bits without the encoder's control
-// communication bit, and `answered` receives that bit.
+// Decodes the word in `burst`; returns its error. `word` receives the decoded bits, in which the encoder's control
+// communication bit is cleared while a control frame is in progress. `answered` receives that bit.
 Error BurstAnnotator::decode_as(const Burst& burst, bool with_last, Frame& word, bool& answered) {
   word = word_of(burst, with_last);
   const std::optional<std::size_t> place = judge_.control_bit(word);

@@ -15,8 +15,8 @@
 
 namespace absenc::capture {
 
-/// Collects control frames of clocked links: the host's bits are the level of its clock in each pause, the encoder's
-/// bits are in the words that follow the pauses. A control frame begins with a 1 behind `zeros` zeros, and ends with
+/// Collects control frames of clocked links: the host sends one bit in each pause (its clock is low for a 1), the
+/// encoder one bit in each word. A control frame begins with a 1 behind `zeros` zeros, and ends with
 /// `zeros` zeros.
 class ControlFrames {
  public:
@@ -27,8 +27,8 @@ class ControlFrames {
   /// Adds the next word: `answered` is the encoder's control bit, `error` the word's error. Call `settle` before the
   /// next word.
   void put(const Burst& burst, bool answered, Error error);
-  /// Completes the last added word at the beginning of the next word or at the end; `fell` is whether the clock fell
-  /// between the two. Returns true if that word is the last of a control frame.
+  /// Completes the last added word at the beginning of the next word or at the end; `fell` is whether the clock fell in
+  /// the pause behind the last added word. Returns true if that word is the last of a control frame.
   bool settle(bool fell);
   /// Ends the capture. Returns true if a control frame was in progress, which stays incomplete.
   bool finish() { return std::exchange(open_, false); }
@@ -43,7 +43,7 @@ class ControlFrames {
     [[nodiscard]] Frame frame() const { return {.bytes = bytes, .bits = size}; }
   };
 
-  // A word that was added but not completed by `settle`, because its following rest has not ended.
+  // A word that was added but not completed by `settle`, because the pause behind it has not ended.
   struct Pending {
     Tick begin;
     Tick end;
@@ -80,8 +80,8 @@ class BurstAnnotator {
 
   Judge judge_;
   AnnotationSink& sink_;
-  std::vector<std::uint8_t> shifted_;   // last word without the clocks that show the idle line
-  std::vector<std::uint8_t> silenced_;  // last word without the encoder's control communication bit
+  std::vector<std::uint8_t> shifted_;   // last word without the bits of the idle line before it
+  std::vector<std::uint8_t> silenced_;  // last word with the encoder's control communication bit cleared
   ControlFrames control_;
 };
 

@@ -64,7 +64,7 @@ void annotate(const Unit& unit, const Options& options, Annotator::Settings sett
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
   const Bytes bytes(data, size);
-  std::size_t turn = size + data[0];  // varies the kind of line and the unit for each input
+  std::size_t turn = size + data[0];  // varies the kind of line with the input and the unit
   for (const Unit* unit : all_units()) {
     if (unit->link != LinkKind::half_duplex && unit->link != LinkKind::full_duplex) continue;
     Options options;

@@ -161,7 +161,8 @@ class Truth {
     add(Kind::reply, Remark::none, error, sent, reading(error));
   }
 
-  // The frame behind a disturbance is valid: a listening host accepts it.
+  // Adds a disturbance and the frame behind it as two annotations: the frame is valid, because a listening host accepts
+  // it.
   void add_disturbed(const Transmission& sent, Wire::const_iterator middle, const Wire& last) {
     const Wire before(sent.bytes.begin(), middle);
     const Tick each = (sent.end - sent.begin) / sent.bytes.size();
@@ -201,7 +202,7 @@ class Truth {
       one.remark = Remark::undocumented;
     }
     one.reading = reading(one.error);
-    // The reply equals its request, so this may be a late reply or the repeated request.
+    // A late reply that equals its request may also be the repeated request: two unanswered requests are expected.
     if (one.error == Error::none && *one.turnaround > static_cast<Tick>(limit_.count()) && one.request == one.reply) {
       add(Kind::request, Remark::unanswered, Error::timeout, request_sent, {});
       return add(Kind::request, Remark::unanswered, Error::timeout, sent, {});
@@ -275,7 +276,7 @@ sim::FaultRates faults_of(const Unit& unit, const Options& options) {
   sim::FaultRates rates = sim::testing::damaged_replies(0.05);
   rates[sim::FaultKind::request_corrupt] = 0.005;
   rates.delay = unit.timing.turnaround_limit * 3 / 2;
-  // Two frames of a stream look the same as one frame sent twice.
+  // In a stream, a frame sent twice looks the same as two frames, and a late frame looks the same as one in time.
   if (unit.streams != nullptr && unit.streams(options)) {
     rates[sim::FaultKind::repeat] = rates[sim::FaultKind::delay] = 0;
   }

@@ -110,7 +110,7 @@ std::size_t Annotator::match_reply() {
   const Exchanges::PendingRequest& pending = exchanges_.waiting()[*which];
   const bool overdue = exchanges_.overdue(pending, begin);
   if (pending.error != Error::none) {
-    // The request is damaged, but an encoder answered it.
+    // The outstanding request is damaged; a good reply in time shows that an encoder answered it.
     const std::size_t size = overdue ? 0 : reply_at({}, at_);
     if (size != 0) exchanges_.report_reply(*which, piece(size), pending.error, pending.remark, {});
     return size;
@@ -119,13 +119,12 @@ std::size_t Annotator::match_reply() {
   const std::size_t size = reply_at(pending.bytes(), at_, usual);
   const bool leaves_rest = whole_ && size < rest(at_).size();
   if (size == 0 || leaves_rest) {
-    // A reply that leaves a rest may match by accident; an echo of the request with a reply that leaves no rest is no
-    // accident. Some replies equal their requests, and a reply may be sent twice.
+    // A reply that leaves characters of the run may match by accident; an echo of the request with a reply that leaves
+    // none is no accident. Some replies equal their requests, and a reply may be sent twice.
     const bool may_be_accident = size == 0 || size > pending.bytes().size();
-    // The reply begins later than twice the turnaround limit after the request, so equal bytes are the repeated
-    // request.
+    // Bytes that equal the request and begin later than twice the turnaround time after it are the repeated request.
     const bool is_late = settings_.ticks.turnaround != 0 && begin > pending.end + 2 * settings_.ticks.turnaround;
-    // A tap between host and encoder receives no echo: equal bytes are a repeated request.
+    // A tap (arrival times) receives no echo: bytes that equal the request are a repeated request.
     const bool may_be_echo = !is_late && !settings_.by_arrival;
     const std::size_t echoed = may_be_accident && may_be_echo ? echoed_reply_size(pending.bytes(), at_) : 0;
     if (echoed != 0 && (size == 0 || echoed == rest(at_).size())) return match_echoed_reply(*which, echoed);
@@ -148,8 +147,8 @@ std::size_t Annotator::match_reply() {
   return size;
 }
 
-// Returns whether a good frame follows the reply of `size` bytes at `at_`: then the reply's unusual size is no
-// accident.
+// Returns whether a good request, or the same reply again, follows the reply of `size` bytes at `at_`: then the reply's
+// unusual size is no accident.
 bool Annotator::is_followed_by_frame(std::size_t size) {
   const Bytes behind = rest(at_ + size);
   const Bytes reply = rest(at_).first(size);
@@ -253,14 +252,14 @@ std::size_t Annotator::take_bad() {
   const std::size_t size = bad_size();
   report_bad(size);
   last_reply_size_ = 0;
-  channel_->at_frame_start = true;  // the bytes behind the bad bytes were found to be good
+  channel_->at_frame_start = true;  // the bad bytes end where a good frame begins, or with the run
   if (!whole_ && !good_from(at_ + size)) channel_->at_frame_start = false;
   return size;
 }
 
-// Returns the number of bad bytes at `at_`, up to the next good frames, or to the end of the run. The rest of a run is
-// bad as a whole unless a frame of the usual size and a good frame behind it are found: garbage before a good reply
-// makes the exchange bad, like in live reading.
+// Returns the number of bad bytes from `at_` on. They end where good frames begin, at a pause (arrival times only), or
+// with the run; if the run still grows, half of the look-ahead before its end. A single good reply does not end them:
+// garbage before a good reply makes the exchange bad, like in live reading.
 std::size_t Annotator::bad_size() {
   const std::size_t left = rest(at_).size();
   // In a stream of unsolicited frames, the next frame begins one frame size behind the bad frame.

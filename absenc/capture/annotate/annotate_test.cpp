@@ -301,7 +301,7 @@ TEST(Can, NodesAnswerInAnyOrder) {
   CanAnnotator annotator(unit, {}, {.limit = 1000}, collector);
   annotator.put(record(0, 0x201, 7));
   annotator.put(record(10, 0x202, 8));
-  annotator.put(record(20, 0x102, 9));  // an unsolicited frame of node 2, not the reply
+  annotator.put(record(20, 0x102, 9));  // an unsolicited frame of node 2, not the reply to its request
   annotator.put(record(30, 0x102, 8));
   annotator.put(record(40, 0x101, 7));
   annotator.put(record(50, 0x333, 0));
@@ -330,8 +330,8 @@ TEST(Can, NodesAnswerInAnyOrder) {
   EXPECT_EQ(collector.ids, (std::vector<std::uint32_t>{0x102, 0x202, 0x102, 0x201, 0x101, 0x333, 4, 0x203, 0x204}));
 }
 
-// A toy encoder with one alarm. Replies with bit 0 report the alarm and their position is valid; the validity of other
-// replies depends on an earlier reply of the same node.
+// A toy encoder with one alarm. The validity of a position is known if its reply, or an earlier reply of the same node,
+// reports the alarm.
 TEST(CompletedReadings, CompletesAReadingByWhatTheSameEncoderReported) {
   static constexpr std::array<FieldInfo, 1> fields{
       {{.name = "node", .kind = FieldInfo::Kind::number, .unit = "", .meaning = "", .role = Role::encoder}}};
@@ -366,7 +366,7 @@ TEST(CompletedReadings, CompletesAReadingByWhatTheSameEncoderReported) {
   EXPECT_TRUE(is_known_after(1, 0));
 }
 
-// The capture has a T-format ID 3 reply with counter_overflow, resets of all errors, and an ID 0 reply, which does not
+// The capture has a T-format ID 3 reply with counter_overflow, a reset of all errors, and ID 0 replies, which do not
 // carry that alarm.
 TEST(CompletedReadings, ForgetsAlarmsThatWereCleared) {
   const Unit& unit = *find_unit("tformat");

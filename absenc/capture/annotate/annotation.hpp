@@ -42,7 +42,7 @@ struct Annotation {
     exchange,  // a request and its reply
     request,   // a request without its reply
     reply,     // a reply without its request
-    noise,     // bytes that are neither request nor reply; they are in `reply`
+    noise,     // bytes that are neither request nor reply, stored in the member `reply`
   };
 
   Kind kind = Kind::noise;
@@ -58,7 +58,8 @@ struct Annotation {
   std::optional<Tick> turnaround{};  // ticks from the end of the request to the beginning of its reply
 };
 
-/// Receives annotations in the order of their end times.
+/// Receives annotations in the order of their end times, except that an unanswered request may follow later
+/// annotations, when its reply is no longer expected.
 struct AnnotationSink {
   virtual void put(const Annotation& annotation) = 0;
 

@@ -89,7 +89,7 @@ class Talker {
       if (host_) {
         line_.replace(*host_, *conversation);
       } else {
-        // A streaming host stops after its first result.
+        // A host that executes a `read` command stops after its first result.
         host_ = line_.attach(sim::NodeRole::host, *conversation, [this] { return !streams_; });
       }
       line_.run(*host_, line_.now() + std::chrono::seconds(30));
@@ -129,7 +129,7 @@ class Talker {
   void record(const sim::Line<std::uint8_t>::Transfer& transfer) {
     std::size_t idle = unit_.link == LinkKind::clocked ? unit_.line.idle_clocks : 0;
     const bool held_low = transfer.held_low != never;
-    if (held_low) {  // the edge with which the clock rises again samples a bit of the idle line
+    if (held_low) {  // a bit of the idle line is sampled when the clock rises again
       ++idle;
       if (!record_.bursts.empty()) record_.bursts.back().low_after = true;
     }

@@ -138,7 +138,7 @@ class Samples {
     const std::uint64_t whole = time / nanoseconds_a_second * rate;
     return whole + (time % nanoseconds_a_second * rate + nanoseconds_a_second - 1) / nanoseconds_a_second;
   }
-  // Applies all changes before the present sample, and finds the sample in which the next change becomes visible.
+  // Applies all changes that the present sample shows, and finds the first sample that shows the next change.
   void take_change() {
     while (true) {
       const Tick next = levels_.next_change();
@@ -337,7 +337,7 @@ void write_sigrok(const std::string& path, Drawing& drawing, std::uint64_t rate)
     add(archive.get(), path, ("logic-1-" + std::to_string(parts.size())).c_str(),
         zip_source_function(archive.get(), provide, parts.back().get()));
   }
-  // Compresses all files of the archive, in the order in which they were added.
+  // zip_close compresses and writes all files of the archive, in the order in which they were added.
   if (zip_close(archive.get()) != 0) {
     if (samples.exception != nullptr) std::rethrow_exception(samples.exception);
     fail(path, zip_strerror(archive.get()));

@@ -86,8 +86,8 @@ class WaveformSink final : public Waveform::Sink {
   void change(Time at, std::size_t wire) override { drawing_->change(tick(at), wire); }
   void comment(Time at, std::string_view words) override { drawing_->label(tick(at), words); }
 
-  /// Ends the drawing `margin` after the waveform's end, for decoders that wait for an idle line, but not before
-  /// `least`: the end of a host's wait without a reply.
+  /// Adds the wires and ends the drawing `margin` after the waveform's end, for decoders that wait for an idle line,
+  /// but not before `least`, for example the end of a host's wait for a reply that does not come.
   void finish(Waveform& waveform, Time margin, Time least = {}) {
     waveform.finish();
     for (const auto& wire : waveform.wires()) drawing_->add_wire(std::string(wire.name), wire.idle);
@@ -105,8 +105,8 @@ class WaveformSink final : public Waveform::Sink {
 /// before the changes.
 void write_vcd(std::ostream& out, Drawing& drawing);
 
-/// Writes `drawing` as digital channels like the CSV export of Saleae Logic 2: one line per time with changes, exact to
-/// the nanosecond.
+/// Writes `drawing` as digital channels like the CSV export of Saleae Logic 2: one line for time 0, for each time with
+/// changes and for the end, exact to the nanosecond.
 void write_saleae_csv(std::ostream& out, Drawing& drawing);
 
 /// Writes `drawing` as a sigrok session with `rate` samples per second (at most 1 GHz). Replaces the file at `path`.

@@ -30,12 +30,13 @@ class Judge {
     if (error != Error::none) decoded_.clear();
     return error;
   }
-  /// Returns the content of the last decoded frame, empty if it was bad. Valid until the next call of `decode`.
+  /// Returns the content of the last decoded frame, empty if it was bad. Valid until the next call of `decode` or
+  /// `request_size`.
   [[nodiscard]] Contents contents() const {
     return {decoded_.fields, decoded_.has_reading ? &decoded_.reading : nullptr};
   }
 
-  /// Returns the size of the frame that begins with the first of `bytes`, or 0 if none does.
+  /// Returns the size of the complete frame, good or not, that begins with the first of `bytes`; 0 if none does.
   [[nodiscard]] std::size_t frame_size(Direction direction, Bytes bytes) const {
     const FrameEnd end = unit_->frame_end(options_, direction, bytes);
     return end.kind == FrameEnd::Kind::complete && end.size <= bytes.size() ? end.size : 0;
@@ -44,7 +45,7 @@ class Judge {
   [[nodiscard]] bool is_incomplete(Direction direction, Bytes bytes) const {
     return unit_->frame_end(options_, direction, bytes).kind == FrameEnd::Kind::incomplete;
   }
-  /// Returns the size of the good request that begins with the first of `bytes`, or 0 if none does.
+  /// Returns the size of the complete good request that begins with the first of `bytes`; 0 if none does.
   [[nodiscard]] std::size_t request_size(Bytes bytes) {
     const std::size_t size = frame_size(Direction::request, bytes);
     return size != 0 && decode({.bytes = bytes.first(size)}, {}) == Error::none ? size : 0;

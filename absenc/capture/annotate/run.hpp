@@ -53,7 +53,8 @@ class Run {
   [[nodiscard]] Tick end(std::size_t index) const { return ends_[index]; }
   [[nodiscard]] Tick end() const { return ends_[size_ - 1]; }
 
-  /// Returns whether none of the `count` characters from `first` on had a wrong parity or stop bit.
+  /// Returns whether none of the `count` characters from `first` on had a wrong parity or stop bit or was
+  /// a break.
   [[nodiscard]] bool clean(std::size_t first, std::size_t count) const {
     if (damages_ == 0) return true;
     const auto from = damaged_.begin() + static_cast<std::ptrdiff_t>(first);

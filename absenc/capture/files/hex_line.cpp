@@ -109,7 +109,7 @@ bool parse_sigrok(std::string_view line, HexLine& parsed) {
   const std::string_view kind = take_word(rest);
   const bool classed = kind.ends_with(':');
   if (classed) {
-    if (kind != "rx-data:" && kind != "tx-data:") return true;  // annotations of other classes are no bytes
+    if (kind != "rx-data:" && kind != "tx-data:") return true;  // annotations of other classes contain no bytes
     parsed.channel = kind == "tx-data:" ? 0 : 1;
     line = rest;
   }

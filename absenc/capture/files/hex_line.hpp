@@ -17,7 +17,7 @@ enum class HexForm : std::uint8_t { plain, dump, xxd, sigrok };
 
 struct HexLine {
   std::optional<Instant> at;
-  std::optional<Tick> begin;  // first sample of the annotation, only for the form sigrok
+  std::optional<Tick> begin;  // form sigrok: index of the first sample of the bytes, if stated
   Tick end = 0;
   int channel = -1;  // direction of the bytes: 0 tx, 1 rx, -1 not stated
   std::optional<std::uint64_t> offset;
@@ -26,8 +26,8 @@ struct HexLine {
   std::string problem;  // reason why the line is invalid, as words; "" if no reason is known
 };
 
-/// Parses a group of hexadecimal digits and appends its bytes: two digits, or more with a prefix: 1A, 1A00, 0x1A, \x1A,
-/// $1A. Returns false and leaves `bytes` unchanged if the group is invalid.
+/// Parses a group of hexadecimal digits and appends its bytes: pairs of digits, with or without a prefix (1A, 1A00,
+/// 0x1A, \x1A, $1A), or a prefix and one digit. Returns false and leaves `bytes` unchanged if the group is invalid.
 bool append_group(std::string_view group, std::vector<std::uint8_t>& bytes);
 
 /// Returns `line` without its comment and without blanks around the rest.

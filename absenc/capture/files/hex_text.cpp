@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t bytes_at_once = 1 << 16;
 
-// Returns the part of `line` to parse. Comments are removed only in plain text: the text beside a dump may contain any
+// Returns the part of `line` to parse. Comments are not removed from dumps: the text beside the bytes may contain any
 // character.
 std::string_view content_of(std::string_view line, std::optional<HexForm> form) {
   if (form == HexForm::dump || form == HexForm::xxd) return trim(line);
@@ -168,7 +168,7 @@ bool is_hex_text(std::string_view head) {
   while (!head.empty()) {
     const std::string_view line = head.substr(0, head.find('\n'));
     if (!strip_comment(line).empty()) {
-      if (line.size() == head.size() && head.size() > 4096) {  // a single long line, cut off at any place
+      if (line.size() == head.size() && head.size() > 4096) {  // `head` ends within a single long line
         return first_form(head.substr(0, head.find_last_of(" ,;"))).has_value() ||
                first_form(head.substr(0, head.size() / 2 * 2)).has_value();
       }

@@ -16,12 +16,13 @@ namespace absenc::capture {
 /// Returns true if the first line that is not empty and not a comment can be read by `read_hex_text`.
 [[nodiscard]] bool is_hex_text(std::string_view head);
 
-/// Returns the reason why the first line with content cannot be read as hexadecimal text; "" if it can.
+/// Returns the reason why the first line with content cannot be read as hexadecimal text; "" if it can, or if no reason
+/// is known.
 [[nodiscard]] std::string hex_text_problem(std::string_view head);
 
-/// Reads lines of one of the forms below; the first line decides which. Empty lines, and text behind `#` or `//`, are
-/// ignored. HEX is any number of bytes: pairs of digits, adjacent or separated by blanks, commas or semicolons, each
-/// group optionally with `0x`, `\x` or `$` before it; `0x` also before a single digit.
+/// Reads lines of one of the forms below; the first line decides which. Empty lines and, except in dumps, text behind
+/// `#` or `//` are ignored. HEX is any number of bytes: pairs of digits, adjacent or separated by blanks, commas or
+/// semicolons, each group optionally with `0x`, `\x` or `$` before it, in which case a single digit is allowed too.
 ///
 /// - Lines that people type and terminal programs log, see log_line.hpp: a time, a port and a direction in any order,
 ///   the bytes, and their text. All lines must be of one port.

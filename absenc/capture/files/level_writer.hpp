@@ -41,7 +41,7 @@ class LevelWriter {
     }
   }
 
-  /// Returns the number of level changes in the present block, of all channels.
+  /// Returns the number of level changes of all channels in the present block, including those that cancel each other.
   [[nodiscard]] std::size_t changes() const { return changes_; }
 
  private:

@@ -59,7 +59,7 @@ bool is_text_of(std::string_view text, Bytes bytes) {
   std::string letters;
   for (const char c : text) {
     const auto byte = static_cast<unsigned char>(c);
-    if ((byte & 0xC0) != 0x80) letters += byte < 0x80 ? c : '.';  // a UTF-8 sequence is one character
+    if ((byte & 0xC0) != 0x80) letters += byte < 0x80 ? c : '.';  // each UTF-8 sequence counts as one character
   }
   if (letters.empty() || letters.size() > bytes.size()) return false;
   for (std::size_t i = 0; i < letters.size(); ++i) {
@@ -116,8 +116,8 @@ struct ParsedTime {
   std::size_t size = 0;  // number of characters that the time takes
 };
 
-// Returns the length of a clock time at the beginning of `text`: "17:55:24.123", "17:55:24,123", "17:55:24:123",
-// "5:55:24"; 0 if `text` begins otherwise.
+// Returns the number of characters at the beginning of `text` that may be a clock time: "17:55:24.123", "17:55:24,123",
+// "17:55:24:123", "5:55:24". The caller checks whether they are one.
 std::size_t clock_size(std::string_view text) {
   std::size_t size = std::min(text.find_first_not_of("0123456789:."), text.size());
   const bool seconds = size > 3 && text[size - 3] == ':' && std::count(text.begin(), text.begin() + size, ':') == 2;
@@ -247,7 +247,7 @@ bool is_filler(std::string_view word) {
   return lower == "byte" || lower == "bytes" || lower == "data" || lower == "hex" || lower == "-";
 }
 
-/// Parses and removes the part of a log line before the bytes: time, direction, port and fillers.
+/// Parses a log line from left to right: time, direction, port and fillers in any order, then the bytes.
 class Prefix {
  public:
   Prefix(std::string_view text, HexLine& parsed) : text_(text), parsed_(parsed) {}
@@ -334,7 +334,8 @@ class Prefix {
     parsed_.source += name;
   }
 
-  // Handles a word with a direction or a port, like "RX", "COM3:", "COM3>". Returns false for another word.
+  // Removes and handles a word that is a direction, a port, a filler or a label, like "RX", "COM3:", "COM3>". Returns
+  // false for another word.
   bool take_word_of_prefix(std::string_view word) {
     text_.remove_prefix(word.size());
     const bool label = word.ends_with(':') || word.ends_with('=');
@@ -356,7 +357,8 @@ class Prefix {
     return false;
   }
 
-  // Handles text in brackets like the same text without brackets. Returns true if the brackets contain the bytes.
+  // Handles text in brackets: known items like the same text without brackets, unknown text as a source. Returns true
+  // if the brackets contain the bytes of the line.
   bool take_bracket() {
     const char closing = text_[0] == '[' ? ']' : ')';
     const std::size_t end = text_.find(closing);
@@ -390,7 +392,7 @@ class Prefix {
     return lower_case(trim(text_.substr(word.size()))).starts_with("byte");
   }
 
-  // Returns whether bytes follow the word: then the word itself is a byte too, not a time or number.
+  // Returns whether bytes or nothing follow the word: then the word itself is a byte too, not a line number.
   [[nodiscard]] bool bytes_follow(std::string_view word) const {
     std::string_view rest = text_.substr(word.size());
     rest.remove_prefix(std::min(rest.find_first_not_of(separators), rest.size()));

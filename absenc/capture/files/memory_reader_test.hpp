@@ -34,8 +34,8 @@ struct Wires {
   [[nodiscard]] std::size_t ticks() const { return levels.front().size(); }
 };
 
-/// Returns the level changes from sample `first` on, found by comparing each sample with the previous one; `before` is
-/// the level before sample `first`.
+/// Returns the level changes in the samples from `first` to `end` - 1, found by comparing each sample with the previous
+/// one; `before` is the level before sample `first`.
 inline Changes changes_of(const Drawn& levels, bool before, std::size_t first, std::size_t end) {
   Changes found{before, {}};
   bool level = before;

@@ -83,7 +83,7 @@ void add_entry(Directory& directory, const Header& header, std::uint64_t at, std
   directory.put(directory_signature, 4).put(zip64_version, 2);
   directory.put(Bytes(header.bytes).subspan(4, 14)).put(in_zip64, 4).put(in_zip64, 4);
   directory.put(header.name().size(), 2).put(28, 2);  // lengths of the name and of the zip64 extra field
-  // Comment, disk and attributes; then the offset of the entry, stored in the extra field.
+  // The next fields are comment, disk and attributes, all 0, and the entry's offset, which is in the extra field.
   directory.put(0, 10).put(in_zip64, 4);
   directory.put(header.name()).put(1, 2).put(24, 2).put(header.size, 8).put(packed, 8).put(at, 8);
 }

@@ -12,8 +12,8 @@ namespace absenc::capture {
 
 struct MendedZip {
   std::unique_ptr<Source> archive;         // the remaining part of the archive, followed by a new directory
-  std::uint64_t end = 0;                   // offset of the end of the last complete entry
-  bool complete = false;                   // the directory was lost but began at `end`: no entry is missing
+  std::uint64_t end = 0;                   // offset of the end of the last entry, which may be cut off
+  bool complete = false;                   // the damaged directory begins at `end`: no entry is missing
   std::optional<std::uint64_t> cut_entry;  // index of the last entry, if the file ends within it
 };
 

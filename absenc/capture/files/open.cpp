@@ -30,7 +30,7 @@ bool is_candump(std::string_view head) {
   return parse_candump(head.substr(first, head.find('\n', first) - first), line);
 }
 
-// Returns whether at least the first line of a file that begins with `head` is text.
+// Returns whether the first line of a file that begins with `head` is printable ASCII text.
 bool is_text(std::string_view head) {
   const std::string_view line = head.substr(0, head.find_first_of("\r\n"));
   return std::all_of(line.begin(), line.end(), [](char c) {
@@ -39,7 +39,8 @@ bool is_text(std::string_view head) {
   });
 }
 
-// Opens a file of a format that contains channel names; returns nullptr if the file has none of these formats.
+// Opens a logic analyser's file that states its channels itself (sigrok, Saleae, VCD, CSV); returns nullptr, and leaves
+// `source` as it is, if the file has none of these formats.
 std::unique_ptr<Reader> open_logic(std::unique_ptr<Source>& source, std::string_view head, std::string_view name,
                                    const OpenChoices& choices) {
   if (is_zip(head)) return read_sigrok(std::move(source), name, choices.samples_per_second);

@@ -47,7 +47,7 @@ class RawReader final : public Reader {
     return true;
   }
 
-  // The vector of samples keeps its size, so resize does not clear it again.
+  // `block.samples` keeps its size from one block to the next, so `resize` rarely has bytes to clear.
   void fill(Block& block) override {
     block.samples.resize(static_cast<std::size_t>(block.file_size));
     const std::size_t got = source_->read(block.file_offset, block.samples);

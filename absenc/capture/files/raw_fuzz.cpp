@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads any bytes as raw samples of any number of channels.
+// Reads any bytes as raw samples of 1, 2, 4 and 8 bytes.
 #include "absenc/capture/files/raw.hpp"
 
 #include "absenc/capture/files/test_files.hpp"

@@ -77,13 +77,13 @@ class TransitionStream {
   [[nodiscard]] std::int64_t end() const { return end_; }
   [[nodiscard]] bool exhausted() const { return remaining_ == 0 && chunks_ == 0; }
   [[nodiscard]] bool damaged() const { return !damage_.what.empty(); }
-  /// Returns the time of the last good transition, in picoseconds: the place of a damage.
+  /// Returns the time of the last good transition, or of the chunk's begin, in picoseconds: a damage is reported there.
   [[nodiscard]] std::int64_t last() const { return last_; }
   [[nodiscard]] Damage damage() const { return damage_; }
   /// Returns the time up to which all transitions are known, in picoseconds: that of the last transition read ahead.
   [[nodiscard]] std::int64_t known() const { return last_; }
 
-  /// Reads ahead until a transition before the time `known` is available or the file ends.
+  /// Reads ahead until a transition before the time `known` is available, or the file ends or is damaged.
   void refill(std::int64_t origin) {
     times_.erase(times_.begin(), times_.begin() + static_cast<std::ptrdiff_t>(next_));
     next_ = 0;

@@ -28,7 +28,7 @@ namespace {
 constexpr std::uint64_t largest_piece = 1 << 24;  // sigrok-cli writes pieces of 4 MiB, PulseView of 10 MiB
 constexpr std::uint64_t streamed_bytes = 1 << 22;
 constexpr std::uint64_t longest_metadata = 1 << 20;
-// Limit for the bytes of a capture; larger sizes are errors.
+// Limit for the number of bytes of a capture: a larger sum, which only a damaged file states, is reduced to it.
 constexpr std::uint64_t believable = std::uint64_t{1} << 60;
 constexpr const char* copy_again = "copy the file again from where it came";
 
@@ -309,13 +309,13 @@ class SigrokReader final : public Reader {
     return is_cut(piece) && archive != nullptr && archive->ran_out();
   }
 
-  // Returns the number of bytes that the sample at offset `bytes` of the data needs to be complete.
+  // Returns the number of bytes from offset `bytes` of the data to the next border between samples; 0 at a border.
   [[nodiscard]] unsigned missing(std::uint64_t bytes) const {
     return static_cast<unsigned>((unit_size_ - bytes % unit_size_) % unit_size_);
   }
 
-  // Reads the part of a piece's last sample that is in the next piece, and returns its size: less if the next piece is
-  // damaged, which is reported for that piece.
+  // Reads the part of a piece's last sample that is in the next piece into `into`, and returns the number of bytes:
+  // fewer if the next piece is damaged, which is reported for that piece.
   [[nodiscard]] std::size_t read_tail(ZipArchive& archive, std::size_t index, std::span<std::uint8_t> into) const {
     return into.empty() || !archive.open(pieces_[index + 1].entry) ? 0 : archive.read(into);
   }
@@ -390,7 +390,7 @@ class SigrokReader final : public Reader {
                           copy_again});
   }
 
-  // Takes an unused libzip handle, which only one thread may use at a time.
+  // Takes an unused libzip handle, which only one thread may use at a time, or opens one; null if that fails.
   std::unique_ptr<ZipArchive> take_handle() {
     {
       const std::lock_guard lock(mutex_);

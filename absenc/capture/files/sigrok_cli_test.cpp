@@ -23,7 +23,8 @@ class SigrokCli : public testing::Test {
   }
   ~SigrokCli() override { std::filesystem::remove_all(folder_); }
 
-  // Returns samples of `channels` lines whose levels change rarely, with as many bytes per sample as sigrok needs.
+  // Returns samples of `channels` lines whose levels change rarely, with as many bytes per sample as sigrok needs, and
+  // writes them to the file `samples`.
   FileBytes make_samples(unsigned channels, std::size_t count) {
     std::mt19937_64 random(channels);
     const unsigned bytes = (channels + 7) / 8;

@@ -79,7 +79,7 @@ TEST(Sigrok, OnePieceThatIsLargeComesInParts) {
 }
 
 TEST(Sigrok, SamplesOfThreeBytesAreSpread) {
-  // One piece that is a single block, and one that is read in parts.
+  // The piece of the first session is a single block, that of the second session is read in parts.
   for (const std::size_t count : {std::size_t{1000}, std::size_t{6'000'000}}) {
     const FileBytes samples = wave(3 * count);
     const auto reader = open_bytes(session(sigrok_metadata("1 MHz", 24, 3), {{"logic-1-1", samples}}));
@@ -239,14 +239,14 @@ TEST(Sigrok, ReadsEverythingBeforeACut) {
   for (const bool deflate : {true, false}) {
     const FileBytes good = session(sigrok_metadata("1 MHz", 8, 1), pieces, "2", deflate);
     const std::size_t metadata = place_of(good, "metadata");
-    const std::size_t first = place_of(good, "logic-1-1") - 30;  // beginning of the local header before the name
+    const std::size_t first = place_of(good, "logic-1-1") - 30;  // offset of the local header, 30 bytes before the name
     const std::size_t directory = place_of(good, "PK\x01\x02");
     for (std::size_t size = 4; size < good.size(); ++size) {
       SCOPED_TRACE(size);
       const FileBytes file = cut_at(good, size);
       if (size < first + 39) {  // the first piece is completely missing
         const std::string why = problem(file);
-        // Number of bytes needed for all samples: the last byte of deflated data only marks the end.
+        // The last byte of deflated data only marks the end: without it, the data is complete all the same.
         const std::size_t seen = size + (deflate ? 1 : 0);
         EXPECT_NE(why.find("cut off at byte "), std::string::npos) << why;
         EXPECT_NE(why.find(seen < metadata - 30 ? "version:"
@@ -268,7 +268,7 @@ TEST(Sigrok, ReadsEverythingBeforeACut) {
       EXPECT_EQ(damage.note, size >= directory + 4);
       EXPECT_NE(damage.what.find("cut off"), std::string::npos);
       if (deflate) continue;
-      std::size_t expected = 0;  // samples expected before the cut; exactly known for stored data only
+      std::size_t expected = 0;  // number of samples before the cut, exactly known only for stored data
       for (const auto& [name, bytes] : pieces) {
         const std::size_t begin = place_of(good, name) + name.size();
         expected += std::min(std::max(size, begin) - begin, bytes.size());
@@ -338,7 +338,7 @@ TEST(Sigrok, SamplesOfThreeBytesMayBeCut) {
     EXPECT_EQ(reader->damages().size(), 1u);
     return contents.samples.size() / 4;
   };
-  EXPECT_EQ(count(second - 40), 333u);  // the damage is within the first piece, between its sample 333 and the rest
+  EXPECT_EQ(count(second - 40), 333u);  // the first piece, 333 samples and one byte, loses that byte
   EXPECT_EQ(count(second - 1), 333u);
   EXPECT_EQ(count(second + 1), 333u);
   EXPECT_EQ(count(second + 2), 334u);

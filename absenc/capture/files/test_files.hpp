@@ -179,7 +179,7 @@ inline FileBytes saleae_file(bool level, double begin, double end, const std::ve
 }
 
 /// Calls `read` with the fuzzer's input as a file, and with a good file changed by the input: each three bytes give a
-/// position and a new value; a single remaining byte cuts the file off.
+/// position and a new value; one or two remaining bytes cut the file off.
 template <class Read>
 void fuzz_file(const std::uint8_t* data, std::size_t size, const FileBytes& good, Read read) {
   read(FileBytes(data, data + size));

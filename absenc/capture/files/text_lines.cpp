@@ -26,7 +26,7 @@ std::optional<Number> whole(std::string_view text, std::size_t most) {
   return value;
 }
 
-// The digits of a decimal number; `point` is the number of digits before the point.
+// The digits of a decimal number; `point` is the number of digits before the point after the exponent is applied.
 struct Decimal {
   std::array<char, 64> digits{};
   std::size_t count = 0;
@@ -73,8 +73,8 @@ std::int64_t digits_at(const Decimal& decimal, std::int64_t first, std::int64_t 
   return value;
 }
 
-// Parses seconds in the usual form, "12.000125", to a positive instant; returns false for other forms. Fast, because
-// files may have a million rows.
+// Parses seconds in the usual form, "12.000125", to a positive instant; returns false for other forms. It is fast,
+// because files may have a million rows.
 bool read_plain_seconds(std::string_view text, Instant& instant) {
   constexpr std::ptrdiff_t most_digits = 18;
   constexpr std::array<std::int64_t, 13> picoseconds = {
@@ -115,7 +115,8 @@ std::optional<std::int64_t> parse_day(std::string_view text) {
   return std::chrono::sys_days(date).time_since_epoch().count();
 }
 
-// Returns the seconds east of Greenwich for a time zone: "+01:00", "-0330", "Z"; nothing for another text.
+// Returns the seconds east of Greenwich for a time zone: "+01:00", "-0330"; 0 for "Z" or ""; nothing for
+// another text.
 std::optional<std::int64_t> parse_zone(std::string_view text) {
   if (text.empty() || text == "Z") return 0;
   const std::string_view minutes =

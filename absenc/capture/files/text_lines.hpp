@@ -14,7 +14,7 @@
 
 namespace absenc::capture {
 
-/// Greatest length of a line that `TextLines` accepts, in bytes.
+/// Length, in bytes, from which on `TextLines` refuses a line.
 inline constexpr std::size_t longest_line = 1 << 20;
 
 [[nodiscard]] constexpr bool is_digit(char c) { return c >= '0' && c <= '9'; }
@@ -24,7 +24,7 @@ class TextLines {
   explicit TextLines(Source& source) : source_(source) {}
 
   /// Reads the next line, without its end ("\n" or "\r\n"), into `line`, valid until the next call. Returns false at
-  /// the end of the file, or if a line is longer than `longest_line`.
+  /// the end of the file, or if a line has `longest_line` bytes or more.
   [[nodiscard]] bool next(std::string_view& line);
 
   /// Returns the offset in the file of the line that `next` returned last.

@@ -122,7 +122,7 @@ class VcdReader final : public ParsedReader {
     return true;
   }
 
-  // Handles a word that begins a time, a value change or a section. Returns false if the file is damaged from here on.
+  // Handles a word that begins a value change or a section. Returns false if the file is damaged from here on.
   bool take(std::string_view word) {
     if (word[0] == '$') return take_section(word);
     started_ = true;
@@ -172,8 +172,8 @@ class VcdReader final : public ParsedReader {
     return true;
   }
 
-  // Changes the channels of a vector. Missing upper bits are 0 if the first written bit is 0 or 1, otherwise equal to
-  // the first bit.
+  // Changes the channels of a vector. Missing upper bits are unknown if the first written bit is unknown (x or z),
+  // otherwise 0.
   bool change_vector(const VcdVariable& variable, std::string_view bits, std::uint64_t offset) {
     const Value extension = to_value(bits[0]) == Value::unknown ? Value::unknown : Value::low;
     for (std::size_t i = 0; i < std::max(variable.width, bits.size()); ++i) {

@@ -17,7 +17,7 @@ namespace absenc::capture {
 /// The channels of one variable: `width` channels, of which `first` is the rightmost bit.
 struct VcdVariable {
   std::size_t first = 0;
-  std::size_t width = 0;  // number of bits; 0: a variable that is left out
+  std::size_t width = 0;  // number of bits of the variable, at least 1
 };
 
 class VcdHeader {
@@ -25,7 +25,8 @@ class VcdHeader {
   /// Reads the declarations up to $enddefinitions. Throws OpenError if they are invalid.
   VcdHeader(TextWords& words, std::string_view name);
 
-  /// Returns all variables of an identifier; nullptr if the identifier was not declared.
+  /// Returns all variables of an identifier, without those that are left out; nullptr if the identifier was not
+  /// declared.
   [[nodiscard]] const std::vector<VcdVariable>* find(std::string_view identifier) const {
     const std::size_t code = short_code(identifier);
     if (code < short_.size()) return short_[code] < 0 ? nullptr : &variables_[static_cast<std::size_t>(short_[code])];
@@ -38,7 +39,7 @@ class VcdHeader {
   [[nodiscard]] std::size_t left_out() const { return left_out_; }
 
  private:
-  // Identifiers of one or two printable characters, 9024 in all, are looked up in an array.
+  // Identifiers of one or two printable characters are looked up in an array of this size.
   static constexpr std::size_t short_codes = 95 * 95;
   static std::size_t short_code(std::string_view identifier) {
     std::size_t code = 0;

@@ -161,7 +161,7 @@ TEST(Vcd, RefusesInvalidHeaders) {
   EXPECT_NE(problem("$timescale 1 us $end $var wire 999999999 ! a $end").find("impossible width"), std::string::npos);
 }
 
-// Reads a file with many blocks, with words across the borders of the read buffer, and with identifiers of one to three
+// Reads a file with many blocks, with words across the borders of the read buffer, and with identifiers of two or three
 // characters.
 TEST(Vcd, LargeFiles) {
   std::string text = "$timescale 1 ns $end\n";

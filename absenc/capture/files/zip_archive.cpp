@@ -16,7 +16,7 @@ namespace absenc::capture {
 namespace {
 
 // A window into the source through which libzip reads: libzip requests 8 KiB at a time, and a larger buffer reduces the
-// calls of the system.
+// number of system calls.
 struct Window {
   Source* source = nullptr;
   std::uint64_t position = 0;

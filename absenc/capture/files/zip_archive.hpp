@@ -47,7 +47,7 @@ class ZipArchive {
   /// Returns, after the whole entry was read, whether the entry ends there and its checksum is right.
   [[nodiscard]] bool at_good_end();
 
-  /// Returns libzip's message about the last error of this archive.
+  /// Returns a message about the last error of this archive, mostly libzip's.
   [[nodiscard]] std::string problem() const;
   /// Returns the offset in the file of the entry that is being read.
   [[nodiscard]] std::uint64_t offset() const;

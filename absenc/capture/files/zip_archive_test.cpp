@@ -22,7 +22,7 @@ FileBytes mixed(std::size_t size) {
 
 const FileBytes content = mixed(100'000);
 
-// Returns the byte at offset `at` of an entry of the archive's directory; the offset begins at the entry's signature.
+// Returns the byte at offset `at` of the first entry of the archive's directory, counted from the entry's signature.
 std::uint8_t& in_directory(FileBytes& file, std::size_t at) {
   constexpr std::string_view signature = "PK\x01\x02";
   const auto found = std::search(file.begin(), file.end(), signature.begin(), signature.end());
@@ -34,7 +34,7 @@ constexpr std::size_t unpacked_size = 24;
 struct Expanded {
   bool whole = false;
   FileBytes bytes;
-  bool found_by_reading = false;  // result of `open`, `read` and the checks at the end
+  bool found_by_reading = false;  // `open` and `read` gave the right content and a good end
   std::string problem;
 };
 

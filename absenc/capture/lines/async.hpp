@@ -18,7 +18,7 @@ struct AsyncFormat {
   double bit = 0;  // duration of a bit in ticks, at least 2.5; need not be a whole number
   bool idle_high = true;
   Parity parity = Parity::none;
-  unsigned stop_bits = 1;  // 1 or 2; only the first stop bit is checked, as in a receiver
+  unsigned stop_bits = 1;  // number of stop bits, 1 or 2; only the first is checked, as in a receiver
   Tick glitch = 0;         // a level shorter than this is noise; 0: no filter
 };
 
@@ -33,8 +33,8 @@ struct AsyncFormat {
 /// errors in the next twelve characters is the start bit.
 class AsyncDecoder {
  public:
-  /// Sums over all characters without an error, from the start bit to the last change of a character, from which the
-  /// true bit time is measured: rounding errors do not add up.
+  /// Counts of characters and faults. `ticks` and `bits` are sums over all characters without a fault, from the start
+  /// bit to the character's last change: their quotient is the true bit time, in which rounding errors do not add up.
   struct Statistics {
     std::uint64_t ticks = 0;
     std::uint64_t bits = 0;
@@ -60,7 +60,7 @@ class AsyncDecoder {
   /// `decode` exactly.
   void join(const Changes& part, Tick first, Tick end, AsyncDecoder& other, std::vector<Character>& guessed,
             std::vector<Character>& characters);
-  /// Ends the capture; appends the character in progress if its stop bit has begun.
+  /// Ends the capture; appends the character in progress if the capture has the middle of its stop bit.
   void finish(std::vector<Character>& characters);
 
   /// Returns a time before which no further character begins.

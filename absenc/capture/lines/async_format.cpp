@@ -10,12 +10,12 @@ namespace absenc::capture {
 namespace {
 
 constexpr double shortest_bit = 2.5;       // shortest bit time, in ticks
-constexpr std::size_t fewest_changes = 4;  // two pulses, the least from which a bit time can be found
+constexpr std::size_t fewest_changes = 4;  // number of changes below which no bit time can be found
 constexpr std::size_t tried_changes = 4096;
 constexpr std::size_t most_clusters = 8;
-constexpr int most_bits = 4;    // limit for the number of bits in the shortest pulse
+constexpr int most_bits = 4;    // each group of pulses is tried as pulses of 1 to 4 bits
 constexpr double worst = 0.5;   // errors per character above which a format is refused
-constexpr double alike = 0.01;  // formats count as equal if their errors per character differ by less
+constexpr double alike = 0.01;  // formats are equal if their errors per character differ by less than this
 
 // Returns the lengths of the pulses between changes, without glitches, the shortest first.
 std::vector<Tick> pulses(const Changes& changes, Tick glitch) {

@@ -73,10 +73,11 @@ void look_ahead(LevelReader& reader, std::vector<Levels>& parts, Enough&& enough
 /// - `bool decode(const Levels&)`: decodes the next part, in order; returns false to end the run
 /// - `Guess`, and `void guess(const Levels&, Guess&) const`: decodes in any thread a part at whose beginning the state
 ///   of the line is unknown
-/// - `bool join(const Levels&, Guess&)`: works like `decode`, with the result of `guess` A guess assumes that the first
-///   change begins a character or word. The true state is continued into the block until it begins a character or word
-///   at the same time as the guess. From there on both depend only on later changes, so the guess is correct. If true
-///   state and guess never meet, the block is decoded twice, and the result is still correct.
+/// - `bool join(const Levels&, Guess&)`: works like `decode`, with the result of `guess`
+///
+/// A guess assumes that the first change begins a character or word. The true state is continued into the block until
+/// it begins a character or word at the same time as the guess. From there on both depend only on later changes, so the
+/// guess is correct. If true state and guess never meet, the block is decoded twice, and the result is still correct.
 ///
 /// The calling thread calls `decode` and `join`. Each thread has two blocks in progress. Exceptions of the reader or
 /// the decoding are thrown here.

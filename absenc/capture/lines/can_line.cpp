@@ -116,8 +116,8 @@ void CanDecoder::take_stuffed(bool bit, std::vector<CanRecord>& frames) {
   tail_ = 0;
 }
 
-// Handles a bit behind the CRC: CRC delimiter, acknowledge slot, acknowledge delimiter, or one of seven bits of the
-// end. The next frame may begin in the last bit of the end.
+// Handles a bit behind the CRC: CRC delimiter, acknowledge slot, acknowledge delimiter, or a bit of the frame's
+// end. The frame is complete after six of the seven bits of the end, because a receiver ignores the level of the last.
 void CanDecoder::take_tail(bool bit, std::vector<CanRecord>& frames) {
   constexpr unsigned acknowledge = 1, last = 8;
   if (tail_ == acknowledge) {

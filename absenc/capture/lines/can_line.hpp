@@ -13,11 +13,11 @@ namespace absenc::capture {
 /// Returns the meaning of an error frame, of this decoder or of a CAN controller, as words without a full stop.
 [[nodiscard]] std::string_view text_of_error(const CanFrame& error);
 
-/// A decoder of CAN frames, which decodes a capture part by part. Each falling edge synchronises the bit clock, as in a
-/// receiver. A violation of the protocol is reported as an error frame like that of the kernel (linux/can/error.h): the
+/// A decoder of CAN frames, which decodes a capture part by part. Each level change synchronises the bit
+/// clock. A violation of the protocol is reported as an error frame like that of the kernel (linux/can/error.h): the
 /// identifier gives the class (0x08 protocol error, 0x20 not acknowledged); for a protocol error data[2] gives the kind
-/// (0x04 bit stuffing, 0x02 form) and data[3] the place (0x08 CRC). After an error the decoder waits for eleven
-/// recessive bits.
+/// (0x04 bit stuffing, 0x02 form) and data[3] the place (0x08 CRC, 0x1A end of frame). After an error the decoder waits
+/// for eleven recessive bits.
 class CanDecoder {
  public:
   /// `bit` is the bit time in ticks, at least 3; it need not be a whole number.

@@ -100,7 +100,7 @@ RC_GTEST_PROP(CanDecoderProperty, PartsMakeNoDifference, (std::uint32_t seed)) {
   for (std::size_t i = 0; i < whole.size(); ++i) RC_ASSERT(frames[i].frame == whole[i].frame);
 }
 
-// A flipped bit gives an error or splits the frame in two, but never a frame that was not sent.
+// A flipped bit gives error frames, but never a good frame that was not sent.
 RC_GTEST_PROP(CanDecoderProperty, AFlippedBitIsNoFrame, (std::uint32_t seed)) {
   std::mt19937 random(seed);
   CanBusDrawing bus(10);

@@ -130,7 +130,8 @@ void ClockedDecoder::take(Tick at, std::vector<Burst>& bursts) {
   ++burst_.bits;
 }
 
-// Stores the level of the data line behind the last clock change. A previous part may have ended too early for that.
+// Stores the level of the data line at `settle` behind the last clock change, if it is not stored yet: a previous part
+// may have ended too early.
 void ClockedDecoder::sample_last_bit() {
   if (format_.settle == 0 || burst_.has_last || !has_in_) return;
   burst_.last = in_.before(last_ + format_.settle);

@@ -15,8 +15,8 @@ struct ClockedFormat {
   // True: the rising edge of the clock samples a bit, false: the falling edge; the bit is the level just before the
   // edge.
   bool rising = false;
-  bool has_select = false;   // words end with chip select; the clock may pause within a word
-  bool select_high = false;  // chip select is active high
+  bool has_select = false;   // true: chip select begins and ends words; the clock may pause within a word
+  bool select_high = false;  // true: chip select is active high
   Tick pause = 0;            // without chip select: a clock that rests longer than this ends a word, in ticks
   // Without chip select: the last bit is sampled this long behind the last clock change, in ticks; 0: not sampled.
   Tick settle = 0;
@@ -52,7 +52,7 @@ struct ClockedPart {
 /// lets it rise again.
 class ClockedDecoder {
  public:
-  static constexpr std::size_t most_bits = 65536;  // longest burst, in bits; a longer burst is cut
+  static constexpr std::size_t most_bits = 65536;  // longest burst, in bits; a longer burst is cut into pieces
 
   explicit ClockedDecoder(const ClockedFormat& format) : format_(format) {}
 

@@ -48,7 +48,7 @@ HWY_INLINE std::uint64_t levels(const std::uint8_t* HWY_RESTRICT samples, T chan
   return bits;
 }
 
-// Writes the positions of the set bits of `toggles`, and up to 8 meaningless values behind them: most words have few
+// Writes the positions of the set bits of `toggles`, and up to 7 meaningless values behind them: most words have few
 // bits, so this avoids a branch on their number. Returns the end of the positions.
 HWY_INLINE Tick* put(std::uint64_t toggles, Tick base, Tick* out) {
   const auto count = static_cast<std::size_t>(std::popcount(toggles));

@@ -47,7 +47,7 @@ AsyncOutcome decode_async(Reader& reader, std::span<const AsyncLine> lines, unsi
 /// The beginning of a capture, split into words at rests longer than `pause`.
 struct PauseReading {
   Tick pause = 0;
-  bool by_change = false;  // a shorter rest also ends a word if the data line changes during the rest
+  bool by_change = false;  // true: a shorter rest also ends a word if the data line changes during the rest
   std::vector<Burst> bursts{};
   bool timed_out = false;  // the data line changed in every rest that ended a word: the end of a timeout or a monoflop
 };
@@ -58,7 +58,7 @@ struct ClockedLine {
   std::optional<unsigned> out{};     // index of the channel with the host's data, for SPI
   std::optional<unsigned> select{};  // index of the channel with chip select, for SPI
   bool rising = false;               // true: the rising edge of the clock samples a bit; false: the falling edge
-  bool select_high = false;          // chip select is active high
+  bool select_high = false;          // true: chip select is active high
   Tick pause = 0;   // without chip select: a clock that rests longer ends a word, in ticks; 0: `choose` decides
   Tick settle = 0;  // sampling time of a word's last bit; see ClockedFormat
   Tick change_pause = 0;
@@ -69,7 +69,7 @@ struct ClockedLine {
 
 struct ClockedOutcome {
   std::string problem;  // reason why nothing could be decoded, as a sentence; "": none
-  Tick pause = 0;       // length of a rest that ended words, in ticks
+  Tick pause = 0;       // limit above which a rest of the clock ended a word, in ticks
 };
 
 ClockedOutcome decode_clocked(Reader& reader, const ClockedLine& line, unsigned threads, const PartSink& sink);

@@ -130,7 +130,8 @@ std::vector<Burst> bursts_until(Tick last, const std::vector<Levels>& parts, con
   return bursts;
 }
 
-// Returns whether the data line changed in each rest between two of the bursts, independently of clock edges.
+// Returns whether the data line changed in each rest between two of the bursts, later than `settle` behind the
+// end of the first.
 bool changes_in_rests(const std::vector<Burst>& bursts, const std::vector<Levels>& parts, const WireIndices& wires,
                       Tick settle) {
   if (!wires.in || bursts.size() < 2) return false;
@@ -146,7 +147,8 @@ bool changes_in_rests(const std::vector<Burst>& bursts, const std::vector<Levels
   return true;
 }
 
-// Finds the times of `format` that end words. Returns the problem as a sentence, or "" without a problem.
+// Sets the limits in `format` above which rests of the clock end words. Returns the problem as a sentence, or ""
+// without a problem.
 std::string find_pause(LevelReader& reader, const WireIndices& wires, const ClockedLine& line,
                        std::vector<Levels>& parts, ClockedFormat& format) {
   Changes clock;

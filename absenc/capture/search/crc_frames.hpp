@@ -17,7 +17,7 @@ namespace absenc::capture {
 
 /// Layout of a frame with a checksum: the covered part, the place of the checksum and its byte and bit order.
 struct Shape {
-  unsigned width = 0;  // width of the CRC in bits; 0: a sum
+  unsigned width = 0;  // width of the checksum in bits
   bool refin = false;
   bool refout = false;
   bool low_first = false;

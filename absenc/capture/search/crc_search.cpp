@@ -86,7 +86,7 @@ class CrcSearch {
     });
   }
 
-  // Returns how many checksums the frames determine: one for each length of frames, and one for each linearly
+  // Returns how many independent checksums the frames contain: one for each length of frames, and one for each linearly
   // independent difference of frames of equal length.
   [[nodiscard]] double known_checks(const Shape& shape, std::size_t first) {
     Shape plain;
@@ -231,8 +231,8 @@ class CrcSearch {
     add(shape, poly, widest_cover->first, {widest_cover->second.front()}, free_bits);
   }
 
-  // Adds a solution with the probability that it is chance: each determined checksum gives `width` bits; the polynomial
-  // and `free_bits` bits of init and xorout were chosen to fit.
+  // Adds a solution with the probability that it is chance: each independent checksum gives `width` bits; the
+  // polynomial and `free_bits` bits of init and xorout were chosen to fit.
   void add(const Shape& shape, std::uint32_t poly, const Key& key, std::vector<std::size_t> firsts, double free_bits) {
     CheckSolution solution;
     solution.parameters = {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Finds the CRC or sum of an unknown encoder from a few of its frames. The difference of two frames of equal length
-// with good CRCs does not depend on init and xorout and is a multiple of the polynomial, and so is the greatest common
-// divisor of all differences.
+// with good CRCs does not depend on init and xorout and is a multiple of the polynomial, so the polynomial divides the
+// greatest common divisor of all differences.
 #pragma once
 
 #include <cstddef>

@@ -194,7 +194,7 @@ TEST(CrcSearch, FindsExclusiveOrCrcInBothBitOrders) {
   }
 }
 
-// Eight frames that differ only in the same bit count as two frames.
+// Four frames, of which two equal the other two, count as two frames.
 TEST(CrcSearch, FramesThatDifferInOneWayOnlyCountOnce) {
   std::mt19937 random(9);
   const GeneratedCheck made{.parameters = esl_8};

@@ -13,7 +13,7 @@ namespace absenc::capture {
 namespace {
 
 constexpr unsigned many_attempts = 1u << 20;  // number of random replies tried if there are only one or two frames
-// Number of accepted random replies after which the rate has an error of some percent.
+// Number of accepted random replies after which no more are tried: the rate then has an error of some percent.
 constexpr unsigned enough_accepted = 256;
 
 /// Stores the position that a good reply reports.
@@ -37,7 +37,8 @@ std::size_t repeated(const ObservedExchange& exchange) {
 
 double position_of(const Reading& reading) { return static_cast<double>(reading.singleturn); }
 
-// Returns the shortest distance between two positions, as a fraction, 0 to 1/2, of the whole range.
+// Returns the shortest distance between two positions as a fraction of the whole range: 0 to 1/2, for linear encoders 0
+// to 1.
 double relative_distance(const Reading& from, const Reading& to) {
   const double all = std::ldexp(1.0, static_cast<int>(from.singleturn_bits));
   const double difference = std::abs(position_of(to) - position_of(from));
@@ -160,7 +161,7 @@ Evidence weigh(const Unit& unit, const Options& options, std::span<const Observe
 double tail(std::size_t good, std::size_t all, double each) {
   if (good == 0 || each >= 1) return 0;
   const auto n = static_cast<double>(all);
-  double sum = 0;  // sum of the terms in units of the first term, the largest that matters
+  double sum = 0;  // sum of the terms, as multiples of the first term
   double first = 0;
   for (std::size_t k = good; k <= all; ++k) {
     const auto at = static_cast<double>(k);

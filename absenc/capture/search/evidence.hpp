@@ -19,7 +19,7 @@ struct ObservedFrame {
   std::size_t bits = 0;  // number of bits, on clocked links; otherwise 0
   std::optional<CanFrame> can{};
 
-  /// Returns a view of this frame, which is valid as long as this object.
+  /// Returns a view of this frame, which is valid as long as this object exists.
   [[nodiscard]] Frame frame() const { return {bytes, bits, can ? &*can : nullptr}; }
   friend bool operator==(const ObservedFrame&, const ObservedFrame&) = default;
 };
@@ -51,7 +51,7 @@ struct Evidence {
 /// log10 of the chance below which frames suffice as evidence, without the motion of the position.
 inline constexpr double frames_suffice = -2;
 
-/// Number of random replies tried for each frame if several frames multiply their chances.
+/// Number of random replies tried for each frame if there are more than two frames, whose chances multiply.
 inline constexpr unsigned usual_attempts = 1u << 14;
 
 /// Returns the probability that the unit accepts a random reply of the length of `good.reply` to `good.request`: at

@@ -11,7 +11,7 @@ namespace absenc::capture {
 namespace {
 
 constexpr std::int64_t most_bits = 64;
-// Number of exchanges tried first: options that explain none of these explain nothing.
+// Number of exchanges tried first: options that explain none of these are given up.
 constexpr std::size_t telling = 32;
 
 struct NoEvidence final : EvidenceSink {
@@ -85,8 +85,8 @@ class HypothesisSearch {
     add(options);
   }
 
-  /// Adds `base` with every change of a single option, and with every number of bits for each, because no model
-  /// explains all exchanges.
+  /// Adds `base` with every change of a single option, and of each the numbers of bits that fit best, because no
+  /// model explains all exchanges.
   void vary(const Options& base) {
     vary_bits(base);
     for (std::size_t i = 0; i < unit_.options.size(); ++i) {
@@ -102,8 +102,8 @@ class HypothesisSearch {
     }
   }
 
-  /// Adds `base` with single options changed so that the position moves less, for frames that are no evidence by
-  /// themselves.
+  /// Adds `base` with every change of a single option. If the frames are no evidence by themselves, the options with
+  /// which the position moves least are then ranked first.
   void vary_motion(const Options& base) {
     for (std::size_t i = 0; i < unit_.options.size(); ++i) {
       const auto count = static_cast<std::int64_t>(unit_.options[i].choices.size());
@@ -144,7 +144,8 @@ class HypothesisSearch {
     return count;
   }
 
-  // Adds `base` with the fewest bits that explain most exchanges, because frames cannot show more bits.
+  // Adds `base` with the numbers of bits that explain the most exchanges, and of these with the fewest bits, because
+  // frames cannot show more bits.
   void vary_bits(const Options& base) {
     const std::vector<std::size_t> bits = resolution_options(unit_);
     std::optional<Options> fewest;

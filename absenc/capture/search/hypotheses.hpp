@@ -10,9 +10,9 @@
 
 namespace absenc::capture {
 
-/// Options that explain exchanges, with their evidence. Every attempt raises the chance of a false match. Here attempts
-/// are the hypotheses tried before; `rank` (client/identify) adds every unit, setting and encoder tried, and in a
-/// stream every byte counts at which a frame might begin.
+/// Options that explain exchanges, with their evidence. Every attempt raises the chance of a false match. Here the
+/// attempts are the hypotheses tried so far; `rank` (client/identify) adds every unit, setting and encoder tried, and
+/// in a stream every byte counts at which a frame might begin.
 struct Hypothesis {
   Options options{};
   Evidence evidence{};

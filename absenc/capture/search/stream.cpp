@@ -38,8 +38,8 @@ double acceptance_of_noise(const Unit& unit, const Options& options) {
   return static_cast<double>(std::max<std::size_t>(good, 1)) / static_cast<double>(examined);
 }
 
-// Returns whether the number of bits of a position is stated by the options, because it cannot be requested from the
-// encoder.
+// Returns whether each option in `of_bits` is the number of single-turn or multi-turn bits itself, so that a model's
+// options state the number of bits of a position.
 bool states_bits(const Unit& unit, const Options& options, std::span<const std::size_t> of_bits) {
   const Resolution resolution = unit.resolution(options);
   return std::all_of(of_bits.begin(), of_bits.end(), [&](std::size_t option) {
@@ -77,7 +77,7 @@ std::pair<unsigned, int> bits_of(const Unit& unit, const Hypothesis& hypothesis)
   return {resolution.singleturn_bits, -static_cast<int>(resolution.multiturn_bits)};
 }
 
-// Sets the option with which a host only listens, and if possible the rate of the unsolicited frames.
+// Sets the option with which the encoder sends unsolicited frames, to their rate per second if the option is a rate.
 void set_streaming(const Unit& unit, Options& options, double frames_per_second) {
   if (unit.streams == nullptr || unit.streams(options)) return;
   for (std::size_t i = 0; i < unit.options.size(); ++i) {
@@ -98,8 +98,8 @@ void set_streaming(const Unit& unit, Options& options, double frames_per_second)
 std::vector<ObservedExchange> split_stream(const Unit& unit, const Options& options, Bytes bytes) {
   std::vector<ObservedExchange> replies;
   std::size_t longest = 0;        // size of the longest good reply in the stream, in bytes
-  std::size_t begin_of_good = 0;  // index of the first good reply
-  std::size_t end_of_good = 0;    // index behind the last good reply
+  std::size_t begin_of_good = 0;  // index in `replies` of the first good reply
+  std::size_t end_of_good = 0;    // index in `replies` behind the last good reply
   for (std::size_t at = 0; at < bytes.size();) {
     const std::size_t size = reply_size(unit, options, bytes.subspan(at));
     const auto from = bytes.begin() + static_cast<std::ptrdiff_t>(at);
@@ -125,7 +125,7 @@ std::vector<Hypothesis> find_stream_hypotheses(const Unit& unit, Bytes bytes, Ti
     const std::vector<ObservedExchange> replies = split_stream(unit, options, bytes);
     Hypothesis one{.options = options, .evidence = weigh(unit, options, replies)};
     if (one.evidence.explained < least_frames) continue;
-    // Each byte from the first on was tried as the beginning of a frame, so each is an attempt.
+    // The first frame was searched at every byte of a frame's length, so each byte of the longest frame is an attempt.
     for (const ObservedExchange& reply : replies) one.tried = std::max(one.tried, reply.reply.bytes.size());
     one.tried *= all.size();
     found.push_back(std::move(one));
