@@ -52,6 +52,8 @@ class EncoderOn : public Device<Item> {
   /// Notifies only the observer that the host kept or broke a rule. Breaking this rule is no violation, because the
   /// document permits a host to do so, or the host may have given up after an error.
   void note(bool kept, std::string_view rule) { rules_.note(kept, rule); }
+  /// Returns the rules of the encoder, for parts of it that check some of them.
+  [[nodiscard]] HostRules& rules() { return rules_; }
   /// Restarts the encoder, as a reset does: it ignores everything until the time `until`.
   void restart(Time until) {
     power_ = Power::starting;

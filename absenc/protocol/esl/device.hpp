@@ -138,10 +138,6 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   static constexpr std::int32_t warning_above = 105;
   // Time from power on until SF reports `ready`; assumed, because the document states none.
   static constexpr Time start_up = 100ms;
-  // Shortest time between two requests of a reset that is no violation. The document states "typical 40 us".
-  static constexpr Time reset_interval_least = 35us;
-
-  static constexpr std::string_view eight_rule = "reset not sent eight times in a row";
 
   static constexpr std::int32_t magnitude(std::int32_t value) { return value < 0 ? -value : value; }
   static constexpr std::uint32_t counts_of(std::int64_t position) { return static_cast<std::uint32_t>(position) >> 8; }
@@ -188,21 +184,21 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     if (!is_own(bytes)) return Answer::for_others;
     const Result<Request> request = decode_request(profile_, bytes);
     if (!request) {
-      in_a_row_ = 0;
+      forget_rows();
       return report_bad_request(bytes[0], status::parity_error, at, reply);
     }
-    count(request->id, at);
+    const bool executes = count(request->id, at);
     const std::optional<Reply> made =
         is_memory_access(request->id) ? access_memory(*request, at) : reply_to(request->id, at);
     if (!made) return Answer::for_others;
     reply.append(encode_reply(profile_, *made));
-    // The reset is counted after its reply is made, because the reply still shows the old state.
-    if (is_reset(request->id)) count_reset(request->id, at);
+    // The reset is executed after its reply is made, because the reply still shows the old state.
+    if (executes) execute_reset(request->id, at);
     return Answer::sent;
   }
   bool is_refused(Flaw flaw, Bytes heard) override {
     if (heard.empty() || !is_own(heard)) return false;
-    in_a_row_ = 0;
+    forget_rows();
     if (flaw != Flaw::damaged) return false;
     refused_field_ = heard[0];
     return is_reported(heard[0]);
@@ -226,29 +222,26 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     reply.append(encode_reply(profile_, report, field));
     return Answer::sent;
   }
-  // Ends a sequence of reset requests, and checks that eight were sent. `resets_sent_` counts all requests, `in_a_row_`
-  // only those that were not sent too fast.
-  void end_resets() {
-    if (resets_sent_ > 0 && resets_sent_ < reset_requests) note(false, eight_rule);
-    resets_sent_ = 0;
+  void forget_rows() {
+    resets_.forget();
+    encoder_ids_ = 0;
   }
-  void count(DataId id, Time at) {
-    constexpr std::string_view interval_rule = "reset sent too fast: much less than 40 us after the one before";
-    if (is_reset(id) && in_a_row_ > 0 && id == last_id_ &&
-        !expect(at - last_reset_ >= reset_interval_least, interval_rule, at)) {
-      in_a_row_ = 0;
-    }
-    if (id != last_id_) end_resets();
-    if (is_reset(id) && ++resets_sent_ == reset_requests) note(true, eight_rule);
-    in_a_row_ = id == last_id_ ? in_a_row_ + 1 : 1;
-    last_id_ = id;
+  // Counts a request for the rules and the sequence counters. Returns whether it completes a reset.
+  bool count(DataId id, Time at) {
+    encoder_ids_ = id == DataId::encoder_id ? encoder_ids_ + 1 : 0;
     if (id == DataId::encoder_id) {
-      expect(in_a_row_ != reset_requests, "ID 8 sent eight times in a row: dynamic addressing, which nothing describes",
-             at);
+      expect(encoder_ids_ != reset_requests,
+             "ID 8 sent eight times in a row: dynamic addressing, which nothing describes", at);
     }
     if (profile_.sequence_step == SequenceStep::request || has_sequence(id)) {
       for (std::uint8_t& counter : counters_) ++counter;
     }
+    if (is_reset(id)) return resets_.count(static_cast<unsigned>(id), at, earliest(at)) && stands(at);
+    resets_.end();
+    return false;
+  }
+  bool stands(Time at) {
+    return expect(magnitude(shaft_->at(at).speed_millirpm) <= standing_still, "reset while the shaft turns", at);
   }
   // Executes a memory request and returns the reply. Nothing with several encoders on the line, and for an address
   // that does not exist, because the document defines no answer to it.
@@ -271,13 +264,6 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   void store(std::uint8_t page, std::uint8_t address, std::uint8_t value) override {
     *stored(page, address) = value;
     if (!is_immediate(page, address)) change_memory();
-  }
-  void count_reset(DataId id, Time at) {
-    last_reset_ = earliest(at);
-    if (in_a_row_ < reset_requests) return;
-    in_a_row_ = 0;
-    const bool stands = magnitude(shaft_->at(at).speed_millirpm) <= standing_still;
-    if (expect(stands, "reset while the shaft turns", at)) execute_reset(id, at);
   }
   void execute_reset(DataId id, Time at) {
     if (id == DataId::clear_alarms) {
@@ -363,7 +349,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     // Alarms about turns survive power off, and resets by IDs C and D end them; all other alarms end with the power.
     latches_ &= alarms::turns_wrong;
     turns_cleared_ = false;
-    in_a_row_ = resets_sent_ = 0;
+    forget_rows();
   }
   // Returns the value of a condition. For channel 2 `index` is that of channel 1's condition, which precedes it.
   [[nodiscard]] std::int32_t value_of(std::size_t index, Channel channel = Channel::one) const {
@@ -382,12 +368,10 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   bool turns_cleared_ = false;  // whether an ID D was executed, so that an ID C can clear multiturn_error
   std::array<std::uint8_t, 2> counters_{};
 
-  DataId last_id_{};
-  unsigned in_a_row_ = 0;     // number of consecutive requests with `last_id_`
-  unsigned resets_sent_ = 0;  // number of consecutive reset requests with `last_id_`, including those sent too fast
+  author::RowCounter resets_{reset_row, rules()};
+  unsigned encoder_ids_ = 0;        // number of consecutive requests with ID 8
   std::uint8_t refused_field_ = 0;  // CF of the last damaged request that is refused
   std::uint8_t others_field_ = 0;   // CF of the last request; the reply of another encoder begins with the same byte
-  Time last_reset_{};
 };
 
 }  // namespace absenc::esl

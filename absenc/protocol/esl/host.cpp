@@ -75,13 +75,6 @@ Procedure read_safely(Dialog& dialog, SafePositionResult& found) {
 
 namespace {
 
-// Returns the pause between the last reply and the next of the eight reset requests: 40 us from start to start; a slow
-// line takes longer.
-Time pause_between_resets(const Dialog& dialog, DataId id) {
-  const Time duration = line_settings.character() * static_cast<std::int64_t>(request_length(dialog.format(), id));
-  return dialog.sent_at() - duration + reset_interval - dialog.received_at();
-}
-
 // Appends the names of the alarms that remain after an ID C, and what clears them (Table 8). Returns the text.
 std::string_view what_remains(Sentence& words, unsigned remaining) {
   constexpr unsigned until_power_off =
@@ -128,15 +121,7 @@ Procedure reset(Dialog& dialog, ProcedureResult& found, DataId id) {
                                       ? author::objection_to_zero(to_reading(first), to_reading(before))
                                       : author::objection_to_moving(to_reading(first), to_reading(before));
   if (why_not.error != Error::none) co_return why_not;
-  for (unsigned i = 0; i < reset_requests; ++i) {
-    const Time pause = i == 0 ? Time{} : pause_between_resets(dialog, id);
-    const Result<Reply> reply = co_await dialog.attempt(request_of(dialog, id)).changes().after(pause);
-    // If the eighth reply is lost, the reset may have been executed: the reading after it shows that.
-    if (reply || i + 1 == reset_requests) continue;
-    co_return {reply.error(),
-               "one of the eight requests was not answered well, so the encoder has most likely done nothing: read the "
-               "position before you try again"};
-  }
+  co_await author::send_in_a_row(dialog, request_of(dialog, id), reset_row);
   // ID B writes the zero to the EEPROM; ID D may do so, too.
   const Time pause = id == DataId::clear_alarms ? reset_interval : eeprom_write_pause;
   const Reply now = co_await dialog.ask(look).repeated(attempts).after(pause).or_say(

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "absenc/core/angle.hpp"
+#include "absenc/protocol/author/in_a_row.hpp"
 #include "absenc/protocol/author/known.hpp"
 #include "absenc/protocol/esl/frame.hpp"
 #include "absenc/protocol/esl/timing.hpp"
@@ -359,6 +360,17 @@ constexpr unsigned unsafe_alarms(const ChannelReply& channel) {
 [[nodiscard]] constexpr bool selects_page(const Request& request) {
   return request.id == DataId::write_memory && request.memory_address == page_select_address;
 }
+
+/// The requests of a reset (Table 4). 40 us are typical, from start to start; a slow line takes longer. The virtual
+/// encoder accepts a little less.
+inline constexpr author::InARow reset_row{
+    .requests = reset_requests,
+    .interval = reset_interval,
+    .between = author::InARow::Between::requests,
+    .accepted = 35us,
+    .number_rule = "reset not sent eight times in a row",
+    .interval_rule = "reset sent too fast: much less than 40 us after the one before",
+};
 
 /// The functions of ESL that the engine and virtual encoders of absenc/protocol/author require (dialog.hpp,
 /// device.hpp).

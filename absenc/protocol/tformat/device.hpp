@@ -109,7 +109,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     zero_pending_ = false;
     latches_ &= static_cast<std::uint8_t>(~(alarms::counting_error | alarms::multiturn_error));
     refused_status_ = 0;
-    reset_count_ = resets_sent_ = 0;
+    resets_.forget();
   }
 
  private:
@@ -127,8 +127,6 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   static constexpr std::int32_t power_off_acceleration = 4'000;
   static constexpr std::int32_t power_off_timer_acceleration = 80'000;
   static constexpr Time power_off_timer = 5s;
-
-  static constexpr std::string_view ten_rule = "reset not sent ten times in a row";
 
   static constexpr std::int32_t magnitude(std::int32_t value) { return value < 0 ? -value : value; }
 
@@ -159,14 +157,14 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   }
   void refuse(Time at, ByteBuffer<64>& reply) override {
     update(at);
-    reset_count_ = resets_sent_ = 0;
+    resets_.forget();
     Reply refusal = everything(at);
     refusal.status |= refused_status_;
     refused_status_ = 0;
     reply.append(encode_reply(refusal).view());
   }
   std::optional<Reply> answer(const Request& request, Time at) {
-    if (!is_reset(request.id)) end_resets();
+    if (!is_reset(request.id)) resets_.end();
     if (is_memory_access(request.id)) return access_memory(request, at);
     Reply reply = everything(at);
     reply.id = request.id;                                  // encode_reply uses only the fields that this id carries
@@ -200,21 +198,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
 
   // ---- Resets
 
-  // Ends a sequence of reset requests, and checks that ten were sent. `resets_sent_` counts all requests,
-  // `reset_count_` only those that were not sent too fast.
-  void end_resets() {
-    if (resets_sent_ > 0 && resets_sent_ < reset_requests) note(false, ten_rule);
-    reset_count_ = resets_sent_ = 0;
-  }
   void count_reset(DataId id, Time at) {
-    if (id != reset_id_) end_resets();
-    if (++resets_sent_ == reset_requests) note(true, ten_rule);
-    constexpr std::string_view interval_rule = "reset sent too fast: less than 40 us after the one before";
-    if (reset_count_ > 0 && !expect(at - last_reset_ >= reset_interval, interval_rule, at)) reset_count_ = 0;
-    reset_id_ = id;
-    last_reset_ = at;
-    if (++reset_count_ < reset_requests) return;
-    reset_count_ = 0;
+    if (!resets_.count(static_cast<unsigned>(id), at, at)) return;
     const bool stands = magnitude(shaft_->at(at).speed_millirpm) <= standing_still;
     if (expect(stands, "reset while the shaft turns", at)) execute_reset(id, at);
   }
@@ -323,10 +308,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   std::int64_t zero_request_ = 0;  // counts that become zero when the EEPROM is written
   std::int64_t zero_turns_ = 0;    // number of turns that must be the same after the EEPROM is written
 
-  DataId reset_id_{};
-  unsigned reset_count_ = 0;
-  unsigned resets_sent_ = 0;
-  Time last_reset_{};
+  author::RowCounter resets_{reset_row, rules()};
   std::uint8_t refused_status_ = 0;
 };
 

@@ -17,6 +17,7 @@
 #include "absenc/core/result.hpp"
 #include "absenc/protocol/author/device.hpp"
 #include "absenc/protocol/author/dialog.hpp"
+#include "absenc/protocol/author/in_a_row.hpp"
 #include "absenc/protocol/tformat/format.hpp"
 
 namespace absenc::tformat {
@@ -58,6 +59,15 @@ inline constexpr CrcParameters crc_parameters{8, 0x01, 0, true, true, 0};
 [[nodiscard]] constexpr bool is_memory_access(DataId id) {
   return id == DataId::read_memory || id == DataId::write_memory;
 }
+/// The requests of a reset (10). The document does not state from where to where 40 us are measured: the host measures
+/// them from the end of the reply, so that they are 40 us or more in any case.
+inline constexpr author::InARow reset_row{
+    .requests = reset_requests,
+    .interval = reset_interval,
+    .accepted = reset_interval,
+    .number_rule = "reset not sent ten times in a row",
+    .interval_rule = "reset sent too fast: less than 40 us after the one before",
+};
 /// Returns whether ten requests with this data ID reset something: alarms, the zero, or the turns.
 [[nodiscard]] constexpr bool is_reset(DataId id) {
   return id == DataId::clear_alarms || id == DataId::zero || id == DataId::reset_multiturn;

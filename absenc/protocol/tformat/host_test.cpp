@@ -125,7 +125,7 @@ TEST(TformatHost, ExplainsRefusals) {
   const auto reset = middle.run("clear-alarms");
   EXPECT_EQ(reset.error, Error::request_rejected);
   EXPECT_TRUE(reset.says("ca0: ")) << reset.detail;
-  EXPECT_TRUE(reset.says("; one of the ten requests")) << reset.detail;
+  EXPECT_TRUE(reset.says("; one of the requests in a row")) << reset.detail;
 }
 
 // Captures have replies without a request, and replies to invalid requests (8.4, 9.4).

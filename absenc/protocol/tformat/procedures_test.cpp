@@ -332,8 +332,8 @@ TEST(TformatProcedures, LostReplyStopsAResetUnlessItIsTheTenth) {
     std::uint32_t turns;
   };
   for (const Row& row :
-       {Row{7, 8, Error::wrong_length, "one of the ten requests", 5},
-        Row{10, 11, Error::wrong_length, "one of the ten requests", 5}, Row{11, 12, Error::none, "", 0},
+       {Row{7, 8, Error::wrong_length, "one of the requests in a row", 5},
+        Row{10, 11, Error::wrong_length, "one of the requests in a row", 5}, Row{11, 12, Error::none, "", 0},
         Row{12, 15, Error::wrong_length, "whether the encoder obeyed could not be read", 0}}) {
     Bench bench(lose(row.from, row.to));
     bench.shaft.put(5, 0);

@@ -79,17 +79,7 @@ Procedure reset(Dialog& dialog, ProcedureResult& found, DataId id) {
   const Outcome why_not = objection(dialog.format(), id, first, second);
   if (why_not.error != Error::none) co_return why_not;
 
-  // Intervals are measured from the end of the reply, which makes 40 us or more, whatever the document measures them
-  // from.
-  for (unsigned sent = 1; sent <= reset_requests; ++sent) {
-    const Result<Reply> reply = co_await dialog.attempt({id}).changes().after(reset_interval);
-    // If the tenth reply is lost, the reset may have been executed: the reading after it shows that.
-    if (!reply && sent < reset_requests) {
-      co_return {reply.error(),
-                 "one of the ten requests was not answered well, so the encoder has most likely done nothing: see that "
-                 "with `absenc read` before you try again"};
-    }
-  }
+  co_await send_in_a_row(dialog, {id}, reset_row);
   // Only ID 8 writes the EEPROM, which takes longer. The result is read again, because the tenth reply still shows the
   // old alarms.
   const Reply now = co_await dialog.ask({DataId::everything})
