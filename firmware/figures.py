@@ -63,7 +63,8 @@ def measured(folder):
                 program = os.path.join(folder, f"reader-{reader}-{cpu}.elf")
                 every[reader] = sizes(program) | run(plugin, program, machine)
             base = every.pop("base")
-            # The cost of the two marks themselves, which is subtracted from every figure.
+            # The base program reads nothing between its two marks, so the instructions that it counts are the cost of
+            # the marks. They are subtracted from all three counts of instructions.
             base["character"] = base["reply"] = base["reading"]
             for reader, figures in every.items():
                 above = {name: None if figures[name] is None else figures[name] - base[name] for name in FIGURES}

@@ -38,7 +38,7 @@ struct Waved {
 
 /// Draws a waveform into `file`, whose name ends in .vcd, .sr (sigrok) or .csv (like Saleae Logic 2), and returns what
 /// was drawn. `text` is "tformat?motion=rpm=60", with or without a leading "sim:"; `settings` are those of `open`.
-/// Throws UsageError, Failure, os::Failure.
+/// Throws UsageError, Failure, os::Failure, and std::runtime_error if the file cannot be written.
 [[nodiscard]] Waved draw_wave(std::string_view text, std::span<const std::string> settings, const std::string& file,
                               const WaveChoices& choices = {});
 

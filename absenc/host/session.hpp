@@ -151,9 +151,6 @@ class Session {
   /// Shares one guard between the sessions of all encoders on a line, because late replies belong to the line. The
   /// guard must outlive the sessions.
   void share(ReplyGuard<Item>& guard) { guard_ = &guard; }
-  /// Removes the reply guard, so that late replies reach the conversations: for a caller that does not know which
-  /// requests were sent.
-  void leave_unguarded() { guard_ = nullptr; }
   /// Sets the filter that is used from the next command on; null: none. The filter must outlive the session.
   void set_filter(Filter<Item>* filter) { filter_ = filter; }
   /// Returns the longest time between a request and its late reply on this line, as of the end of the last command; 0:
@@ -262,7 +259,7 @@ class Session {
     }
   }
 
-  [[nodiscard]] std::uint64_t late() const { return guard_ != nullptr ? guard_->late() : 0; }
+  [[nodiscard]] std::uint64_t late() const { return guard_->late(); }
 
   // Counts the damaged frames that the stream has discarded since the last call, also those that `catch_up` dropped.
   void count_discarded(const Conversation<Item>& conversation) {
@@ -281,7 +278,6 @@ class Session {
   // no reply is late. On a CAN bus only commands that read are guarded: other nodes send too, and a listener receives
   // all frames.
   [[nodiscard]] bool guarded(const Command& command) const {
-    if (guard_ == nullptr) return false;
     if (unit_->link == LinkKind::can) return command.verb == Verb::read || command.verb == Verb::read_part;
     return unit_->link != LinkKind::spi && unit_->link != LinkKind::clocked;
   }
@@ -313,8 +309,6 @@ class Session {
       guard_->attach(conversation, *unit_, options_, !command.changes_encoder);
     }
     if (!again) {
-      guarded_ = guarded(command);
-      if (guarded_) guard_->attach(conversation, *unit_, options_, !command.changes_encoder);
       if (filter_ != nullptr) filter_->attach(inner());
       if constexpr (std::is_same_v<Item, std::uint8_t>) {
         echo_.use_unit(*unit_, options_);
@@ -323,10 +317,8 @@ class Session {
     }
     const bool ended = drive(machine(), *port_, [&] { return !conversation.streams() && on_emit(conversation); });
     // The values are copied, because the guard may serve another encoder when they are read.
-    if (guard_ != nullptr) {
-      counters_.late = guard_->late();
-      lateness_ = guard_->lateness();
-    }
+    counters_.late = guard_->late();
+    lateness_ = guard_->lateness();
     return ended;
   }
 

@@ -20,7 +20,7 @@ namespace absenc::firmware {
 ///   std::size_t stop_receiving();        // returns the number of received bytes
 ///   void set_rate(std::uint32_t);
 ///
-/// The functions below `Interrupts` are called from interrupts of one priority.
+/// tick, transmission_complete, arrived and line_error are called from interrupts of one priority.
 template <class Hardware>
 class UartDma {
  public:

@@ -110,7 +110,8 @@ class Distinct {
 double Evidence::chance() const { return motion && explains_all() ? frames + *motion : frames; }
 
 double acceptance(const Unit& unit, const Options& options, const ObservedExchange& good, unsigned attempts) {
-  std::mt19937_64 random(good.reply.bytes.size());  // fixed seed: the same result each time
+  // Seeded by the length of the reply, so that the same exchange gives the same result each time.
+  std::mt19937_64 random(good.reply.bytes.size());
   ObservedExchange noise = good;
   const std::size_t repeated_size = repeated(good);
   unsigned accepted = 0;

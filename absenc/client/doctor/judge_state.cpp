@@ -18,7 +18,7 @@ namespace absenc::client {
 
 namespace {
 
-// A flag that a reading reported as raised.
+// A flag that at least one reading reported as raised.
 struct RaisedFlag {
   const FlagInfo* flag = nullptr;
   bool is_alarm = false;

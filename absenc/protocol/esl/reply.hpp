@@ -351,7 +351,7 @@ constexpr unsigned unsafe_alarms(const ChannelReply& channel) {
   }
   return reading;
 }
-/// Returns the position and turns of a valid reply with their validity, by the data ID in the reply.
+/// Returns the position and turns of a valid reply like to_reading(id, reply), with the data ID that the reply carries.
 [[nodiscard]] constexpr Reading to_reading(const Reply& reply) { return to_reading(reply.id, reply); }
 
 // ---- Protocol, for author's engine
