@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A position reading, and the only functions that convert counts to degrees or micrometres.
+// A position reading, and functions that convert counts to degrees or micrometres.
 #pragma once
 
 #include <cstdint>

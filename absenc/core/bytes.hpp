@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Views of bytes and a buffer of fixed capacity, which all layers use instead of a heap.
+// Views of bytes, and a buffer of fixed capacity that needs no heap.
 #pragma once
 
 #include <array>
@@ -14,8 +14,8 @@ using Bytes = std::span<const std::uint8_t>;
 /// A view of bytes that belong to another object and may be written.
 using MutableBytes = std::span<std::uint8_t>;
 
-/// A buffer for up to Capacity items, which are stored inside the object. Appending to a full buffer is refused, never
-/// truncated.
+/// A buffer for up to Capacity items, which are stored inside the object. Items for which there is no room are refused
+/// together, never truncated.
 template <class Item, std::size_t Capacity>
 class Buffer {
  public:

@@ -67,7 +67,7 @@ consteval auto hex_bytes() {
 template <HexLiteral literal>
 inline constexpr auto hex = detail::hex_bytes<literal>();
 
-/// Static bytes that are the characters of a literal, for test vectors of ASCII protocols and of clocked links.
+/// Static bytes that are the characters of a literal, without the terminating zero.
 template <HexLiteral literal>
 inline constexpr auto ascii = [] {
   std::array<std::uint8_t, literal.view().size()> bytes{};

@@ -68,7 +68,8 @@ inline constexpr std::array<ErrorText, 17> error_texts{{
 }};
 
 /// Returns whether `error` means that the received bytes are damaged: they are no whole frame with a right checksum.
-/// The other errors mean no reply, a sound frame with unexpected content, a refusal, or a mistake of the caller.
+/// The other errors mean no reply, a sound frame with unexpected content, a refusal, a turning shaft, or a mistake of
+/// the caller.
 [[nodiscard]] constexpr bool is_damage(Error error) {
   return (error >= Error::line_stuck && error <= Error::wrong_length) || error == Error::bad_checksum;
 }
@@ -76,8 +77,7 @@ inline constexpr std::array<ErrorText, 17> error_texts{{
 /// Returns name, description and advice for `error`.
 [[nodiscard]] constexpr const ErrorText& text_of(Error error) { return error_texts[static_cast<std::size_t>(error)]; }
 
-/// A value (initially T{}) or an Error other than `none`. Reading the value of a failed result is undefined, as in
-/// std::expected.
+/// A value (initially T{}) or an Error other than `none`. The value of a failed result must not be read.
 template <class T>
 class [[nodiscard]] Result {
  public:

@@ -2,8 +2,8 @@
 // The only clock type: nanoseconds since a start that the caller chooses. No layer below `os` reads a clock.
 #pragma once
 
-// libstdc++'s <bits/chrono.h> has only the durations of <chrono>, without calendars and time zones, which would cost
-// half a second of compile time in every file.
+// libstdc++'s <bits/chrono.h> has the durations and clocks of <chrono>, but not its calendars and time zones, which
+// would cost half a second of compile time in every file.
 #if __has_include(<bits/chrono.h>)
 #include <bits/chrono.h>
 #else

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A classic CAN data frame, the item of CAN links.
+// A classic CAN frame, data or remote: the item of CAN links.
 #pragma once
 
 #include <array>
@@ -14,8 +14,8 @@ struct CanFrame {
   std::uint32_t id = 0;                ///< identifier of the frame: 11 bits, or 29 when `extended`
   bool extended = false;               ///< Whether the identifier has 29 bits.
   bool remote = false;                 ///< Whether the frame is a remote frame, which has no data.
-  std::uint8_t size = 0;               ///< number of data bytes, 0 to 8
-  std::array<std::uint8_t, 8> data{};  ///< Data bytes; the first `size` of them are used.
+  std::uint8_t size = 0;               ///< number of data bytes, or of requested bytes in a remote frame; 0 to 8
+  std::array<std::uint8_t, 8> data{};  ///< data frame: data bytes, of which the first `size` are used
 
   /// Returns the first `size` data bytes.
   [[nodiscard]] constexpr Bytes bytes() const { return {data.data(), size}; }

@@ -25,7 +25,7 @@ enum class Parity : std::uint8_t { none, odd, even };
 /// Wires beside the data wires; the host drives them.
 enum class ExtraWire : std::uint8_t { trigger, clear };
 
-/// Default bit rate, in bits per second, of virtual encoders whose protocol does not define one.
+/// Bit rate, in bits per second, that is assumed where a protocol defines none, for example by virtual encoders.
 inline constexpr std::uint32_t assumed_rate = 115'200;
 
 /// Settings of a line. For SPI and clocked links they describe how to configure a controller; sim draws waveforms from

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The rule for the `silence` event, which all ports and simulated lines follow.
+// The rule for the `silence` event, which the ports of the operating system and the simulated lines follow.
 #pragma once
 
 #include "absenc/link/step.hpp"
@@ -40,7 +40,7 @@ class Silence {
   }
 
  private:
-  Time since_{};           // end of the last transfer, or time of the last activity
+  Time since_{};           // end of the last transfer, time of the last activity, or begin of the silence
   bool received_ = false;  // an item was received since the last transfer
   bool reported_ = false;
 };

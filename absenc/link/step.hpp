@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The interface between a protocol and its port: a machine is fed events and returns steps.
-// It owns no port and no clock, so the same object runs on a real port, on a microcontroller and in virtual time.
-// It is not in core, because it refers to lines and CAN frames, which core does not know.
+// The interface between a protocol and its port: a machine is fed events and returns steps. A machine owns no port and
+// no clock, so the same object runs on a real port, on a microcontroller and in virtual time. This interface is not in
+// core, because it refers to lines and CAN frames, which core does not know.
 #pragma once
 
 #include <cstddef>
@@ -55,7 +55,7 @@ struct Step {
   [[nodiscard]] constexpr std::uint8_t behind_out() const { return width > Time{} ? 0x00 : 0xFF; }
 };
 
-/// An event on the line. `at` is the time of its completion: the end of the last bit.
+/// An event on the line. `at` is the time of its completion: for bits on the line, the end of the last one.
 ///
 /// A clocked device gets the period of the clock in `selected`, because its reply depends on it: the ACK of BiSS, and
 /// the delay of a long line. An SPI device gets the period in `sent`: a pause lies between chip select and the first
@@ -85,8 +85,8 @@ struct Event {
   /// the clock, 0 if not known.
   Time width{};
   Time lead{};  ///< sent, device side of an SPI link: time from chip select to the first clock
-  /// Uncertainty of `at`. received: `items` may have arrived earlier by this time, because the port could not look
-  /// sooner; sent: the transfer may have ended earlier by this time; 0: none, or not known.
+  /// Uncertainty of `at`. received: `items` may have arrived earlier by up to this time, because the port could not
+  /// look sooner; sent: the transfer may have ended earlier by up to this time; 0: none, or not known.
   Time late{};
 };
 

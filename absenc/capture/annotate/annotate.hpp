@@ -29,13 +29,13 @@ enum class Carries : std::uint8_t {
 /// rate.
 [[nodiscard]] LineTicks line_ticks(const Unit& unit, double ticks_per_bit, std::uint64_t ticks_per_second);
 
-/// Converts characters to annotated exchanges. Memory is fixed.
+/// Converts characters to annotated exchanges. Memory does not grow with the length of the capture.
 ///
 /// A pause on the line ends a frame. The first characters of a capture, up to the first pause, may be the end of a
-/// frame or no characters at all: they are reported as cut. On a line that never pauses, a frame is accepted only if
-/// another good frame follows, because a weak checksum finds frames everywhere. On a line with both directions a frame
-/// is classified as request or reply by the preceding frames, never by its bytes alone: some replies equal their
-/// requests.
+/// frame or no characters at all: they are reported as cut, unless the line was silent before them. On a line that
+/// never pauses, a frame is accepted only if another good frame follows, because a weak checksum finds frames
+/// everywhere. On a line with both directions a frame is classified as request or reply by the preceding frames, never
+/// by its bytes alone: some replies equal their requests.
 ///
 /// With arrival times (`by_arrival`) a pause may lie within a frame and be missing between two frames. Frames are then
 /// separated by length and content alone, and pauses only help to judge bytes that are no good frame: see
@@ -64,7 +64,8 @@ class Annotator {
   void put(const Character& character);
   /// Ends the capture at `end`.
   void finish(Tick end);
-  /// by_arrival: reports all complete good frames among the added characters, without waiting for further characters.
+  /// by_arrival: reports the good frames that the added characters certainly complete, without waiting for further
+  /// characters. A reply of another length than the last one may be reported later.
   void report_complete();
   /// by_arrival: reports everything received so far. Call it when the line was silent for so long that no frame
   /// continues and no reply can follow.

@@ -27,14 +27,16 @@ bool Annotator::has_gap(std::size_t before) const {
   return before == 0 || (before < run.size() && run.begin(before) - run.begin(before - 1) >= settings_.gap);
 }
 
-// Returns whether the `size` bytes at `at_` have a pause before them, and behind them a pause or the end of the run.
+// Returns whether the `size` bytes at `at_` have before them a pause or the beginning of the run, and behind them a
+// pause or the end of a run that no longer grows.
 bool Annotator::stands_alone(std::size_t size) const {
   const bool is_end = whole_ && size == rest(at_).size();
   return has_gap(at_) && (is_end || has_gap(at_ + size));
 }
 
-// Reports the good frame at `at_` and returns its size. Returns 0, and reports nothing, if there is none, or if the
-// next characters may belong to it.
+// Returns the size of the good frame at `at_`, after it reported a reply or stored a request. Returns 0, and reports
+// nothing, if the beginning of a frame is unknown, if there is no good frame, or if the next characters may belong to
+// it.
 std::size_t Annotator::whole_frame() {
   if (!channel_->at_frame_start) return 0;
   const auto answered = [&](std::size_t size) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests annotation by arrival times: frames that arrive in parts or several at once, captures that begin anywhere,
-// damaged frames, requests without replies.
+// Tests annotation by arrival times: frames that arrive in parts or several at once, captures that begin within an
+// exchange, damaged replies, requests without replies, unsolicited frames.
 #include <gtest/gtest.h>
 
 #include <algorithm>

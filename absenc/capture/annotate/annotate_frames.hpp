@@ -32,7 +32,8 @@ class ControlFrames {
   bool settle(bool fell);
   /// Ends the capture. Returns true if a control frame was in progress, which stays incomplete.
   bool finish() { return std::exchange(open_, false); }
-  /// Returns the completed control frame, decoded; valid until the next word and until `judge` decodes again.
+  /// Returns the last control frame, complete or not, decoded unless one of its words was bad. Valid until the next
+  /// word and until `judge` decodes again.
   [[nodiscard]] Annotation annotation(Judge& judge) const;
 
  private:
@@ -62,7 +63,8 @@ class ControlFrames {
   bool open_ = false;
 };
 
-/// Annotates SPI exchanges, each with request and reply, and clocked words, which have no request.
+/// Annotates SPI exchanges, each a reply and, if the host's data line was captured, its request; and clocked words,
+/// which have no request.
 class BurstAnnotator {
  public:
   /// `unit` and `sink` must outlive the annotator.

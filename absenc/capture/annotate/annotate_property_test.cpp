@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Captures thousands of random exchanges of every unit with faults. The annotator, which knows neither the sender nor
-// the frame boundaries, must find each exchange with its error and exact times.
+// Captures thousands of random exchanges, with faults or without, of every unit that does not use CAN. The annotator,
+// which knows neither the sender nor the frame boundaries of characters, must find each good exchange with its exact
+// times, and an error at the place of each bad one.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -305,7 +306,7 @@ class Characters : public ::testing::TestWithParam<const Unit*> {
   const Unit& unit = *GetParam();
   Options options = testing::options_of(unit);
 
-  /// Runs commands until `exchanges` exchanges are recorded; conversations with collisions are left out.
+  /// Runs commands until at least `exchanges` annotations are expected; conversations with collisions are left out.
   void talk(const sim::FaultRates& rates, std::size_t exchanges, std::uint64_t seed) {
     Talker talker(unit, options, rates, seed);
     while (truth.expected.size() < exchanges) {
@@ -337,8 +338,8 @@ TEST_P(Characters, EveryExchangeWithoutFaults) {
   expect_same(annotate(settings_of(unit)), truth.expected);
 }
 
-// Returns whether random replies pass the check with a probability of 1/64 or more: damaged replies then cannot be told
-// from good ones.
+// Returns whether more than 1/64 of random replies, as long as the reply of a test vector, pass the check: damaged
+// replies then cannot be told from good ones.
 bool has_weak_check(const Unit& unit, const Options& options) {
   NoFields nowhere;
   sim::Random random(1);
@@ -403,7 +404,8 @@ TEST_P(Characters, DamagedCharacters) {
   expect_same(annotate(settings_of(unit)), expected);
 }
 
-// Begins the capture at any character: no false frame may be found, and soon all frames must be found.
+// Begins the capture at some of the first 200 characters: no error and no false exchange may be found, and at most two
+// annotations may be missing.
 TEST_P(Characters, BeginsAnywhere) {
   talk({}, 300, 5);
   const std::vector<Character> all = characters;

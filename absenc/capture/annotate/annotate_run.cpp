@@ -8,7 +8,7 @@ namespace absenc::capture {
 
 namespace {
 
-// Number of characters to examine behind a frame on a line that does not pause: two of the longest frames.
+// Number of characters to examine behind a frame on a line that does not pause: more than two frames of usual length.
 constexpr std::size_t lookahead = 160;
 
 }  // namespace
@@ -93,8 +93,8 @@ std::size_t Annotator::next_frame() {
   return taken != 0 ? taken : take_bad();
 }
 
-// Returns the index of the newest outstanding request that ended before `begin`, or nothing: a host that sends another
-// request no longer expects earlier replies.
+// Returns the index of the newest outstanding request that ended at or before `begin`, or nothing: a host that sends
+// another request no longer expects earlier replies.
 std::optional<std::size_t> Annotator::request_before(Tick begin) const {
   const auto waiting = exchanges_.waiting();
   for (std::size_t i = waiting.size(); i-- > 0;) {
@@ -252,17 +252,17 @@ std::size_t Annotator::take_bad() {
   const std::size_t size = bad_size();
   report_bad(size);
   last_reply_size_ = 0;
-  channel_->at_frame_start = true;  // the bad bytes end where a good frame begins, or with the run
+  channel_->at_frame_start = true;  // mostly the bad bytes end where a good frame begins, or with the run
   if (!whole_ && !good_from(at_ + size)) channel_->at_frame_start = false;
   return size;
 }
 
 // Returns the number of bad bytes from `at_` on. They end where good frames begin, at a pause (arrival times only), or
-// with the run; if the run still grows, half of the look-ahead before its end. A single good reply does not end them:
-// garbage before a good reply makes the exchange bad, like in live reading.
+// with the run; if the run still grows, half of the look-ahead before its end. Outside a stream of unsolicited frames a
+// single good reply does not end them: garbage before a good reply makes the exchange bad, like in live reading.
 std::size_t Annotator::bad_size() {
   const std::size_t left = rest(at_).size();
-  // In a stream of unsolicited frames, the next frame begins one frame size behind the bad frame.
+  // In a stream of unsolicited frames, the next frame begins one frame size behind the beginning of the bad frame.
   const std::size_t period = channel_->last_size;
   if (channel_->at_frame_start && period != 0 && period < left && reply_at({}, at_ + period) != 0) return period;
   // A good unsolicited frame may end with the run: the bytes before it are the bad ones.

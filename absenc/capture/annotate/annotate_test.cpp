@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests cases that simulated conversations do not contain: lines that never pause, bytes without times, unnamed wires,
-// CAN.
+// Tests cases that simulated conversations do not contain, for example lines that never pause, bytes without times,
+// unnamed wires, noise, CAN.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -91,7 +91,7 @@ std::vector<const Unit*> units_of_characters() {
 
 constexpr Tick length = 100;  // duration of a character in ticks
 
-// Tests an encoder that sends positions without a pause; the capture begins anywhere.
+// Tests an encoder that sends positions without a pause; the capture begins at any of its first characters.
 TEST_P(OfUnit, ALineThatNeverPauses) {
   std::vector<Character> characters;
   std::vector<Tick> begins;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An annotation: a request with its reply, or a request or reply alone, decoded by the protocol's unit.
+// An annotation: a request with its reply, or a request or reply alone, decoded by the protocol's unit; or noise.
 #pragma once
 
 #include <cstddef>
@@ -23,9 +23,9 @@ enum class Remark : std::uint8_t {
   repeated,      // the reply was sent a second time
   echo,          // the request's echo was received between the request and the reply
   late,          // the reply arrived after the time in which a host expects it
-  damaged,       // a character had a wrong parity or stop bit
+  damaged,       // a character had a wrong parity or stop bit, or a CAN controller reported an error
   undocumented,  // no document states the reply to this request
-  cut,           // the frame is incomplete, because the capture begins or ends within it
+  cut,           // the capture begins or ends here: the frame or its exchange may be incomplete
 };
 
 /// Returns the remark as a clause without a full stop; "" for Remark::none.
@@ -51,14 +51,14 @@ struct Annotation {
   bool composed = false;      // the frame was composed of several exchanges that carried one byte of it each
   Tick begin = 0;
   Tick end = 0;
-  // The members below are valid only during the call of AnnotationSink::put.
+  // The bytes and fields that the members below refer to are valid only during the call of AnnotationSink::put.
   Frame request{};
   Frame reply{};
   Contents contents{};               // decoded content of request and reply; empty for bad frames
   std::optional<Tick> turnaround{};  // ticks from the end of the request to the beginning of its reply
 };
 
-/// Receives annotations in the order of their end times, except that an unanswered request may follow later
+/// Receives annotations in the order of their end times, except that a request without a reply may follow later
 /// annotations, when its reply is no longer expected.
 struct AnnotationSink {
   virtual void put(const Annotation& annotation) = 0;

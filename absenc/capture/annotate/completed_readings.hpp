@@ -18,8 +18,8 @@ namespace absenc::capture {
 /// annotators, so that it sees all replies in the order of time.
 ///
 /// No frame reports that an encoder was switched off and on, but the encoder sends no replies while it is off: an
-/// unanswered request clears the stored alarms. The reply to a request that clears alarms also clears the stored alarms
-/// of its encoder. Otherwise the encoder is assumed to have stayed on.
+/// unanswered request clears the stored alarms of all encoders. The reply to a request that clears alarms or resets the
+/// turns also clears the stored alarms of its encoder. Otherwise the encoder is assumed to have stayed on.
 class CompletedReadings final : public AnnotationSink {
  public:
   /// `unit` and `sink` must outlive this object.
@@ -64,7 +64,7 @@ class CompletedReadings final : public AnnotationSink {
 
   const Unit* unit_;
   AnnotationSink* sink_;
-  std::vector<std::vector<std::uint8_t>> clearing_;  // requests that clear alarms, as bytes
+  std::vector<std::vector<std::uint8_t>> clearing_;  // requests that clear alarms or reset the turns
   std::map<std::int64_t, Reading> last_;             // last completed reading of each encoder, by the encoder's address
 };
 

@@ -98,8 +98,7 @@ std::string seconds(Tick time) {
   return std::to_string(time / nanoseconds_a_second) + '.' + fraction;
 }
 
-/// The samples of a drawing, computed when libzip requests them, and split into parts of the size that sigrok itself
-/// uses.
+/// The samples of a drawing, computed when libzip requests them.
 class Samples {
  public:
   Samples(Drawing& drawing, std::uint64_t rate)

@@ -24,12 +24,12 @@ struct CloseFile {
 /// A file handle that closes its file.
 using ScratchFile = std::unique_ptr<std::FILE, CloseFile>;
 
-/// Creates a temporary file, which disappears with the process. Returns null on failure.
+/// Creates a temporary file, which disappears when it is closed or the process ends. Returns null on failure.
 [[nodiscard]] inline ScratchFile temporary_file() { return ScratchFile(std::tmpfile()); }
 
 /// Level changes of wires and labels for them, of any length. Changes and labels are stored on disk, with a few bytes
-/// per change, until all wires and the end time are known, so memory does not grow with the length. Ticks are
-/// nanoseconds.
+/// per change, because they are written only when all wires and the end time are known; so memory does not grow with
+/// the length. Ticks are nanoseconds.
 class Drawing {
  public:
   struct Wire {
@@ -42,9 +42,10 @@ class Drawing {
 
   void add_wire(std::string name, bool before) { wires_.push_back({std::move(name), before}); }
   /// Inverts the level of the wire with index `wire` at the time `at`; the wire may be added later. Times must not
-  /// decrease. Throws std::runtime_error if the disk is full.
+  /// decrease. Throws std::runtime_error if the disk is full; a full disk may be noticed only by `rewind_changes`.
   void change(Tick at, std::size_t wire);
-  /// Adds the label `words` at the time `at`. Times must not decrease. Throws std::runtime_error if the disk is full.
+  /// Adds the label `words` at the time `at`. Times must not decrease. Throws std::runtime_error if the disk is full; a
+  /// full disk may be noticed only by `rewind_labels`.
   void label(Tick at, std::string_view words);
   void set_end(Tick end) { end_ = end; }
   /// Sets a function that is called regularly while the drawing is written to a file; an exception thrown by the
@@ -58,9 +59,10 @@ class Drawing {
     if (on_progress_) on_progress_();
   }
 
-  /// Sets the position of `next_change` to the first level change.
+  /// Sets the position of `next_change` to the first level change. Throws std::runtime_error if the disk is full.
   void rewind_changes();
-  /// Reads the next level change into `at` and `wire`; returns false if no change follows.
+  /// Reads the next level change into `at` and `wire`; returns false if no change follows. Throws std::runtime_error if
+  /// the disk fails.
   [[nodiscard]] bool next_change(Tick& at, std::size_t& wire);
   void rewind_labels();
   [[nodiscard]] bool next_label(Tick& at, std::string& words);
@@ -110,7 +112,8 @@ void write_vcd(std::ostream& out, Drawing& drawing);
 void write_saleae_csv(std::ostream& out, Drawing& drawing);
 
 /// Writes `drawing` as a sigrok session with `rate` samples per second (at most 1 GHz). Replaces the file at `path`.
-/// Throws std::runtime_error with a sentence if the file cannot be written.
+/// Throws std::runtime_error with a sentence if the file cannot be written, and passes on exceptions of the function
+/// set by `Drawing::watch`.
 void write_sigrok(const std::string& path, Drawing& drawing, std::uint64_t rate);
 
 }  // namespace absenc::capture

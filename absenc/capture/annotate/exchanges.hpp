@@ -46,7 +46,7 @@ class Exchanges {
     [[nodiscard]] Bytes bytes() const { return {storage.data(), size}; }
   };
 
-  /// `judge` must not be the judge that holds the contents of the reply, because this object decodes requests with it.
+  /// This object has its own judge, because it decodes requests while another judge holds the contents of a reply.
   /// `sink` must outlive this object.
   Exchanges(Judge judge, const LineTicks& ticks, AnnotationSink& sink)
       : judge_(std::move(judge)), ticks_(ticks), sink_(sink) {}
@@ -63,7 +63,8 @@ class Exchanges {
   /// must be empty with an error. A damaged reply counts as a reply. A reply after the limit is paired too, but with
   /// the error timeout: no host would accept it.
   void report_reply(std::size_t which, const Piece& reply, Error error, Remark remark, const Contents& contents);
-  /// Reports the `count` oldest outstanding requests as unanswered.
+  /// Reports the `count` oldest outstanding requests without a reply: as good if they need none, with their own error
+  /// if they are bad, else as unanswered.
   void report_unanswered(std::size_t count);
   /// Reports bytes that belong to no outstanding request.
   void report_unpaired(Annotation::Kind kind, const Piece& piece, Error error, Remark remark,

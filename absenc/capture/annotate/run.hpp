@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Characters of one channel without a pause between them, in separate arrays for values and times.
+// Characters of one channel without a pause between them (with arrival times also with pauses), in separate arrays for
+// values and times.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +15,8 @@ namespace absenc::capture {
 
 class Run {
  public:
-  /// Largest number of characters, much longer than any frame: only a line that is never silent fills the run.
+  /// Largest number of characters, longer than any frame: without arrival times only a line that is never silent fills
+  /// the run.
   static constexpr std::size_t capacity = 512;
 
   void push(const Character& character) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the whole path from wires to annotations: conversations of every unit are drawn as a waveform, read back,
-// decoded to characters or bursts, and annotated like an unknown capture.
+// Tests the whole path from wires to annotations: conversations of every unit that does not use CAN are drawn as a
+// waveform, read back, decoded to characters or bursts, and annotated like an unknown capture.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -110,7 +110,7 @@ class WholeWay : public ::testing::TestWithParam<const Unit*> {
     return memory_source({written.begin(), written.end()});
   }
 
-  // Requires `reader` to give every expected frame with its fields and errors, at its time.
+  // Requires `reader` to give every expected annotation with its bytes, error and position, at its time up to a bit.
   void expect_same(Reader& reader, const Lines& expected) {
     const double ticks_per_ns = static_cast<double>(reader.layout().ticks_per_second) / 1e9;
     const LineTicks in_ns = settings.ticks;
