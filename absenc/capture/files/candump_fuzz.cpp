@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads any bytes as a candump log, and valid logs with some bytes changed.
+// Opens any bytes as a capture, and valid candump logs with some bytes changed.
 #include "absenc/capture/files/candump.hpp"
 
 #include "absenc/capture/files/test_files.hpp"

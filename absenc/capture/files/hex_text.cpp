@@ -40,8 +40,8 @@ class HexTextReader final : public ParsedReader {
     const std::optional<HexForm> form = first_form(line);
     if (!form) throw OpenError(std::string(name) + " holds no bytes as text");
     form_ = *form;
-    // The first line with bytes decides which form and items the lines have: a decoder may print other annotations
-    // before it.
+    // The first line with bytes decides which items (time, port, direction) the lines have: a decoder may print other
+    // annotations before it.
     constexpr std::uint64_t far_enough = 1 << 16;
     do {
       if (!parse_hex_line(form_, content_of(line, form_), line_)) break;

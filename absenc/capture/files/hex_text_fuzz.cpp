@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads any bytes as hexadecimal text, and valid texts with some bytes changed.
+// Opens any bytes as a capture, and valid hexadecimal texts with some bytes changed.
 #include "absenc/capture/files/hex_text.hpp"
 
 #include "absenc/capture/files/test_files.hpp"

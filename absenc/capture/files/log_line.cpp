@@ -335,7 +335,7 @@ class Prefix {
   }
 
   // Removes and handles a word that is a direction, a port, a filler or a label, like "RX", "COM3:", "COM3>". Returns
-  // false for another word.
+  // false, with a problem, for another word or a second direction.
   bool take_word_of_prefix(std::string_view word) {
     text_.remove_prefix(word.size());
     const bool label = word.ends_with(':') || word.ends_with('=');

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads any bytes as CSV of a logic analyser, and valid files with some bytes changed.
+// Opens any bytes as a capture, and valid CSV files of logic analysers with some bytes changed.
 #include "absenc/capture/files/logic_csv.hpp"
 
 #include "absenc/capture/files/test_files.hpp"

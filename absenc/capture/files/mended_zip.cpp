@@ -53,7 +53,8 @@ struct Header {
   [[nodiscard]] Bytes name() const { return Bytes(bytes).subspan(local_bytes, number(bytes, 26, 2)); }
   [[nodiscard]] Bytes extra() const { return Bytes(bytes).last(number(bytes, 28, 2)); }
 
-  // Reads the local header at offset `at`. Returns false if no valid header is at that place.
+  // Reads the local header at offset `at`. Returns false if no valid header is at that place, or if the entry's sizes
+  // are stored behind its data.
   [[nodiscard]] bool read(Source& source, std::uint64_t at) {
     bytes.resize(local_bytes);
     if (source.read(at, bytes) != local_bytes || number(bytes, 0, 4) != local_signature) return false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Opens a capture file of any known format, detected from its content, not its name.
+// Opens a capture file of any known format, detected from its content, not its name, or a folder of Saleae's files.
 #pragma once
 
 #include <cstdint>
@@ -21,8 +21,8 @@ struct OpenChoices {
 /// Opens a file. The formats are described in their own headers: sessions of sigrok (sigrok.hpp), value change dumps
 /// (vcd.hpp), CSV of logic analysers (logic_csv.hpp), Saleae's binary export, as a file or a folder (saleae.hpp),
 /// candump logs (candump.hpp), bytes as text (hex_text.hpp); with `channels` set, a file of none of the first four
-/// formats is raw samples (raw.hpp). Throws OpenError if the file cannot be opened, has an unknown format, or its
-/// beginning is invalid.
+/// formats is raw samples (raw.hpp). Throws OpenError if the file cannot be opened, has an unknown format, has an
+/// invalid beginning, or does not fit `choices`.
 [[nodiscard]] std::unique_ptr<Reader> open_capture(const std::filesystem::path& path, const OpenChoices& choices);
 
 /// Opens a capture from any source, like the function for a path; `name` is used in messages and as the channel name of

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Common parts of the readers of text and parsed files: their layout, and the list of damages. Text is parsed in
-// `claim`, because each part depends on the previous one.
+// Common parts of readers: the list of damages, and the layout of readers that parse a file in `claim`, because each
+// part of the file depends on the previous one.
 #pragma once
 
 #include <algorithm>

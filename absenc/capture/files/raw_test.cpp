@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the reader of raw samples, and the checks that all readers make when a file is opened.
+// Tests the reader of raw samples, and errors that `open_capture` reports for files of any format.
 #include "absenc/capture/files/raw.hpp"
 
 #include <gtest/gtest.h>

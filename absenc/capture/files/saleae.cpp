@@ -80,7 +80,8 @@ class TransitionStream {
   /// Returns the time of the last good transition, or of the chunk's begin, in picoseconds: a damage is reported there.
   [[nodiscard]] std::int64_t last() const { return last_; }
   [[nodiscard]] Damage damage() const { return damage_; }
-  /// Returns the time up to which all transitions are known, in picoseconds: that of the last transition read ahead.
+  /// Returns the time before which all transitions are known, in picoseconds: that of the last transition read ahead,
+  /// or of the chunk's begin.
   [[nodiscard]] std::int64_t known() const { return last_; }
 
   /// Reads ahead until a transition before the time `known` is available, or the file ends or is damaged.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads any bytes as a binary export of Saleae, and valid exports of both versions with some bytes changed.
+// Opens any bytes, and valid binary exports of Saleae of both versions with some bytes changed, as a capture and as one
+// channel of an export.
 #include "absenc/capture/files/saleae.hpp"
 
 #include "absenc/capture/files/test_files.hpp"

@@ -15,7 +15,8 @@ namespace absenc::capture {
 [[nodiscard]] bool is_zip(std::string_view head);
 
 /// Reads sessions of versions 1 and 2 with up to 64 logic channels; analog channels are left out, with a note. Without
-/// a rate in the file, `samples_per_second` is used. Throws OpenError if the session has no usable samples.
+/// a rate in the file, `samples_per_second` is used. Throws OpenError if the session cannot be read or has no logic
+/// samples.
 ///
 /// - A piece of up to 16 MiB is one block, expanded by `fill`; a larger one is expanded by `claim`, 4 MiB at a time.
 /// - A damaged piece is an empty block, because it is unknown which of its samples are wrong (a larger piece ends where

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files that sigrok-cli writes from raw samples, in each of its formats, must be read as the same samples.
+// Files that sigrok-cli writes from raw samples (sessions, VCD, CSV, the text of its UART decoder) must be read as the
+// same levels or bytes.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads any bytes as a sigrok session; a complete and a cut session with some bytes changed; and any metadata.
+// Opens any bytes as a capture; a complete or a cut sigrok session with some bytes changed; and sessions with any
+// metadata.
 #include "absenc/capture/files/sigrok.hpp"
 
 #include <algorithm>

@@ -12,7 +12,7 @@
 
 namespace absenc::capture {
 
-/// Exception for a capture that cannot be opened. Its text is a sentence that states the reason and what to try.
+/// Exception for a capture that cannot be opened. Its text states the reason and, where that helps, what to try.
 struct OpenError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -26,7 +26,7 @@ struct Source {
   [[nodiscard]] virtual std::size_t read(std::uint64_t offset, std::span<std::uint8_t> into) = 0;
 };
 
-/// Opens a file as a source of bytes. Throws OpenError if the file cannot be opened or is a folder.
+/// Opens a file as a source of bytes. Throws OpenError if the file cannot be opened or is no regular file.
 [[nodiscard]] std::unique_ptr<Source> file_source(const std::filesystem::path& path);
 
 [[nodiscard]] std::unique_ptr<Source> memory_source(std::vector<std::uint8_t> bytes);

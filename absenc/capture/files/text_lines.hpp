@@ -53,7 +53,7 @@ struct Instant {
 };
 
 /// Parses seconds like "12", "-0.000125", "1.8e-08"; digits below a picosecond are cut off. Returns nothing if `text`
-/// contains anything else.
+/// contains anything else, or 10^18 or more.
 [[nodiscard]] std::optional<Instant> parse_seconds(std::string_view text);
 
 /// Parses a clock time like "2026-11-21T17:55:24.123456789+00:00" (also with a blank instead of T, with Z or without a

@@ -22,8 +22,8 @@ namespace absenc::capture {
 /// - Ticks are the file's times in units of $timescale. Values at the first time in the file are the initial levels;
 ///   without an initial level a channel begins low.
 /// - x and z (and u, w, - of VHDL) leave the level unchanged, with a note; h and l are 1 and 0.
-/// - A time that runs backwards, an undeclared identifier and an invalid value change are damages: the changes before
-///   them are valid.
+/// - A time that is invalid or runs backwards, an undeclared identifier, an invalid value change and a section without
+///   an end are damages: the changes before them are valid.
 [[nodiscard]] std::unique_ptr<Reader> read_vcd(std::unique_ptr<Source> source, std::string_view name);
 
 }  // namespace absenc::capture

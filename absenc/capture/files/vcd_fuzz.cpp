@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads any bytes as a value change dump, and a valid dump with some bytes changed and its end cut off.
+// Opens any bytes as a capture, and a valid value change dump with some bytes changed or its end cut off.
 #include "absenc/capture/files/vcd.hpp"
 
 #include "absenc/capture/files/test_files.hpp"

@@ -49,7 +49,7 @@ class ZipArchive {
 
   /// Returns a message about the last error of this archive, mostly libzip's.
   [[nodiscard]] std::string problem() const;
-  /// Returns the offset in the file of the entry that is being read.
+  /// Returns the offset in the file of the entry that `open` opened last.
   [[nodiscard]] std::uint64_t offset() const;
 
  private:

@@ -243,8 +243,8 @@ void AsyncDecoder::join(const Changes& part, Tick first, Tick end, AsyncDecoder&
   const auto met = meet(part, first, end, guessed, characters);
   if (!met) return;
   characters.insert(characters.end(), guessed.begin() + static_cast<std::ptrdiff_t>(*met), guessed.end());
-  // `other` counted wrong faults before its characters met those of this decoder: a third decoder counts these faults
-  // again, and they are subtracted.
+  // `other` counted wrong characters and faults before its characters met those of this decoder: a third decoder counts
+  // these again, and they are subtracted.
   AsyncDecoder wrong(format_, channel_, Start::trust);
   std::vector<Character> ignored;
   wrong.meet(part, first, end, std::span(guessed).subspan(*met, 1), ignored);

@@ -39,7 +39,7 @@ class AsyncDecoder {
     std::uint64_t ticks = 0;
     std::uint64_t bits = 0;
     std::uint64_t characters = 0;
-    std::uint64_t faults = 0;  // number of wrong stop and parity bits, and of falling edges that were no start bit
+    std::uint64_t faults = 0;  // characters with a wrong stop or parity bit, and falling edges that were no start bit
 
     Statistics& operator+=(const Statistics& other);
     Statistics& operator-=(const Statistics& other);

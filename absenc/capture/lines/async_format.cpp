@@ -28,7 +28,8 @@ std::vector<Tick> pulses(const Changes& changes, Tick glitch) {
   return lengths;
 }
 
-// Returns the bit time in ticks as the mean over pulses that have up to `most` bits and are nearly a multiple of `bit`.
+// Returns the bit time in ticks as the mean over pulses that have up to `most` bits and are nearly a multiple of `bit`;
+// `bit` if there are none.
 double fitted(const std::vector<Tick>& lengths, double bit, double most) {
   double ticks = 0;
   double bits = 0;
@@ -88,8 +89,8 @@ AsyncDecoder::Statistics decoded(const Stretch& part, const AsyncFormat& format)
   return decoder.statistics();
 }
 
-// Returns the number of errors per character. Pulses that are clearly shorter than a bit count as errors too: in a
-// short capture, a bit time that is too long may cause no others.
+// Returns the number of errors per character, 1 without characters. Pulses that are clearly shorter than a bit count as
+// errors too: in a short capture, a bit time that is too long may cause no others.
 double faults(const AsyncDecoder::Statistics& statistics, const std::vector<Tick>& lengths, double bit) {
   if (statistics.characters == 0) return 1;
   const auto shorter = std::find_if(lengths.begin(), lengths.end(),

@@ -19,11 +19,12 @@ struct AsyncSettings {
   Tick glitch = 0;              // a level shorter than this is noise, in ticks; 0: no filter
 };
 
-/// Finds the format from the first changes of a line between `first` and `end`. It tries each bit time of which the
-/// pulses could be multiples, with each idle level, and takes the format with the fewest errors, of equal formats that
-/// with the longest bit. The bit time is then measured from the start bit to the last change of the characters. If the
-/// baud rate is not given, returns nothing if there are too few changes, or if more than half of the characters would
-/// be wrong. `ticks_per_second` is needed when the baud rate is given.
+/// Finds the format from the first changes of a line between `first` and `end`. It tries the given baud rate, or
+/// without one each bit time of which the pulses could be multiples, with each idle level that `settings` allow, and
+/// takes the format with the fewest errors, of equal formats that with the longest bit. Without a given baud rate, it
+/// then measures the bit time from the start bit to the last change of the characters, and returns nothing if there are
+/// too few changes, or more than one error for two characters. `ticks_per_second` is needed only when the baud rate is
+/// given.
 std::optional<AsyncFormat> find_format(const Changes& changes, Tick first, Tick end, const AsyncSettings& settings,
                                        std::uint64_t ticks_per_second);
 

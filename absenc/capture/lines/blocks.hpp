@@ -24,7 +24,7 @@ struct Levels {
   std::vector<Changes> changes;
 };
 
-/// Reads selected channels as level changes from a reader of any content.
+/// Reads selected channels as level changes from a reader of samples or of changes.
 class LevelReader {
  public:
   LevelReader(Reader& reader, std::vector<unsigned> channels) : reader_(reader), channels_(std::move(channels)) {}
@@ -79,8 +79,8 @@ void look_ahead(LevelReader& reader, std::vector<Levels>& parts, Enough&& enough
 /// it begins a character or word at the same time as the guess. From there on both depend only on later changes, so the
 /// guess is correct. If true state and guess never meet, the block is decoded twice, and the result is still correct.
 ///
-/// The calling thread calls `decode` and `join`. Each thread has two blocks in progress. Exceptions of the reader or
-/// the decoding are thrown here.
+/// The calling thread calls `decode` and `join`. Each thread has two blocks in progress. `run` throws exceptions of the
+/// reader and the decoding.
 template <class Decoding>
 class BlockRun {
  public:

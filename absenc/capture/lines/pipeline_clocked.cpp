@@ -11,7 +11,7 @@ namespace absenc::capture {
 namespace {
 
 constexpr std::size_t enough_clocks = 8194;  // number of clock changes that suffice to find the period
-// Limit for the changes of the data line that are stored while the clock has too few.
+// Limit for the changes of all wires but the clock that are stored while the clock has too few.
 constexpr std::size_t most_data = 64 * 16384;
 
 // Indices of the wires of a clocked line among the channels that are read.

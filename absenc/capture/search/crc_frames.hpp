@@ -15,7 +15,8 @@
 
 namespace absenc::capture {
 
-/// Layout of a frame with a checksum: the covered part, the place of the checksum and its byte and bit order.
+/// Layout of a checksum in a frame: its width, bit and byte order and place, and whether it covers a byte 00 that is
+/// not sent.
 struct Shape {
   unsigned width = 0;  // width of the checksum in bits
   bool refin = false;

@@ -44,7 +44,7 @@ class CrcSearch {
     bool init_open;
     auto operator<=>(const Key&) const = default;
   };
-  // Possible positions of the first covered byte, by polynomial and by init and xorout.
+  // Possible positions of the first covered byte or bit, by polynomial and by init and xorout.
   using Firsts = std::map<std::uint32_t, std::map<Key, std::vector<std::size_t>>>;
 
   void each_order(Shape shape) {
@@ -305,7 +305,8 @@ class CrcSearch {
 
   Frames frames_;
   std::map<const CheckedFrame*, std::uint32_t> checks_;
-  // Results of `known_checks`, by the number of bytes behind the checksum and the position of the first covered byte.
+  // Results of `known_checks`, by the number of bytes (or bits) behind the checksum and the position of the first
+  // covered one.
   std::map<std::pair<std::size_t, std::size_t>, double> known_;
   std::size_t shapes_ = 0;
   CheckSearch found_;

@@ -49,8 +49,9 @@ struct CheckSearch {
   std::size_t open = 0;  // number of layouts about which the frames determine too little to list solutions
 };
 
-/// Returns all checksums of 3 to 16 bits that explain every frame. The frames must be all of bytes or all of bits.
-/// Duplicates add no evidence, nor do bits that never change, alone or combined: the evidence is the number of
+/// Returns checksums of 3 to 16 bits that explain every frame: all that are found with usual init and xorout or
+/// constants, else for each layout and polynomial one with other values. The frames must be all of bytes or all of
+/// bits. Duplicates add no evidence, nor do bits that never change, alone or combined: the evidence is the number of
 /// independent ways in which the covered parts differ. A checksum that never changes is not accepted.
 [[nodiscard]] CheckSearch find_checks(std::span<const CheckedFrame> frames);
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the search for checksums with frames whose CRC is computed by core, which shares no code with the search.
+// Tests the search for checksums with frames whose CRC is computed by `crc_bitwise` of core, which the search does not
+// use.
 #include "absenc/capture/search/crc_search.hpp"
 
 #include <gtest/gtest.h>
@@ -147,7 +148,7 @@ TEST(CrcSearch, FindsASum) {
 }
 
 // Returns frames like those of HIPERFACE, read while the shaft turns slowly: most bytes hardly change, the last is the
-// exclusive or of all.
+// exclusive or of `check_from` and all others.
 std::vector<CheckedFrame> slow_positions(std::uint8_t check_from) {
   std::vector<CheckedFrame> frames;
   for (std::uint32_t i = 0; i < 8; ++i) {

@@ -37,7 +37,7 @@ struct ObservedExchange {
 struct Evidence {
   std::size_t tried = 0;      // number of exchanges examined
   std::size_t explained = 0;  // number of exchanges with a good reply
-  std::size_t distinct = 0;   // number of different good replies, because a repeated frame proves no more
+  std::size_t distinct = 0;   // number of different good exchanges, because a repeated one proves no more
   /// log10 of the probability that the unit would accept as many random frames.
   double frames = 0;
   /// log10 of the probability that random positions would move as little; empty: no position changed.

@@ -24,7 +24,7 @@ bool same_resolution(const Resolution& one, const Resolution& other) {
 
 bool is_number_of_bits(const Option& option) { return option.choices.empty() && option.maximum <= most_bits; }
 
-/// Returns whether the options of a hypothesis equal `options`.
+/// Returns whether the options of one of the hypotheses equal `options`.
 bool contains(std::span<const Hypothesis> all, const Options& options) {
   return std::any_of(all.begin(), all.end(),
                      [&](const Hypothesis& one) { return one.options.values == options.values; });
@@ -85,8 +85,8 @@ class HypothesisSearch {
     add(options);
   }
 
-  /// Adds `base` with every change of a single option, and of each the numbers of bits that fit best, because no
-  /// model explains all exchanges.
+  /// Adds `base` with every change of a single option that has choices, and of each the numbers of bits that fit best,
+  /// because no model explains all exchanges.
   void vary(const Options& base) {
     vary_bits(base);
     for (std::size_t i = 0; i < unit_.options.size(); ++i) {
@@ -102,8 +102,8 @@ class HypothesisSearch {
     }
   }
 
-  /// Adds `base` with every change of a single option. If the frames are no evidence by themselves, the options with
-  /// which the position moves least are then ranked first.
+  /// Adds `base` with every change of a single option that has choices. If the frames are no evidence by themselves,
+  /// the options with which the position moves least are then ranked first.
   void vary_motion(const Options& base) {
     for (std::size_t i = 0; i < unit_.options.size(); ++i) {
       const auto count = static_cast<std::int64_t>(unit_.options[i].choices.size());

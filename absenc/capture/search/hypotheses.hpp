@@ -17,7 +17,7 @@ struct Hypothesis {
   Options options{};
   Evidence evidence{};
   std::size_t tried = 1;  // number of hypotheses tried up to and including this one, each of which may match by chance
-  bool at_least = false;  // the position may have more bits: these options have the fewest that explain all exchanges
+  bool at_least = false;  // the position may have more bits: these are the fewest that explain as many exchanges
 
   /// Returns log10 of the probability that one of `tried` hypotheses is as good as this one by chance.
   [[nodiscard]] double chance() const;
@@ -42,11 +42,11 @@ inline constexpr double is_found = -3;
 [[nodiscard]] std::vector<Hypothesis> find_hypotheses(const Unit& unit, std::span<const OptionText> settings,
                                                       std::span<const ObservedExchange> exchanges);
 
-/// Returns the indices of the unit's options that change the number of bits of a position.
+/// Returns the indices of the unit's numeric options that change the number of bits of a position.
 [[nodiscard]] std::vector<std::size_t> resolution_options(const Unit& unit);
 
-/// Returns the options of every model with the given settings, then the unit's defaults without a model; options that
-/// contradict the settings are left out.
+/// Returns the options of every model with the given settings, then the unit's defaults with the settings, without a
+/// model, unless a model has the same values. Options that contradict the settings are left out.
 [[nodiscard]] std::vector<Options> likely_options(const Unit& unit, std::span<const OptionText> settings);
 
 }  // namespace absenc::capture

@@ -47,8 +47,8 @@ bool states_bits(const Unit& unit, const Options& options, std::span<const std::
   });
 }
 
-// Returns the options of all models. If at most two options determine the number of bits, units with streams also get
-// options for every number of bits.
+// Returns the likely options of the unit. If the unit has streams, and one or two options determine the number of bits,
+// only options that state the number of bits are returned, for every number of bits.
 std::vector<Options> stream_options(const Unit& unit) {
   std::vector<Options> all = likely_options(unit, {});
   const std::vector<std::size_t> of_bits = resolution_options(unit);
@@ -130,8 +130,7 @@ std::vector<Hypothesis> find_stream_hypotheses(const Unit& unit, Bytes bytes, Ti
     one.tried *= all.size();
     found.push_back(std::move(one));
   }
-  // Explanations that are equally good are sorted by their number of bits, the fewest first: frames cannot show more
-  // bits.
+  // The fewest bytes outside of frames come first, then models, then the smallest `bits_of`.
   std::stable_sort(found.begin(), found.end(), [&](const Hypothesis& one, const Hypothesis& other) {
     const std::size_t noise = one.evidence.tried - one.evidence.explained;
     const std::size_t other_noise = other.evidence.tried - other.evidence.explained;
