@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures the time per character of a fully loaded T-format line, from the line decoder to the decoded exchange.
+// Measures the time per character of a fully loaded T-format line, from the line decoder's characters to the decoded
+// exchange.
 #include <benchmark/benchmark.h>
 
 #include <memory>

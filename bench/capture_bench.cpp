@@ -194,8 +194,8 @@ Cost plain_read(const File& file) {
   return cost;
 }
 
-// Decodes two files at once with one thread each, and returns half the elapsed time: the least time per file that a
-// second core can give under the current load.
+// Decodes the file twice at once, with one thread each, and returns half the elapsed time: the least time per file that
+// a second core can give under the current load.
 double two_independent(const File& file) {
   return cost_of([&] {
            std::jthread other([&] { decode(file, 1); });

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Measures Unit::decode of every unit, as captures, `decode` and `identify` call it: options, checks, and output of
-// every field. The frames are the unit's valid vectors. The time per frame is compared with that of one CRC over the
-// frame's bytes, computed bit by bit.
+// every field. The frames are the unit's valid vectors with a reply. The time per frame is compared with that of one
+// CRC over the reply's bytes, computed bit by bit.
 #include <algorithm>
 #include <array>
 #include <cstdio>

@@ -13,7 +13,7 @@ namespace absenc::sim {
 /// another node.
 [[nodiscard]] std::vector<bool> can_bits(const CanFrame& frame);
 
-/// Number of recessive bits between two frames.
+/// Fewest recessive bits between two frames.
 inline constexpr std::size_t can_intermission_bits = 3;
 
 }  // namespace absenc::sim

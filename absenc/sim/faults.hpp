@@ -60,8 +60,9 @@ struct FaultRate {
 /// the same faults.
 ///
 /// On character links whole replies are damaged, on clocked links the bits that the device drives. A reply that a fault
-/// makes longer or later does not follow the device's own timing. Until such a reply is sent, the device receives
-/// nothing (like a real one), so it does not report a protocol violation by the host.
+/// makes longer or later does not follow the device's own timing. Until such a reply, or the reply to a damaged
+/// request, is sent, the device receives nothing (like a real one), so it does not report a protocol violation by the
+/// host.
 class FaultyDevice final : public Machine<std::uint8_t> {
  public:
   /// Injects faults between `device` and its line. The same seed gives the same faults.
@@ -72,13 +73,13 @@ class FaultyDevice final : public Machine<std::uint8_t> {
   /// Returns the next step that the port must carry out.
   Step<std::uint8_t> next(Time now) override;
 
-  /// Sets the probabilities of faults, from the next reply on.
+  /// Sets the probabilities of faults, from the next reply or received byte on.
   void set_rates(const FaultRates& rates) { rates_ = rates; }
   /// Returns the number of injected faults of this kind.
   [[nodiscard]] std::uint64_t count(FaultKind kind) const { return counts_[static_cast<std::size_t>(kind)]; }
   /// Returns the number of injected faults of each kind, indexed by FaultKind.
   [[nodiscard]] const FaultCounts& counts() const { return counts_; }
-  /// Returns the number of replies with at least one fault.
+  /// Returns the number of replies with at least one fault; `request_corrupt` does not count.
   [[nodiscard]] std::uint64_t damaged_replies() const { return damaged_replies_; }
 
  private:

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A port that delays received items, like a USB hiccup or a network. It keeps their order and runs in virtual time.
+// A port that delays or loses received items, like a USB hiccup or a network. It keeps their order and runs in virtual
+// time.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +16,8 @@ namespace absenc::sim::testing {
 template <class Item>
 class LatePort final : public Port<Item> {
  public:
-  /// `delay` is called once per reply and returns its delay, or `never` if the reply is lost.
+  /// `delay` is called at the first item received after each request, and returns the delay of all items up to the next
+  /// request, or `never` if they are lost.
   LatePort(SimPort<Item>& inner, std::function<Time()> delay) : inner_(&inner), delay_(std::move(delay)) {}
 
   Time now() override {

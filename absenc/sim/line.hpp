@@ -17,7 +17,7 @@ namespace absenc::sim {
 enum class NodeRole : std::uint8_t { host, device };
 
 /// One shared line with the machines on it. Hosts and devices are machines of the same kind; the role only decides who
-/// drives the clock (SPI, clocked) and the pulses, and which pair a full-duplex node drives.
+/// drives the clock (SPI, clocked), and which pair a full-duplex node drives.
 ///
 /// Characters that overlap on one pair reach every receiver as the AND of both (an idle line is high); a character that
 /// begins during another one is received as part of that other one. CAN frames are arbitrated by identifier; the same
@@ -65,7 +65,7 @@ class Line {
   void wake(Node node);
   /// Sets whether a node receives what it sends.
   void set_echo(Node node, bool echo);
-  /// Makes the line call `observer` for each item on it.
+  /// Makes the line call `observer` for each character or CAN frame on it.
   void observe(Observer observer);
   /// Makes the line call `observer` for each transfer of SPI bytes or clocked bits.
   void observe_transfers(TransferObserver observer);

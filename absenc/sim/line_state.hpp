@@ -38,10 +38,10 @@ struct Line<Item>::State {
 
   /// Kind of the step that is pending or in progress, transfer or pulse; wait: none.
   typename Step<Item>::Kind active_step = Step<Item>::Kind::wait;
-  std::uint64_t begin_generation = 0;  ///< number of transfers and pulses so far
+  std::uint64_t begin_generation = 0;  ///< number of transfers, pulses and replaced machines so far
   bool begun = false;                  ///< false while the transfer's `at` lies in the future
   std::vector<Item> out;               ///< items of the transfer that the node sends
-  std::size_t bits = 0;                ///< clocked: number of bits of the transfer
+  std::size_t bits = 0;                ///< spi, clocked: number of bits of the transfer
   std::size_t expect = 0;              ///< number of items that the node expects
   Time width{};  ///< `width` of the step: duration of the pulse, or time for which a device drives low
   std::uint8_t behind_out = 0xFF;  ///< spi, clocked: byte that the host samples after `out` has ended

@@ -32,11 +32,12 @@ class Motion final : public Shaft {
   [[nodiscard]] static Motion sine(std::int64_t start, double amplitude_degrees, double frequency_hz);
   /// Returns a motion in straight lines between points `seconds,degrees` (degrees relative to `start`), one point per
   /// line, seconds rising. The shaft stands still before the first and after the last point. A heading and lines that
-  /// begin with # are skipped. Throws std::invalid_argument with `name` and the number of the invalid line.
+  /// begin with # are skipped. So are blank lines. Throws std::invalid_argument with `name` and the number of the
+  /// invalid line, or with `name` if there is no point.
   [[nodiscard]] static Motion path(std::int64_t start, std::istream& csv, std::string_view name);
 
-  /// Keeps the shaft at its start position until `time`, and starts the motion then. Without this call the motion has
-  /// its phase 0 at time 0 and also runs before it.
+  /// Starts the motion at `time`; until then the shaft rests at the position where the motion begins. Without this call
+  /// the motion begins at time 0, and also runs before it.
   void begin_at(Time time) {
     begin_ = time;
     rests_before_ = true;

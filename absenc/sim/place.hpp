@@ -14,7 +14,7 @@ namespace absenc::sim {
 [[nodiscard]] constexpr std::uint64_t counts_at(std::int64_t position, unsigned bits) {
   const auto fraction = static_cast<std::uint64_t>(position) & 0xFFFF'FFFF;
   if (bits == 0) return 0;
-  // With more than 32 bits the counts include the turns.
+  // With more than 32 bits, the bits that `position` does not have are 0.
   return (bits <= 32 ? fraction >> (32 - bits) : static_cast<std::uint64_t>(position) << (bits - 32)) & low_mask(bits);
 }
 

@@ -18,7 +18,7 @@ struct RoughRates {
   double bit = 0;  ///< probability that a data bit is flipped
   /// 2 to 16 adjacent bits are damaged: the first and last are flipped, each bit between them with probability 1/2.
   double burst = 0;
-  /// One byte arrives twice. On SPI and clocked links one bit arrives twice and the last bit is lost.
+  /// One byte or CAN frame arrives twice. On SPI and clocked links one bit arrives twice and the last bit is lost.
   double doubled = 0;
   /// Another sender sends random bytes during the frame or beyond its end; the host receives the AND of both.
   double talker = 0;

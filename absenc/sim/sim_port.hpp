@@ -25,7 +25,8 @@ struct RealTime {
 template <class Item>
 class SimPort final : public Port<Item> {
  public:
-  /// Makes a line to `device`, which must outlive the port.
+  /// Makes a line to `device`, which must outlive the port. Throws std::invalid_argument if `real_time` has only one of
+  /// its functions, or the settings have no rate.
   SimPort(LinkKind kind, LineSettings settings, Machine<Item>& device, RealTime real_time = {});
 
   [[nodiscard]] Time now() override;

@@ -50,7 +50,8 @@ class Waveform {
   /// Draws all items on `line`, which has the waveform's kind and settings, from now on. Replaces the observers of the
   /// line; the waveform must outlive the line.
   void observe(Line<std::uint8_t>& line);
-  /// Draws all frames on `line`, which has the waveform's settings, from now on. Replaces the observers of the line.
+  /// Draws all frames on `line`, which has the waveform's settings, from now on. Replaces the observer of the line; the
+  /// waveform must outlive the line.
   void observe(Line<CanFrame>& line);
 
   /// Draws one asynchronous character.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A virtual E201-9S interface with a BiSS or SSI encoder behind it: all commands, the encoder's supply and the MA
-// clock.
+// clock. It never streams: `1` returns one position.
 #pragma once
 
 #include "absenc/protocol/author/device.hpp"

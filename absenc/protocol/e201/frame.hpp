@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Commands of the RLS E201-9S USB interface, one letter each, and its ASCII replies. README.md lists the commands with
-// their sources. Replies that no document describes are decoded as leniently as possible: text.hpp.
+// Commands of the RLS E201-9S USB interface, a letter each, some with a number, and its ASCII replies. README.md lists
+// the commands with their sources. Replies that no document describes are decoded as leniently as possible: text.hpp.
 #pragma once
 
 #include <array>
@@ -104,7 +104,7 @@ struct Format {
   [[nodiscard]] constexpr ssi::Format ssi() const { return {.word = word, .after_word = after_word, .scale = scale}; }
 };
 
-/// Returns whether the position word fits into the 64 samples; for BiSS with the shortest ACK.
+/// Returns whether the position word is usable and fits into the 64 samples; for BiSS with the shortest ACK.
 [[nodiscard]] constexpr bool fits(const Format& format) {
   const bool is_biss = format.carries == Carries::biss;
   return is_usable(format.word) &&
@@ -171,8 +171,8 @@ inline constexpr unsigned widest = 64;  ///< Greatest width of a position in bit
   return samples;
 }
 
-/// Decodes a reply that is a line of text. Errors: wrong_length (no complete line, or more than one), bad_framing (the
-/// text is no reply to the command `asked`).
+/// Decodes a reply that is a line of text. Errors: wrong_length (no complete line, more than one, or one that is too
+/// long for `Text`), bad_framing (the text is no reply to the command `asked`).
 [[nodiscard]] constexpr Result<Reply> decode_line(std::uint8_t asked, Bytes bytes) {
   const std::size_t end = end_of_first_line(bytes);
   const Bytes text = trimmed(bytes.first(end));

@@ -78,7 +78,7 @@ TEST(TformatDevice, AnswersRefusedFrameAfterItsEnd) {
   EXPECT_EQ(bench.encoder.answer_count(), 1u);
   EXPECT_EQ(bench.violations(), 0u);
   for (const Wire& request : {Wire{0xA2, 0x05, 0xEF, 0x01}, Wire{0x32, 0x81, 0x00, 0xB3, 0x00}}) {
-    // The requests have an unknown data ID, and a busy bit with one byte too many.
+    // The first request has an unknown data ID, the second the busy bit and one byte too many.
     EXPECT_EQ(bench.raw(request), wire(Reply{.encoder_id = 0x11}));
   }
   EXPECT_EQ(bench.violations(), 0u);

@@ -239,8 +239,8 @@ namespace detail {
 
 }  // namespace detail
 
-/// Returns whether a reply begins like a reply to data ID 3, although `asked` is another ID: the encoder answers every
-/// request that it cannot accept in this manner (8.4, 9.4).
+/// Returns whether a reply begins like a reply to data ID 3, although `asked` is another ID: in this manner the encoder
+/// answers requests that it cannot accept (8.4, 9.4).
 [[nodiscard]] constexpr bool begins_rejection(DataId asked, Bytes reply) {
   return asked != DataId::everything && !reply.empty() && reply[0] == control_field(DataId::everything);
 }
@@ -261,8 +261,9 @@ constexpr Error check_reply(const Format& format, const Request& request, const 
 
 }  // namespace detail
 
-/// Checks a reply in this order: length, checksum, echo, refusal, fixed bits, range, cross checks. Returns the decoded
-/// reply, or the error of the first failed check. A busy memory reply is no error: its member `busy` is set.
+/// Checks a reply in this order: length, checksum, control field, refusal, fixed bits and ENID, range, cross checks; of
+/// a memory access, address and value follow the control field. Returns the decoded reply, or the error of the first
+/// failed check. A busy memory reply is no error: its member `busy` is set.
 [[nodiscard]] constexpr Result<Reply> decode_reply(const Format& format, const Request& request, Bytes bytes) {
   Error error = detail::check_frame(request, bytes);
   if (error != Error::none) return error;
@@ -288,9 +289,9 @@ struct KnownAlarms {
 
 /// Returns the known alarms after a reply that carries SF and no ALMC. SF has a bit for counting_error, and one bit for
 /// over_heat, multiturn_error, battery_error and battery_alarm together. If that one bit is 0, all four are clear. If
-/// it is 1 and none of the four is known to be raised, one of them is raised, but it is unknown which. `sf_reported`:
-/// bits of SF that this encoder reports. Without a battery the one bit is always 1, and the known state of the four
-/// stays.
+/// it is 1 and none of the four is known to be raised, one or more of them are raised, but it is unknown which.
+/// `sf_reported`: bits of SF that this encoder reports. Without a battery the one bit is always 1, and the known state
+/// of the four stays.
 [[nodiscard]] constexpr KnownAlarms known_after(KnownAlarms before, std::uint8_t sf, unsigned sf_reported) {
   constexpr unsigned together = alarms::shown_in_status;
   unsigned reported = before.reported | alarms::counting_error;
@@ -309,8 +310,8 @@ struct KnownAlarms {
 
 namespace detail {
 
-// Sets which parts of the position and turns in `reading` are valid. All bits of the position are valid only if
-// full_absolute_status is known to be clear; its top 5 bits are valid unless there is a counting error.
+// Sets which parts of the position and turns in `reading` are valid. Unless there is a counting error, the top 5 bits
+// of the position are valid, and further bits only if full_absolute_status is known to be clear.
 constexpr void judge(Reading& reading, const KnownAlarms& known) {
   reading.alarms = known.raised;
   reading.alarms_reported = known.reported;
@@ -341,9 +342,9 @@ constexpr unsigned reported_status(const Format& format, bool has_alarms) {
 
 }  // namespace detail
 
-/// Returns the position and turns of a valid reply to `id`, with their validity, which ALMC decides. Only a reply to ID
-/// 3 carries ALMC. `known_alarms`: the last ALMC since power on; without it, the validity is unknown for other IDs,
-/// because SF hides over_speed and full_absolute_status.
+/// Returns the position and turns of a valid reply to `id`, with their validity. ALMC decides the validity, and only a
+/// reply to ID 3 carries ALMC. `known_alarms`: the last ALMC since power on; without it, SF of a reply to another ID
+/// can show parts as invalid, but mostly not as valid, because it hides over_speed and full_absolute_status.
 [[nodiscard]] constexpr Reading to_reading(const Format& format, DataId id, const Reply& reply,
                                            std::optional<std::uint8_t> known_alarms = std::nullopt) {
   const bool has_all = id == DataId::everything;
@@ -364,7 +365,7 @@ constexpr unsigned reported_status(const Format& format, bool has_alarms) {
   reading.alarms_reported &= ~expected_alarms(format);
   return reading;
 }
-/// Returns the position and turns of a valid reply with their validity, by the data ID in the reply.
+/// Does the same with the data ID that `reply` contains.
 [[nodiscard]] constexpr Reading to_reading(const Format& format, const Reply& reply,
                                            std::optional<std::uint8_t> known_alarms = std::nullopt) {
   return to_reading(format, reply.id, reply, known_alarms);
