@@ -70,7 +70,7 @@ class TamperedInterface final : public Machine<std::uint8_t> {
             .out = {reinterpret_cast<const std::uint8_t*>(out_.text.data()), out_.text.size()},
             .at = now + out_.after};
   }
-  /// Returns the letters of all commands that were received so far.
+  /// Returns the letters of all commands in `log`.
   [[nodiscard]] std::string asked() const {
     std::string letters;
     for (const auto& [letter, at] : log) letters += letter;

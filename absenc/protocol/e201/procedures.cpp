@@ -158,7 +158,7 @@ Outcome failure(const Dialog& dialog, Error error) {
           what.advice.empty() ? text_of(error).advice : what.advice};
 }
 
-// Reads frames at each clock. Ends early if the sweep is aborted or an exchange fails.
+// Reads frames at each clock. Ends early if the sweep is aborted, a clock cannot be set, or the line is never silent.
 Part<Outcome> try_clocks(Dialog& dialog, InterfaceResults& found) {
   Outcome bad = done;  // outcome of the last invalid frame
   if (dialog.is_aborted()) co_return done;

@@ -62,9 +62,11 @@ struct InterfaceResults {
 };
 
 /// Reads a position with `4`. If the reply is missing or has a wrong length, reads the firmware version: before 1.16
-/// the error is unsupported, otherwise `4` is sent once more.
+/// the error is unsupported, otherwise `4` is sent once more. `4` is not repeated if neither command was answered or if
+/// the line is never silent.
 author::Procedure read(Dialog& dialog, InterfaceResults& found);
-/// Reads version, serial number, supply and clock. A missing reply is an error only for the version.
+/// Reads version, serial number, supply and clock. A missing or invalid reply is an error only if it is that of the
+/// version, or if the line is never silent.
 author::Procedure read_info(Dialog& dialog, InterfaceResults& found);
 /// Sets the clock with `M` and reads it back with `m`. Argument: 1 to 8, or kHz. Error also: cross_check_failed
 /// (another clock is set afterwards).
@@ -83,8 +85,7 @@ author::Procedure sweep_clocks(Dialog& dialog, InterfaceResults& found, Argument
 inline constexpr std::string_view check_stream =
     "check that it is an E201-9S and does not stream (`absenc run ... stream-off` ends it)";
 
-/// Returns cause and advice for `error` of `reply` to `request`; an empty reply is a timeout. The advice is from the
-/// document.
+/// Returns cause and advice for `error` of `reply` to `request`; an empty reply is a timeout.
 [[nodiscard]] Explanation explain(const Format& format, Error error, Bytes request, Bytes reply);
 
 }  // namespace absenc::e201

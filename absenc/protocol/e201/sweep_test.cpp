@@ -47,8 +47,8 @@ TEST(E201Sweep, CountsRecommendsAndRestores) {
 }
 
 TEST(E201Sweep, LineDelayMovesTheRecommendation) {
-  // The line is two bits late at 4400 kHz and one bit at 2200 kHz; its delay of 900 ns is about one period at 1100 kHz:
-  // no fast clock is stable.
+  // The line is three whole bits late at 4400 kHz and one at 2200 kHz; its delay of 905 ns is about one period at 1100
+  // kHz: no fast clock is stable.
   Bench bench("singleturn_bits=19 latency_us=0 line_delay_ns=905");
   const Fields fields = bench.run("clock-sweep", {20}).fields;
   EXPECT_LT(fields.at("valid_1100_khz"), 20);

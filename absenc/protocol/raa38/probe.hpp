@@ -10,9 +10,9 @@
 namespace absenc::raa38 {
 
 /// Puts each value of an option from `first` to `last` with its evidence into `sink`. `contradiction(value, i)` returns
-/// why capture i contradicts the value, or an empty text. If a value is possible, sets `value` to it and returns true.
-/// A `value` that is possible is left unchanged, because the position of a shaft at standstill fits many numbers of
-/// bits.
+/// why capture i contradicts the value, or an empty text. Returns false if no value is possible. Otherwise sets `value`
+/// to the first possible value and returns true; a `value` that is possible itself is left unchanged, because the
+/// position of a shaft at standstill fits many numbers of bits.
 template <class Contradiction>
 bool judge_option(EvidenceSink& sink, std::size_t option, std::int64_t first, std::int64_t last, std::size_t captures,
                   std::int64_t& value, std::string_view agrees, Contradiction&& contradiction) {

@@ -123,8 +123,8 @@ struct Bench {
   Time took{};
 };
 
-/// Returns how long a conversation takes if another sender never pauses from the first request of the conversation
-/// on.
+/// Returns how long a conversation takes if another sender never pauses from the first request of the conversation on;
+/// `never` if the conversation does not end.
 inline Time time_with_noise(Conversation<std::uint8_t>& conversation) {
   using Kind = Step<std::uint8_t>::Kind;
   constexpr std::uint8_t noise = 0x55;

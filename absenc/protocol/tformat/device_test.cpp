@@ -263,8 +263,8 @@ TEST(TformatDevice, RequestDuringTransmissionIsAViolation) {
   const Wire all{0x1A, 0xEA, 0x05, 0xEF, 0x1A};
   encoder.feed({.kind = Event<std::uint8_t>::Kind::received, .at = 1us, .items = all});
   EXPECT_EQ(encoder.violation_count(), 2u);
-  // If the emulator was delayed, the reply to the first request, which takes 29 us, might have been sent before the
-  // others arrived. A host repeats a request only after its timeout, at least a millisecond each time.
+  // If the emulator was delayed, the reply to the first request might have been sent before the others arrived. A host
+  // repeats a request only after its timeout, at least a millisecond each time.
   for (const auto& [late, rules] : {std::pair(20us, 2u), {900us, 2u}, {1500us, 1u}, {3ms, 0u}}) {
     VirtualEncoder delayed({}, shaft);
     delayed.power_on(Time{}, PowerOn::skip);

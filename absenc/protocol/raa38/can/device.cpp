@@ -11,7 +11,8 @@ using namespace std::chrono_literals;
 using FrameStep = Step<CanFrame>;
 using FrameEvent = Event<CanFrame>;
 
-// Time until the virtual node answers, and time until it has started; the document gives none.
+// Time from a request to the virtual node's answer, and time from a real power on to its first cyclic position; the
+// document gives neither.
 constexpr Time answer_time = 200us;
 constexpr Time start_up_time = 100ms;
 
@@ -130,8 +131,8 @@ void VirtualNode::execute(const OrderInfo& info, std::uint8_t value, Time at) {
   if (info.answer == Answer::code) answer(encode_answer(node(), info.order), at);
 }
 
-// Stores a setting whose value the document defines, and answers it. A new bit rate becomes active after the answer
-// was sent.
+// Stores a setting if the document defines its value, and answers it in any case. A new bit rate becomes active after
+// the answer was sent.
 void VirtualNode::configure(const OrderInfo& info, std::uint8_t value, Time at) {
   const bool known = meaning_of(info, value).has_value();
   const bool is_rate = info.order == Order::rate;

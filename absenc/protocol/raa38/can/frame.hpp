@@ -331,7 +331,7 @@ constexpr Result<Values> decode_answer(const Format& format, const OrderInfo& in
 }  // namespace detail
 
 /// Decodes a reply to `request`, or only `request` if `reply` is null. If `request` is null, the reply of a node is
-/// taken as a position.
+/// taken as a position. Error if both are null: wrong_length.
 [[nodiscard]] constexpr Result<Values> decode(const Format& format, const CanFrame* request, const CanFrame* reply) {
   if (reply == nullptr) return request == nullptr ? Error::wrong_length : detail::decode_request(*request);
   if (reply->remote) return Error::bad_framing;

@@ -89,16 +89,16 @@ using Dialog = author::DialogOf<Protocol>;
 
 // ---- One node
 
-/// Sets with order 31 the number of positions per second that the node sends, 0 for none, and measures the rate of
-/// the frames that are received. Errors: timeout (neither an answer nor a frame arrives), cross_check_failed (another
-/// rate).
+/// Sets with order 31 the number of positions per second that the node sends, 0 for none, and measures the rate of the
+/// frames that are received. Errors: timeout (neither an answer nor a frame arrives), bad_framing (the same, and frames
+/// are destroyed), cross_check_failed (another rate).
 author::Procedure set_cyclic(Dialog& dialog, Values& found, Arguments arguments);
 
-/// Changes the zero or the direction. Order 20 makes the present position 0, as the document suggests; the position
-/// is read before and after, and nothing is written if it is 0 already. Order 22 sets the counting direction, which
-/// no command reads; the position afterwards must be unchanged or mirrored. Errors: not_still (the shaft turns),
-/// cross_check_failed (any other position, or the node no longer sends cyclic positions), timeout (order 22 has
-/// neither an answer nor an effect).
+/// Changes the zero or the direction. Order 20 makes the present position 0, as the document suggests; the position is
+/// read before and after, and nothing is written if it is near 0 already. Order 22 sets the counting direction, which
+/// no command reads; the position afterwards must be unchanged or mirrored. Errors besides those of reading the
+/// position: not_still (the shaft turns), cross_check_failed (any other position, or the node no longer sends cyclic
+/// positions), timeout (order 22 has neither an answer nor an effect).
 author::Procedure change(Dialog& dialog, Values& found, Order order, Arguments arguments);
 
 /// Reports the number of the node if the node answers. Requests no other number: on a CANopen bus such requests are
@@ -124,9 +124,9 @@ struct NodeFrames {
   }
 };
 
-/// Result of a scan: the frames that were received from each node number.
+/// Result of a scan: counts of the frames that were received from each node number.
 struct Nodes {
-  std::array<NodeFrames, 256> at{};  ///< What was received from each node number.
+  std::array<NodeFrames, 256> at{};  ///< Counts of each node number, which is the index.
 
   /// Returns how many node numbers were found on the bus.
   [[nodiscard]] unsigned count() const;
@@ -144,11 +144,11 @@ struct ConfigureResult : Values {
 };
 
 /// Changes the node number (order 11) or the bit rate (order 13). The node must answer under the new number and no
-/// longer under the old one; for the bit rate the host switches too, and back if the node does not answer. Both
-/// orders are sent on 7E5, which reaches every node, so only one node may be on the bus. Errors: invalid_argument
-/// (other nodes are on the bus, or the document does not have that rate), unexpected_reply (only other nodes are on
-/// the bus), timeout, request_rejected, cross_check_failed (the node answers under its old number or at its old
-/// rate).
+/// longer under the old one; for the bit rate the host switches too, and back if the node does not answer. Both orders
+/// are sent on 7E5, which reaches every node, so only one node may be on the bus. Errors: invalid_argument (other nodes
+/// are on the bus, two nodes share the number, or the document does not have that rate), unexpected_reply (only other
+/// nodes are on the bus), timeout, bad_framing (frames are destroyed), request_rejected, cross_check_failed (the node
+/// answers under its old number or at its old rate).
 author::Procedure configure(Dialog& dialog, ConfigureResult& found, Order order, Arguments arguments);
 
 }  // namespace absenc::raa38::can

@@ -281,7 +281,8 @@ struct Protocol {
   }
   /// Returns the host's times on a line with the baud rate of the format.
   static constexpr author::HostTimes host_times(const Format& format) { return host_times(format, format.line().rate); }
-  /// Returns how a host sends a request: once and never repeated, because each setting wears the memory.
+  /// Returns how a host sends a request: once, unless the caller orders repetitions, because each setting wears the
+  /// memory.
   static constexpr author::Manner manner(const Format&, const Request&) { return {}; }
   /// Returns the bytes of `request` as they are sent.
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }

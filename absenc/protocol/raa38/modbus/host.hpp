@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Host procedures of an RAA38S6 over Modbus RTU; README.md gives the reasons. Because the memory wears out, a setting
-// is sent once, and not at all if the encoder has it already. Each setting is read back if the protocol allows it.
+// is sent once. Address, baud rate and zero are not sent if the encoder has them already, unless the argument `force`
+// is 1. Each setting is read back if the protocol allows it.
 #pragma once
 
 #include <array>
@@ -69,7 +70,8 @@ author::Procedure find_baud(Dialog& dialog, CommandValues& found);
 
 /// Result of a scan of the slaves on a line. The scan sends A0 first, which a single encoder answers; otherwise it
 /// requests every address from the first argument to the second. If all replies of an address are damaged, two encoders
-/// share it or the line is bad. Error: timeout if no slave answers.
+/// share it or the line is bad. Errors: timeout if no slave answers, invalid_argument if the last address is before the
+/// first.
 struct Slaves {
   /// Result of polling one address: no answer, a valid answer, only damaged answers, or a refusal.
   enum class Kind : std::uint8_t { none, answers, clash, refuses };
@@ -78,14 +80,15 @@ struct Slaves {
 /// Scans the line for slaves.
 author::Procedure scan(Dialog& dialog, Slaves& found, Arguments arguments);
 
-/// Sets the address with A1. Refuses an address at which another slave answers (invalid_argument). Then reads the
-/// position at the new address to verify. Errors: request_rejected, cross_check_failed (the encoder still has its old
-/// address), timeout (the encoder answers at neither address).
+/// Sets the address with A1. Refuses an address at which another slave answers, even with a damaged reply
+/// (invalid_argument). Then reads the position at the new address to verify. Errors besides those of reading the
+/// position: request_rejected, cross_check_failed (the encoder still has its old address), timeout (the encoder answers
+/// at neither address).
 author::Procedure set_address(Dialog& dialog, CommandValues& found, Arguments arguments);
 
-/// Sets the baud rate of encoder and line with CC and verifies that the encoder answers. Errors: invalid_argument (the
-/// encoder does not have this rate), cross_check_failed (the encoder still has its old rate), timeout (the encoder
-/// answers at neither rate). After an error the line has its old rate.
+/// Sets the baud rate of encoder and line with CC and verifies that the encoder answers. Errors besides those of
+/// reading the position: invalid_argument (the encoder does not have this rate), cross_check_failed (the encoder still
+/// has its old rate), timeout (the encoder answers at neither rate). After an error the line has its old rate.
 author::Procedure set_baud(Dialog& dialog, CommandValues& found, Arguments arguments);
 
 /// Sets the counting direction with CC and reports how the position changed. Only the echo of the request confirms the

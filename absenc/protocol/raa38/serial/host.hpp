@@ -81,9 +81,9 @@ class Listen final : public Conversation<std::uint8_t> {
 /// Interface by which procedures send requests and await replies.
 using Dialog = author::DialogOf<Protocol>;
 
-/// Reads the position, sets the zero, and polls until the position is zero. Errors: unsupported and invalid_argument
-/// (the options have no means to set the zero), not_still (the shaft turns), cross_check_failed (the position is not
-/// zero after half a second).
+/// Reads the position, sets the zero, and polls until the position is zero. Errors besides those of reading the
+/// position: unsupported and invalid_argument (the options have no means to set the zero), not_still (the shaft turns),
+/// cross_check_failed (the position is not zero after half a second).
 author::Procedure set_zero(Dialog& dialog, Values& found);
 
 /// Result of a scan of the units on a bus; the index is the unit number. The scan listens for encoders that transmit

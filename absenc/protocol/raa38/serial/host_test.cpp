@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of the host's conversations with the virtual encoder in virtual time.
+// Tests of the host's conversations with the virtual encoder in virtual time, and of the rules that the virtual encoder
+// checks.
 #include "absenc/protocol/raa38/serial/bench_test.hpp"
 
 namespace absenc::raa38::serial {
