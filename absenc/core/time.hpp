@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The only clock type: nanoseconds since a start that the caller chooses. No layer below `os` reads a clock.
+// The type of protocol time: nanoseconds since a start that the caller chooses. Core, link, protocol, host and sim read
+// no clock.
 #pragma once
 
 // libstdc++'s <bits/chrono.h> has the durations and clocks of <chrono>, but not its calendars and time zones, which

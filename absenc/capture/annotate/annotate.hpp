@@ -87,7 +87,8 @@ class Annotator {
   void store_undecided(const Character& character);
   void find_roles();
 
-  // These functions split the characters into runs, which have no pause between their characters.
+  // These functions split the characters into runs. A run has no pause between its characters, except with arrival
+  // times.
   void take(const Character& character);
   [[nodiscard]] Tick pause_of(const Channel& channel) const;
   void close(Channel& channel, bool cut);

@@ -42,7 +42,8 @@ class ZipArchive {
   /// Expands the next bytes of the open entry into `into` and returns their number; fewer on error or at the end of the
   /// entry, see `problem`.
   [[nodiscard]] std::size_t read(std::span<std::uint8_t> into);
-  /// Returns whether `read` returned fewer bytes because the archive's data ended, not because it is damaged.
+  /// Returns whether `read` returned fewer bytes because the entry's data ended, even if its checksum or size is wrong;
+  /// false if the data is damaged otherwise.
   [[nodiscard]] bool ran_out() const;
   /// Returns, after the whole entry was read, whether the entry ends there and its checksum is right.
   [[nodiscard]] bool at_good_end();

@@ -12,7 +12,7 @@ namespace absenc::e201 {
 /// A virtual E201-9S interface with an encoder behind it.
 class VirtualInterface final : public author::Responder {
  public:
-  /// Creates an interface that is off until `power_on`. `shaft`, which moves the encoder, must outlive it.
+  /// Creates an interface that is off until `power_on`. `shaft`, which moves the encoder, must outlive the interface.
   VirtualInterface(const Format& format, const Shaft& shaft);
 
   [[nodiscard]] MutableBytes memory() override { return {}; }

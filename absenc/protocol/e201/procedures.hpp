@@ -57,7 +57,7 @@ struct InterfaceResults {
     }
   }
   /// Returns the number of the middle clock of the longest run of clocks without an invalid frame; 0 if every clock had
-  /// one.
+  /// one. Of equally long runs the first counts, and of two middle clocks the faster.
   [[nodiscard]] unsigned recommended() const;
 };
 

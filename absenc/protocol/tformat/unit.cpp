@@ -434,7 +434,8 @@ constexpr Declaration<Protocol, VirtualEncoder> declaration{
     .alarms = fields.of<&Values::alarms>(),
     .memory = memory_areas,
     .conditions = conditions,
-    // Any pause ends a frame; some encoders tolerate a pause that is shorter than their own answer time.
+    // In the document a pause of any length ends a frame; some encoders tolerate a pause that is shorter than their own
+    // answer time.
     .timing = {.pause_bits = 5, .turnaround = answer_time, .turnaround_limit = answer_limit},
 };
 

@@ -252,7 +252,7 @@ inline constexpr std::array<OrderInfo, 8> orders{{
   return static_cast<std::uint32_t>(counts);
 }
 
-/// Checks the answer to a setting and returns the error: those of `check_shape`, unexpected_reply (an answer to another
+/// Checks the answer to a setting and returns the error: those of `check_shape`, unexpected_reply (no answer to this
 /// order), out_of_range (bytes that must be 0), request_rejected, or none.
 [[nodiscard]] constexpr Error check_configuration_answer(Order order, const CanFrame& frame) {
   if (const Error error = check_shape(frame); error != Error::none) return error;
