@@ -38,7 +38,7 @@ struct Option {
   bool probeable = false;                       ///< true: captured frames can show the value of the option
   unsigned decimals = 0;                        ///< Number of decimal digits that the user may write.
   bool describes_word = false;  ///< true: a word format replaces this option, so the two cannot be given together
-  std::uint32_t step = 1;       ///< values are `minimum` and multiples of this step above it
+  std::uint32_t step = 1;       ///< permitted values are `minimum` plus multiples of this step
   Role role = Role::other;      ///< Role by which programs that do not know the unit find the option.
   bool in_hex = false;          ///< true: texts show the value in hexadecimal, as with FieldInfo::in_hex
   bool or_zero = false;         ///< true: 0 is permitted too, although it is below `minimum`
@@ -54,7 +54,7 @@ struct OptionValue {
 struct Model {
   std::string_view name;                ///< Name of the model.
   std::string_view meaning;             ///< Description of the model, as a phrase.
-  std::uint32_t maximum_rpm;            ///< fastest shaft for which a position is specified, in rpm
+  std::uint32_t maximum_rpm;            ///< fastest shaft for which a position is specified, in rpm; 0: none stated
   std::span<const OptionValue> values;  ///< Options that the model sets, with their values.
 };
 
@@ -90,10 +90,10 @@ struct OptionError {
     unknown_model,
     unknown_option,
     bad_value,
-    bad_word,                      ///< the word format is invalid: the member `word` has the reason and the place
-    beside_word,                   ///< the option or model `text` cannot be given together with a word format
-  } kind = Kind::none;             ///< Kind of the error.
-  std::string_view text{};         ///< The name or the value that is wrong, as the user wrote it.
+    bad_word,               ///< the word format is invalid: the member `word` has the reason and the place
+    beside_word,            ///< the option `text`, or a model ("model"), was given together with a word format
+  } kind = Kind::none;      ///< Kind of the error.
+  std::string_view text{};  ///< The name or the value that is wrong, as the user wrote it; beside_word: see there.
   const Option* option = nullptr;  ///< bad_value: the option for which `text` was given; else null.
   WordFormatError word{};          ///< bad_word: reason and place of the error in the word format.
 };
@@ -111,7 +111,7 @@ struct Unit;
 void tell_shared(const Unit& unit, Options& options);
 
 /// Parses an integer, decimal or 0x hexadecimal, with an optional minus sign. Error: invalid_argument (any other text,
-/// or too large for 64 bits).
+/// or a magnitude above INT64_MAX).
 [[nodiscard]] constexpr Result<std::int64_t> parse_number(std::string_view text) {
   const bool negative = text.starts_with('-');
   if (negative) text.remove_prefix(1);
@@ -156,7 +156,8 @@ void tell_shared(const Unit& unit, Options& options);
   return value;
 }
 
-/// Parses the value of an option: a number in its range, or one of its choices. Error: invalid_argument.
+/// Parses the value of an option: a number that its range, step and `or_zero` permit, or one of its choices. Error:
+/// invalid_argument.
 [[nodiscard]] constexpr Result<std::int64_t> parse_value(const Option& option, std::string_view text) {
   for (std::size_t i = 0; i < option.choices.size(); ++i) {
     if (option.choices[i] == text) return static_cast<std::int64_t>(i);

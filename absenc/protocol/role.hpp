@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The meaning of a field, an option or an argument for code that knows no protocol. Names are for people: code that
-// handles all units never looks up a name.
+// handles all units finds the members of a unit by role.
 #pragma once
 
 #include <cstdint>

@@ -22,7 +22,7 @@ namespace absenc {
 /// Purpose of a unit's command, by which the verbs of the command line (`absenc read`, `absenc zero` ...) find the
 /// command.
 enum class Verb : std::uint8_t {
-  read,  ///< reads the position, with all alarms that the unit can report; `absenc read` uses the first such command
+  read,  ///< reads the position; `absenc read` uses the first such command
   read_part,
   info,
   temperature,
@@ -81,7 +81,7 @@ struct MemoryArea {
   std::uint32_t first;           ///< First address of the area on its page.
   std::uint32_t count;           ///< Number of bytes on each page.
   std::string_view meaning;      ///< Content of the area, as a phrase.
-  bool writable = true;          ///< Whether hosts may write the bytes or the register.
+  bool writable = true;          ///< Whether hosts may write the bytes.
   bool in_dump = true;           ///< whether a copy of the memory (`absenc memory dump`) includes the area
   std::uint32_t write_life = 0;  ///< number of writes that the document permits; 0: the document states none
   /// Why memory_write needs its argument with the role force for this area; "": it does not need it.
@@ -103,7 +103,7 @@ struct RegisterInfo {
   std::uint32_t address;  ///< Address of the register.
   std::uint32_t size;     ///< size of the register in bytes
   bool readable = true;   ///< Whether hosts may read the register.
-  bool writable = false;  ///< Whether hosts may write the bytes or the register.
+  bool writable = false;  ///< Whether hosts may write the register.
 };
 
 /// A property of a virtual encoder's environment that its document mentions: a temperature, a battery, a fault of one

@@ -73,7 +73,7 @@ struct Report {
   /// Puts the fields of a valid reply to the request into the sink.
   void (*put_reply)(FieldSink&, const Format&, const Request&, const Reply&) = nullptr;
   /// Returns the document's explanation of an invalid or missing reply. Not called if a procedure has an advice of its
-  /// own. Null: none.
+  /// own, or its outcome stands alone (`only`). Null: none.
   Explanation (*explain)(const Format&, Error, Items request, Items reply) = nullptr;
   /// Returns the explanation of the error of a conversation that ended, for units in which only the conversation knows
   /// the reason. If set, it replaces `explain` for conversations.
@@ -243,8 +243,8 @@ struct CommandOf {
     one.size = std::max(size, other.size);
     return one;
   }
-  /// Returns whether a conversation can be made with these arguments: false if P::encode refuses the request. An error
-  /// of `request` gives true, because the conversation reports that error.
+  /// Returns whether a conversation can be made with these arguments: false if P::encode refuses a request that is no
+  /// pulse. An error of `request` gives true, because the conversation reports that error.
   [[nodiscard]] bool can_ask(const Format& format, Arguments arguments) const {
     if constexpr (std::is_same_v<Request, NoRequest>) {
       return true;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Device side of a line of characters (UART): recognizes requests, ignores those for other encoders, answers in time,
-// checks the rules that hosts must follow, and has a memory. It knows no protocol, and is compiled once.
+// Device side of a line of characters (UART): Responder recognizes requests, ignores those for other encoders, answers
+// in time, and checks that hosts do not send meanwhile. It knows no protocol, and is compiled once. BusDevice adds a
+// protocol and a memory.
 #pragma once
 
 #include <array>

@@ -49,7 +49,7 @@ class HostOf : public Engine {
   [[nodiscard]] const Request& request() const { return request_; }
   /// Returns the last valid reply; an empty one if there was none.
   [[nodiscard]] const Reply& last() const { return last_; }
-  /// Returns position and turns in the last valid reply, with the times of its exchange.
+  /// Returns position and turns in the last valid reply, with the times of the last exchange.
   [[nodiscard]] Reading last_reading() const {
     Reading reading = P::reading(format_, request_, last_);
     reading.latched = P::latched(format_, sent_at());

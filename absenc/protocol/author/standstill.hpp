@@ -42,9 +42,9 @@ inline constexpr std::uint32_t zero_millidegrees = 350;
   return {Error::not_still, "nothing was changed"};
 }
 
-/// Returns why a zero must not be set after these two readings, taken `between_looks` apart: invalid_argument (a
-/// position is invalid, so the zero would be wrong for ever), not_still (the shaft turns); no error: the zero may be
-/// set.
+/// Returns why a zero must not be set after these two readings, taken `between_looks` apart: invalid_argument (the
+/// encoder is starting, or a position is invalid, so the zero would be wrong for ever), not_still (the shaft turns); no
+/// error: the zero may be set.
 [[nodiscard]] constexpr Outcome objection_to_zero(const Reading& first, const Reading& second) {
   for (const Reading& look : {first, second}) {
     if (!look.ready) {

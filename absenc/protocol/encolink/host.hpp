@@ -31,7 +31,8 @@ struct Frames {
   };
   /// Type of replies; empty for an identity, which is decoded from the bytes of the reply instead.
   using Reply = Position;
-  static constexpr std::size_t longest_reply = identity_bytes;  ///< Number of bytes of the longest reply.
+  /// Number of bytes of the longest reply, an identity; one more byte may follow it.
+  static constexpr std::size_t longest_reply = identity_bytes;
 
   /// Returns the host's timeouts for a reply and between its characters, and the silence before a request.
   static constexpr author::HostTimes host_times(const Format& format) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of the virtual QS35 against its document, with requests written as bytes.
+// Tests of the virtual QS35 against its document, mostly with single requests.
 #include "absenc/protocol/esl/device.hpp"
 
 #include <gtest/gtest.h>
@@ -38,7 +38,8 @@ TEST(EslDevice, AnswersTwoMicrosecondsAfterTheRequest) {
   EXPECT_EQ(host.reply.size(), 18u);
 }
 
-// The sequence counters count IDs 1, 2, 8 and B only, unless the profile states that every request is counted.
+// The sequence counters count IDs 1 and 2, but not IDs 9 and A, unless the profile states that every request is
+// counted.
 TEST(EslDevice, SequenceCounters) {
   Bench bench;
   EXPECT_EQ(bench.read(DataId::position).one.sequence, 1);
@@ -408,7 +409,7 @@ TEST(EslDevice, OtherOrTooFastRequestRestartsTheCount) {
   bench.raw(Request{DataId::temperature});
   reset(bench, DataId::zero, 1);
   EXPECT_EQ(bench.read().singleturn, 1'000'000u);
-  for (unsigned i = 0; i < 8; ++i) bench.raw(Request{DataId::zero});  // these eight requests are 23 us apart, too fast
+  for (unsigned i = 0; i < 8; ++i) bench.raw(Request{DataId::zero});  // these eight requests are less than 35 us apart
   EXPECT_EQ(bench.read().singleturn, 1'000'000u);
   EXPECT_GT(bench.violations(), 0u);
   reset(bench, DataId::zero);
