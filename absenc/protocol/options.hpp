@@ -58,7 +58,7 @@ struct Model {
   std::span<const OptionValue> values;  ///< Options that the model sets, with their values.
 };
 
-/// Most options of a unit: biss-chain has twelve, and seven for each of its eight words.
+/// Greatest number of options of a unit: biss-chain has twelve, and seven for each of its eight words.
 inline constexpr std::size_t maximum_options = 68;
 
 /// Name of the option that gives a word format, for units that take one.
@@ -102,8 +102,8 @@ struct Unit;
 
 /// Computes the values of all options from a model and single settings, which override the model, and stores them in
 /// `resolved`. Returns why it is impossible, or an error of kind `none`. Without a model name the first model that
-/// contradicts no setting is used, so a setting that fits one model only also gives the other values of that model; if
-/// no model fits, the unit's defaults apply. With a word format no model is used.
+/// contradicts no setting is used, so a setting that fits only one model also selects the other values of that model;
+/// if no model fits, the unit's defaults apply. With a word format no model is used.
 [[nodiscard]] OptionError resolve_options(const Unit& unit, std::string_view model,
                                           std::span<const OptionText> settings, Options& resolved);
 

@@ -174,8 +174,7 @@ struct EvidenceSink {
 };
 
 /// A range of consecutive bits of a frame that carries a value, or a part of it. Bits are numbered as for
-/// `Unit::is_checked`. The last bit of a range is the most significant on lines of characters, the first on clocked
-/// links.
+/// `Unit::is_checked`. The last bit of a range is the most significant one; on clocked links, the first bit is.
 struct BitRange {
   std::size_t first = 0;  ///< Index of the first bit in the frame.
   std::size_t count = 0;  ///< Number of bits in the range.

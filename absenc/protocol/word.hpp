@@ -87,7 +87,7 @@ struct PlacedField {
 };
 
 /// Gives the functions of a position word access to a format that is known at run time only. Known does the same for a
-/// format known at compile time; both have the same members.
+/// format known at compile time; both have these members.
 template <class Format>
 struct Given {
   static constexpr bool is_known = false;  ///< Whether the format is known at compile time.
@@ -302,8 +302,8 @@ struct WordContents {
   return contents;
 }
 
-/// Returns the reading of a word. A set error bit makes position and turns invalid; a word without an error bit is
-/// always valid.
+/// Returns the reading of a word. `word.error` makes position and turns invalid; without an error bit it is false,
+/// unless the protocol derives it (SSI: parity).
 template <std::size_t size>
 [[nodiscard]] constexpr Reading to_reading(const WordContents& contents, const WordWith<size>& word,
                                            const Scale& scale) {
@@ -317,7 +317,7 @@ template <std::size_t size>
           .alarms = (word.error ? word_error : 0) | (word.warning ? word_warning : 0),
           .alarms_reported = contents.reported};
 }
-/// Returns the reading of a word with this format. A set error bit makes position and turns invalid.
+/// Returns the reading of a word with this format. `word.error` makes position and turns invalid.
 [[nodiscard]] constexpr Reading to_reading(const WordFormat& format, const Word& word, const Scale& scale) {
   return to_reading(contents_of(format), word, scale);
 }

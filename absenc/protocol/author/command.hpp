@@ -53,8 +53,8 @@ struct ItemOf<P> {
 template <class P>
 using ItemOf = typename detail::ItemOf<P>::Item;
 
-/// Functions that turn requests and replies of a unit into fields, and errors into texts for people. Firmware does not
-/// link them. All conversations of the unit derive from `Host`.
+/// Functions that turn requests and replies of a unit into fields, and errors into texts for people. Firmware that
+/// uses no Unit does not link them. All conversations of the unit derive from `Host`.
 template <class P, class Host = Conversation<ItemOf<P>>>
 struct Report {
   /// Class with the functions of the protocol.

@@ -319,7 +319,7 @@ using ProcedureDialog = typename detail::ProcedureDialog<P>::Type;
 
 /// A conversation that runs `procedure(dialog, found, bound..., arguments)`; the arguments are passed only if the
 /// procedure takes them. Its result is `Found`, whose member `reading`, if it has one, is the position; otherwise the
-/// dialog has the position. If `Found` has a member `streams`, each `emit` is a result, and the procedure ends only
+/// `reading` of the dialog is. If `Found` has a member `streams`, each `emit` is a result, and the procedure ends only
 /// with an error. The coroutine frames are in the storage after this object.
 template <class P, class Found, auto procedure, auto... bound>
 class Run : public ProcedureDialog<P> {

@@ -35,7 +35,8 @@ class LineDelay {
   std::uint32_t noise_ = 1;
 };
 
-/// A virtual encoder without its line: makes the samples of SLO. Also used behind a virtual adapter.
+/// A virtual encoder apart from its port: makes the samples of SLO, with the delay of its line. Also used behind a
+/// virtual adapter.
 template <class F>
 class EncoderOf {
  public:

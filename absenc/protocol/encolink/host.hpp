@@ -20,7 +20,7 @@ enum class Ask : std::uint8_t {
 };
 
 /// Types and functions of the protocol that the classes in absenc/protocol/author use: frames, lengths and times.
-/// author/dialog.hpp explains each member.
+/// author/dialog.hpp lists the members that they require.
 struct Frames {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = encolink::Format;

@@ -64,7 +64,7 @@ TEST(EslDevice, AnswersOnlyItsOwnValidRequests) {
   EXPECT_TRUE(bench.raw(wire(hex<"08">)).empty());                 // incomplete request
   EXPECT_EQ(bench.raw(wire(hex<"0875">)).size(), 18u);             // the request after the faulty ones is answered
   EXPECT_TRUE(bench.raw(memory_write(page_select_address, 7)).empty());
-  EXPECT_TRUE(bench.raw(memory_read(0x30)).empty());  // the addresses of page 8 end at 2F
+  EXPECT_TRUE(bench.raw(memory_read(0x30)).empty());  // the addresses of page 8 end at 0x2F
   EXPECT_EQ(bench.encoder.answer_count(), 1u);
 }
 

@@ -36,7 +36,7 @@ class Server : public Device<std::uint8_t> {
   explicit Server(const LineSettings& line) : line_(line) {}
   ~Server() = default;
 
-  /// Called at power on; the subclass must call `set_rate`.
+  /// Called at power on; the subclass calls `set_rate` if the rate may have changed.
   virtual void started() = 0;
   /// Called for a frame with a valid CRC and any address; `body` is the frame without its CRC. The subclass appends the
   /// reply without its CRC, or nothing. It must call `check_line_rules` if the frame is for this server.
