@@ -27,7 +27,8 @@ inline constexpr std::array<std::string_view, 3> sharing_choices{"auto", "true",
 enum Sharing : std::int64_t { sharing_automatic, sharing_yes, sharing_no };
 
 /// Description of an option of a unit: a number in a range, or one of `choices` (the value is the index into it). With
-/// `decimals`, the user writes up to that many decimal digits, and all values are in units of the last digit.
+/// `decimals`, the user writes up to that many digits after the decimal point, and all values are in units of the last
+/// one.
 struct Option {
   std::string_view name;                        ///< Name of the option.
   std::string_view meaning;                     ///< Meaning of the option, with its unit.
@@ -36,7 +37,7 @@ struct Option {
   std::int64_t maximum = 0;                     ///< Highest value, if the option is a number.
   std::span<const std::string_view> choices{};  ///< Words for the values from 0 on; empty: the option is a number.
   bool probeable = false;                       ///< true: captured frames can show the value of the option
-  unsigned decimals = 0;                        ///< Number of decimal digits that the user may write.
+  unsigned decimals = 0;                        ///< Most digits after the decimal point that the user may write.
   bool describes_word = false;  ///< true: a word format replaces this option, so the two cannot be given together
   std::uint32_t step = 1;       ///< permitted values are `minimum` plus multiples of this step
   Role role = Role::other;      ///< Role by which programs that do not know the unit find the option.

@@ -24,7 +24,7 @@ enum class Role : std::uint8_t {
   identity,  ///< field: identifies the encoder: its type, its serial number
   clash,     ///< field of a scan: not 0: every answer at this address is damaged
   trouble,   ///< field of a scan: what is wrong with an answer that was complete
-  rate,      ///< option: bits per second
+  rate,      ///< option: bit rate; its choices are bits per second
   // Roles of the options of a checksum at the end of a word, which `crc find` finds
   check_width,       ///< option: width of the checksum in bits
   check_polynomial,  ///< option: polynomial of the checksum without its highest power

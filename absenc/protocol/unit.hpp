@@ -245,8 +245,8 @@ inline constexpr std::size_t longest_encoded = 1024;
 
 /// Resolution of an encoder: the numbers of bits of its position and turns.
 struct Resolution {
-  unsigned singleturn_bits = 0;   ///< Bits of the single-turn position; 0: none.
-  unsigned multiturn_bits = 0;    ///< Bits of the turns; 0: none.
+  unsigned singleturn_bits = 0;   ///< Bits of the position in the turn, or of a linear encoder; 0: none or unknown.
+  unsigned multiturn_bits = 0;    ///< Bits of the turns; 0: none or unknown.
   double unit_um = 0;             ///< linear encoders: micrometres per count; 0: a rotary encoder
   bool multiturn_signed = false;  ///< true: the number of turns is signed, so turns below zero are possible
 };

@@ -23,8 +23,9 @@ struct WordWith {
   static constexpr std::size_t capacity = size;  ///< Number of elements of `values`.
   std::uint64_t position = 0;                    ///< Position in counts: within the turn, or of a linear encoder.
   std::uint64_t multiturn = 0;                   ///< Number of turns.
-  bool error = false;                            ///< Whether the error bit reports an error.
-  bool warning = false;                          ///< Whether the warning bit reports a warning.
+  /// Whether the encoder reports an error, by the error bit or by another sign of its protocol (SSI: parity).
+  bool error = false;
+  bool warning = false;  ///< Whether the warning bit reports a warning.
   /// Values of fields with Meaning::value, by the index of the field in the format.
   std::array<std::uint64_t, size> values{};
 
@@ -34,7 +35,7 @@ struct WordWith {
 /// The decoded values of a position word of any format.
 using Word = WordWith<WordFormat::maximum_fields>;
 
-/// Bit of Reading::alarms: the error bit of a word.
+/// Bit of Reading::alarms: the encoder reports an error (WordWith::error).
 inline constexpr std::uint32_t word_error = 1;
 inline constexpr std::uint32_t word_warning = 2;  ///< Bit of Reading::alarms: the warning bit of a word.
 
@@ -53,7 +54,7 @@ struct WordValues {
   std::uint64_t position;    ///< Position of a linear encoder, in counts.
   double position_um;        ///< Position of a linear encoder, in micrometres.
   double position_mm;        ///< Position of a linear encoder, in millimetres.
-  bool error;                ///< Whether the error bit reports an error.
+  bool error;                ///< Whether the encoder reports an error: WordWith::error.
   bool warning;              ///< Whether the warning bit reports a warning.
   /// Alarms of a reading. Declared only for the descriptions of its flags; never delivered as a field.
   std::uint32_t alarms;

@@ -13,8 +13,8 @@ namespace absenc::author {
 
 /// How long a host waits for an answer on a CAN bus.
 struct CanHostTimes {
-  Time answer_limit{};  ///< time without any frame on the bus after which the host stops to wait
-  Time busy_limit{};    ///< time after which the host stops to wait although other nodes keep the bus busy
+  Time answer_limit{};  ///< time without any frame on the bus after which the host stops waiting
+  Time busy_limit{};    ///< time after which the host stops waiting although other nodes keep the bus busy
 };
 
 /// Conversation that sends one frame at a time and receives frames; a subclass decides which frame is sent next. Frames

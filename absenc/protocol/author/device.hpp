@@ -23,7 +23,7 @@ struct DeviceTimes {
   Time character{};    ///< duration of a character on the line
   Time answer_time{};  ///< time from the end of a request to the begin of its reply
   Time start_time{};   ///< time from power on until requests are answered
-  Time gap{};          ///< pause that ends an incomplete request; 0: the time of two characters
+  Time gap{};          ///< pause that ends an incomplete request or the reply of another encoder; 0: two characters
   /// Whether requests received during a transmission are stored and answered afterwards, as on full-duplex lines.
   bool keeps_requests = false;
 };

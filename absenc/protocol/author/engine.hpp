@@ -25,7 +25,7 @@ struct HostTimes {
 
 /// How a request is sent, repeated and timed, and how its reply ends.
 struct Manner {
-  unsigned repeats = 0;       ///< how often the request is sent again after an invalid or missing reply
+  unsigned repeats = 0;       ///< how often the request is sent again, at most, after an invalid or missing reply
   Time pause{};               ///< pause before a repetition, from the last sent or received character
   bool expects_reply = true;  ///< false: the encoder does not reply, so the exchange ends with the request
   /// Whether a reply is accepted only when silence follows it, because its checksum alone is too weak.
