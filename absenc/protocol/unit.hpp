@@ -243,10 +243,10 @@ struct Any {
 /// Greatest length in bytes of a request that Unit::encode writes.
 inline constexpr std::size_t longest_encoded = 1024;
 
-/// Resolution of an encoder: the numbers of bits of its position and turns.
+/// Resolution of an encoder: the numbers of bits of its position and turns, and the length of a linear count.
 struct Resolution {
-  unsigned singleturn_bits = 0;   ///< Bits of the position in the turn, or of a linear encoder; 0: none or unknown.
-  unsigned multiturn_bits = 0;    ///< Bits of the turns; 0: none or unknown.
+  unsigned singleturn_bits = 0;   ///< Bits of the position within the turn, or of a linear encoder; 0: none.
+  unsigned multiturn_bits = 0;    ///< Bits of the turns; 0: none.
   double unit_um = 0;             ///< linear encoders: micrometres per count; 0: a rotary encoder
   bool multiturn_signed = false;  ///< true: the number of turns is signed, so turns below zero are possible
 };
@@ -322,7 +322,8 @@ struct Unit {
   /// Constructs a virtual encoder in `storage`, which has `device_storage` bytes; `shaft` must outlive it. Returns an
   /// empty Any if the options contradict each other.
   Any<Device> (*device)(const Options& options, const Shaft& shaft, std::span<std::byte> storage);
-  /// Returns the numbers of bits of position and turns of an encoder with these options.
+  /// Returns the resolution of an encoder with these options; numbers of bits that the options leave open are those of
+  /// the virtual encoder.
   Resolution (*resolution)(const Options& options);
   /// Returns whether the checks must detect that bit number `bit` of this valid reply was flipped. Null: they must
   /// detect every bit. Bits count from the least significant of the first byte on; on clocked links in the order of the

@@ -54,7 +54,7 @@ struct Declaration {
 
   /// Returns the settings of the line. Null: `format.line()` does.
   LineSettings (*line)(const Format&) = nullptr;
-  /// Returns the numbers of bits of position and turns. Null: `format.resolution()` does.
+  /// Returns the resolution of the encoder. Null: `format.resolution()` does.
   Resolution (*resolution)(const Format&) = nullptr;
   /// Returns whether the options do not contradict each other, so that a virtual encoder can be made and clocked frames
   /// can be decoded. Null: always.
