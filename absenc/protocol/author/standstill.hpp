@@ -15,7 +15,7 @@ namespace absenc::author {
 inline constexpr Time between_looks = std::chrono::milliseconds(10);
 /// Greatest difference of two positions of a standing shaft, caused by noise, in 1/1000 degree.
 inline constexpr std::uint32_t standstill_millidegrees = 20;
-/// Largest distance from 0 after a zero by a position offset (EncoLink), in 1/1000 degree.
+/// Largest distance from 0 after a zero was set, in 1/1000 degree, as the hosts of EncoLink and RAA38 check it.
 inline constexpr std::uint32_t zero_millidegrees = 350;
 
 /// Returns the angle `millidegrees` in counts of a circle with 2^bits counts (1 to 64 bits); at least one count.
