@@ -118,8 +118,8 @@ author::Procedure zero(Dialog& dialog, ProcedureState& found, Arguments argument
 /// afterwards).
 author::Procedure preset_multiturn(Dialog& dialog, ProcedureState& found, Arguments arguments);
 /// Starts the self-calibration and polls its status while the user turns the shaft; emits each status that is not the
-/// result. Errors also:
-/// cross_check_failed (the self-calibration failed; the detail states why), timeout (it does not end).
+/// result. Errors also: cross_check_failed (the self-calibration failed; the detail states why), timeout (it does not
+/// end).
 author::Procedure self_calibrate(Dialog& dialog, ProcedureState& found);
 
 /// Returns the number of bytes of the register at `address`: `wanted`, or if that is 0 the size in the table; 0 if the
