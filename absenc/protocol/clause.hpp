@@ -15,7 +15,7 @@ namespace absenc {
 
 /// Kind of a clause for encoders: the behaviour that the document demands. Names in backquotes are members of Clause.
 enum class Demand : std::uint8_t {
-  // Demands about readings, tested with the requests that every host sends
+  // Demands about readings, tested with the requests that every host sends; `does` is tested with those of its command
   answered,  ///< the encoder answers each request, pulse or transfer
   streamed,  ///< the encoder sends frames unsolicited
   in_time,   ///< each reply begins before a host's timeout, because documents give typical times and no limits
@@ -68,8 +68,8 @@ inline constexpr Errors form_errors = any_of(Error::bad_framing, Error::unexpect
 /// A request that the test of a clause sends, and that reading a position never sends.
 struct Ask {
   std::string_view wire{};  ///< bytes of the request in hexadecimal: "a2"
-  /// Writes the request into `request` and returns its length, for requests that depend on the options. Null: `wire` is
-  /// sent.
+  /// Writes the request into `request` and returns its length, for requests that depend on the options. Null: `wire` or
+  /// `wrong_end` states the request.
   Result<std::size_t> (*make)(const Options& options, MutableBytes request) = nullptr;
   bool wrong_end = false;  ///< true: the request is that for a position, with a wrong bit in its last byte
   /// Bit rate of the request in 1/1000 of the line's rate: a slower request has its last bit where the receiver expects
@@ -142,7 +142,8 @@ struct HostClause {
   std::string_view paragraph;  ///< Paragraph of the document.
   std::string_view words;      ///< Demand of the document, in words.
   HostDemand demand;           ///< Kind of the clause, which selects its test.
-  /// Name of the rule that the virtual encoder checks; the clause is untested until the encoder has checked this rule.
+  /// Name of the rule that the virtual encoder checks, or the test's controller for `spi_mode_rule`; the clause is
+  /// untested until this rule has been checked.
   std::string_view rule{};
   // Test hosts for this clause, if the hosts that all tests use do not break it: those send two commands in a row,
   // leave pauses out, or clock too fast, too early or in another mode.

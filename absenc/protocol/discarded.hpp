@@ -7,8 +7,8 @@
 
 namespace absenc {
 
-/// Number of discarded frames: as many as fit into the bytes between two valid frames, rounded up. Before the first
-/// valid frame it is rounded down, because an incomplete frame there may have begun before the host listened.
+/// Number of discarded frames: the skipped bytes after each valid frame, divided by the length of a frame and rounded
+/// up. Before the first valid frame it is rounded down, because a frame may have begun before the host listened.
 class DiscardedFrames {
  public:
   /// Counts frames with a length of `frame_bytes` bytes.
@@ -37,7 +37,7 @@ class DiscardedFrames {
   bool begun_ = false;
   std::uint64_t skipped_ = 0;
   std::uint64_t before_ = 0;  // discarded frames up to the last valid frame
-  std::uint64_t gap_ = 0;     // bytes skipped after the last valid frame
+  std::uint64_t gap_ = 0;     // bytes skipped after the last valid frame, or since the start
 };
 
 }  // namespace absenc

@@ -27,7 +27,8 @@ inline constexpr std::array<std::string_view, 3> sharing_choices{"auto", "true",
 enum Sharing : std::int64_t { sharing_automatic, sharing_yes, sharing_no };
 
 /// Description of an option of a unit: a number in a range, or one of `choices` (the value is the index into it). With
-/// `decimals`, the user writes up to that many decimal digits, and all values are in units of the last digit.
+/// `decimals`, the user writes up to that many digits after the decimal point, and all values are in units of the last
+/// one.
 struct Option {
   std::string_view name;                        ///< Name of the option.
   std::string_view meaning;                     ///< Meaning of the option, with its unit.
@@ -36,9 +37,9 @@ struct Option {
   std::int64_t maximum = 0;                     ///< Highest value, if the option is a number.
   std::span<const std::string_view> choices{};  ///< Words for the values from 0 on; empty: the option is a number.
   bool probeable = false;                       ///< true: captured frames can show the value of the option
-  unsigned decimals = 0;                        ///< Number of decimal digits that the user may write.
+  unsigned decimals = 0;                        ///< Most digits after the decimal point that the user may write.
   bool describes_word = false;  ///< true: a word format replaces this option, so the two cannot be given together
-  std::uint32_t step = 1;       ///< values are `minimum` and multiples of this step above it
+  std::uint32_t step = 1;       ///< permitted values are `minimum` plus multiples of this step
   Role role = Role::other;      ///< Role by which programs that do not know the unit find the option.
   bool in_hex = false;          ///< true: texts show the value in hexadecimal, as with FieldInfo::in_hex
   bool or_zero = false;         ///< true: 0 is permitted too, although it is below `minimum`
@@ -54,11 +55,11 @@ struct OptionValue {
 struct Model {
   std::string_view name;                ///< Name of the model.
   std::string_view meaning;             ///< Description of the model, as a phrase.
-  std::uint32_t maximum_rpm;            ///< fastest shaft for which a position is specified, in rpm
+  std::uint32_t maximum_rpm;            ///< fastest shaft for which a position is specified, in rpm; 0: none stated
   std::span<const OptionValue> values;  ///< Options that the model sets, with their values.
 };
 
-/// Most options of a unit: biss-chain has twelve, and seven for each of its eight words.
+/// Greatest number of options of a unit: biss-chain has twelve, and seven for each of its eight words.
 inline constexpr std::size_t maximum_options = 68;
 
 /// Name of the option that gives a word format, for units that take one.
@@ -90,10 +91,10 @@ struct OptionError {
     unknown_model,
     unknown_option,
     bad_value,
-    bad_word,                      ///< the word format is invalid: the member `word` has the reason and the place
-    beside_word,                   ///< the option or model `text` cannot be given together with a word format
-  } kind = Kind::none;             ///< Kind of the error.
-  std::string_view text{};         ///< The name or the value that is wrong, as the user wrote it.
+    bad_word,               ///< the word format is invalid: the member `word` has the reason and the place
+    beside_word,            ///< the option `text`, or a model ("model"), was given together with a word format
+  } kind = Kind::none;      ///< Kind of the error.
+  std::string_view text{};  ///< The name or the value that is wrong, as the user wrote it; beside_word: see there.
   const Option* option = nullptr;  ///< bad_value: the option for which `text` was given; else null.
   WordFormatError word{};          ///< bad_word: reason and place of the error in the word format.
 };
@@ -102,8 +103,8 @@ struct Unit;
 
 /// Computes the values of all options from a model and single settings, which override the model, and stores them in
 /// `resolved`. Returns why it is impossible, or an error of kind `none`. Without a model name the first model that
-/// contradicts no setting is used, so a setting that fits one model only also gives the other values of that model; if
-/// no model fits, the unit's defaults apply. With a word format no model is used.
+/// contradicts no setting is used, so a setting that fits only one model also selects the other values of that model;
+/// if no model fits, the unit's defaults apply. With a word format no model is used.
 [[nodiscard]] OptionError resolve_options(const Unit& unit, std::string_view model,
                                           std::span<const OptionText> settings, Options& resolved);
 
@@ -111,7 +112,7 @@ struct Unit;
 void tell_shared(const Unit& unit, Options& options);
 
 /// Parses an integer, decimal or 0x hexadecimal, with an optional minus sign. Error: invalid_argument (any other text,
-/// or too large for 64 bits).
+/// or a magnitude above INT64_MAX).
 [[nodiscard]] constexpr Result<std::int64_t> parse_number(std::string_view text) {
   const bool negative = text.starts_with('-');
   if (negative) text.remove_prefix(1);
@@ -156,7 +157,8 @@ void tell_shared(const Unit& unit, Options& options);
   return value;
 }
 
-/// Parses the value of an option: a number in its range, or one of its choices. Error: invalid_argument.
+/// Parses the value of an option: a number that its range, step and `or_zero` permit, or one of its choices. Error:
+/// invalid_argument.
 [[nodiscard]] constexpr Result<std::int64_t> parse_value(const Option& option, std::string_view text) {
   for (std::size_t i = 0; i < option.choices.size(); ++i) {
     if (option.choices[i] == text) return static_cast<std::int64_t>(i);

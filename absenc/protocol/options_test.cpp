@@ -87,7 +87,7 @@ TEST(Options, SharedLineSetsOption) {
   };
   bus({});
   bus({{"bus", "true"}});
-  bus({{"bus", "false"}});  // a value that the user gave has priority over `tell_shared`
+  bus({{"bus", "false"}});  // `true` and `false` from the user have priority over `tell_shared`
 }
 
 TEST(Options, InvalidWordIsReportedWithItsPlace) {

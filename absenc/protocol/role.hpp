@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The meaning of a field, an option or an argument for code that knows no protocol. Names are for people: code that
-// handles all units never looks up a name.
+// handles all units finds the members of a unit by role.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@ enum class Role : std::uint8_t {
   identity,  ///< field: identifies the encoder: its type, its serial number
   clash,     ///< field of a scan: not 0: every answer at this address is damaged
   trouble,   ///< field of a scan: what is wrong with an answer that was complete
-  rate,      ///< option: bits per second
+  rate,      ///< option: bit rate; its choices are bits per second
   // Roles of the options of a checksum at the end of a word, which `crc find` finds
   check_width,       ///< option: width of the checksum in bits
   check_polynomial,  ///< option: polynomial of the checksum without its highest power

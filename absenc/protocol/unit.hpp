@@ -22,7 +22,7 @@ namespace absenc {
 /// Purpose of a unit's command, by which the verbs of the command line (`absenc read`, `absenc zero` ...) find the
 /// command.
 enum class Verb : std::uint8_t {
-  read,  ///< reads the position, with all alarms that the unit can report; `absenc read` uses the first such command
+  read,  ///< reads the position; `absenc read` uses the first such command
   read_part,
   info,
   temperature,
@@ -81,7 +81,7 @@ struct MemoryArea {
   std::uint32_t first;           ///< First address of the area on its page.
   std::uint32_t count;           ///< Number of bytes on each page.
   std::string_view meaning;      ///< Content of the area, as a phrase.
-  bool writable = true;          ///< Whether hosts may write the bytes or the register.
+  bool writable = true;          ///< Whether hosts may write the bytes.
   bool in_dump = true;           ///< whether a copy of the memory (`absenc memory dump`) includes the area
   std::uint32_t write_life = 0;  ///< number of writes that the document permits; 0: the document states none
   /// Why memory_write needs its argument with the role force for this area; "": it does not need it.
@@ -103,7 +103,7 @@ struct RegisterInfo {
   std::uint32_t address;  ///< Address of the register.
   std::uint32_t size;     ///< size of the register in bytes
   bool readable = true;   ///< Whether hosts may read the register.
-  bool writable = false;  ///< Whether hosts may write the bytes or the register.
+  bool writable = false;  ///< Whether hosts may write the register.
 };
 
 /// A property of a virtual encoder's environment that its document mentions: a temperature, a battery, a fault of one
@@ -174,8 +174,7 @@ struct EvidenceSink {
 };
 
 /// A range of consecutive bits of a frame that carries a value, or a part of it. Bits are numbered as for
-/// `Unit::is_checked`. The last bit of a range is the most significant on lines of characters, the first on clocked
-/// links.
+/// `Unit::is_checked`. The last bit of a range is the most significant one; on clocked links, the first bit is.
 struct BitRange {
   std::size_t first = 0;  ///< Index of the first bit in the frame.
   std::size_t count = 0;  ///< Number of bits in the range.
@@ -244,9 +243,9 @@ struct Any {
 /// Greatest length in bytes of a request that Unit::encode writes.
 inline constexpr std::size_t longest_encoded = 1024;
 
-/// Resolution of an encoder: the numbers of bits of its position and turns.
+/// Resolution of an encoder: the numbers of bits of its position and turns, and the length of a linear count.
 struct Resolution {
-  unsigned singleturn_bits = 0;   ///< Bits of the single-turn position; 0: none.
+  unsigned singleturn_bits = 0;   ///< Bits of the position within the turn, or of a linear encoder; 0: none.
   unsigned multiturn_bits = 0;    ///< Bits of the turns; 0: none.
   double unit_um = 0;             ///< linear encoders: micrometres per count; 0: a rotary encoder
   bool multiturn_signed = false;  ///< true: the number of turns is signed, so turns below zero are possible
@@ -323,7 +322,8 @@ struct Unit {
   /// Constructs a virtual encoder in `storage`, which has `device_storage` bytes; `shaft` must outlive it. Returns an
   /// empty Any if the options contradict each other.
   Any<Device> (*device)(const Options& options, const Shaft& shaft, std::span<std::byte> storage);
-  /// Returns the numbers of bits of position and turns of an encoder with these options.
+  /// Returns the resolution of an encoder with these options; numbers of bits that the options leave open are those of
+  /// the virtual encoder.
   Resolution (*resolution)(const Options& options);
   /// Returns whether the checks must detect that bit number `bit` of this valid reply was flipped. Null: they must
   /// detect every bit. Bits count from the least significant of the first byte on; on clocked links in the order of the

@@ -32,7 +32,7 @@ struct VectorCheck final : FieldSink {
     }
     return true;
   }
-  /// Returns whether each expected field was delivered once, with its expected value, and no other field.
+  /// Returns whether as many fields were delivered as expected, and each had its expected value.
   [[nodiscard]] constexpr bool all() const { return matches == expected.size() && count == expected.size(); }
 
   std::span<const Expected> expected;  ///< The expected fields with their values.

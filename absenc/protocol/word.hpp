@@ -23,8 +23,9 @@ struct WordWith {
   static constexpr std::size_t capacity = size;  ///< Number of elements of `values`.
   std::uint64_t position = 0;                    ///< Position in counts: within the turn, or of a linear encoder.
   std::uint64_t multiturn = 0;                   ///< Number of turns.
-  bool error = false;                            ///< Whether the error bit reports an error.
-  bool warning = false;                          ///< Whether the warning bit reports a warning.
+  /// Whether the encoder reports an error, by the error bit or by another sign of its protocol (SSI: parity).
+  bool error = false;
+  bool warning = false;  ///< Whether the warning bit reports a warning.
   /// Values of fields with Meaning::value, by the index of the field in the format.
   std::array<std::uint64_t, size> values{};
 
@@ -34,7 +35,7 @@ struct WordWith {
 /// The decoded values of a position word of any format.
 using Word = WordWith<WordFormat::maximum_fields>;
 
-/// Bit of Reading::alarms: the error bit of a word.
+/// Bit of Reading::alarms: the encoder reports an error (WordWith::error).
 inline constexpr std::uint32_t word_error = 1;
 inline constexpr std::uint32_t word_warning = 2;  ///< Bit of Reading::alarms: the warning bit of a word.
 
@@ -53,7 +54,7 @@ struct WordValues {
   std::uint64_t position;    ///< Position of a linear encoder, in counts.
   double position_um;        ///< Position of a linear encoder, in micrometres.
   double position_mm;        ///< Position of a linear encoder, in millimetres.
-  bool error;                ///< Whether the error bit reports an error.
+  bool error;                ///< Whether the encoder reports an error: WordWith::error.
   bool warning;              ///< Whether the warning bit reports a warning.
   /// Alarms of a reading. Declared only for the descriptions of its flags; never delivered as a field.
   std::uint32_t alarms;
@@ -87,7 +88,7 @@ struct PlacedField {
 };
 
 /// Gives the functions of a position word access to a format that is known at run time only. Known does the same for a
-/// format known at compile time; both have the same members.
+/// format known at compile time; both have these members.
 template <class Format>
 struct Given {
   static constexpr bool is_known = false;  ///< Whether the format is known at compile time.
@@ -302,8 +303,8 @@ struct WordContents {
   return contents;
 }
 
-/// Returns the reading of a word. A set error bit makes position and turns invalid; a word without an error bit is
-/// always valid.
+/// Returns the reading of a word. `word.error` makes position and turns invalid; without an error bit it is false,
+/// unless the protocol derives it (SSI: parity).
 template <std::size_t size>
 [[nodiscard]] constexpr Reading to_reading(const WordContents& contents, const WordWith<size>& word,
                                            const Scale& scale) {
@@ -317,7 +318,7 @@ template <std::size_t size>
           .alarms = (word.error ? word_error : 0) | (word.warning ? word_warning : 0),
           .alarms_reported = contents.reported};
 }
-/// Returns the reading of a word with this format. A set error bit makes position and turns invalid.
+/// Returns the reading of a word with this format. `word.error` makes position and turns invalid.
 [[nodiscard]] constexpr Reading to_reading(const WordFormat& format, const Word& word, const Scale& scale) {
   return to_reading(contents_of(format), word, scale);
 }

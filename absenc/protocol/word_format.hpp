@@ -69,7 +69,7 @@ struct WordField {
 /// Error in the text of a word format; `reason` is empty if there is none.
 struct WordFormatError {
   std::string_view reason{};  ///< Why the text is no word format; empty: it is one.
-  std::size_t at = 0;         ///< index of the character in the text at which the error is
+  std::size_t at = 0;         ///< index in the text at which the error is; its length: something is missing at the end
 };
 
 /// Format of a position word as data: its fields in order. It is made from options or from a text, and used by all code

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of the engine and of procedures, with a protocol of one byte: the reply is the request with its high bit set.
+// Tests of the engine, procedures, scan and reports, with a protocol of one byte: the reply is the request with its
+// high bit set. Then tests of texts and of the standstill.
 #include <gtest/gtest.h>
 
 #include <array>

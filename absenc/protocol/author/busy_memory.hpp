@@ -10,8 +10,8 @@ namespace absenc::author {
 
 /// How often and how long a host repeats a request to a busy memory.
 struct BusyWait {
-  Time limit;               ///< Longest time from the first valid reply to the last repetition.
-  Time pause;               ///< Pause before a repetition after a busy reply.
+  Time limit;               ///< Longest time from the first valid reply to one after which the request is repeated.
+  Time pause;               ///< Pause before a repetition after a valid reply.
   unsigned attempts = 1;    ///< How often each request is sent, at most, until its reply is valid.
   bool after_busy = false;  ///< Whether the result must be a reply that follows a busy reply.
 };

@@ -13,8 +13,8 @@ namespace absenc::author {
 
 /// How long a host waits for an answer on a CAN bus.
 struct CanHostTimes {
-  Time answer_limit{};  ///< time without any frame on the bus after which the host stops to wait
-  Time busy_limit{};    ///< time after which the host stops to wait although other nodes keep the bus busy
+  Time answer_limit{};  ///< time without any frame on the bus after which the host stops waiting
+  Time busy_limit{};    ///< time after which the host stops waiting although other nodes keep the bus busy
 };
 
 /// Conversation that sends one frame at a time and receives frames; a subclass decides which frame is sent next. Frames
@@ -42,7 +42,7 @@ class CanEngine : public Conversation<CanFrame> {
 
   /// Returns the time at which the last request was sent completely.
   [[nodiscard]] Time sent_at() const { return sent_at_; }
-  /// Returns whether a bus error destroyed frames since the last request.
+  /// Returns whether a bus error destroyed frames since the last request, or since the last `listen`.
   [[nodiscard]] bool is_disturbed() const { return disturbed_; }
   /// Returns why no answer was received: timeout, or bad_framing on a bus with errors.
   [[nodiscard]] Error missing() const { return disturbed_ ? Error::bad_framing : Error::timeout; }

@@ -13,14 +13,15 @@
 
 namespace absenc::author {
 
-/// The functions that a protocol of clocked bits must have:
+/// The members that a protocol of clocked bits must have:
 ///
 ///   struct Protocol {
 ///     using Format, Reply;
 ///     using Request = NoRequest;
 ///     static constexpr unsigned most_clocks;                 // of one transfer
 ///     static ClockedHostTimes host_times(const Format&);
-///     static unsigned clocks(const Format&);                 // of one reading; more than `most_clocks` are refused
+///     static unsigned clocks(const Format&);                 // of one reading; refused if they need more bytes
+///                                                            // than `most_clocks`
 ///     static Result<Reply> decode(const Format&, BitView);
 ///     static Reading reading(const Format&, const Reply&);
 ///   };
@@ -51,7 +52,7 @@ class ClockedHostOf : public ClockedEngine {
   [[nodiscard]] const Reading* reading() const override {
     return error() == Error::none && reading_.singleturn_bits != 0 ? &reading_ : nullptr;
   }
-  /// Returns the position of the last stored valid reply, even if invalid replies followed.
+  /// Returns the position that `keep` or `conclude` stored last, even if invalid replies followed.
   [[nodiscard]] const Reading& position() const { return reading_; }
   /// Returns false: the explanation of a reply is added to the error's texts.
   [[nodiscard]] static constexpr bool is_alone() { return false; }

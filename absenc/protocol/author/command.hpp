@@ -53,8 +53,8 @@ struct ItemOf<P> {
 template <class P>
 using ItemOf = typename detail::ItemOf<P>::Item;
 
-/// Functions that turn requests and replies of a unit into fields, and errors into texts for people. Firmware does not
-/// link them. All conversations of the unit derive from `Host`.
+/// Functions that turn requests and replies of a unit into fields, and errors into texts for people. Firmware that
+/// uses no Unit does not link them. All conversations of the unit derive from `Host`.
 template <class P, class Host = Conversation<ItemOf<P>>>
 struct Report {
   /// Class with the functions of the protocol.
@@ -73,7 +73,7 @@ struct Report {
   /// Puts the fields of a valid reply to the request into the sink.
   void (*put_reply)(FieldSink&, const Format&, const Request&, const Reply&) = nullptr;
   /// Returns the document's explanation of an invalid or missing reply. Not called if a procedure has an advice of its
-  /// own. Null: none.
+  /// own, or its outcome stands alone (`only`). Null: none.
   Explanation (*explain)(const Format&, Error, Items request, Items reply) = nullptr;
   /// Returns the explanation of the error of a conversation that ended, for units in which only the conversation knows
   /// the reason. If set, it replaces `explain` for conversations.
@@ -243,8 +243,8 @@ struct CommandOf {
     one.size = std::max(size, other.size);
     return one;
   }
-  /// Returns whether a conversation can be made with these arguments: false if P::encode refuses the request. An error
-  /// of `request` gives true, because the conversation reports that error.
+  /// Returns whether a conversation can be made with these arguments: false if P::encode refuses a request that is no
+  /// pulse. An error of `request` gives true, because the conversation reports that error.
   [[nodiscard]] bool can_ask(const Format& format, Arguments arguments) const {
     if constexpr (std::is_same_v<Request, NoRequest>) {
       return true;

@@ -16,9 +16,10 @@
 
 namespace absenc::author {
 
-/// The properties of a unit of the protocol `P`, from which Descriptor (unit.hpp) makes the Unit. `P` has the functions
-/// that dialog.hpp, device.hpp or clocked_host.hpp list. `VirtualEncoder`, a BusDevice or ClockedDevice, is constructed
-/// from (format, shaft). All conversations of the unit derive from `Host`, as in Report.
+/// The properties of a unit of the protocol `P`, from which Descriptor (unit.hpp) makes the Unit. `P` has the members
+/// that dialog.hpp and device.hpp, clocked_host.hpp or can_dialog.hpp list. `VirtualEncoder`, a Device such as
+/// BusDevice or ClockedDevice, is constructed from (format, shaft). All conversations of the unit derive from `Host`,
+/// as in Report.
 template <class P, class VirtualEncoder, class Host = Conversation<ItemOf<P>>>
 struct Declaration {
   /// Class with the functions of the protocol.
@@ -53,7 +54,7 @@ struct Declaration {
 
   /// Returns the settings of the line. Null: `format.line()` does.
   LineSettings (*line)(const Format&) = nullptr;
-  /// Returns the numbers of bits of position and turns. Null: `format.resolution()` does.
+  /// Returns the resolution of the encoder. Null: `format.resolution()` does.
   Resolution (*resolution)(const Format&) = nullptr;
   /// Returns whether the options do not contradict each other, so that a virtual encoder can be made and clocked frames
   /// can be decoded. Null: always.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests that each member of a Declaration reaches the Unit. tests/unit_declaration_test.py shows that a misspelt member
+// Tests that the members of a Declaration reach the Unit. tests/unit_declaration_test.py shows that a misspelt member
 // does not compile.
 #include "absenc/protocol/author/declaration.hpp"
 

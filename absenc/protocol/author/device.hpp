@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Device side of a line of characters (UART): recognizes requests, ignores those for other encoders, answers in time,
-// checks the rules that hosts must follow, and has a memory. It knows no protocol, and is compiled once.
+// Device side of a line of characters (UART): Responder recognizes requests, ignores those for other encoders, answers
+// in time, and checks that hosts do not send meanwhile. It knows no protocol, and is compiled once. BusDevice adds a
+// protocol and a memory.
 #pragma once
 
 #include <array>
@@ -22,7 +23,7 @@ struct DeviceTimes {
   Time character{};    ///< duration of a character on the line
   Time answer_time{};  ///< time from the end of a request to the begin of its reply
   Time start_time{};   ///< time from power on until requests are answered
-  Time gap{};          ///< pause that ends an incomplete request; 0: the time of two characters
+  Time gap{};          ///< pause that ends an incomplete request or the reply of another encoder; 0: two characters
   /// Whether requests received during a transmission are stored and answered afterwards, as on full-duplex lines.
   bool keeps_requests = false;
 };

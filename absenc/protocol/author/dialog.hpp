@@ -49,7 +49,7 @@ class HostOf : public Engine {
   [[nodiscard]] const Request& request() const { return request_; }
   /// Returns the last valid reply; an empty one if there was none.
   [[nodiscard]] const Reply& last() const { return last_; }
-  /// Returns position and turns in the last valid reply, with the times of its exchange.
+  /// Returns position and turns in the last valid reply, with the times of the last exchange.
   [[nodiscard]] Reading last_reading() const {
     Reading reading = P::reading(format_, request_, last_);
     reading.latched = P::latched(format_, sent_at());
@@ -319,7 +319,7 @@ using ProcedureDialog = typename detail::ProcedureDialog<P>::Type;
 
 /// A conversation that runs `procedure(dialog, found, bound..., arguments)`; the arguments are passed only if the
 /// procedure takes them. Its result is `Found`, whose member `reading`, if it has one, is the position; otherwise the
-/// dialog has the position. If `Found` has a member `streams`, each `emit` is a result, and the procedure ends only
+/// `reading` of the dialog is. If `Found` has a member `streams`, each `emit` is a result, and the procedure ends only
 /// with an error. The coroutine frames are in the storage after this object.
 template <class P, class Found, auto procedure, auto... bound>
 class Run : public ProcedureDialog<P> {

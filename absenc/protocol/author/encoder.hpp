@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Base of every virtual encoder, on any kind of line: power, alarms raised by tests and users, breaches of rules, and
-// the number of answers.
+// Base of virtual encoders on any kind of line: power, alarms raised by tests and users, breaches of rules, and the
+// number of answers. Those of Modbus and of CAN do not need it.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace absenc::author {
 
-/// A virtual encoder with the parts that all share: power, alarms, rule checks and counters. Subclasses add the line.
+/// A virtual encoder with the parts that most share: power, alarms, rule checks and counters. Subclasses add the line.
 template <class Item>
 class EncoderOn : public Device<Item> {
  public:

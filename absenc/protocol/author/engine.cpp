@@ -69,8 +69,8 @@ ByteStep Engine::next(Time now) {
   return step;
 }
 
-// Calls `woken` when a sleep or the time of listening is over. The subclass may sleep again in it. Steps that it has
-// requested (`emit`, `configure`) come first.
+// Calls `woken` when a sleep or the time of listening is over. The subclass may sleep again in `woken`. Steps that the
+// subclass has requested (`emit`, `configure`) come first.
 void Engine::wake(Time now) {
   while ((state_ == State::sleeping || state_ == State::listening) && rate_ == 0 && !emitting_) {
     if (state_ == State::listening && earliest_ == never) earliest_ = now + listening_;
@@ -81,7 +81,8 @@ void Engine::wake(Time now) {
   }
 }
 
-// Returns the time before which the engine neither sends the next request nor ends.
+// Returns the time until which `next` only returns `wait`; Time::min() if it need not wait. A request that waits for
+// `earliest_` alone is returned at once, with that time in its step.
 Time Engine::rest_end() const {
   if (state_ == State::ready && times_.silence != Time{}) return std::max(received_at_ + times_.silence, earliest_);
   return state_ >= State::sleeping && state_ != State::over ? earliest_ : Time::min();

@@ -25,13 +25,13 @@ struct HostTimes {
 
 /// How a request is sent, repeated and timed, and how its reply ends.
 struct Manner {
-  unsigned repeats = 0;       ///< how often the request is sent again after an invalid or missing reply
+  unsigned repeats = 0;       ///< how often the request is sent again, at most, after an invalid or missing reply
   Time pause{};               ///< pause before a repetition, from the last sent or received character
   bool expects_reply = true;  ///< false: the encoder does not reply, so the exchange ends with the request
   /// Whether a reply is accepted only when silence follows it, because its checksum alone is too weak.
   bool ends_by_silence = false;
-  /// Whether any reply, or none, is accepted, because the document does not define it: the received bytes are not
-  /// checked, and silence ends the exchange.
+  /// Whether any undamaged reply, or none, is accepted, because the document does not define it: the received bytes are
+  /// not checked, and silence ends the exchange.
   bool any_reply = false;
   Time answer_limit{};  ///< longest time until the reply begins; 0: HostTimes::answer_limit
   Time hold{};          ///< how long the encoder may still be busy with the request after an error
@@ -43,7 +43,8 @@ struct Manner {
 /// class from a protocol. CAN and clocked lines have engines of their own, because replies end differently there.
 ///
 /// After an invalid reply the engine waits for silence before it ends or sends again: sending while an encoder sends
-/// can destroy the encoder's driver. A valid reply ends the exchange at once, unless Manner demands silence after it.
+/// can destroy the encoder's driver. A valid reply or a refusal (`is_whole`) ends the exchange at once, unless Manner
+/// demands silence after it.
 class Engine : public Conversation<std::uint8_t> {
  public:
   /// Not copyable: requests and replies are views into the conversation itself.
@@ -83,7 +84,7 @@ class Engine : public Conversation<std::uint8_t> {
 
   /// Sends `request` as `manner` states, not before `earliest`. The bytes must stay valid until the exchange has ended.
   void send(Bytes request, const Manner& manner, Time earliest);
-  /// Delivers the present result to the caller (step `emit`) before any other step.
+  /// Delivers the present result to the caller (step `emit`) before any other step but a change of the rate.
   void emit() { emitting_ = true; }
   /// Switches this end of the line to `rate` bits per second, before the next transfer or the end of the conversation.
   void set_rate(std::uint32_t rate) { rate_ = rate; }
@@ -120,7 +121,7 @@ class Engine : public Conversation<std::uint8_t> {
 
  private:
   enum class State : std::uint8_t {
-    receiving,  ///< state: the reply to the last request is awaited
+    receiving,  ///< the reply to the last request is awaited
     settling,   ///< the reply has an error: waits until the line is silent
     ready,      ///< the next request is to be sent, as soon as pauses permit
     sending,    ///< the request is being sent

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Declares a field by the member of a struct that has its value. All units do so: the kind of a field follows from the
-// type of its member, and the order of put fields from the order of their declarations.
+// Declares a field by the member of a struct that has its value, or by a function that computes the value from the
+// struct. The type of the value gives the kind of the field, and the order of the declarations that of put fields.
 #pragma once
 
 #include <algorithm>

@@ -22,8 +22,8 @@ struct InARow {
   unsigned requests = 0;                         ///< number of equal requests that execute the command, 2 or more
   Time interval{};                               ///< shortest time before the next request of the row, as hosts keep it
   Between between = Between::reply_and_request;  ///< the events between which hosts keep `interval`
-  /// Shortest time from the end of a request to the end of the next one that a virtual encoder accepts. A request that
-  /// follows sooner is the first of a new row.
+  /// Shortest time from the end of a request, or of its reply (RowCounter::measure_from), to the end of the next
+  /// request that a virtual encoder accepts. A request that follows sooner is the first of a new row.
   Time accepted{};
   std::string_view number_rule{};    ///< rule of the virtual encoder: the host sent too few requests
   std::string_view interval_rule{};  ///< rule of the virtual encoder: the host sent two requests too fast
@@ -62,13 +62,14 @@ class RowCounter {
   HostRules* rules_;
   unsigned code_ = 0;
   unsigned sent_ = 0;     // requests of the row
-  unsigned counted_ = 0;  // requests of the row since the last one that was sent too fast
+  unsigned counted_ = 0;  // requests of the row, from the last one that was sent too fast on
   Time since_{};
 };
 
-/// Sends `request` as often as `row` demands, never more often. Without a valid reply to one of them the procedure
-/// ends, because an encoder that has missed a request does nothing. If only the last reply is missing, the encoder may
-/// have executed the command, and reading shows it: the result is whether the last reply was valid.
+/// Sends `request` as often as `row` demands, never more often. Without a valid reply to one before the last the
+/// procedure ends, because an encoder that has missed a request does nothing. If only the last reply is missing or
+/// invalid, the encoder may have executed the command, and reading shows it: the result is whether that reply was
+/// valid.
 template <class P>
 Part<bool> send_in_a_row(DialogOf<P>& dialog, typename P::Request request, const InARow& row) {
   Time pause = row.between == InARow::Between::reply_and_request ? row.interval : Time{};

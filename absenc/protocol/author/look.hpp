@@ -35,8 +35,8 @@ struct Looked {
   Reading reading{};              ///< The reading of the reply, with the times of the exchange.
 };
 
-/// Requests the position once, and stores the exchange in `found`. The result is the position in counts. Without a
-/// valid reply the procedure ends.
+/// Requests the position, as often as Protocol::manner permits, and stores the valid exchange in `found`. The result is
+/// the position in counts. Without a valid reply the procedure ends.
 template <class P>
 Part<std::uint64_t> look(DialogOf<P>& dialog, Looked<P>& found, typename P::Request request) {
   found.reply = co_await dialog.ask(request);

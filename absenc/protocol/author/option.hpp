@@ -98,8 +98,8 @@ template <auto member>
   return one;
 }
 
-/// Returns the option `one`, marked so that users may write `decimals` decimal digits; its values are in units of the
-/// last digit.
+/// Returns the option `one`, marked so that users may write up to `decimals` digits after the decimal point; its
+/// values are in units of the last one.
 template <unsigned decimals, auto member>
 [[nodiscard]] constexpr OptionOf<member> decimal(OptionOf<member> one) {
   one.info.decimals = decimals;
@@ -171,7 +171,7 @@ struct OptionsOf {
 struct ModelText {
   std::string_view name;      ///< Name of the model.
   std::string_view meaning;   ///< Description of the model, as a phrase.
-  std::uint32_t maximum_rpm;  ///< highest permitted speed in rpm; 0: the document states none
+  std::uint32_t maximum_rpm;  ///< fastest shaft for which a position is specified, in rpm; 0: none stated
   std::string_view values;    ///< Options that the model sets, as `name=value` separated by blanks.
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decides whether the shaft stands still, and whether a zero may be set. All limits for this, as angles, are here.
+// Decides whether the shaft stands still, and whether a zero may be set. The limits for this, as angles, are here.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace absenc::author {
 inline constexpr Time between_looks = std::chrono::milliseconds(10);
 /// Greatest difference of two positions of a standing shaft, caused by noise, in 1/1000 degree.
 inline constexpr std::uint32_t standstill_millidegrees = 20;
-/// Largest distance from 0 after a zero was set, in 1/1000 degree, if the document states none.
+/// Largest distance from 0 after a zero was set, in 1/1000 degree, as the hosts of EncoLink and RAA38 check it.
 inline constexpr std::uint32_t zero_millidegrees = 350;
 
 /// Returns the angle `millidegrees` in counts of a circle with 2^bits counts (1 to 64 bits); at least one count.
@@ -42,9 +42,9 @@ inline constexpr std::uint32_t zero_millidegrees = 350;
   return {Error::not_still, "nothing was changed"};
 }
 
-/// Returns why a zero must not be set after these two readings, taken `between_looks` apart: invalid_argument (a
-/// position is invalid, so the zero would be wrong for ever), not_still (the shaft turns); no error: the zero may be
-/// set.
+/// Returns why a zero must not be set after these two readings, taken `between_looks` apart: invalid_argument (the
+/// encoder is starting, or a position is invalid, so the zero would be wrong for ever), not_still (the shaft turns); no
+/// error: the zero may be set.
 [[nodiscard]] constexpr Outcome objection_to_zero(const Reading& first, const Reading& second) {
   for (const Reading& look : {first, second}) {
     if (!look.ready) {

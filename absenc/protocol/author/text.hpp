@@ -14,7 +14,7 @@
 namespace absenc::author {
 
 /// A test vector as text: a frame with the fields, or the error, that decoding must give. A value in `fields` is an
-/// integer, a real number if it has a point, or a text. Frames are hexadecimal, or plain text if
+/// integer, a real number if it has a point, or a text. Frames are hexadecimal, or plain text on clocked links and if
 /// Declaration::frames_are_texts.
 struct VectorText {
   std::string_view id;       ///< Identifier of the vector, unique within the unit.

@@ -150,7 +150,8 @@ struct Descriptor {
     return bytes.size();
   }
 
-  /// Returns the length in bytes of the request that begins with the bytes `begin`; 0 if no request does.
+  /// Returns the length in bytes of the request that begins with the bytes `begin`, or how many bytes are needed to
+  /// know it; 0 if no request does.
   static constexpr std::size_t request_size(const Options& values, Bytes begin) {
     return P::request_size(declared.format(values), begin);
   }

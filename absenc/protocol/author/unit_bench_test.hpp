@@ -151,7 +151,7 @@ class Tampered final : public Machine<std::uint8_t> {
   Wire out_;
 };
 
-/// A line in virtual time with a virtual encoder and at most one host; without a host it is silent.
+/// A line in virtual time with a virtual encoder and at most one host, which is idle between conversations.
 struct HostedLine : sim::Line<std::uint8_t> {
   HostedLine(LinkKind kind, const LineSettings& settings) : Line(kind, settings) {}
 

@@ -67,8 +67,8 @@ struct ChainReply {
   bool cds = false;                                       ///< CDS: the encoder's bit of control communication.
 };
 
-/// Decodes a frame of a chain. Errors: those of `decode` for one word, and invalid_argument (`is_usable` is false).
-/// An error in one word rejects the whole frame.
+/// Decodes a frame of a chain. Errors: those of `decode` for one word, line_stuck also for a word and CRC of zeros
+/// alone, and invalid_argument (`is_usable` is false). An error in one word rejects the whole frame.
 [[nodiscard]] constexpr Result<ChainReply> decode(const ChainFormat& format, BitView samples, Cds cds = Cds::zero) {
   if (!is_usable(format)) return Error::invalid_argument;
   ChainReply reply;

@@ -11,7 +11,7 @@ namespace absenc::biss {
 /// Errors of the bits before the data: idle bits, ACK, start bit and CDS.
 inline constexpr Errors header_errors = any_of(Error::bad_framing, Error::line_stuck);
 
-/// Requirements of the document on the registers that every encoder has.
+/// Requirements of the document on the registers of an encoder.
 inline constexpr std::array<Clause, 3> register_clauses{{
     {.id = "bank",
      .paragraph = "BiSS C Protocol Description rev D2, register 40",

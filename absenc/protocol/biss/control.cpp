@@ -116,7 +116,8 @@ bool ControlMaster::direction(bool cds) {
   }
 }
 
-// Repeats the host's start bit until the encoder sends its own, which may take 20 ms.
+// Repeats the host's start bit until the encoder sends its own, which may take 20 ms; before the first written byte the
+// encoder must send it at once.
 bool ControlMaster::started(bool cds) {
   const bool write = frame_.request.operation == Operation::write;
   if (!cds) {

@@ -92,10 +92,11 @@ struct ControlFrame {
 
 /// Decodes a control frame from the bits of CDM and CDS, one of each per position frame. The start bit may be the
 /// first bit, or follow zeros. Without CDS bits only the request is decoded: written data is taken from CDM, and
-/// repeated start bits are separated from data by the CRC. Errors: wrong_length (no bits, or more than 64 data
-/// bytes), bad_framing (no start bit, too few zeros before it, or neither read nor write), truncated, bad_checksum
-/// (header or a byte), timeout (no slave has this ID, or the slave does not answer), unexpected_reply (written data
-/// is returned with another value), request_rejected.
+/// repeated start bits are separated from data by the CRC. Errors: wrong_length (no bits, or more than 64 data bytes),
+/// bad_framing (no start bit, too few zeros before it, neither read nor write, a command without start bit S, or a
+/// delayed first written byte), truncated, bad_checksum (header or a byte), timeout (no slave has this ID, the slave
+/// does not answer, or the host sends no start bit S), unexpected_reply (written data is returned with another value, a
+/// write is answered as a read, or a slave acknowledges a command that is not for it), request_rejected.
 [[nodiscard]] Result<ControlFrame> decode_control(BitView cdm, BitView cds);
 
 /// The host's side of control frames. It owns no line: the caller passes the CDS of each position frame to `next` and
@@ -106,7 +107,7 @@ class ControlMaster {
   /// them.
   ControlMaster() = default;
 
-  /// Begins to read `count` registers of `slave` from `address` on, 1 to 64.
+  /// Begins to read `count` registers (1 to 64) of `slave` from `address` on.
   void read(unsigned slave, unsigned address, std::size_t count);
   /// Begins to write `bytes` to the registers of `slave` from `address` on.
   void write(unsigned slave, unsigned address, Bytes bytes);
@@ -117,7 +118,8 @@ class ControlMaster {
 
   /// Processes the CDS of a received frame and returns the CDM to send after that frame.
   bool next(bool cds);
-  /// Ends the control frame with `error`, because a position frame and its CDS were lost.
+  /// Ends the control frame with `error`: a position frame and its CDS were lost, or the encoder's start bit is too
+  /// late.
   void fail(Error error);
 
   /// Returns whether the control frame has ended.
@@ -175,8 +177,8 @@ struct ControlTarget {
   [[nodiscard]] virtual bool stop_bit(bool next_allowed) const { return !next_allowed; }
   /// Returns whether the next data byte can begin now: its value is available, or the encoder can accept a new one.
   [[nodiscard]] virtual bool is_ready() const = 0;
-  /// Returns whether `slave` takes part in register accesses. Command 1 switches this off for the slaves that it
-  /// addresses, and on again if it is sent to all slaves; slaves that are switched off still receive it.
+  /// Returns whether `slave` takes part in register accesses and acknowledges commands. Command 1 switches this off for
+  /// the slaves that it addresses, and on again if it is sent to all slaves, which slaves that are off receive too.
   [[nodiscard]] virtual bool listens(unsigned) const { return true; }
   /// Returns whether `slave` executes the command with number `command`.
   [[nodiscard]] virtual bool obeys(unsigned slave, unsigned command) const = 0;

@@ -32,11 +32,11 @@ class NumberList {
   [[nodiscard]] constexpr std::string_view view() const { return {text_.view().data(), text_.size()}; }
 
  private:
-  Buffer<char, 96> text_;  // Text of the list; numbers that do not fit are dropped.
+  Buffer<char, 96> text_;  // Text of the list; characters that do not fit are dropped.
 };
 
-/// The two characters of a manufacturer as text; a byte that is not printable is shown as \x and two hexadecimal
-/// digits.
+/// The two characters of a manufacturer as text; a space, a backslash and a byte that is not printable are shown as \x
+/// and two hexadecimal digits.
 class MakerName {
  public:
   /// Appends these bytes of the manufacturer registers.

@@ -35,7 +35,8 @@ class LineDelay {
   std::uint32_t noise_ = 1;
 };
 
-/// A virtual encoder without its line: makes the samples of SLO. Also used behind a virtual adapter.
+/// A virtual encoder apart from its port: makes the samples of SLO, with the delay of its line. Also used behind a
+/// virtual adapter.
 template <class F>
 class EncoderOf {
  public:
@@ -47,7 +48,7 @@ class EncoderOf {
   /// a full byte.
   void sample(Time at, Time period, Samples& samples, bool cds = false) {
     samples.clear();
-    // If half a period is longer than the timeout, the frame ends at once and SLO is idle.
+    // If half a period is as long as the timeout or longer, the frame ends at once and SLO is idle.
     if (period / 2 >= format_.timeout.of_encoder(period)) {
       samples.append(~std::uint64_t{0}, 64);
       return;
@@ -63,7 +64,7 @@ class EncoderOf {
     }
     life_counter_ = static_cast<std::uint8_t>((life_counter_ + 1u) & low_mask(life_counter_bits));
     const std::size_t whole = std::min<std::size_t>(clocks(format_, behaviour_.latency, period), Samples::capacity());
-    // The words of slaves whose process data are switched off are sent as zeros.
+    // Slaves whose process data are switched off send no words; zeros at the end of the frame take their place.
     while (samples.size() < whole) samples.append(0, 1);
     delay_.apply(behaviour_, period, samples);
     while (samples.size() % 8 != 0) samples.append(0, 1);
@@ -113,7 +114,7 @@ class VirtualRegisters final : public ControlTarget {
   void set_time(Time at, Time delay);
   /// Returns the memory of all slaves, one after the other.
   [[nodiscard]] MutableBytes memory() { return MutableBytes(memory_).first(std::size_t{slaves_} * slave_size); }
-  /// Returns the number of register writes since construction.
+  /// Returns the number of writes to `memory` since construction; selecting a bank is none.
   [[nodiscard]] std::uint32_t written() const { return written_; }
   /// Returns the slaves whose process data are switched off: bit n is slave n.
   [[nodiscard]] std::uint8_t silent() const { return data_off_; }

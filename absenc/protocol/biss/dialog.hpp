@@ -30,7 +30,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
   }
   /// Sets the CDM bit that is sent after the last frame.
   void set_cdm(bool cdm) { cdm_ = cdm; }
-  /// Returns the number of frames that were clocked.
+  /// Returns the number of clocked frames, without a stuck first frame that the start sequence follows.
   [[nodiscard]] std::uint32_t frames() const { return frames_; }
   /// Returns the number of frames that failed a check.
   [[nodiscard]] std::uint32_t bad_frames() const { return bad_frames_; }
@@ -82,7 +82,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
     if (last_) {
       const unsigned head = last_->delay_bits + last_->ack_bits;
       const unsigned expected = head_bits(this->format(), this->format().latency, this->format().period());
-      // Called for every frame, because a late frame must be confirmed by the frame right before it.
+      // Called for every valid frame, because a late frame must be confirmed by the valid frame right before it.
       const bool again = late_.is_again(head);
       if (head > expected && !again) last_ = Error::truncated;
     }

@@ -27,7 +27,7 @@ inline constexpr unsigned idle_bits = 2;
 inline constexpr LineSettings line_settings{.rate = 1'000'000, .spi_mode = 3};
 /// Shortest period of MA that the document allows: 10 MHz.
 inline constexpr Time shortest_period = 100ns;
-/// Longest BiSS timeout. After the last clock, SLO stays low for 12.5 to 40 us.
+/// Longest fixed BiSS timeout: after the last clock, SLO stays low for 12.5 to 40 us.
 inline constexpr Time timeout_maximum = 40us;
 /// Number of pulses of MA in the start sequence after power on, with 40 us before and after them.
 inline constexpr unsigned start_pulses = 2;

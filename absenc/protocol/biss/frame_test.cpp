@@ -94,8 +94,8 @@ void agree(std::uint64_t seed) {
     ASSERT_EQ(known.error(), given.error());
     if (!given) continue;
     ++good;
-    // Encoding the fields of an accepted frame must give the same frame. Skipped bits of the word are not stored, so
-    // they are not compared.
+    // Encoding the fields of an accepted frame must give the same frame. Formats with skipped bits are not compared,
+    // because these bits are not stored.
     Reply at_hand = *given;
     at_hand.delay_bits = 0;
     BitBuffer<512> again;

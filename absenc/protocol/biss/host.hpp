@@ -109,7 +109,7 @@ template <class F, bool finds>
 class PositionReader : public author::ClockedHostOf<ProtocolOf<F>> {
   using Base = author::ClockedHostOf<ProtocolOf<F>>;
   using P = ProtocolOf<F>;
-  // greatest number of late frames that are read until two in a row have the same delay
+  // greatest number of frames that are read after a first late one, until two in a row have the same delay
   static constexpr unsigned most_late = 4;
 
  public:

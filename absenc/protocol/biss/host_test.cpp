@@ -126,8 +126,8 @@ Error clock_out(Reader& read, std::span<const BitBuffer<128>> frames) {
   return read.error();
 }
 
-// Compares the reader of a known format with that of any format, on valid frames and on frames with each single bit
-// wrong.
+// Compares the reader of a known format with that of any format, on valid frames and with each single bit of the first
+// frame wrong.
 template <const Format& format>
 void reads_as_any_format() {
   std::array<BitBuffer<128>, 2> good;

@@ -104,7 +104,8 @@ Part<Error> read_registers(ControlDialog<F>& dialog, ControlMaster& master, Byte
 }
 
 /// Writes a register and reads it back, even after an error other than a refusal: the value in the register decides,
-/// not the encoder's answer. Returns cross_check_failed if the value differs.
+/// not the encoder's answer. If the value differs, returns the error of the write, or cross_check_failed if it had
+/// none.
 template <class F>
 Part<Error> write_register(ControlDialog<F>& dialog, ControlMaster& master, unsigned address, std::uint8_t value) {
   const std::array<std::uint8_t, 1> bytes{value};
@@ -127,7 +128,7 @@ Part<Error> change_register(ControlDialog<F>& dialog, ControlMaster& master, uns
   co_return error;
 }
 
-/// Selects the bank of `address` and returns the error; does nothing if the address belongs to no bank.
+/// Selects `bank` and returns the error; does nothing if `address` belongs to no bank or `bank` is selected already.
 template <class F>
 Part<Error> select_bank(ControlDialog<F>& dialog, ControlMaster& master, unsigned bank, unsigned address) {
   if (address >= registers::bank_size) co_return Error::none;
@@ -231,7 +232,8 @@ Procedure write_bank(ControlDialog<F>& dialog, ControlResults& found, Arguments 
   co_return done;
 }
 
-/// Reads the registers that identify the encoder. Leaves out registers that the encoder refuses.
+/// Reads the two groups of registers that identify the encoder. Leaves out a group that the encoder refuses; error
+/// request_rejected if it refuses both.
 template <class F>
 Procedure read_info(ControlDialog<F>& dialog, ControlResults& found) {
   ControlMaster master;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of register procedures: refused requests, delays, reading back, reported fields, and accepted frames.
+// Tests of procedures: refused requests, delays, stop bits, commands, reading back, reported fields, accepted frames.
 #include "absenc/protocol/biss/procedures.hpp"
 
 #include <gtest/gtest.h>
@@ -47,7 +47,7 @@ TEST(BissProcedures, WaitsFortyMillisecondsForStartBit) {
   asked(42'000, Error::busy);
 }
 
-// LENZ's host treats P = 1 after bank select as a fault; other encoders send P = 1 after each register.
+// LENZ's host treats P = 1 after bank select as a fault; some encoders send P = 1 after each register.
 TEST(BissProcedures, ReadsOnAfterStopBit) {
   for (const StopBit stop_bit : {StopBit::next, StopBit::zero, StopBit::one}) {
     Format format = testing::bits_24;

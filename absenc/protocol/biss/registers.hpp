@@ -11,14 +11,14 @@
 
 namespace absenc::biss::registers {
 
-/// Number of registers of a bank: addresses 00 to 3F belong to the selected bank.
+/// Number of registers of a bank: addresses 0x00 to 0x3F belong to the selected bank.
 inline constexpr unsigned bank_size = 0x40;
 inline constexpr unsigned bank_select = 0x40;  ///< Address of the register that selects the bank.
 /// Address of the register with the bank of the electronic data sheet; value 0: none.
 inline constexpr unsigned eds_bank = 0x41;
 inline constexpr unsigned profile = 0x42;        ///< Address of the profile of the encoder, two registers.
 inline constexpr unsigned serial_number = 0x44;  ///< Address of the serial number, four registers.
-/// Address of the first register that the maker defines; the last one is 77.
+/// Address of the first register that the maker defines; the last one is 0x77.
 inline constexpr unsigned device = 0x48;
 inline constexpr unsigned device_id = 0x78;     ///< Address of the device ID, six registers.
 inline constexpr unsigned manufacturer = 0x7E;  ///< Address of the manufacturer's two characters.
@@ -42,8 +42,8 @@ inline constexpr unsigned end = 0x80;           ///< First address beyond the re
 inline constexpr unsigned most_banks = 256;  ///< Greatest number of banks; an encoder may have fewer, or none.
 
 /// Memory areas for the memory commands: pages are banks, and addresses outside the banks are on page 0. A memory dump
-/// has only bank 0, which users may write; the other areas identify the encoder and must not be copied to another
-/// encoder.
+/// has only bank 0, which users may write; the other areas select a bank, identify the encoder or belong to the maker,
+/// and must not be copied to another encoder.
 inline constexpr std::array<MemoryArea, 6> areas = [] {
   return std::array<MemoryArea, 6>{{
       {.page = 0, .first = 0, .count = bank_size, .meaning = "bank"},

@@ -105,8 +105,9 @@ constexpr std::uint64_t compared_bits(const Channel& channel, const Word& word, 
   return difference <= 2;
 }
 
-/// Decodes a frame of BiSS Safety. Errors: those of `decode` for one word, sequence_mismatch (the life counter does not
-/// follow `previous_life_counter`), cross_check_failed (the words differ by more than one count of the compared bits).
+/// Decodes a frame of BiSS Safety. Errors: those of `decode` for one word, line_stuck also for a word and CRC of zeros
+/// alone, invalid_argument (`is_usable` is false), sequence_mismatch (the life counter does not follow
+/// `previous_life_counter`), cross_check_failed (the words differ by more than one count of the compared bits).
 [[nodiscard]] constexpr Result<SafetyReply> decode(const SafetyFormat& format, BitView samples, Cds cds = Cds::zero) {
   if (!is_usable(format)) return Error::invalid_argument;
   SafetyReply reply;

@@ -94,7 +94,8 @@ TEST(BissWords, SafetyComparesPositionsAndLifeCounter) {
   EXPECT_EQ(error(0x123456, 0x1234, 1), Error::sequence_mismatch);
 }
 
-// Checks at several clocks that the host gives exactly the clocks of an encoder that needs 10 us.
+// Checks at several clocks that the host gives the clocks of an encoder that needs 10 us, but not those of one that
+// needs two periods more.
 template <class F>
 void expect_clocks_of_ten_microseconds() {
   for (const std::uint16_t khz : std::to_array<std::uint16_t>({100, 1'000, 4'400, 10'000})) {

@@ -40,7 +40,7 @@ TEST_P(EncolinkRegister, ReadsRegisterWithoutLosingPositions) {
     bench.shaft.put(0, 0x12345);
     std::uint64_t last = 0;
     unsigned wrong = 0;
-    Time begun{};  // time after the identity, which every register access reads first
+    Time begun{};  // time of the first emitted position, after the identity, which the procedure reads first
     const RunResult read = bench.run("memory-read", {registers[part_number].address}, [&](const auto& emitted) {
       RunResult now;
       now.take(emitted);

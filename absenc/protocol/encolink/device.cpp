@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::string_view part_text = "MB080SLA20MENT00";  // part number, 16 characters; [8..9] are the resolution
 constexpr std::string_view access_rule = "register access before the last one was answered";
-// time from the last byte of a register access to its execution; assumed, not in the document
+// time from the last byte of a register access until its answer is ready; assumed, not in the document
 constexpr Time access_time = 200us;
 
 struct Text {

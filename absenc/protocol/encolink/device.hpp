@@ -44,7 +44,7 @@ class VirtualEncoder final : public author::Responder {
 
   /// Returns the format of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
-  /// Returns the position that a frame sent at `now` would carry.
+  /// Returns the position that a frame sent at `now`, after the start-up, would carry.
   [[nodiscard]] Position measure(Time now) const;
   /// Returns the value of the register position_offset.
   [[nodiscard]] std::uint32_t offset() const { return values_[position_offset]; }

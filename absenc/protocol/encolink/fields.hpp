@@ -91,7 +91,7 @@ struct Values {
   Maybe<std::uint32_t> address{};  ///< Address of the accessed register.
   Maybe<std::size_t> length{};     ///< Number of bytes of the accessed register.
   Maybe<Bytes> data{};             ///< Bytes of the accessed register, most significant first.
-  Maybe<std::int64_t> value{};     ///< Bytes as a number; in an answer only if the table lacks the register.
+  Maybe<std::int64_t> value{};  ///< Fewer than 8 bytes as a number; in an answer only if the table lacks the register.
 };
 
 namespace detail {

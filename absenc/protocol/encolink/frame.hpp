@@ -212,7 +212,7 @@ constexpr ReplyBytes position_bytes(const Format& format, const Position& positi
   return frame;
 }
 
-// Decodes channel 1. Padding that is not zero means that the encoder has more position bits than `format`:
+// Decodes channel 1. Padding that is not zero means that the encoder has more bits of position or turns than `format`:
 // out_of_range.
 constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   const std::uint64_t number = load_big_endian(bytes.first(format.position_bytes()));

@@ -176,7 +176,7 @@ TEST(EncolinkUnit, EncodesRequestOfEachCommand) {
                          {"memory-write", {0, 0x12345678, 0}, of(hex<"00CDEF89AB58000400000000123456787B">)},
                          {"memory-read", {0x1234, 0}, {}},  // the number of bytes is unknown
                          {"memory-write", {0x1234, 0, 0}, {}},
-                         {"memory-write", {0x64, 1, 0}, {}},  // the register at 64 has 20 bytes
+                         {"memory-write", {0x64, 1, 0}, {}},  // the register at 0x64 has 20 bytes
                          {"memory-write", {0x49, 0x63, 9}, {}}}) {
     std::array<std::uint8_t, 64> bytes{};
     const Result<std::size_t> size = unit.encode({}, *find_command(unit, one.command), one.arguments, bytes);

@@ -20,7 +20,7 @@ enum class Ask : std::uint8_t {
 };
 
 /// Types and functions of the protocol that the classes in absenc/protocol/author use: frames, lengths and times.
-/// author/dialog.hpp explains each member.
+/// author/dialog.hpp lists the members that they require.
 struct Frames {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = encolink::Format;
@@ -31,7 +31,8 @@ struct Frames {
   };
   /// Type of replies; empty for an identity, which is decoded from the bytes of the reply instead.
   using Reply = Position;
-  static constexpr std::size_t longest_reply = identity_bytes;  ///< Number of bytes of the longest reply.
+  /// Number of bytes of the longest reply, an identity; one more byte may follow it.
+  static constexpr std::size_t longest_reply = identity_bytes;
 
   /// Returns the host's timeouts for a reply and between its characters, and the silence before a request.
   static constexpr author::HostTimes host_times(const Format& format) {

@@ -220,8 +220,8 @@ using AccessBytes = ByteBuffer<access_header + access_capacity + 1>;
   return std::any_of(behind.begin(), behind.end(), [](std::uint8_t byte) { return byte != 0; });
 }
 
-/// Decodes the `ra` bytes of a register access. Errors in this order: bad_framing (wrong keys), unsupported (unknown
-/// operation), wrong_length, bad_checksum.
+/// Decodes the `ra` bytes of a register access. Errors: bad_framing (wrong keys), unsupported (unknown operation),
+/// wrong_length, bad_checksum.
 [[nodiscard]] constexpr Result<RegisterRequest> decode_access(Bytes bytes) {
   for (std::size_t i = 0; i < access_keys.size(); ++i) {
     if (i == bytes.size()) return Error::wrong_length;
@@ -242,8 +242,8 @@ using AccessBytes = ByteBuffer<access_header + access_capacity + 1>;
 }
 
 /// Decodes the encoder's answer to a register access, one byte per cycle, beginning with `channel3::read_ready` or
-/// `write_ready`: the status, then the data of a register that was read, which is returned. Errors in this order:
-/// wrong_length, unexpected_reply, request_rejected.
+/// `write_ready`: the status, then the data of a register that was read, which is returned. Errors: wrong_length,
+/// unexpected_reply, request_rejected.
 [[nodiscard]] constexpr Result<Bytes> decode_answer(const RegisterRequest& request, Bytes answer) {
   if (answer.size() < 2) return Error::wrong_length;
   const bool reads = request.operation == RegisterRequest::Operation::read;

@@ -200,7 +200,7 @@ Explanation explain_host(const Host& host) {
       return {};
   }
 }
-/// Returns cause and advice for an error of a captured frame, or of a register access with all its bytes.
+/// Returns the cause of an error of a captured frame, or of a register access with all its bytes; empty if unknown.
 constexpr Explanation explain(const Format&, Error error, Bytes request, Bytes reply) {
   if (is_access(request)) {
     if (error != Error::request_rejected || reply.size() < 2) return {};

@@ -226,7 +226,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     resets_.forget();
     encoder_ids_ = 0;
   }
-  // Counts a request for the rules and the sequence counters. Returns whether it completes a reset.
+  // Counts a request for the rules and the sequence counters. Returns whether it completes a reset at standstill.
   bool count(DataId id, Time at) {
     encoder_ids_ = id == DataId::encoder_id ? encoder_ids_ + 1 : 0;
     if (id == DataId::encoder_id) {
@@ -273,7 +273,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     }
     const std::uint16_t turns_before = turns(at);
     if (id == DataId::zero || value_of(condition::id_d_clears_singleturn) != 0) {
-      // Each channel stores the position that it measures as its zero.
+      // Each channel stores the position of the shaft as its zero.
       for (const std::size_t to : {zero_at, zero_at + 4}) {
         store_little_endian(MutableBytes(memory_).subspan(to, 4), counts_of(shaft_->at(at).position));
       }
@@ -346,7 +346,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     counters_.fill(0);
   }
   void stopped(Time) override {
-    // Alarms about turns survive power off, and resets by IDs C and D end them; all other alarms end with the power.
+    // Alarms about turns survive power off, and resets by IDs C and D end them; all other latched alarms end with the
+    // power.
     latches_ &= alarms::turns_wrong;
     turns_cleared_ = false;
     forget_rows();

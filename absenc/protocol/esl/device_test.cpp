@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of the virtual QS35 against its document, with requests written as bytes.
+// Tests of the virtual QS35 against its document, mostly with single requests.
 #include "absenc/protocol/esl/device.hpp"
 
 #include <gtest/gtest.h>
@@ -38,7 +38,8 @@ TEST(EslDevice, AnswersTwoMicrosecondsAfterTheRequest) {
   EXPECT_EQ(host.reply.size(), 18u);
 }
 
-// The sequence counters count IDs 1, 2, 8 and B only, unless the profile states that every request is counted.
+// The sequence counters count IDs 1 and 2, but not IDs 9 and A, unless the profile states that every request is
+// counted.
 TEST(EslDevice, SequenceCounters) {
   Bench bench;
   EXPECT_EQ(bench.read(DataId::position).one.sequence, 1);
@@ -63,7 +64,7 @@ TEST(EslDevice, AnswersOnlyItsOwnValidRequests) {
   EXPECT_TRUE(bench.raw(wire(hex<"08">)).empty());                 // incomplete request
   EXPECT_EQ(bench.raw(wire(hex<"0875">)).size(), 18u);             // the request after the faulty ones is answered
   EXPECT_TRUE(bench.raw(memory_write(page_select_address, 7)).empty());
-  EXPECT_TRUE(bench.raw(memory_read(0x30)).empty());  // the addresses of page 8 end at 2F
+  EXPECT_TRUE(bench.raw(memory_read(0x30)).empty());  // the addresses of page 8 end at 0x2F
   EXPECT_EQ(bench.encoder.answer_count(), 1u);
 }
 
@@ -408,7 +409,7 @@ TEST(EslDevice, OtherOrTooFastRequestRestartsTheCount) {
   bench.raw(Request{DataId::temperature});
   reset(bench, DataId::zero, 1);
   EXPECT_EQ(bench.read().singleturn, 1'000'000u);
-  for (unsigned i = 0; i < 8; ++i) bench.raw(Request{DataId::zero});  // these eight requests are 23 us apart, too fast
+  for (unsigned i = 0; i < 8; ++i) bench.raw(Request{DataId::zero});  // these eight requests are less than 35 us apart
   EXPECT_EQ(bench.read().singleturn, 1'000'000u);
   EXPECT_GT(bench.violations(), 0u);
   reset(bench, DataId::zero);

@@ -287,7 +287,7 @@ inline constexpr std::array<Layout, 16> layouts = [] {
 }
 
 /// Returns CF, the control field of a request: encoder address, data ID, and a parity bit that makes the number of ones
-/// odd.
+/// odd among the bits that `parity_scope` covers and itself.
 [[nodiscard]] constexpr std::uint8_t control_field(const Profile& profile, unsigned address, DataId data) {
   const auto id = static_cast<unsigned>(data);
   const unsigned covered = profile.parity_scope == ParityScope::all ? address << 4 | id : id;
@@ -307,7 +307,7 @@ inline constexpr std::array<Layout, 16> layouts = [] {
 struct Request {
   DataId id = DataId::position;      ///< Data ID of the request.
   std::uint8_t encoder_address = 0;  ///< address of the encoder on the line, 0 to 7
-  std::uint8_t memory_address = 0;   ///< data IDs of memory access: address of the byte, 0 to 7F
+  std::uint8_t memory_address = 0;   ///< data IDs of memory access: address of the byte, 0 to 0x7F
   std::uint8_t value = 0;            ///< data ID write_memory: byte to be written
 };
 
@@ -319,7 +319,7 @@ struct ChannelReply {
   std::uint8_t encoder_id = 0;  ///< Encoder id (ENID).
 };
 
-/// A decoded reply; members that its data ID does not carry are 0.
+/// A decoded reply; members that its data ID does not carry are 0, and `two.status` is then status::channel_2.
 struct Reply {
   DataId id = DataId::position;                   ///< Data ID of the reply.
   std::uint8_t encoder_address = 0;               ///< Address of the encoder on the line (EAD), 0 to 7.

@@ -180,7 +180,7 @@ TEST(EslFrame, EveryCheckHasItsSentence) {
   }
 }
 
-// Checks which part of a reading each status and alarm bit makes invalid.
+// Checks which part of a reading each alarm bit makes invalid, and the status bits of readiness and of errors.
 TEST(EslFrame, ValidityOfEachPart) {
   Reply reply = sample(DataId::position);
   reply.one = {.status = status::ready};

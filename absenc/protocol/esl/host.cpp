@@ -12,8 +12,8 @@ using author::Procedure;
 
 namespace {
 
-// Greatest number of times that a read or a page select is sent until a reply is valid; resets, writes and ID 8 are
-// never repeated.
+// Greatest number of times that a read or a page select is sent until a reply is valid. Resets and ID 8 are never
+// repeated, and writes only after a busy reply.
 constexpr unsigned attempts = 3;
 constexpr unsigned safe_attempts = 6;
 
@@ -243,8 +243,8 @@ Procedure select_page(Dialog& dialog, ProcedureResult& found, Arguments argument
 namespace {
 
 // Finds in SF whether the LED or the Lissajous signals raise led_or_lissajous_error, and stores it in `found`. Returns
-// whether at least one cause is found. A bit of SF that another raised alarm sets too is ambiguous, unless the other
-// bit is clear.
+// whether SF decides it for at least one of the two. A bit of SF that another raised alarm sets too is ambiguous,
+// unless the other bit is clear.
 bool find_cause_in_status(ProcedureResult& found, const Reply& reply) {
   constexpr unsigned other_safety = alarms::unsafe & ~unsigned{alarms::led_or_lissajous_error};
   constexpr unsigned other_non_safety = alarms::turns_wrong | alarms::overspeed;

@@ -125,7 +125,7 @@ TEST(EslHost, TurnsFromSingleTurnEncoderAreAnError) {
 
 // ---- Safe positions
 
-// Each safe position takes one exchange, after two have shown that the sequence counter moves.
+// The first safe position takes two exchanges, which show that the sequence counter moves; each later one takes one.
 TEST(EslHost, SafePositionsFollowEachOther) {
   Bench bench;
   const testing::Talk made(unit, testing::options_of({}), "safe-position");
@@ -192,7 +192,7 @@ TEST(EslHost, SilenceIsATimeout) {
   EXPECT_TRUE(bench.run("memory-read", {0}).says("(Figure 18)"));
 }
 
-// Each failed check has an error and a sentence.
+// Each of these failed checks has an error and a sentence.
 TEST(EslHost, ExplainsInvalidReplies) {
   struct Row {
     const char* sentence;

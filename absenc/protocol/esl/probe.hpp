@@ -14,8 +14,9 @@ namespace absenc::esl {
 /// else may have been sent to the encoder between them.
 bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sink);
 
-/// Returns new values of one or two options of `profile` with which an invalid reply is valid; empty if no such change
-/// is found, or if the reply is valid or empty.
+/// Returns new values of one or two options of `profile` with which an invalid reply is valid, or the other
+/// parity_scope if it explains a reported parity error; empty if no such change is found, or if the reply is valid or
+/// empty.
 [[nodiscard]] Buffer<OptionValue, 2> find_change(const Profile& profile, Bytes reply);
 
 }  // namespace absenc::esl

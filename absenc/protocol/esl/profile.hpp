@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Options of ESL: one for each property that the QS35 document leaves open, and those for the address and the checks of
-// an encoder. README.md states how hardware shows each alternative; probe.hpp finds them in captured frames.
+// Options of ESL: one for each property that the QS35 document leaves open; those for the address, the turns, the line
+// and the checks of an encoder; and one for the reaction of a virtual encoder to faulty requests. README.md states
+// how hardware shows each alternative that the document leaves open; probe.hpp finds these in captured frames.
 #pragma once
 
 #include <algorithm>
@@ -43,8 +44,9 @@ enum class Id6Redundant : std::uint8_t { bits_16, bits_9 };
 /// silent.
 enum class BadRequest : std::uint8_t { report, silent };
 
-/// Properties of an encoder: those that the document leaves open, its address, and how strictly it is checked. Its
-/// members are the options of ESL.
+/// Properties of an encoder: those that the document leaves open, its address, whether it counts turns and shares the
+/// line, how strictly it is checked, and how a virtual one reacts to faulty requests. Its members are the options of
+/// ESL.
 struct Profile {
   CrcBitOrder crc_bit_order = CrcBitOrder::lsb;       ///< Order in which bits enter the CRCs.
   CrcByteOrder crc16_byte_order = CrcByteOrder::low;  ///< Order of the bytes of 16-bit CRCs.

@@ -277,9 +277,9 @@ constexpr Check check_reply_to(const Profile& profile, const Request& request, s
 }
 }  // namespace detail
 
-/// Checks a reply in this order: length, checksums, echo, refusal, fixed bits, range, cross checks. Returns the first
-/// check that failed. `reply` gets the content once the checksums are right; use it only if the result is `passed`. A
-/// busy memory reply passes.
+/// Checks a reply in this order: length, checksums, echo, refusal, fixed bits and range, cross checks. Returns the
+/// first check that failed. `reply` gets the content once the checksums are right; use it only if the result is
+/// `passed`. A busy memory reply passes.
 [[nodiscard]] constexpr Check check_reply(const Profile& profile, const Request& request, Bytes bytes, Reply& reply) {
   const std::uint8_t asked = control_field(profile, request.encoder_address, request.id);
   return detail::check_reply_to(profile, request, asked, bytes, reply);

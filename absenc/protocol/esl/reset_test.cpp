@@ -39,8 +39,8 @@ TEST(EslReset, Resets) {
   EXPECT_EQ(bench.read().multiturn, 0u);
 }
 
-// A reset takes 10 ms between the positions, 40 us from start to start of the eight requests, and then the EEPROM's
-// write time.
+// A reset takes 10 ms between the positions, 40 us from start to start of the eight requests, and then 7 ms for the
+// EEPROM, or 40 us after clear-alarms.
 TEST(EslReset, ResetKeepsItsTimes) {
   for (const auto& [command, id, last] :
        {std::tuple{"zero", DataId::zero, Time(7ms)}, std::tuple{"reset-multiturn", DataId::reset_multiturn, Time(7ms)},

@@ -388,8 +388,8 @@ TEST(EslSafetyCampaign, NoiseOfTheRightLength) {
   EXPECT_EQ(accepted, 0u);
 }
 
-// A line with every kind of fault: each position that the command reports as safe is the shaft's, and no unsafe one is
-// reported.
+// A line with every kind of fault of replies: each position that the command reports as safe is the shaft's, and no
+// unsafe one is reported.
 TEST(EslSafetyCampaign, SafePositionsOverABadLine) {
   const sim::FaultRates rates = sim::testing::damaged_replies(0.1);
   sim::Random random(1);

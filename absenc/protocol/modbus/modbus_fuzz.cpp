@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fuzz test: sends any bytes with pauses to a server, which must not hang and must not accept a wrong CRC.
+// Fuzz test: sends any bytes with pauses to a server, which must answer only after a pause and with a right CRC.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>

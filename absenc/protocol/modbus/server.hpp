@@ -36,7 +36,7 @@ class Server : public Device<std::uint8_t> {
   explicit Server(const LineSettings& line) : line_(line) {}
   ~Server() = default;
 
-  /// Called at power on; the subclass must call `set_rate`.
+  /// Called at power on; the subclass calls `set_rate` if the rate may have changed.
   virtual void started() = 0;
   /// Called for a frame with a valid CRC and any address; `body` is the frame without its CRC. The subclass appends the
   /// reply without its CRC, or nothing. It must call `check_line_rules` if the frame is for this server.
@@ -67,7 +67,7 @@ class Server : public Device<std::uint8_t> {
 
   FrameBytes frame_;
   bool damaged_ = false;          // the present frame has a damaged character, or too many characters
-  bool follows_traffic_ = false;  // something was received or sent before the present frame
+  bool follows_traffic_ = false;  // the silence after earlier traffic is known, so it is checked
   bool began_too_soon_ = false;   // the silence before the present frame was shorter than 3.5 characters
   bool has_gap_ = false;          // two characters of the present frame were more than 1.5 characters apart
   bool line_was_used_ = false;    // anything was received or sent since power on

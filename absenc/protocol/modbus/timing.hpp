@@ -37,7 +37,7 @@ inline constexpr std::uint32_t fixed_times_above = 19'200;
   return {.answer_limit = answer_limit + line.character(),
           .gap_limit = frame_silence(line),
           .silence = request_silence(line),
-          // This is longer than any reply, and longer than the delay with which an adapter reports silence.
+          // Longer than any reply of the units that use it, and than the delay with which an adapter reports silence.
           .patience = 1s};
 }
 

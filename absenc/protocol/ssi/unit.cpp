@@ -119,7 +119,7 @@ constexpr auto commands = std::array{
         .only_if(is_possible),
 };
 
-// SSI has no checksum, so no wrong bit is detected for certain.
+// A word has no checksum and often no parity bit, so detection of a wrong bit is not demanded.
 bool is_checked(const Options&, Frame, Frame, std::size_t) { return false; }
 BitRanges bits_in(const Options& values, Frame, Frame, const FieldInfo& field) {
   return place_in_word(format_by(values).word, field, 0);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// SSI test words with the document that each is from.
+// SSI test words with the document that each is from; "derived": made by the rules of the document.
 #pragma once
 
 #include <array>
@@ -9,7 +9,7 @@
 namespace absenc::ssi {
 
 // clang-format off
-/// Test frames from documents, each with the fields or the error that decoding must give.
+/// Test frames, each with the fields or the error that decoding must give.
 inline constexpr auto vectors = std::to_array<author::VectorText>({
     {"ssi-001", "12 bits", "RAA38S6 manual 3.5", "bits=12", "", "000111101111", "singleturn=495 angle_deg=43.505859375"},
     {"ssi-002", "12 bits at zero", "RAA38S6 manual 3.5", "bits=12", "", "000000000000", "singleturn=0 angle_deg=0.0"},
