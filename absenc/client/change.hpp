@@ -18,9 +18,9 @@ namespace absenc::client {
 enum class ChangeState : std::uint8_t {
   none,       ///< the command changes no encoder
   not_sent,   ///< no request was sent, so the encoder is unchanged
-  confirmed,  ///< the request was sent, and reply and read-back confirm the change
+  confirmed,  ///< the request was sent; the reply and, where there is one, the read-back confirm the change
   refused,    ///< the request was sent, but the encoder refused it or its read-back shows no change
-  unknown,    ///< the request was sent, but no good reply came: the change may be done or not
+  unknown,    ///< the request was sent, but no good reply or read-back came: the change may be done or not
 };
 
 /// Returns the state as a word: "not_sent", "confirmed", "refused" or "unknown"; "" for `none`.

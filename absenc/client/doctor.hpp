@@ -121,7 +121,8 @@ struct Measured {
   Time quickest{};      ///< Shortest time from the end of a request to the end of its good reply; 0: not known.
   Time slowest{};       ///< Longest time from the end of a request to the end of its good reply; 0: not known.
   double rate = 0;      ///< Number of good readings per second; 0: not known.
-  /// Echo of the adapter: "echo seen" or "no echo", or the user's setting, "echo=off"; "": the line has no echo.
+  /// Echo of the adapter: "echo seen", "no echo" or "echo not known", or the user's setting, as "echo=off"; "": not a
+  /// line of characters, or no good reading.
   std::string echo{};
   /// Latency of the connection, from the adapter's latency timer or the setting `latency`; without a value: not known.
   std::optional<Time> latency{};

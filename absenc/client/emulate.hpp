@@ -44,7 +44,8 @@ struct RequestCounts {
 };
 
 /// A running virtual encoder, served by its own thread until this object is destroyed. Any thread may call the
-/// functions; a change is effective when the call returns.
+/// functions; a change is effective when the call returns. If serving has failed, functions that change or ask the
+/// encoder throw the exception that ended it.
 class Emulation {
  public:
   /// Starts the virtual encoder, as `emulate` does.
@@ -85,7 +86,8 @@ class Emulation {
   /// Sets the rate of every fault to 0.
   void clear_faults();
 
-  /// Returns the number of replies into which this fault was injected.
+  /// Returns how often this fault was injected, into replies or, for "request_corrupt", into requests. Throws
+  /// UsageError for an unknown fault.
   [[nodiscard]] std::uint64_t fault_count(std::string_view kind) const;
   /// Returns the number of requests that the encoder answered.
   [[nodiscard]] std::uint64_t answer_count() const;

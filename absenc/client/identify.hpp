@@ -18,7 +18,7 @@ namespace absenc::client {
 struct FoundEncoder {
   const Unit* unit = nullptr;           ///< Unit whose protocol explains the replies.
   Options options{};                    ///< Options of the unit with which the replies are explained.
-  std::vector<std::string> settings{};  ///< Shortest list of settings that yields `options`, as "model=23-bit".
+  std::vector<std::string> settings{};  ///< Short list of settings that yields `options`, as "model=23-bit".
   /// Address for `open`, as "tformat:/dev/ttyUSB0?model=23-bit"; "" for a capture.
   std::string address{};
   /// Setting that selects this encoder among several on the line, as "address=3"; "": it is the only one.
