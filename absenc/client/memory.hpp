@@ -72,7 +72,7 @@ class Encoder;
 using MemoryProgress = std::function<void(std::size_t done, std::size_t all)>;
 
 /// Access to the memory of an open encoder, from Encoder::memory. Functions throw EncoderFailure if a command fails,
-/// and exceptions of the port.
+/// Failure if a reply has another number of bytes than requested, and exceptions of the port.
 class Memory {
  public:
   /// Reads and writes the memory of `encoder`, which must outlive this object.
@@ -121,11 +121,13 @@ class MemoryChange {
   [[nodiscard]] const MemoryImage& found() const { return found_; }
   /// Returns the bytes that differed when `look` read them, with their wanted values.
   [[nodiscard]] const MemoryImage& differing() const { return differing_; }
-  /// Returns the bytes that were written and verified.
+  /// Returns the bytes that were written and read back, without those that `verify` found changed.
   [[nodiscard]] const MemoryImage& written() const { return written_; }
-  /// Returns the wanted bytes that differed and were not written, without the byte that `unknown` returns.
+  /// Returns the wanted bytes that differed and were not written, or that `verify` found changed, without the byte that
+  /// `unknown` returns.
   [[nodiscard]] MemoryImage not_written() const;
-  /// Returns the state of the last byte that was written; not_sent before the first write.
+  /// Returns the state of the last byte that was to be written, or unknown if `verify` found changed bytes; not_sent
+  /// before the first write.
   [[nodiscard]] ChangeState state() const { return state_; }
   /// Returns the byte of which it is unknown whether it was written; empty if there is none.
   [[nodiscard]] MemoryImage unknown() const;

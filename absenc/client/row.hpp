@@ -85,8 +85,8 @@ struct Row {
   /// Returns the value of the column `name`. Throws UsageError, which suggests the nearest name, if there is no such
   /// column.
   [[nodiscard]] const Value& operator[](std::string_view name) const;
-  /// Returns the value of the column `name` as type `T`. Throws std::bad_variant_access if the value has another type
-  /// or is missing.
+  /// Returns the value of the column `name` as type `T`. Throws UsageError if there is no such column, and
+  /// std::bad_variant_access if the value has another type or is missing.
   template <class T>
   [[nodiscard]] const T& get(std::string_view name) const {
     return std::get<T>((*this)[name]);

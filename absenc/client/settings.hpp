@@ -41,7 +41,7 @@ struct Setting {
 /// Result of writing a setting.
 struct SettingChange {
   Answer now;           ///< Value of the setting that was read back; if the setting cannot be read, the written value.
-  bool was_so = false;  ///< Whether nothing was sent, because the encoder already had this value.
+  bool was_so = false;  ///< Whether no write was sent, because the encoder already had this value.
   ChangeState state = ChangeState::none;  ///< State of the change; not_sent if the encoder already had this value.
   /// A sentence about a new address of the encoder, "from now on it is reached with address=3"; "": the address is
   /// unchanged.

@@ -35,9 +35,9 @@ struct LineFindings {
   std::size_t searches =
       // number of combinations of protocol, settings and encoder that were tried as an explanation of received frames
       0;
-  bool only_echo = false;          // whether only the adapter's echo was received
+  bool only_echo = false;          // whether in some conversation nothing but the adapter's echo was received
   std::set<std::string> lines{};   // the kinds of lines that were tried, in words
-  std::vector<std::string> notes;  // sentences about protocols that could not be tried, with the reason
+  std::vector<std::string> notes;  // sentences about impossible attempts and contradictory identities
   bool out_of_time = false;
   bool interrupted = false;
 };
