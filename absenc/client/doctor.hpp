@@ -138,11 +138,11 @@ struct Examination {
   Measured measured{};              ///< Times, rates and settings that were measured.
   bool complete = true;             ///< False if the diagnosis was interrupted.
 
-  /// Returns whether no finding is a warning or a fault.
+  /// Returns whether the diagnosis is complete and no finding is a warning or a fault.
   [[nodiscard]] bool healthy() const;
-  /// Returns the first finding that the user should mend; null if there is none.
+  /// Returns the first of the most severe findings; null if no finding is a warning or a fault.
   [[nodiscard]] const Finding* first() const;
-  /// Returns the result on one line, "good: ..." or "first: ...".
+  /// Returns the result on one line, "good: ...", "first: ..." or "interrupted: ...".
   [[nodiscard]] std::string verdict() const;
 };
 
