@@ -161,9 +161,9 @@ struct DoctorChoices {
 /// Returns the identifier of a kind of finding, as "only_echo".
 [[nodiscard]] std::string_view id_of(FindingKind finding_kind);
 
-/// Diagnoses an encoder from the port upwards, by readings, and returns the result. Never writes to the encoder. `text`
-/// and `settings` are those of `open`. A port that cannot be opened is a finding, not an exception. Throws UsageError,
-/// Cancelled.
+/// Diagnoses an encoder from the port upwards, by readings, and returns the result. Sends no command that changes the
+/// encoder. `text` and `settings` are those of `open`. A port that cannot be opened is a finding, not an exception.
+/// Throws UsageError, Cancelled.
 [[nodiscard]] Examination examine(std::string_view text, std::span<const std::string> settings = {},
                                   const DoctorChoices& choices = {});
 

@@ -73,7 +73,8 @@ class Emulation {
   void power_off();
   /// Switches the virtual encoder on. With `real` it needs the start-up time of the document before it replies.
   void power_on(bool real = false);
-  /// Raises an alarm by its name in the unit. Throws UsageError for an unknown name, with the nearest one.
+  /// Raises an alarm by its name in the unit. Throws UsageError for an unknown name, and for an alarm that the encoder
+  /// cannot report with its options.
   void raise_alarm(std::string_view name);
   /// Ends the cause of an alarm. An alarm that the encoder latches stays until a host clears it. Throws UsageError.
   void lower_alarm(std::string_view name);

@@ -205,7 +205,7 @@ class Encoder {
 
 /// Opens and connects an encoder and returns it. `text` is an address, "tformat:/dev/ttyUSB0?model=23-bit" or
 /// "sim:esl", or a name of absenc.toml; `settings` ("name=value") are appended to it. Throws os::Failure. Throws
-/// UsageError, which names the wrong part and the nearest right one.
+/// UsageError, which names the wrong part and, for an unknown name, a similar one if there is one.
 [[nodiscard]] Encoder open(std::string_view text, std::span<const std::string> settings = {});
 
 /// An input range of samples at equal distances in time, without drift. Samples whose time has passed are left out.

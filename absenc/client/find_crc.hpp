@@ -24,7 +24,7 @@ struct CheckedFrame {
 /// bits.
 struct FoundCheck {
   std::string_view name;  ///< Kind of check: "crc", "sum", "negative_sum" or "xor".
-  /// Parameters of a CRC; for the other kinds the width is 8 and `init` is the constant that is added.
+  /// Parameters of a CRC; for the other kinds the width is 8 and `init` is the constant of the sum or xor.
   CrcParameters parameters{};
   bool low_first = false;  ///< Whether the low byte of a check of more than 8 bits comes first.
   bool padded = false;     ///< Whether the check also covers a byte 00 appended to the data.

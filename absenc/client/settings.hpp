@@ -32,10 +32,10 @@ struct Setting {
 /// Returns the commands that read the unit's settings, at least one. Throws UsageError if there are none.
 [[nodiscard]] std::vector<const Command*> readable_settings(const Unit& unit);
 /// Returns the command that reads the setting `name`. Throws UsageError if there is no such setting that can be read;
-/// it suggests the nearest name.
+/// it suggests a similar name or lists all.
 [[nodiscard]] const Command& require_readable_setting(const Unit& unit, std::string_view name);
 /// Returns the setting `name`, which can be written. Throws UsageError if the setting can only be read, or if there is
-/// no setting of this name; in the second case the text suggests the nearest name.
+/// no setting of this name; in the second case the text suggests a similar name or lists all.
 [[nodiscard]] Setting require_setting(const Unit& unit, std::string_view name);
 
 /// Result of writing a setting.

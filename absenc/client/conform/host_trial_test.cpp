@@ -266,7 +266,7 @@ void check_stranger_hosts(const EncoderAddress& address) {
   for (const Unit* const other : all_units()) {
     if (other->link == LinkKind::clocked || (other->link == LinkKind::can) != std::is_same_v<Item, CanFrame>) continue;
     const std::vector<Item> request = request_of<Item>(polled_address(fmt::format("sim:{}", other->id)));
-    // Skips requests that both units accept.
+    // Skips empty requests, and requests that both units accept.
     if (request.empty() || error_of(address, request) == Error::none) continue;
     expect_none_kept(judged_sending([&] { return request; }), other->id);
   }

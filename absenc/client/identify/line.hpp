@@ -47,7 +47,7 @@ struct LineFindings {
 [[nodiscard]] LineSearch parse_search(std::string_view text);
 
 /// Searches the line for encoders and returns the findings. Throws UsageError. Throws os::Failure if the port cannot be
-/// opened.
+/// opened, or is lost before the identities of the found encoders are read.
 [[nodiscard]] LineFindings search_line(const LineSearch& search);
 
 }  // namespace absenc::client

@@ -15,7 +15,7 @@
 namespace absenc::client {
 
 /// Returns the unit of this name. Throws UsageError if there is none; it names the protocols of the maker or model of
-/// this name, or else the nearest name.
+/// this name, or else suggests a similar protocol or lists all.
 [[nodiscard]] const Unit& require_unit(std::string_view id);
 [[nodiscard]] const Command& require_command(const Unit& unit, std::string_view name);
 
@@ -63,7 +63,8 @@ struct RoleArgument {
 
 /// Returns the unit's condition of this name; null if the virtual encoder has no such condition.
 [[nodiscard]] const Condition* find_condition(const Unit& unit, std::string_view name);
-/// Returns the unit's condition of this name. Throws UsageError, which names the nearest name, if there is none.
+/// Returns the unit's condition of this name. If there is none, throws UsageError, which suggests a similar name or
+/// lists all.
 [[nodiscard]] const Condition& require_condition(const Unit& unit, std::string_view name);
 /// Parses a value of the condition. Throws UsageError if it is not a number within the condition's range.
 [[nodiscard]] std::int64_t require_value(const Condition& condition, std::string_view written);
