@@ -81,8 +81,8 @@ class Memory {
   /// Returns the unit of the encoder.
   [[nodiscard]] const Unit& unit() const;
 
-  /// Reads the position once, which fails if the configured model is wrong. The memory itself does not show a wrong
-  /// model and would accept the bytes. Does nothing if the unit cannot read positions.
+  /// Reads the position once, which fails if the reply does not fit the configured model. The memory itself does not
+  /// show a wrong model and would accept the bytes. Does nothing if the unit cannot read positions.
   void check_model();
 
   /// Reads the bytes at the addresses of `image` and returns them. Throws UsageError for addresses that cannot be read.
@@ -98,9 +98,9 @@ class Memory {
   Encoder* encoder_;
 };
 
-/// A change of the memory to a wanted image, in three steps: look, write, verify. After an exception the images still
-/// state which bytes were written and which were not. If the change is repeated, it writes only bytes that still
-/// differ.
+/// A change of the memory to a wanted image, in three steps: look, write, verify, which throw the exceptions of Memory.
+/// After an exception the images still state which bytes were written and which were not. If the change is repeated, it
+/// writes only bytes that still differ.
 class MemoryChange {
  public:
   /// Prepares the change without sending anything. Throws UsageError for addresses that cannot be written.
@@ -110,7 +110,8 @@ class MemoryChange {
   void look(const MemoryProgress& progress = {});
   /// Writes the bytes that differ, one by one, and reads each back.
   void write(const MemoryProgress& progress = {});
-  /// Reads all written bytes again, because a later write may have changed an earlier byte. Throws Failure.
+  /// Reads all written bytes again, because a later write may have changed an earlier byte. Throws Failure if it
+  /// finds a changed byte.
   void verify(const MemoryProgress& progress = {});
   /// After a failure, reads the byte whose write was interrupted, to find out whether it was written.
   void settle();

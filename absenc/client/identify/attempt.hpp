@@ -26,7 +26,7 @@ using capture::Hypothesis;
 using capture::ObservedExchange;
 
 inline constexpr unsigned reads = 6;              // number of readings that are taken of each encoder that replies
-inline constexpr Time listening = 100ms;          // time for which the line is listened to before the first request
+inline constexpr Time listening = 100ms;          // time of listening before the first request at a setting of the line
 inline constexpr std::size_t stream_size = 2048;  // number of bytes of an unsolicited stream that are judged
 inline constexpr unsigned most_unanswered = 3;    // number of readings without a reply after which no more are taken
 inline constexpr Time settled = 5ms;              // silence after which no earlier reply is expected

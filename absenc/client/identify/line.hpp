@@ -30,7 +30,7 @@ struct LineFindings {
   std::vector<Candidate> candidates{};
   std::size_t requests = 0;  // number of requests that were sent
   std::size_t heard = 0;     // number of bytes or frames that were received after requests, without echo
-  // number of bytes or frames that were received while listening, before the first request
+  // number of bytes or frames that were received while listening, before the first request at each setting of the line
   std::size_t unsolicited = 0;
   std::size_t searches =
       // number of combinations of protocol, settings and encoder that were tried as an explanation of received frames
@@ -46,8 +46,9 @@ struct LineFindings {
 /// text names a protocol.
 [[nodiscard]] LineSearch parse_search(std::string_view text);
 
-/// Searches the line for encoders and returns the findings. Throws UsageError. Throws os::Failure if the port cannot be
-/// opened, or is lost before the identities of the found encoders are read.
+/// Searches the line for encoders and returns the findings. Throws UsageError, and os::Ended if `over` of the search
+/// returns true. Throws os::Failure if the port cannot be opened, or is lost before the found encoders are asked for
+/// their identities.
 [[nodiscard]] LineFindings search_line(const LineSearch& search);
 
 }  // namespace absenc::client
