@@ -136,7 +136,7 @@ class Encoder {
 
   /// Runs a command of the unit by name and returns the fields of its result. Arguments that are left out have their
   /// defaults. Does not ask the user for confirmation, even if the command changes the encoder, but reads back written
-  /// values. Throws EncoderFailure, os::Failure, os::Interrupted, UsageError, Cancelled.
+  /// values. Throws EncoderFailure, Failure, os::Failure, os::Interrupted, UsageError, Cancelled.
   Answer run(std::string_view command, std::span<const std::int64_t> arguments = {});
   /// Runs a command of the unit by name, with arguments in the order of the command.
   Answer run(std::string_view command, std::initializer_list<std::int64_t> arguments) {
