@@ -215,8 +215,8 @@ class Text(Case):
                         "--bits", "--json")
         self.assert_good(result)
         self.assertEqual(json.loads(result.stdout)["bits"]["singleturn"], [{"first": 0, "count": 13}])
-        # Bits that are active low are marked as inverted. On CAN and SPI, bit numbers count from the lowest bit of each
-        # byte.
+        # Bits that are active low are marked as inverted. Except on clocked lines, bit numbers count from the lowest
+        # bit of each byte.
         for arguments, field, places in (
             (["encolink", "--hex", "003e825200"], "warning", [{"first": 16, "count": 1, "inverted": True}]),
             (["raa38-modbus", "--hex", "0103021234B533"], "singleturn",

@@ -189,7 +189,7 @@ class DataIds(EmulateCase):
         self.assert_reply(client.exchange(3), 3, 0, [0xFF, 0xFF, 0x7F, 0x17, 0xFF, 0xFF, 0x00, 0x00])
 
     def reset(self, client, data_id, times):
-        """Sends the request `times` times, 100 us apart, as a reset demands. Returns the last reply."""
+        """Sends the request `times` times, at least 100 us apart, as a reset demands. Returns the last reply."""
         reply = b""
         for _ in range(times):
             reply = client.exchange(data_id)
@@ -359,7 +359,7 @@ class Behaviour(EmulateCase):
         port = int(line.rsplit(":", 1)[1])
         with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as connection:
             ends = [Client(connection.fileno()), Client.open(emulator.path)]
-            for asking, listening in (ends, ends[::-1]):  # both TCP clients share one line, so both receive the reply
+            for asking, listening in (ends, ends[::-1]):  # both clients share one line, so both receive the reply
                 self.assert_reply(asking.exchange(0), 0, 0, [5, 0, 0])
                 self.assert_reply(listening.receive(6), 0, 0, [5, 0, 0])
             ends[1].__exit__()

@@ -66,7 +66,7 @@ def built_on(root, unit):
 
 
 def is_public(path):
-    """Returns whether CMakeLists.txt lists the header in absenc_public."""
+    """Returns whether the header is public, by the same rule as absenc_public in CMakeLists.txt."""
     if path.suffix != ".hpp" or path.parts[0] != "absenc" or is_test(path):
         return False
     in_client = path.parts[1] == "client" and len(path.parts) == 3

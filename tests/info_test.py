@@ -15,7 +15,7 @@ class EncoderCase(Case):
 
 
 def questions():
-    """Returns the names of the commands without required arguments, in the order in which `info` runs them."""
+    """Returns the names of tformat's commands that `info` runs, in its order; none of them has a required argument."""
     commands = json_lines(absenc("list", "tformat", "--json").stdout)[0]["commands"]
     free = [command for command in commands if not any(one["required"] for one in command["arguments"])]
     return [command["name"] for verb in ("info", "temperature", "config_get", "read")

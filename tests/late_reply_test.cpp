@@ -81,8 +81,8 @@ class DelayedSession {
     if (age > 3ms) ++outcomes.stale;
   }
 
-  /// Returns how much earlier than the reading's timestamp its position was really sampled, from the true motion of the
-  /// shaft.
+  /// Returns how far the reading's timestamp is from the time at which its position was really sampled, by the true
+  /// motion of the shaft, less the time of one count; at least 0.
   Time age_of(const Reading& reading) const {
     const auto fraction = static_cast<std::uint32_t>(reading.singleturn << (32 - reading.singleturn_bits));
     const auto truth = static_cast<std::uint32_t>(shaft.at(reading.latched).position);

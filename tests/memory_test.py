@@ -314,8 +314,8 @@ class Interruptions(MemoryCase):
     wanted = {(page, address): 1 + address for page in (0, 4) for address in range(30)}
 
     def progress_of(self, err):
-        """Returns the lists of addresses that the message of an interrupted load reports as written, unknown and not
-        written. Together the lists must have each address of the dump."""
+        """Returns the sets of addresses that the message of an interrupted load reports as written, unknown and not
+        written."""
         listed = []
         for words in ("written and read back", "not known whether written", "not written"):
             found = re.search(rf"^  {words}: (.*)$", err, re.MULTILINE)
@@ -323,8 +323,8 @@ class Interruptions(MemoryCase):
         return listed
 
     def assert_progress_is_true(self, err, image):
-        """Checks that each address of the dump is in exactly one list of the message, and that the encoder's memory has
-        the content which the list states."""
+        """Checks that no address is in two lists of the message, and that `image`, the encoder's memory, agrees with
+        the lists. Returns the lists."""
         written, unknown, left = self.progress_of(err)
         self.assertEqual({at for at in written if image[at] != self.wanted[at]}, set(), err)
         self.assertEqual({at for at in left if image[at] == self.wanted[at]}, set(), err)

@@ -287,8 +287,7 @@ class Screen(MonitorCase):
 
 class Lines(MonitorCase):
     def test_summary_lines_agree(self):
-        """The summary lines of two encoders have the same form: one with occasional errors, one that uses all the
-        available time."""
+        """The summary lines of several encoders have the same form, also that of an encoder with occasional errors."""
         result = absenc("monitor", "sim:tformat", "sim:esl?fault=corrupt=0.05", "sim:ssi", "--rate", "0", "--for", "0.73",
                         "--json", "--interval", "0.2")
         closing = re.findall(r"^absenc: (sim:\S+): (\d+) readings; (\d+) good(.*)", result.stderr, re.MULTILINE)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests that every command of every unit with a character link ends in bounded time with an error on a line that is
-// never silent.
+// Tests that every command of every unit with a character link ends in bounded time on a line that is never silent, and
+// with an error unless the line repeats the request.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -106,7 +106,8 @@ std::vector<std::int64_t> least_arguments(const Command& command) {
 
 class NeverSilent : public ::testing::TestWithParam<const Unit*> {
  protected:
-  // Runs each command with these options on a line that is never silent: it must end within 30 s with an error.
+  // Runs each command with these options on a line that is never silent: it must end within 30 s, and with an error
+  // unless the line repeats the request.
   void expect_ends(const Options& options, Time period, const Kind& kind) {
     for (const Command& command : unit.commands) {
       const Any<Conversation> made = unit.host(options, command, least_arguments(command), storage_);

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests every verb of absenc on a pseudo-terminal that is never silent: each must end and report the problem."""
+"""Tests verbs of absenc on a pseudo-terminal that is never silent: each must end by itself and report the problem."""
 import concurrent.futures
 import json
 import time
@@ -23,7 +23,8 @@ def least(argument):
 
 
 def invocations(unit, encoder):
-    """Yields the command line of each verb that communicates with an encoder, and of each command of the unit."""
+    """Yields command lines that communicate with an encoder: of verbs that end by themselves, and of each command of
+    the unit."""
     verbs = {command["verb"] for command in unit["commands"]}
     yield "read", encoder
     yield "read", encoder, "--count", "2"

@@ -81,7 +81,7 @@ class PlatformIO(Case):
 
 
 class Zephyr(Case):
-    # Keys of module.yml, from the schema in zephyr/scripts/zephyr_module.py.
+    # Keys of module.yml, from the schema in Zephyr's own scripts/zephyr_module.py.
     def test_module_file(self):
         module = yaml.safe_load((ROOT / "zephyr/module.yml").read_text())
         self.assertEqual(module.keys(), {"name", "build"})

@@ -15,8 +15,7 @@ except ImportError:
 
 from selenium.webdriver.chrome.service import Service
 
-# Each entry: name of an encoder, its protocol and options. The caller supplies the port that a name in braces stands
-# for.
+# Each entry: name of an encoder, its protocol and options.
 KINDS = {
     "shoulder": ("tformat", "motion=rpm=60"),
     "slide-x": ("biss", "model=linear-26-1um&motion=sine=20,0.1&singleturn=33554432"),
@@ -33,7 +32,8 @@ KINDS = {
 
 
 def config(kinds, ports=None):
-    """Returns the text of an absenc.toml with these encoders."""
+    """Returns the text of an absenc.toml with these encoders, on the ports that `ports` has by name, all others on
+    sim."""
     text = ""
     for name, (protocol, options) in kinds.items():
         text += f'[encoder.{name}]\nprotocol = "{protocol}"\nport = "{(ports or {}).get(name, "sim")}"\nrate_hz = 100\n'

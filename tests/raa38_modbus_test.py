@@ -42,7 +42,8 @@ FRAMES = [
     ("bits=14", REQUEST_1, framed("01830b"), "request_rejected", "behind the gateway", "gateway"),
     ("bits=14", REQUEST_1, framed("018377"), "request_rejected", "the standard does not have", "manual"),
 ]
-# Further bad replies, in the same form, to requests that no reading sends.
+# Further bad exchanges, whose requests no reading sends. Each row: request, reply, expected error, evidence in the
+# message.
 OTHER_FRAMES = [
     (framed("ffa0"), framed("ffa000"), "out_of_range", "from 1 to 247"),
     (framed("ffa0"), framed("ffa001")[:-1], "wrong_length", "several encoders"),

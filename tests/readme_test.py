@@ -67,7 +67,7 @@ class Page:
         return text.replace("/tmp/", f"{self.folder}/").replace(PORT, f"{self.folder}/ttyUSB0").replace("127.0.0.1:8420", f"127.0.0.1:{self.port}")
 
     def start(self, command):
-        """Starts the command in the background until `close`, and waits until it prints a line that shows that it is
+        """Starts the command in the background until `close`, and waits for its first line, which shows that it is
         ready."""
         process = subprocess.Popen(["bash", "-c", "exec " + self.here(command)], cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL,
                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE)

@@ -95,7 +95,8 @@ class Hdf5(RecordCase):
             self.assertTrue(set(columns["event"]) - {b"", b"gap"}, part)
 
     def test_killed_recording_is_valid(self):
-        """After SIGKILL at any time it must be possible to open the file, and few rows may be missing."""
+        """Sends SIGKILL up to 3 s after the first rows, eight times. It must be possible to open the file, and at most
+        the rows of LOST seconds may be missing."""
         random.seed(3)
         for number in range(8):
             path = self.output(f"{number}.h5")

@@ -240,7 +240,7 @@ class Gaps(RecordCase):
 
 class Failures(RecordCase):
     def lose(self, change, *words):
-        """Records, calls `change(path)` to change the file, and expects that `record` ends at once with an error."""
+        """Records, calls `change(path)` to change the file, and expects that `record` ends with an error."""
         path = self.output(f"{len(os.listdir(self.directory))}.csv")
         process = self.start("record", "sim:tformat", "--output", path, "--every", "1000", "--rate", "100")
         wait_until(lambda: len(rows_so_far(path)) > 0, "readings")
@@ -366,8 +366,8 @@ class Failures(RecordCase):
         self.assertGreater(os.path.getsize(copy), 2**20 - 3 * 4096)
 
     def test_killed_recording_is_complete(self):
-        """After SIGKILL at any time, a hundred times, every line must be complete, and at most the last second may be
-        missing."""
+        """Sends SIGKILL up to 50 ms after the file appears, a hundred times. Every line must be complete, and at most
+        the last second may be missing."""
         random.seed(1)
         for number in range(100):
             path = self.output(f"{number}.csv")

@@ -29,8 +29,8 @@ class Abuse(ServeCase):
         return connection
 
     def status(self, path="/healthz", address="127.0.0.1"):
-        """Returns the HTTP status of a request on a new connection, or None if the server closes the connection without
-        a reply."""
+        """Returns the HTTP status of a request on a new connection, or None if the server resets the connection
+        without a reply."""
         with socket.create_connection(("127.0.0.1", self.served.port), PATIENCE, (address, 0)) as connection:
             with contextlib.suppress(ConnectionError):
                 connection.sendall(f"GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n".encode())

@@ -38,8 +38,8 @@ class Page(ServeCase):
         self.browser.get(self.served.url + hash_text)
 
     def text(self, selector="body"):
-        """Returns the visible text of an element. It is read in one step, because the page may replace its nodes
-        between two."""
+        """Returns the visible text of the elements that match the selector. It is read in one step, because the page
+        may replace its nodes between two."""
         return self.browser.execute_script("""
             return [...document.querySelectorAll(arguments[0])].filter((one) => one.getClientRects().length > 0)
                    .map((one) => one.innerText).join("\\n");""", selector)

@@ -233,7 +233,8 @@ TEST_F(Clocked, ReportsTooFewClocksToDevice) {
   EXPECT_EQ(notes, "too few clocks: 8");
 }
 
-// (e) CAN at 250 kbit/s: a frame without data takes 47 bits of 4 us, each data byte 8 more.
+// (e) CAN at 250 kbit/s: a frame without data takes 47 bits of 4 us, each data byte 8 more; stuff bits are added to
+// that.
 struct Can : testing::Test {
   sim::Line<CanFrame> line{LinkKind::can, {.rate = 250'000}};
   static CanFrame frame(std::uint32_t id, Byte data) { return {.id = id, .size = 1, .data = {data}}; }

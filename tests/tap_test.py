@@ -190,7 +190,7 @@ class Output(TapCase):
         self.assertEqual(result.returncode, 0, result.stderr)
 
     def test_exchange_is_shown_at_once(self):
-        """tap must print an exchange before the next one arrives."""
+        """tap must print every exchange, also the last one, while its input is still open."""
         with subprocess.Popen([ABSENC, "tap", "-", "tformat", "--json"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                               stderr=subprocess.DEVNULL, bufsize=0) as process:
             for _ in range(20):

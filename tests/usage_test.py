@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests that any argument which absenc does not understand ends the command with status 2 before the command has any
+"""Tests that arguments which absenc does not understand end the command with status 2 before the command has any
 effect."""
 import json
 import unittest

@@ -161,7 +161,7 @@ class Wave(Case):
                 self.assertIn("timeout", {row.get("error") for row in rows})
 
     def edges(self, *arguments):
-        """Returns the times at which each wire of the waveform changes, and the initial levels."""
+        """Returns, for each wire of the waveform, the times of its initial level and of its changes."""
         path = self.file("edges.vcd")
         self.wave(*arguments[:1], path, *arguments[1:], "--force")
         names, times, at = {}, {}, 0

@@ -31,12 +31,12 @@ struct CampaignChoices {
   std::vector<std::string> options{};  ///< Options of the unit, as "address=3".
   /// Faults with their rates from 0 to 1, as "bit=0.001"; others have rate 0. Empty: the default rates of all faults.
   std::vector<std::string> faults{};
-  std::uint64_t exchanges = 100'000;  ///< Number of exchanges, at least 1.
-  std::uint64_t seed = 1;             ///< Seed of the faults; the same seed gives the same campaign.
+  std::uint64_t exchanges = 100'000;  ///< Number of exchanges, at least 1; the last reading may exceed it.
+  std::uint64_t seed = 1;             ///< Seed of faults and shaft positions; the same seed gives the same counts.
   /// Speed of the shaft in revolutions per minute (mm/s for linear encoders), with positions confirmed as `absenc read`
   /// does. Without a value the shaft moves to another place before every reading and positions are not confirmed.
   std::optional<double> rpm{};
-  /// Maximum speed that the host assumes, in revolutions per minute or mm/s; 0: limit of the model, or the default.
+  /// Speed limit that the host assumes with `rpm`, in rev/min or mm/s; 0: that of the model, or the default.
   std::uint32_t maximum_rpm = 0;
 };
 
@@ -61,7 +61,8 @@ struct Guarded {
   double let_through = 0;  ///< Computed number of wrong positions that pass both frame checks and confirmation.
 };
 
-/// Result of a campaign: numbers of exchanges and shares of errors.
+/// Result of a campaign: numbers of exchanges and shares of errors. With `rpm`, `recovered`, `wrong` and `older` are
+/// not counted: `guarded` has the wrong positions.
 struct CampaignResult {
   std::string protocol{};       ///< Identifier of the unit.
   std::string model{};          ///< Name of the encoder's model; "" if the unit has none.
@@ -71,7 +72,7 @@ struct CampaignResult {
   Share failed{};               ///< Share of exchanges that ended with an error.
   Share given_up{};             ///< Share of readings that ended with an error after all attempts.
   Share recovered{};            ///< Share of readings that succeeded after a failed attempt.
-  Share wrong{};                ///< Share of exchanges that returned a position which the shaft did not have.
+  Share wrong{};                ///< Share of exchanges that returned a wrong position; includes `older`.
   /// Share of exchanges (with `rpm`: of readings) after which a damaged request had changed the encoder for good; the
   /// campaign then continues with a fresh encoder.
   Share changed{};
@@ -79,14 +80,14 @@ struct CampaignResult {
   /// request.
   Share older{};
   std::optional<Guarded> guarded{};  ///< Shares of confirmed and wrong positions; without a value unless `rpm` was set.
-  /// Computed strength of the frame check. Without a value on CAN, and if the check has more than 16 bits, is not
-  /// linear or covers at most half of the reply, or if replies differ in length.
+  /// Computed strength of the frame check. Without a value on CAN, if no sample reply has a position, if the check has
+  /// more than 16 bits, is not linear or covers at most half of the reply, or if replies differ in length.
   std::optional<CheckWorth> worth{};
-  double seconds = 0;  ///< Processor time that the whole campaign used, in seconds.
+  double seconds = 0;  ///< Processor time of the process during the exchanges, in seconds; excludes computing `worth`.
 };
 
-/// Runs a campaign on one core. Throws UsageError for unknown names, for rates outside 0 to 1, and for options with
-/// which the unit has no virtual encoder.
+/// Runs a campaign on one core. Throws UsageError for unknown names, for wrong option values, for rates outside 0 to 1,
+/// and for options with which the unit has no virtual encoder.
 [[nodiscard]] CampaignResult campaign(std::string_view protocol, const CampaignChoices& choices = {});
 
 }  // namespace absenc::client

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reports whether a command changed its encoder: not sent, confirmed, refused or unknown. Programs compare the state's
-// word, people read its sentence. Every exception of a command that changes the encoder carries the state.
+// word, people read its sentence. Exceptions of the port, the encoder or a cancellation carry the state if the command
+// changes the encoder.
 #pragma once
 
 #include <cstdint>
@@ -17,9 +18,9 @@ namespace absenc::client {
 enum class ChangeState : std::uint8_t {
   none,       ///< the command changes no encoder
   not_sent,   ///< no request was sent, so the encoder is unchanged
-  confirmed,  ///< the request was sent, and reply and read-back confirm the change
+  confirmed,  ///< the request was sent; the reply and, where there is one, the read-back confirm the change
   refused,    ///< the request was sent, but the encoder refused it or its read-back shows no change
-  unknown,    ///< the request was sent, but no good reply came: the change may be done or not
+  unknown,    ///< the request was sent, but no good reply or read-back came: the change may be done or not
 };
 
 /// Returns the state as a word: "not_sent", "confirmed", "refused" or "unknown"; "" for `none`.
@@ -72,12 +73,12 @@ class OfChange final : public Base, public Changing {
 /// Returns the change that the exception carries; null if it carries none, or one with the state `none`.
 [[nodiscard]] const Change* change_of(const std::exception& failure);
 
-/// Throws the exception that is being handled again, with `change` added unless the exception already carries a change
-/// or has a type that carries none. Call this only in a catch block.
+/// Rethrows the exception that is being handled, with `change` added unless the state of `change` is `none`, the
+/// exception already carries a change, or its type can carry none. Call this only in a catch block.
 [[noreturn]] void rethrow_with(const Change& change);
 
 /// Runs `work`, which sends nothing that changes the encoder, and returns its result. Adds the state `not_sent` to
-/// exceptions of `work`.
+/// exceptions of `work`, as `rethrow_with` does.
 template <class Work>
 auto before_change(const Work& work) {
   try {

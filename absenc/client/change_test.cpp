@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs every changing command of every unit with every fault, and with a port that is lost at every step. Compares the
-// reported change with the memory of the virtual encoder, in virtual time.
+// Runs the changing commands of every unit with every fault that its link can have, and with a port that is lost after
+// various numbers of steps. Compares the reported change with the memory of the virtual encoder, in virtual time.
 #include "absenc/client/change.hpp"
 
 #include <gtest/gtest.h>
@@ -109,8 +109,8 @@ Ended run(const std::string& address, const Command& command, const Values& valu
   return ended;
 }
 
-/// Returns arguments with which the command changes something on a good line. Returns nothing if the command needs
-/// options that depend on the encoder's installation.
+/// Returns arguments with which the command's change is confirmed on a good line; nothing if no candidate is, as when
+/// the command needs options that depend on the encoder's installation.
 std::optional<Values> working_values(const Unit& unit, const Command& command) {
   std::vector<Values> candidates;
   for (const std::int64_t wanted : {INT64_MAX, std::int64_t{2}, std::int64_t{3}, std::int64_t{90}, INT64_MIN}) {
@@ -171,7 +171,7 @@ void require_truth(const Ended& ended, const Ended& good, const std::string& wha
   }
 }
 
-// Returns the smallest number of steps at the port with which the command ends without an exception.
+// Returns the smallest number of steps at the port, but at least 33, with which the command ends without an exception.
 std::size_t steps_of(const std::string& address, const Command& command, const Values& values) {
   std::size_t most = 64;
   while (run(address, command, values, most).thrown) most *= 2;

@@ -46,7 +46,8 @@ struct Conformance {
   [[nodiscard]] std::string tap() const;
   /// Returns the results as JUnit XML, with an error if no clause could be judged.
   [[nodiscard]] std::string junit() const;
-  /// Returns the results as text for people: three lines for each clause, then the numbers of verdicts.
+  /// Returns the results as text for people: three lines for each clause, the commands that restore an encoder that is
+  /// left changed, and the numbers of verdicts.
   [[nodiscard]] std::string report() const;
 };
 

@@ -23,7 +23,7 @@ struct DecodeChoices {
   std::vector<std::string> channels{};
   unsigned raw_channels = 0;  ///< Number of channels in a file of raw samples; 0: the file is of another kind.
   std::uint64_t samples_per_second = 0;  ///< Number of samples per second; 0: the rate that the file states.
-  double baud = 0;                       ///< Baud rate of the line, in bits per second; 0: detected in the capture.
+  double baud = 0;                       ///< Baud rate of the line, in bits per second; 0: the unit's, or detected.
   /// Parity of the line; without a value the parity of the unit, or the parity detected in the capture.
   std::optional<Parity> parity{};
   std::string model{};                 ///< Name of a model of the unit; empty: the default model.
@@ -36,7 +36,8 @@ struct DecodeChoices {
 /// Columns: `time_s` (`tick` in a capture without times), `end_s` (`end_tick`), `kind` ("exchange", "request", "reply",
 /// "noise"), `request` and `reply` (bytes; text for CAN and clocked links, as "1FF:022B" and "0001"), `turnaround_us`,
 /// `angle_deg` (`position_mm` for linear encoders), then each field of the unit under its name, and `error` with
-/// `message`, which are empty in a good row. In a row with an error the position and the fields are empty.
+/// `message`. In a good row `error` is empty, and `message` has only a remark, if any. In a row with an error the
+/// position and the fields are empty.
 ///
 /// If a reply does not carry the alarms, they come from an earlier reply of the same encoder, until a request is
 /// unanswered or clears alarms. Without such a reply, alarms and the position that depends on them are `Unknown`.
@@ -56,8 +57,8 @@ class Decoded {
   /// Ends the decoding threads, even in the middle of the file.
   ~Decoded();
 
-  /// Waits for the first row and returns an iterator to it; call it once. Throws UsageError or Failure, as every later
-  /// step does.
+  /// Waits for the first row and returns an iterator to it; call it once. Throws UsageError, Failure or, after
+  /// `cancel`, Cancelled, as every later step does.
   [[nodiscard]] Iterator begin();
   /// Returns the end of the range, for comparison with an iterator.
   [[nodiscard]] static Iterator::End end() { return {}; }

@@ -121,7 +121,8 @@ struct Measured {
   Time quickest{};      ///< Shortest time from the end of a request to the end of its good reply; 0: not known.
   Time slowest{};       ///< Longest time from the end of a request to the end of its good reply; 0: not known.
   double rate = 0;      ///< Number of good readings per second; 0: not known.
-  /// Echo of the adapter: "echo seen" or "no echo", or the user's setting, "echo=off"; "": the line has no echo.
+  /// Echo of the adapter: "echo seen", "no echo" or "echo not known", or the user's setting, as "echo=off"; "": not a
+  /// line of characters, or no good reading.
   std::string echo{};
   /// Latency of the connection, from the adapter's latency timer or the setting `latency`; without a value: not known.
   std::optional<Time> latency{};
@@ -137,11 +138,11 @@ struct Examination {
   Measured measured{};              ///< Times, rates and settings that were measured.
   bool complete = true;             ///< False if the diagnosis was interrupted.
 
-  /// Returns whether no finding is a warning or a fault.
+  /// Returns whether the diagnosis is complete and no finding is a warning or a fault.
   [[nodiscard]] bool healthy() const;
-  /// Returns the first finding that the user should mend; null if there is none.
+  /// Returns the first of the most severe findings; null if no finding is a warning or a fault.
   [[nodiscard]] const Finding* first() const;
-  /// Returns the result on one line, "good: ..." or "first: ...".
+  /// Returns the result on one line, "good: ...", "first: ..." or "interrupted: ...".
   [[nodiscard]] std::string verdict() const;
 };
 
@@ -160,9 +161,9 @@ struct DoctorChoices {
 /// Returns the identifier of a kind of finding, as "only_echo".
 [[nodiscard]] std::string_view id_of(FindingKind finding_kind);
 
-/// Diagnoses an encoder from the port upwards, by readings, and returns the result. Never writes to the encoder. `text`
-/// and `settings` are those of `open`. A port that cannot be opened is a finding, not an exception. Throws UsageError,
-/// Cancelled.
+/// Diagnoses an encoder from the port upwards, by readings, and returns the result. Sends no command that changes the
+/// encoder. `text` and `settings` are those of `open`. A port that cannot be opened is a finding, not an exception.
+/// Throws UsageError, Cancelled.
 [[nodiscard]] Examination examine(std::string_view text, std::span<const std::string> settings = {},
                                   const DoctorChoices& choices = {});
 

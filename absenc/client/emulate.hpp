@@ -44,7 +44,8 @@ struct RequestCounts {
 };
 
 /// A running virtual encoder, served by its own thread until this object is destroyed. Any thread may call the
-/// functions; a change is effective when the call returns.
+/// functions; a change is effective when the call returns. If serving has failed, functions that change or ask the
+/// encoder throw the exception that ended it.
 class Emulation {
  public:
   /// Starts the virtual encoder, as `emulate` does.
@@ -72,7 +73,8 @@ class Emulation {
   void power_off();
   /// Switches the virtual encoder on. With `real` it needs the start-up time of the document before it replies.
   void power_on(bool real = false);
-  /// Raises an alarm by its name in the unit. Throws UsageError for an unknown name, with the nearest one.
+  /// Raises an alarm by its name in the unit. Throws UsageError for an unknown name, and for an alarm that the encoder
+  /// cannot report with its options.
   void raise_alarm(std::string_view name);
   /// Ends the cause of an alarm. An alarm that the encoder latches stays until a host clears it. Throws UsageError.
   void lower_alarm(std::string_view name);
@@ -85,7 +87,8 @@ class Emulation {
   /// Sets the rate of every fault to 0.
   void clear_faults();
 
-  /// Returns the number of replies into which this fault was injected.
+  /// Returns how often this fault was injected, into replies or, for "request_corrupt", into requests. Throws
+  /// UsageError for an unknown fault.
   [[nodiscard]] std::uint64_t fault_count(std::string_view kind) const;
   /// Returns the number of requests that the encoder answered.
   [[nodiscard]] std::uint64_t answer_count() const;

@@ -50,7 +50,7 @@ struct Sample {
   };
 
   Kind kind = Kind::absent;  ///< Whether this sample holds a reading, a failure or an event.
-  Time at{};                 ///< Time at which the reading was latched, or at which the event occurred.
+  Time at{};                 ///< Time at which the reading was latched, the attempt failed, or the event occurred.
   Reading reading{};         ///< The reading; default-constructed if `kind` is not `reading`.
   /// Whether a second reading confirmed the position, because the shaft can have moved from one to the other in the
   /// time between them.
@@ -120,9 +120,9 @@ class Encoder {
   [[nodiscard]] bool connected() const;
 
   /// Returns a reading of the position with all alarms that the encoder can report. If no second reading confirmed the
-  /// position, its validity is marked as unknown. Opens a lost port again. Throws EncoderFailure, os::Failure,
-  /// Cancelled. Throws DeadlinePassed if there is no reading at `deadline` (a time of os::now), up to 20 ms and the
-  /// duration of one exchange later.
+  /// position, its validity is marked as unknown. Opens a lost port again. Throws EncoderFailure, Failure, UsageError,
+  /// os::Failure, os::Interrupted, Cancelled. Throws DeadlinePassed if there is no reading at `deadline` (a time of
+  /// os::now), up to 20 ms and the duration of one exchange later.
   [[nodiscard]] Reading read(Time deadline = never);
   /// Returns a reading with the alarms: by the command that reads each alarm by name if the unit has one, otherwise by
   /// `read`.
@@ -136,7 +136,7 @@ class Encoder {
 
   /// Runs a command of the unit by name and returns the fields of its result. Arguments that are left out have their
   /// defaults. Does not ask the user for confirmation, even if the command changes the encoder, but reads back written
-  /// values. Throws EncoderFailure, os::Failure, UsageError, Cancelled.
+  /// values. Throws EncoderFailure, Failure, os::Failure, os::Interrupted, UsageError, Cancelled.
   Answer run(std::string_view command, std::span<const std::int64_t> arguments = {});
   /// Runs a command of the unit by name, with arguments in the order of the command.
   Answer run(std::string_view command, std::initializer_list<std::int64_t> arguments) {
@@ -158,11 +158,12 @@ class Encoder {
   void resume();
 
   /// Sets a function that is polled during every wait, including the wait for the next sample, and returns the previous
-  /// function. Once the function returns true, the wait ends with Cancelled. Empty: no function.
+  /// function. Once the function returns true, the wait ends with Cancelled, a loop over samples without an exception.
+  /// Empty: no function.
   std::function<bool()> end_when(std::function<bool()> over);
 
-  /// Returns the state of the last command that changes the encoder. An exception of such a command carries the same
-  /// state (change.hpp).
+  /// Returns the state of the last command that changes the encoder. Exceptions of such a command, except UsageError,
+  /// carry the same state (change.hpp).
   [[nodiscard]] const Change& change() const;
 
   /// Makes the continued position start again at the next reading; call it after a command that moves the zero.
@@ -178,7 +179,7 @@ class Encoder {
   [[nodiscard]] const Joint& joint() const;
   /// Returns a sentence for each setting of the port that could be better. The encoder must be connected.
   [[nodiscard]] const std::vector<std::string>& notes() const;
-  /// Returns the counts of all exchanges: good ones, errors by kind, repeated requests.
+  /// Returns the counts of all conversations: good ones, errors by kind, repeated attempts.
   [[nodiscard]] const host::Counters& counters() const;
   /// Returns the latencies of all good exchanges, from the end of a request to the end of its reply.
   [[nodiscard]] const host::Latencies& latencies() const;
@@ -204,7 +205,7 @@ class Encoder {
 
 /// Opens and connects an encoder and returns it. `text` is an address, "tformat:/dev/ttyUSB0?model=23-bit" or
 /// "sim:esl", or a name of absenc.toml; `settings` ("name=value") are appended to it. Throws os::Failure. Throws
-/// UsageError, which names the wrong part and the nearest right one.
+/// UsageError, which names the wrong part and, for an unknown name, a similar one if there is one.
 [[nodiscard]] Encoder open(std::string_view text, std::span<const std::string> settings = {});
 
 /// An input range of samples at equal distances in time, without drift. Samples whose time has passed are left out.

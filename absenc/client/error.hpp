@@ -15,7 +15,8 @@ struct UsageError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Exception: a file or a well-formed reply has unexpected content. The text is a sentence that states the problem.
+/// Exception: an operation cannot be completed, as when a file or a well-formed reply has unexpected content. The text
+/// is a sentence that states the problem.
 struct Failure : std::runtime_error {
   using std::runtime_error::runtime_error;
 };

@@ -24,7 +24,7 @@ struct CheckedFrame {
 /// bits.
 struct FoundCheck {
   std::string_view name;  ///< Kind of check: "crc", "sum", "negative_sum" or "xor".
-  /// Parameters of a CRC; for the other kinds the width is 8 and `init` is the constant that is added.
+  /// Parameters of a CRC; for the other kinds the width is 8 and `init` is the constant of the sum or xor.
   CrcParameters parameters{};
   bool low_first = false;  ///< Whether the low byte of a check of more than 8 bits comes first.
   bool padded = false;     ///< Whether the check also covers a byte 00 appended to the data.
@@ -46,7 +46,9 @@ struct CheckFindings {
   std::size_t longest = 0;           ///< Length of the longest frame, in positions.
   /// Whether the frames contain too little information to list all checks that explain them.
   bool is_open = false;
-  std::size_t odd = 0;  ///< Number, from 1, of a frame without which a check explains all others; 0: there is none.
+  /// Number, from 1, of a frame without which a check explains all others; 0: there is none, or a check explains every
+  /// frame, or there are fewer than 5 frames.
+  std::size_t odd = 0;
   /// A sentence about open questions, or about the reason why no check was found; "": there is nothing to say.
   std::string advice{};
 };
@@ -58,7 +60,7 @@ struct CheckFindings {
 /// A unit with options that configure it for a found check.
 struct CheckOptions {
   const Unit* unit;  ///< Unit whose frames can have the check.
-  /// Options that select the check, as "crc_width=16"; empty if the unit always has this check.
+  /// Options that select the check, as "crc_width=16"; empty if the defaults of the unit select it.
   std::vector<std::string> options;
 };
 

@@ -18,7 +18,7 @@ namespace absenc::client {
 struct FoundEncoder {
   const Unit* unit = nullptr;           ///< Unit whose protocol explains the replies.
   Options options{};                    ///< Options of the unit with which the replies are explained.
-  std::vector<std::string> settings{};  ///< Shortest list of settings that yields `options`, as "model=23-bit".
+  std::vector<std::string> settings{};  ///< Short list of settings that yields `options`, as "model=23-bit".
   /// Address for `open`, as "tformat:/dev/ttyUSB0?model=23-bit"; "" for a capture.
   std::string address{};
   /// Setting that selects this encoder among several on the line, as "address=3"; "": it is the only one.
@@ -46,12 +46,12 @@ struct IdentifyChoices {
 };
 
 /// Polls the line with every protocol that fits, at its rates and addresses, by reads that change nothing, and returns
-/// the encoders that reply. `place` is a port with its settings: "/dev/ttyUSB0", "tcp:HOST:PORT?latency=50",
-/// "spi:/dev/spidev0.0", "can0". Throws os::Failure, UsageError, os::Interrupted.
+/// the encoders that reply or send unsolicited frames. `place` is a port with its settings: "/dev/ttyUSB0",
+/// "tcp:HOST:PORT?latency=50", "spi:/dev/spidev0.0", "can0". Throws os::Failure, UsageError, os::Interrupted.
 [[nodiscard]] Identified identify(std::string_view place, const IdentifyChoices& choices = {});
 
 /// Returns the encoders that explain the frames of the capture in the file `path`. `choices` must contain neither a
-/// model nor options, because these are searched for. Throws UsageError, Failure.
+/// model nor options, because these are searched for. Throws UsageError, Failure, os::Interrupted.
 [[nodiscard]] Identified identify_capture(const std::string& path, const DecodeChoices& choices = {});
 
 }  // namespace absenc::client

@@ -72,7 +72,7 @@ class Encoder;
 using MemoryProgress = std::function<void(std::size_t done, std::size_t all)>;
 
 /// Access to the memory of an open encoder, from Encoder::memory. Functions throw EncoderFailure if a command fails,
-/// and exceptions of the port.
+/// Failure if a reply has another number of bytes than requested, and exceptions of the port.
 class Memory {
  public:
   /// Reads and writes the memory of `encoder`, which must outlive this object.
@@ -81,8 +81,8 @@ class Memory {
   /// Returns the unit of the encoder.
   [[nodiscard]] const Unit& unit() const;
 
-  /// Reads the position once, which fails if the configured model is wrong. The memory itself does not show a wrong
-  /// model and would accept the bytes. Does nothing if the unit cannot read positions.
+  /// Reads the position once, which fails if the reply does not fit the configured model. The memory itself does not
+  /// show a wrong model and would accept the bytes. Does nothing if the unit cannot read positions.
   void check_model();
 
   /// Reads the bytes at the addresses of `image` and returns them. Throws UsageError for addresses that cannot be read.
@@ -98,9 +98,9 @@ class Memory {
   Encoder* encoder_;
 };
 
-/// A change of the memory to a wanted image, in three steps: look, write, verify. After an exception the images still
-/// state which bytes were written and which were not. If the change is repeated, it writes only bytes that still
-/// differ.
+/// A change of the memory to a wanted image, in three steps: look, write, verify, which throw the exceptions of Memory.
+/// After an exception the images still state which bytes were written and which were not. If the change is repeated, it
+/// writes only bytes that still differ.
 class MemoryChange {
  public:
   /// Prepares the change without sending anything. Throws UsageError for addresses that cannot be written.
@@ -110,7 +110,8 @@ class MemoryChange {
   void look(const MemoryProgress& progress = {});
   /// Writes the bytes that differ, one by one, and reads each back.
   void write(const MemoryProgress& progress = {});
-  /// Reads all written bytes again, because a later write may have changed an earlier byte. Throws Failure.
+  /// Reads all written bytes again, because a later write may have changed an earlier byte. Throws Failure if it
+  /// finds a changed byte.
   void verify(const MemoryProgress& progress = {});
   /// After a failure, reads the byte whose write was interrupted, to find out whether it was written.
   void settle();
@@ -121,11 +122,13 @@ class MemoryChange {
   [[nodiscard]] const MemoryImage& found() const { return found_; }
   /// Returns the bytes that differed when `look` read them, with their wanted values.
   [[nodiscard]] const MemoryImage& differing() const { return differing_; }
-  /// Returns the bytes that were written and verified.
+  /// Returns the bytes that were written and read back, without those that `verify` found changed.
   [[nodiscard]] const MemoryImage& written() const { return written_; }
-  /// Returns the wanted bytes that differed and were not written, without the byte that `unknown` returns.
+  /// Returns the wanted bytes that differed and were not written, or that `verify` found changed, without the byte that
+  /// `unknown` returns.
   [[nodiscard]] MemoryImage not_written() const;
-  /// Returns the state of the last byte that was written; not_sent before the first write.
+  /// Returns the state of the last byte that was to be written, or unknown if `verify` found changed bytes; not_sent
+  /// before the first write.
   [[nodiscard]] ChangeState state() const { return state_; }
   /// Returns the byte of which it is unknown whether it was written; empty if there is none.
   [[nodiscard]] MemoryImage unknown() const;

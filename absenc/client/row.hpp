@@ -82,11 +82,11 @@ struct Row {
   std::span<const Column> columns;  ///< Descriptions of the values; the owner of the row owns them.
   std::vector<Value> values;        ///< Values of the row, one for each column.
 
-  /// Returns the value of the column `name`. Throws UsageError, which suggests the nearest name, if there is no such
-  /// column.
+  /// Returns the value of the column `name`. If there is no such column, throws UsageError, which suggests a similar
+  /// name or lists all.
   [[nodiscard]] const Value& operator[](std::string_view name) const;
-  /// Returns the value of the column `name` as type `T`. Throws std::bad_variant_access if the value has another type
-  /// or is missing.
+  /// Returns the value of the column `name` as type `T`. Throws UsageError if there is no such column, and
+  /// std::bad_variant_access if the value has another type or is missing.
   template <class T>
   [[nodiscard]] const T& get(std::string_view name) const {
     return std::get<T>((*this)[name]);

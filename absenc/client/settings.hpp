@@ -32,16 +32,16 @@ struct Setting {
 /// Returns the commands that read the unit's settings, at least one. Throws UsageError if there are none.
 [[nodiscard]] std::vector<const Command*> readable_settings(const Unit& unit);
 /// Returns the command that reads the setting `name`. Throws UsageError if there is no such setting that can be read;
-/// it suggests the nearest name.
+/// it suggests a similar name or lists all.
 [[nodiscard]] const Command& require_readable_setting(const Unit& unit, std::string_view name);
 /// Returns the setting `name`, which can be written. Throws UsageError if the setting can only be read, or if there is
-/// no setting of this name; in the second case the text suggests the nearest name.
+/// no setting of this name; in the second case the text suggests a similar name or lists all.
 [[nodiscard]] Setting require_setting(const Unit& unit, std::string_view name);
 
 /// Result of writing a setting.
 struct SettingChange {
   Answer now;           ///< Value of the setting that was read back; if the setting cannot be read, the written value.
-  bool was_so = false;  ///< Whether nothing was sent, because the encoder already had this value.
+  bool was_so = false;  ///< Whether no write was sent, because the encoder already had this value.
   ChangeState state = ChangeState::none;  ///< State of the change; not_sent if the encoder already had this value.
   /// A sentence about a new address of the encoder, "from now on it is reached with address=3"; "": the address is
   /// unchanged.

@@ -38,7 +38,8 @@ class Tap {
 
   /// Opens `place` and waits until protocol and options are known. `place` is a port with its settings
   /// ("/dev/ttyUSB0?baud=115200", "tcp:HOST:PORT"), or "-" for raw bytes from standard input. Writes nothing to a
-  /// serial port. Throws os::Failure, UsageError, and Failure if no protocol explains the received bytes.
+  /// serial port. Throws os::Failure, os::Interrupted, UsageError, and Failure if the port is lost or no protocol
+  /// explains the received bytes.
   explicit Tap(const std::string& place, const TapChoices& choices = {});
   /// Moves the tap; afterwards the other object may only be destroyed or assigned to.
   Tap(Tap&&) noexcept;
@@ -46,8 +47,8 @@ class Tap {
   Tap& operator=(Tap&&) noexcept;
   ~Tap();
 
-  /// Waits for the first row and returns an iterator to it; call it once. Throws os::Failure or Failure, as every later
-  /// step does.
+  /// Waits for the first row and returns an iterator to it; call it once. Throws os::Failure, Failure, os::Interrupted
+  /// or, after `cancel`, Cancelled, as every later step does.
   [[nodiscard]] Iterator begin();
   /// Returns the end of the range, for comparison with an iterator.
   [[nodiscard]] static Iterator::End end() { return {}; }
@@ -60,7 +61,7 @@ class Tap {
 
   /// Returns the identifier of the unit with which the tap decodes.
   [[nodiscard]] std::string_view protocol() const;
-  /// Returns the options with which the tap decodes, as the shortest list of settings, each "name=value".
+  /// Returns the options with which the tap decodes, as a short list of settings, each "name=value".
   [[nodiscard]] std::vector<std::string> options() const;
   /// Returns the columns of each row, in their order.
   [[nodiscard]] std::span<const Column> columns() const;

@@ -52,8 +52,8 @@ std::uint32_t all_alarms(const Unit& unit) {
   return bits;
 }
 
-// Returns whether any command reports different results for two encoders that are treated equally: at once, after a
-// power cycle, with all alarms raised, and after resets.
+// Returns whether any command that changes nothing, except a scan, reports different results for two encoders that are
+// treated equally: at once, after a power cycle, with all alarms raised, and after resets.
 template <class Item>
 bool reports_differ(const Unit& unit, ConditionedEncoder<Item>&& one, ConditionedEncoder<Item>&& other) {
   if (!one.made()) return false;

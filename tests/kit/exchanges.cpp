@@ -229,8 +229,8 @@ class Campaign {
     return true;
   }
 
-  // Runs commands that change the encoder over the faulty line, and verifies each reported success over a good line.
-  // These runs end the work with this encoder, because they alter it.
+  // Runs commands that change the encoder, except those of the unit alone (Verb::run), over the faulty line, and
+  // verifies each reported success over a good line. These runs end the work with this encoder, because they alter it.
   void change() {
     for (const Command& command : unit_.commands) {
       if (!command.changes_encoder || command.verb == Verb::run) continue;

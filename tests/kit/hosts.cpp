@@ -156,8 +156,8 @@ struct VectorReplay {
     require(converse(bytewise(frame.bytes)).error != Error::none, [&] { return text() + ", byte by byte"; });
   }
 
-  // ---- Unsolicited frames. `stream` sends eight frames without a pause, one of them damaged. Every reported position
-  // must be that of the good frames.
+  // ---- Unsolicited frames. `stream` sends eight frames without a pause, at most one of them damaged. Every reported
+  // position must be that of the good frames.
 
   void stream() const {
     if (vector.error != Error::none) return;

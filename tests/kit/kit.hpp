@@ -24,8 +24,8 @@ namespace absenc::kit {
 /// finding, and so is a command without a request.
 [[nodiscard]] Findings check_hosts(const Unit& unit);
 
-/// Checks that every command, a scan too, ends with `timeout` if no encoder answers. Does not apply where the host
-/// clocks the line, because such a line is never silent.
+/// Checks that every command, a scan too, ends with `timeout` if no encoder answers; a command that expects no reply
+/// may succeed. Does not apply where the host clocks the line, because such a line is never silent.
 [[nodiscard]] Findings check_silence(const Unit& unit);
 
 /// Encodes every command with random arguments and decodes the request: its fields must contain these arguments.

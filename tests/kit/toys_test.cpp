@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the kit itself: each toy unit has one mistake, and the kit must report a finding for it.
+// Tests the kit itself: the kit must report a finding for each toy unit with a mistake, and none for those without.
 #include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 

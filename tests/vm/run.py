@@ -20,8 +20,8 @@ BUSY = "no_timer_check"  # kernel option without which a busy computer delays th
 
 
 def boot(kernel, initramfs, folder):
-    """Runs the machine to its end. Returns its console output, and the reason if the output is incomplete, otherwise an
-    empty text."""
+    """Runs the machine to its end. Returns its console output, and the reason if the output is incomplete, otherwise
+    None."""
     line = os.path.join(folder, "line")
     command = [
         image.program("qemu-system-x86_64"), "-accel", "tcg", "-m", "512", "-no-reboot", "-nodefaults", "-display",

@@ -88,7 +88,7 @@ class Campaign {
     result.wrong.of = result.older.of = result.changed.of = result.exchanges;
   }
 
-  /// Collects up to `count` good replies with a position, over a line without faults; none on CAN.
+  /// Reads `count` times and returns the good replies with a position; none on CAN. The line must have no faults.
   std::vector<GoodReply> good_replies(unsigned count) {
     std::vector<GoodReply> replies;
     if constexpr (!std::is_same_v<Item, CanFrame>) {

@@ -44,8 +44,8 @@ class CheckCode {
   [[nodiscard]] unsigned check_bits() const { return static_cast<unsigned>(check_.size()); }
   /// Returns the number of bits of a reply that the checksum does not cover: bits before the frame, and constant bits.
   [[nodiscard]] std::size_t fixed_bits() const { return fixed_; }
-  /// Returns the number of code words of weight 0 to `most`, by MacWilliams' identity from the 2^check_bits words of
-  /// the dual code.
+  /// Returns the numbers of code words of each weight from 0 to `most`, by MacWilliams' identity from the 2^check_bits
+  /// words of the dual code.
   [[nodiscard]] std::vector<double> weights(unsigned most) const;
   /// Returns the probability that independent bit errors damage a reply, leave its fixed bits intact, and leave the
   /// checksum right.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Compares each confirmed position on a bad line with the true position of the shaft, for every model, at rest and
-// turning. The number of wrong confirmed positions must not exceed the number computed from frame checks and speed
-// limit.
+// turning. The number of wrong confirmed positions must agree, within chance, with the number computed from frame
+// checks and speed limit.
 #include <gtest/gtest.h>
 
 #include <cctype>
@@ -81,8 +81,9 @@ TEST_P(Confirmed, IsWrongLessOftenWithALowerLimit) {
 
 INSTANTIATE_TEST_SUITE_P(Models, Confirmed, ::testing::ValuesIn(encoders()), name_of);
 
-// The words have 12 bits and no check: 4 counts of noise and the 3 counts that the fastest shaft moves between two
-// readings hide only damage of the lowest bits. Other damage passes only if the next word has the same damage.
+// The words have 12 bits and no check: the 4 counts of noise, and the counts that a shaft at the speed limit moves
+// between two readings, hide only damage of the lowest bits. Other damage passes only if the next word has the same
+// damage.
 TEST(ConfirmedWords, WithoutACheckOnlyTheLimitTells) {
   CampaignChoices choices{.faults = {"corrupt=0.1"}, .exchanges = 20'000};
   choices.rpm = 0;

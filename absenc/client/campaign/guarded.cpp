@@ -85,8 +85,8 @@ class LetThrough {
   void add_position() { ++positions_; }
   /// Adds a wrong position, by its distance in counts from the true position.
   void add_wrong(std::int64_t away) { away_.push_back(away); }
-  /// Adds a comparison of two positions. `moved` is the movement of the true shaft between them, `before` its movement
-  /// between the two positions before; both in counts.
+  /// Adds a comparison of a position with the one before. `moved` is the movement of the true shaft between these two,
+  /// `before` its movement in the comparison before; both in counts.
   void add_comparison(Time between, std::int64_t moved, std::int64_t before) {
     comparisons_.push_back({between, moved, before});
   }
@@ -124,7 +124,7 @@ class LetThrough {
   };
 
   // Returns whether the host's comparison of positions would accept `step`, by the host's rule but computed in floating
-  // point. `before` is the step between the two positions before.
+  // point. `before` is the step of the comparison before.
   [[nodiscard]] bool agrees(Time between, std::uint64_t step, std::uint64_t before) const {
     const double most = std::ldexp(15.0 / 32, static_cast<int>(bits_));
     const double reached = 4 + counts_per_second_ * std::chrono::duration<double>(between).count();

@@ -8,8 +8,9 @@
 
 namespace absenc::client {
 
-/// Reads a turning shaft until `choices.exchanges` exchanges are done. Counts readings, exchanges and failures in
-/// `result`, and returns the shares of confirmed and wrong positions.
+/// Reads a shaft that turns steadily, or rests if `choices.rpm` is 0, until at least `choices.exchanges` exchanges are
+/// done. Counts readings, exchanges, failures and changed encoders in `result`, and returns the shares of confirmed and
+/// wrong positions.
 [[nodiscard]] Guarded read_guarded(const Unit& unit, const Options& options, const Rates& rates,
                                    const CampaignChoices& choices, CampaignResult& result);
 

@@ -20,11 +20,11 @@ namespace absenc::client {
 /// was not recorded.
 struct WireChannels {
   std::vector<std::optional<unsigned>> wires;
-  bool found = false;  // full duplex: false if neither --channel nor channel names show which wire is the host's
+  bool found = false;  // full duplex: true if neither --channel nor channel names show which wire is the host's
 };
 
-/// Assigns channels by --channel ("D0", "clock=D0"), otherwise by the channels' names and their number. Throws
-/// UsageError, which lists the channels of the capture.
+/// Assigns channels by --channel ("D0", "clock=D0"); without it, by the channels' names or, if no name fits, in order.
+/// Throws UsageError, which lists the channels of the capture or the wires of the link.
 [[nodiscard]] WireChannels find_wires(LinkKind link, std::span<const std::string> channels,
                                       std::span<const std::string> wanted);
 

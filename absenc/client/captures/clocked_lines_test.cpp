@@ -68,12 +68,12 @@ struct Master {
   // whether MA rises when the timeout has elapsed; otherwise MA is held low until the next frame
   bool releases = false;
   int clocks = 0;          // number of clocks beyond the bits of the frame and the idle bit
-  std::int64_t pause = 0;  // pause between the release of MA after the timeout and the next frame
+  std::int64_t pause = 0;  // time after the timeout before the next frame; after a release at least `timeout`
 };
 
 constexpr int biss_bits = 32;  // number of bits of a frame, including the idle bit before it
 
-// Computes the frame bit by bit: idle, one ACK bit, start, CDS, 19 bits, nError, nWarning and the CRC.
+// Computes the frame bit by bit: two idle bits, one ACK bit, start, CDS, 19 bits, nError, nWarning and the CRC.
 std::string biss_frame(std::uint32_t position, bool cds) {
   std::string word;
   for (int bit = 18; bit >= 0; --bit) word += (position >> bit & 1) != 0 ? '1' : '0';
@@ -210,8 +210,8 @@ TEST_F(ClockedLines, AControlBitMayComeLateInTheTimeout) {
   }
 }
 
-// An interrupted host: its clock pauses inside a word for nearly the timeout, and between words hardly longer than the
-// timeout. Only the data line SLO shows where the timeout has elapsed.
+// An interrupted host: its clock pauses inside a word for up to nearly the timeout; the pause after each of the first
+// 50 words is at most 1 us longer than the timeout. Only the data line SLO shows where the timeout has elapsed.
 TEST_F(ClockedLines, ATimeoutThatIsOverEndsAWordWhoseClockRestsAsLong) {
   constexpr std::int64_t timeout = 12'500;
   const std::string frame = biss_frame(17, false);

@@ -122,8 +122,8 @@ CheckFindings find_crc(std::span<const CheckedFrame> frames) {
 
 namespace {
 
-// Returns the initial value with which, together with `xorout`, the CRC fits frames of `covered` bits. Frames of one
-// length cannot distinguish an initial value from a final XOR.
+// Returns `crc` with the final XOR `xorout` and with the initial value that then fits frames of `covered` bits. Frames
+// of one length cannot distinguish an initial value from a final XOR.
 CrcParameters with_xorout(CrcParameters crc, std::uint32_t xorout, std::size_t covered) {
   std::uint32_t change = crc.xorout ^ xorout;
   for (std::size_t i = 0; i < covered; ++i) {

@@ -30,8 +30,9 @@ struct FrameCounts final : capture::AnnotationSink {
   std::uint64_t damaged = 0;
 };
 
-// Returns whether the unit's own baud rate decodes requests of a host without replies while the other rate decodes
-// almost nothing. The few level changes of such requests fit many rates.
+// Returns whether the unit's own baud rate decodes requests of a host without replies while the other rate decodes few
+// good frames: not more than damaged ones, or than these requests. The few level changes of such requests fit many
+// rates.
 bool reads_silence(const FrameCounts& at_own, const FrameCounts& at_other) {
   return at_own.damaged == 0 && at_own.unanswered > at_other.unanswered &&
          at_other.good <= std::min(at_other.damaged, at_own.unanswered);
@@ -57,7 +58,7 @@ struct GoodReplies final : capture::AnnotationSink {
   std::vector<std::pair<std::vector<std::uint8_t>, std::vector<std::uint8_t>>> frames;
 };
 
-/// For each option, the values that the collected frames allow.
+/// For each option, the values that the evidence is about, possible or not.
 struct Possible final : EvidenceSink {
   void put(const OptionEvidence& evidence) override { values.insert({evidence.option, evidence.value}); }
   [[nodiscard]] bool is_open(std::size_t option, std::int64_t value) const {
@@ -71,7 +72,8 @@ struct Possible final : EvidenceSink {
 
 // Selects the baud rate with more good frames at the beginning of the capture: the unit's own rate, or the rate that
 // the level changes suggest. Few level changes fit many rates, but only one rate gives right checksums. If characters
-// are damaged, selects the parity with more good frames: a parity bit taken for a stop bit is wrong half of the time.
+// are damaged or no frame is found, selects the parity with more good frames: a parity bit taken for a stop bit is
+// wrong half of the time.
 CaptureRun::Speed CaptureRun::likely_speed(const Lines& lines) const {
   constexpr std::size_t enough_characters = 20'000;
   Speed best{choices_.how.baud, choices_.how.parity.value_or(line_.parity)};

@@ -50,8 +50,8 @@ class Captures {
   std::vector<WireFrame> frames_;
 };
 
-// Returns the options to be given to later commands, as settings: values that the frames determine, and the user's
-// values that differ from the defaults.
+// Returns the values of the probed options that later commands need, as settings: values that the frames determine, and
+// values other than the default where the frames allow several.
 std::vector<std::string> settled(const Unit& unit, const Options& options, std::span<const OptionEvidence> evidence) {
   std::vector<std::string> settings;
   for (std::size_t i = 0; i < unit.options.size(); ++i) {

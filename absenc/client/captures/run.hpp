@@ -58,7 +58,7 @@ class CaptureRun {
   /// chance. For standard input, which can be read only once, returns the options unchanged.
   const Options& settle_options();
   /// Decodes the whole capture into `all` and returns the outcome. Calls `progress` from time to time with the tick
-  /// that is reached. Throws UsageError, Failure and the exceptions of `all`.
+  /// that is reached. Throws UsageError, Failure and the exceptions of `all` and `progress`.
   CaptureOutcome run(capture::AnnotationSink& all, const std::function<void(capture::Tick)>& progress);
 
  private:

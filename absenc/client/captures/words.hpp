@@ -43,8 +43,8 @@ class TickClock {
 /// documented.
 [[nodiscard]] bool has_fields(const capture::Annotation& annotation);
 
-/// Returns the error of an annotation in words, with advice; without an error, its remark, such as that the frame is
-/// cut off; "" if it has neither.
+/// Returns the remark of an annotation in words, such as that the frame is cut off; without a remark, its error with
+/// advice; "" if it has neither.
 [[nodiscard]] std::string message_of(const Unit& unit, const Options& options, const capture::Annotation& annotation);
 
 }  // namespace absenc::client

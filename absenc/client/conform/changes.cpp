@@ -26,7 +26,8 @@ constexpr std::uint32_t beside = 4;  // number of bytes before the written byte 
 // positions are equal if at most this fraction of a turn, 1/512, is between them
 constexpr unsigned position_tolerance = 512;
 
-/// Thrown when the encoder refuses a command or sends a bad reply, so that the clause is broken.
+/// Thrown when a command fails, or when a value or position of the encoder is not as expected, so that the clause is
+/// broken.
 struct ClauseBroken {
   std::string evidence;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests the clauses that change an encoder: at least two mutants break each clause, one of them breaks no other clause.
-// If the test is ended at any step, the memory of the virtual encoder is unchanged.
+// If the test is ended at any step, the encoder keeps its settings, and its memory unless that counts its writes.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 

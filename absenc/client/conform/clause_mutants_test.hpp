@@ -137,8 +137,8 @@ ReplyChanges<Item> frame_mutants(const EncoderAddress& address, const Clause& cl
   return all;
 }
 
-/// Returns mutants with each condition of the encoder at both ends of its range and 5 above normal, and mutants that
-/// always flip the same bit of their replies.
+/// Returns mutants with each condition of the encoder at both ends of its range and 5 above normal, mutants that always
+/// flip the same bit of their replies, and mutants that flip the same bit of each request.
 template <class Item>
 ReplyChanges<Item> command_mutants(const EncoderAddress& address) {
   ReplyChanges<Item> all;
@@ -257,7 +257,8 @@ ReplyChanges<Item> mutants_of(const EncoderAddress& address, const Clause& claus
     default:
       break;
   }
-  // Applies each change only to valid requests that are addressed to other encoders.
+  // Applies each change only to valid requests that are addressed to other encoders or have no address; on CAN to all
+  // special requests.
   if (clause.demand == Demand::foreign_silent) {
     for (const ReplyChange<Item>& change : special_request_mutants<Item>(clause)) {
       all.push_back({.change = [change = change.change, &address](Mutant<Item>& m) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that the virtual encoder satisfies every clause, and that at least two mutants break each clause, one of them
-// no other clause.
+// Checks that the virtual encoder satisfies every clause that does not change it, and that at least two mutants break
+// each such clause, one of them no other clause.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -106,7 +106,7 @@ TEST_P(Clauses, EachKeptClauseCanBeBroken) {
 INSTANTIATE_TEST_SUITE_P(Units, Clauses, ::testing::ValuesIn(all_units().begin(), all_units().end()),
                          [](const auto& one) { return test_name(*one.param); });
 
-// The echo must not be taken for a reply, and its time not for the response time.
+// The echo must not be taken for a reply: with echo the encoder keeps all clauses, and a missing reply breaks one.
 TEST(Conformance, EchoOfAdapterIsNoReply) {
   for (const char* const text : {"sim:tformat?echo=auto", "sim:tformat?echo=on", "sim:amt21?echo=auto"}) {
     const EncoderAddress address = parse_address(text);

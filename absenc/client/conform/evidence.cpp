@@ -120,8 +120,8 @@ std::size_t detected_changes(const Unit& unit, const Options& options, const Obs
   }
   for (const ObservedFrame& request : other_requests(unit, options)) try_one(request, good.reply);
   if (unit.link == LinkKind::clocked) return noticed;  // on a clocked link the checksum is no byte at the end
-  // Flips a bit of a field before the checksum: the checksum would hide the change, so each last byte is tried, one of
-  // which makes the checksum right.
+  // Flips a bit of a field before the checksum: the checksum would hide the change, so every value of the last byte is
+  // tried. One of them makes a checksum of one byte right.
   ObservedFrame changed = good.reply;
   for (std::size_t bit = 0; noticed == 0 && changed.bytes.size() > 2 && bit < bits_of(good.reply) - 8; ++bit) {
     flip(changed, bit);

@@ -28,12 +28,13 @@ inline void conclude(ClauseResult& result, bool kept, std::string evidence) {
 [[nodiscard]] std::string reason_against(const Unit& unit, const Options& options, const Clause& clause);
 
 /// Returns how many changes of a good exchange the decoder reports as one of `errors`. Changes are a wrong bit, a
-/// missing or additional byte, and the same reply to another request. 0: the unit has no such check with these options.
+/// missing or additional byte, and the same reply to another request; if none is reported, except on clocked links,
+/// also a wrong bit with any last byte. 0: the unit has no such check with these options.
 [[nodiscard]] std::size_t detected_changes(const Unit& unit, const Options& options,
                                            const capture::ObservedExchange& good, Errors errors);
 
-/// Returns the error of the exchange's reply, checked as the reply to a request of `command`; if that is "", to its own
-/// request.
+/// Returns the error of the exchange's reply, checked as the reply to a request of `command` or, if `command` is "", to
+/// the exchange's own request. Returns `timeout` if there is no reply.
 [[nodiscard]] Error reply_error(const Unit& unit, const Options& options, std::string_view command,
                                 const capture::ObservedExchange& exchange);
 

@@ -18,8 +18,8 @@ std::uint64_t HostTrial::length() const {
   return is_polled ? requests_to_continue : 0;
 }
 
-// Returns the progress of the present phase: how often its fault occurred, in the phase `refusal` how many requests
-// were received, or, in a phase without a fault, how many requests were answered.
+// Returns the count, since the test began, that ends the present phase: of faults of its kind, in the phase `refusal`
+// of received requests, or, in a phase without a fault, of answered requests.
 std::uint64_t HostTrial::counted() const {
   if (phase_ == Phase::silence) return seen_.missing;
   if (phase_ == Phase::refusal) return seen_.requests.good + seen_.requests.bad;

@@ -61,7 +61,7 @@ class HostTrial {
   std::vector<RuleCount> calm_{};
 };
 
-/// Returns how often the virtual encoder injected this fault into a reply; 0 if it has no faults.
+/// Returns how often the virtual encoder injected `fault`, `silence` or `damage`, into a reply; 0 if it has no faults.
 [[nodiscard]] inline std::uint64_t count_of(const VirtualDevice& encoder, HostTrial::Fault fault) {
   const sim::FaultKind kind = fault == HostTrial::Fault::silence ? sim::FaultKind::silence : sim::FaultKind::corrupt;
   return encoder.faults() != nullptr ? (*encoder.faults())[static_cast<std::size_t>(kind)] : 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that our own host satisfies every clause for hosts, that two mutants break each clause and no other, and that
-// no clause is kept by a sender that is no host of the protocol.
+// Checks that our own host satisfies every clause for hosts, that two mutants break each clause and no other except
+// "asks", and that no clause is kept by a sender that is no host of the protocol.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,7 +20,8 @@ namespace {
 
 Flaws host_that_sends(HostScript script) { return {.sends = {script.begin(), script.end()}}; }
 
-/// Returns defects of SPI controllers, each of which breaks one of the rules about clock, length or mode.
+/// Returns defects of SPI controllers, each of which breaks a rule about clock, length, mode, or the time before a
+/// transfer.
 std::vector<Flaws> flaws_of_controllers() {
   using std::chrono::microseconds;
   using std::chrono::milliseconds;
@@ -152,7 +153,7 @@ std::vector<std::vector<Item>> damaged_requests(const EncoderAddress& address) {
 }
 
 /// Returns the verdicts on hosts that always repeat the same damaged request, and on hosts that alternate it with a
-/// good request.
+/// good request, for at most four damaged requests.
 template <class Item>
 std::vector<Conformance> judged_with_damaged_requests(const EncoderAddress& address) {
   std::vector<Conformance> all;
@@ -265,7 +266,7 @@ void check_stranger_hosts(const EncoderAddress& address) {
   for (const Unit* const other : all_units()) {
     if (other->link == LinkKind::clocked || (other->link == LinkKind::can) != std::is_same_v<Item, CanFrame>) continue;
     const std::vector<Item> request = request_of<Item>(polled_address(fmt::format("sim:{}", other->id)));
-    // Skips requests that both units accept.
+    // Skips empty requests, and requests that both units accept.
     if (request.empty() || error_of(address, request) == Error::none) continue;
     expect_none_kept(judged_sending([&] { return request; }), other->id);
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Devices that are no encoder of the protocol must keep no clause. For each kept clause the test searches the evidence
-// on the line.
+// Devices that are no encoder of the protocol must keep no clause without evidence: for each kept clause the test
+// searches the line for good replies and, if the clause has a request of its own, for that request.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -22,7 +22,7 @@ struct Readings {
   std::vector<Attempted> all{};
   std::uint64_t requests = 0;   // number of requests, pulses and transfers that were sent
   std::uint64_t answered = 0;   // number of requests that got a reply
-  std::uint64_t good = 0;       // number of replies or unsolicited frames that yielded a reading
+  std::uint64_t good = 0;       // number of requests of good readings, or of good unsolicited frames
   std::uint64_t discarded = 0;  // number of damaged frames in a stream
 
   /// Returns the first good reading; null if none is good, or if each good word consists of equal bits.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counts how often a virtual encoder checked each rule of its host.
+// Counts how often a virtual encoder checked each rule of its host, and how often the host broke it.
 #pragma once
 
 #include <algorithm>

@@ -38,7 +38,7 @@ class Movable final : public Machine<Item> {
     if (sending_) feed({.kind = Event<Item>::Kind::sent, .at = now});
   }
 
-  /// Returns the rate that the encoder set on the last port; 0: it set none.
+  /// Returns the last rate that the encoder set on a port; 0: it set none.
   [[nodiscard]] std::uint32_t rate() const { return rate_; }
 
  private:

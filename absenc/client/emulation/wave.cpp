@@ -138,7 +138,7 @@ void converse(Conversations& conversations) {
   }
 }
 
-// Makes temporary files on the disk of the result, so that lack of space is found there.
+// Makes a temporary file on the disk of the result, so that lack of space is found there.
 capture::ScratchFile scratch_file(const std::string& path) {
   os::Descriptor file = os::nameless_file(std::filesystem::path(path).parent_path());
   return capture::ScratchFile(::fdopen(file.release(), "w+"));

@@ -17,8 +17,8 @@ class Connection;
 
 class ChangeRecord {
  public:
-  /// Reads the value that the command will overwrite, unless the value is `known` or cannot be read. Throws the
-  /// exceptions of the port.
+  /// Reads the value that the command will overwrite, if the command writes a setting that can be read, or the memory,
+  /// and there is a journal; not if the value is `known`. Throws the exceptions of the port.
   ChangeRecord(Connection& connection, const Command& command, Arguments arguments, std::optional<std::int64_t> known);
 
   /// Appends the change to the journal if its request was sent. `way` is the encoder's address before the change.

@@ -131,8 +131,8 @@ TEST(ClientEncoder, GoesOnAtTheRateThatItWasSetTo) {
   }
 }
 
-// If a change of the rate is aborted at any point, the port must have a known rate: an encoder at the old rate is read,
-// one at the new rate is not.
+// Aborts a change of the rate at different points. Afterwards the port must have a known rate: an encoder at the old
+// rate is read, one at the new rate is not.
 TEST(ClientEncoder, IsReadAtItsRateWhenAChangeOfItsRateWasBrokenOff) {
   unsigned whole = 0;
   unsigned there = 0;

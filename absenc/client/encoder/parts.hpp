@@ -31,7 +31,7 @@ struct Encoder::Parts {
   void disconnect();
   /// Takes one sample; while the port is lost, tries to open it again.
   Sample next();
-  /// Waits until `time`. Throws Cancelled, os::Interrupted.
+  /// Waits until `time`. Throws Cancelled, os::Interrupted, os::Failure.
   void wait_until(Time time) const;
   void forget_position();
   /// Returns whether `Encoder::cancel` was called, or the function `over` returns true.

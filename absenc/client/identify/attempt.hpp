@@ -26,9 +26,9 @@ using capture::Hypothesis;
 using capture::ObservedExchange;
 
 inline constexpr unsigned reads = 6;              // number of readings that are taken of each encoder that replies
-inline constexpr Time listening = 100ms;          // time for which the line is listened to before the first request
+inline constexpr Time listening = 100ms;          // time of listening before the first request at a setting of the line
 inline constexpr std::size_t stream_size = 2048;  // number of bytes of an unsolicited stream that are judged
-inline constexpr unsigned most_unanswered = 3;    // number of readings without a reply after which the attempt ends
+inline constexpr unsigned most_unanswered = 3;    // number of readings without a reply after which no more are taken
 inline constexpr Time settled = 5ms;              // silence after which no earlier reply is expected
 inline constexpr Time longest_settling = 200ms;   // limit of the wait for silence, on a line that is never silent
 inline constexpr Time late_window = 100ms;        // time after an unanswered request in which its reply may arrive late
@@ -94,7 +94,7 @@ class Attempt {
   Attempt& operator=(const Attempt&) = delete;
 
   [[nodiscard]] const LineSettings& line() const { return address_.line; }
-  /// Returns whether a scan ended before it had polled every address.
+  /// Returns whether a scan without any reply was ended before it had polled every address.
   [[nodiscard]] bool cut() const { return cut_; }
   void open() {
     link_ = search_.open(address_);
@@ -115,7 +115,8 @@ class Attempt {
     return items;
   }
 
-  /// Polls with each set of options that changes the request, until an encoder replies, and stores the candidates.
+  /// Polls with each set of options that changes the request, except on clocked lines only until an encoder replies,
+  /// and stores the candidates.
   void ask() {
     const Command* read = find_command(unit_, Verb::read);
     if (read == nullptr || read->changes_encoder) return;
@@ -198,8 +199,8 @@ class Attempt {
     std::string detail{};  // the unit's explanation of `error`
   };
 
-  // Runs one conversation and stores its exchanges in `exchanges`. If a reply was late, repeats the conversation with a
-  // longer timeout.
+  // Runs one conversation and stores its exchanges in `exchanges`. If a reply was late, which can happen only on lines
+  // of characters, repeats the conversation with a longer timeout.
   Conversed converse(const Command& command, const Options& options, std::vector<ObservedExchange>& exchanges,
                      FieldSink* sink = nullptr) {
     for (;;) {
@@ -293,8 +294,8 @@ class Attempt {
     return targets;
   }
 
-  // Polls one encoder and stores the candidates; returns whether the encoder sent anything. `encoder` is the address
-  // setting of the polled encoder, "": none.
+  // Polls one encoder and stores the candidates; returns whether the encoder replied. `encoder` is the address setting
+  // of the polled encoder, "": none.
   bool ask_one(const Command& read, const SettingTexts& settings, const std::string& encoder) {
     const std::vector<OptionText> known = option_settings(unit_, settings, false);
     const Options options = require_options(unit_, {}, option_settings(unit_, settings, true));

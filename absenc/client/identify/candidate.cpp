@@ -39,7 +39,7 @@ std::vector<std::string> differences(const Unit& unit, std::string_view model, c
 bool is_found(const Candidate& candidate) { return candidate.hypothesis.chance() <= capture::is_found; }
 
 bool is_as_likely(const Candidate& one, const Candidate& best) {
-  // log10 of the factor, three, by which the chances of two equally likely candidates may differ
+  // log10 of the factor, about three, by which the chances of two equally likely candidates may differ
   constexpr double same_likelihood = 0.5;
   return one.hypothesis.is_proven() == best.hypothesis.is_proven() &&
          one.hypothesis.chance() <= best.hypothesis.chance() + same_likelihood;

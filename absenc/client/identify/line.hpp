@@ -30,14 +30,14 @@ struct LineFindings {
   std::vector<Candidate> candidates{};
   std::size_t requests = 0;  // number of requests that were sent
   std::size_t heard = 0;     // number of bytes or frames that were received after requests, without echo
-  // number of bytes or frames that were received while listening, before the first request
+  // number of bytes or frames that were received while listening, before the first request at each setting of the line
   std::size_t unsolicited = 0;
   std::size_t searches =
       // number of combinations of protocol, settings and encoder that were tried as an explanation of received frames
       0;
-  bool only_echo = false;          // whether only the adapter's echo was received
+  bool only_echo = false;          // whether in some conversation nothing but the adapter's echo was received
   std::set<std::string> lines{};   // the kinds of lines that were tried, in words
-  std::vector<std::string> notes;  // sentences about protocols that could not be tried, with the reason
+  std::vector<std::string> notes;  // sentences about impossible attempts and contradictory identities
   bool out_of_time = false;
   bool interrupted = false;
 };
@@ -46,8 +46,9 @@ struct LineFindings {
 /// text names a protocol.
 [[nodiscard]] LineSearch parse_search(std::string_view text);
 
-/// Searches the line for encoders and returns the findings. Throws UsageError. Throws os::Failure if the port cannot be
-/// opened.
+/// Searches the line for encoders and returns the findings. Throws UsageError, and os::Ended if `over` of the search
+/// returns true. Throws os::Failure if the port cannot be opened, or is lost before the found encoders are asked for
+/// their identities.
 [[nodiscard]] LineFindings search_line(const LineSearch& search);
 
 }  // namespace absenc::client

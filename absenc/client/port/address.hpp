@@ -120,7 +120,7 @@ struct EncoderAddress {
 [[nodiscard]] std::optional<std::string> bare_port(std::string_view text);
 
 /// Parses an address and returns it. `settings` ("name=value") are appended to the text; both override the settings of
-/// absenc.toml. Throws UsageError, which names the error and the nearest right name.
+/// absenc.toml. Throws UsageError, which names the error and, for an unknown name, a similar one if there is one.
 [[nodiscard]] EncoderAddress parse_address(std::string_view text, std::span<const std::string> settings = {});
 
 class NamedEncoders;

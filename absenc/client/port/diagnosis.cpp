@@ -17,8 +17,8 @@ bool is_good(const Unit& unit, const Options& options, const Frame& request, con
 
 std::string bytes_text(std::size_t count) { return fmt::format("{} byte{}", count, count == 1 ? "" : "s"); }
 
-// Finds a good reply with the echo of the request before it, or with other bytes before or after it. All texts are
-// empty if there is none.
+// Finds a good reply with the echo of the request before it, or with other bytes before or after it, or an echo without
+// a reply. All texts are empty if there is none of these.
 Diagnosis surrounded(const Unit& unit, const Options& options, const Frame& request, Bytes reply) {
   const Bytes sent = request.bytes;
   const bool echoed =

@@ -22,7 +22,7 @@ struct JournalEntry {
 };
 
 /// Returns the path of the journal: $ABSENC_CHANGES, or else changes.tsv in $STATE_DIRECTORY, $XDG_STATE_HOME/absenc or
-/// ~/.local/state/absenc. Returns "" if ABSENC_CHANGES is "none" or there is no home directory.
+/// ~/.local/state/absenc. Returns "" if ABSENC_CHANGES is "none", or if none of these is known.
 [[nodiscard]] std::string journal_path();
 
 /// Appends an entry to the journal as one line, with a single write. Returns "", or a sentence with the reason of a

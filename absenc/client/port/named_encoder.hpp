@@ -36,7 +36,7 @@ class NamedEncoders {
   ~NamedEncoders() = default;
 
   [[nodiscard]] const SettingsFile& file() const { return file_; }
-  /// Returns the encoder of this name. Throws UsageError, which names the nearest name, if there is none.
+  /// Returns the encoder of this name. If there is none, throws UsageError, which suggests a similar name or lists all.
   [[nodiscard]] NamedEncoder require(std::string_view name) const;
 
  private:

@@ -99,7 +99,7 @@ class Runner {
  public:
   static constexpr bool is_can = std::is_same_v<Item, CanFrame>;
 
-  /// Takes the encoder's address, and how often the session runs a command that may be repeated.
+  /// Takes the encoder's address, and how often at most the session runs a command that may be repeated.
   explicit Runner(const EncoderAddress& address, unsigned attempts = 1)
       : unit_(*address.unit),
         options_(address.options),
@@ -268,7 +268,7 @@ class Runner {
 
   // ---- Observations of the line
 
-  /// Returns the last exchange, with everything that was received since its request.
+  /// Returns the last exchange, with what was received since its request.
   [[nodiscard]] const LineExchange<Item>& last() const { return port_.last; }
   /// Returns the number of late replies: replies that began after their time limit, or that answered an earlier request
   /// than the last one.

@@ -44,8 +44,8 @@ struct SettingsFile {
 [[nodiscard]] std::vector<std::string> settings_file_paths();
 
 /// Reads the first absenc.toml that exists; returns nothing if there is none. Throws UsageError, also if the file of
-/// ABSENC_CONFIG is missing, or if an existing file cannot be read, is a broken link, or is a FIFO: such a file is
-/// never skipped.
+/// ABSENC_CONFIG is missing, or if an existing file cannot be read, is a broken link, or is a FIFO or socket: such a
+/// file is never skipped.
 [[nodiscard]] std::optional<SettingsFile> load_settings_file();
 
 }  // namespace absenc::client

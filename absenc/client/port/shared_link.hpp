@@ -97,8 +97,8 @@ class SharedLink {
 /// the line.
 [[nodiscard]] bool share_line(const EncoderAddress& one, const EncoderAddress& other);
 
-/// Checks that encoders can be read at the same time. Throws UsageError if two are the same encoder, or cannot share a
-/// line.
+/// Checks that encoders can be read at the same time. Throws UsageError if two are the same encoder or on the same SPI
+/// device, or cannot share a line.
 void require_different(std::span<const EncoderAddress> encoders, std::span<const std::string> names);
 
 /// Returns a link to the encoder: the open link of the same line if there is one, otherwise a new one. Throws

@@ -16,7 +16,7 @@
 
 namespace absenc::client {
 
-/// A request and everything received until the next request.
+/// A request and what was received until the next request; items that follow the first 1024 or more are left out.
 template <class Item>
 struct LineExchange {
   std::vector<Item> request{};

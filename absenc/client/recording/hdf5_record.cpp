@@ -105,7 +105,7 @@ class Hdf5Record final : public RecordFile {
         }
         commit();
       }
-    } catch (...) {  // the next call of `append` throws the exception again
+    } catch (...) {  // `append`, `sync`, `finish` and `require_there` throw the exception again
       const std::lock_guard lock(mutex_);
       failure_ = std::current_exception();
       changed_.notify_all();

@@ -72,7 +72,7 @@ using Elements = std::vector<std::uint8_t>;
 
 template <class T>
 void append(Elements& elements, T value) {
-  // the file is little endian, as are all hosts of Debian
+  // the file is little endian, and so must the host be
   const auto* const bytes = reinterpret_cast<const std::uint8_t*>(&value);
   elements.insert(elements.end(), bytes, bytes + sizeof value);
 }

@@ -32,7 +32,7 @@ class RecordFile {
  public:
   virtual ~RecordFile() = default;
 
-  /// Appends a row, which is in the file within a second, with its counts.
+  /// Appends a row, which is in the file within a second, and adds `counts` to the counts of the file.
   virtual void append(const Row& row, const RecordCounts& counts) = 0;
   /// Waits until all appended rows are in the file and on the disk.
   virtual void sync() = 0;

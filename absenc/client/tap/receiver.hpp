@@ -41,7 +41,8 @@ class Receiver {
   /// Starts the receiving thread, which ends at the time `end`. Called once.
   void start(Time end = never);
   /// Waits for bytes or for the report of silence, and returns them in their order. Returns nothing when `deadline` is
-  /// reached, after `cancel`, or if receiving has ended and everything was returned.
+  /// reached, after `cancel`, or if receiving has ended and everything was returned. Throws os::Ended if the
+  /// os::CancelCheck of this thread ends the wait.
   [[nodiscard]] std::optional<Received> next(Time deadline = never);
   /// Ends receiving: `next` returns nothing from now on. May be called from any thread.
   void cancel();

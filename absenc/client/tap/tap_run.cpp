@@ -39,7 +39,7 @@ bool is_asynchronous(const Unit& unit) {
   return unit.link == LinkKind::half_duplex || unit.link == LinkKind::full_duplex;
 }
 
-// Removes the response time of each annotation: arrival times are too coarse to measure it.
+// Records each annotation, then passes it on without its response time, because arrival times are too coarse for it.
 struct Untimed final : capture::AnnotationSink {
   Untimed(TapRecord* of_run, capture::AnnotationSink& next) : record(of_run), sink(next) {}
   void put(const capture::Annotation& annotation) override {

@@ -42,7 +42,8 @@ class TapRun {
   /// Starts decoding: exchanges are passed to `sink`, which must outlive the object. Called once.
   void begin(capture::AnnotationSink& sink);
   /// Waits until bytes arrive or the time `Receiver::quiet` elapses, and passes the complete exchanges to the sink.
-  /// Returns false when receiving has ended. Throws os::Failure of the record file, and the exceptions of the sink.
+  /// Returns false when receiving has ended. Throws os::Failure of the record file, and the exceptions of the sink and
+  /// of Receiver::next.
   bool advance();
   /// Returns what was received and why receiving ended; call it after `advance` returned false.
   [[nodiscard]] TapOutcome outcome() const;

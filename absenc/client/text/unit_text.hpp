@@ -15,7 +15,7 @@
 namespace absenc::client {
 
 /// Returns the unit of this name. Throws UsageError if there is none; it names the protocols of the maker or model of
-/// this name, or else the nearest name.
+/// this name, or else suggests a similar protocol or lists all.
 [[nodiscard]] const Unit& require_unit(std::string_view id);
 [[nodiscard]] const Command& require_command(const Unit& unit, std::string_view name);
 
@@ -63,7 +63,8 @@ struct RoleArgument {
 
 /// Returns the unit's condition of this name; null if the virtual encoder has no such condition.
 [[nodiscard]] const Condition* find_condition(const Unit& unit, std::string_view name);
-/// Returns the unit's condition of this name. Throws UsageError, which names the nearest name, if there is none.
+/// Returns the unit's condition of this name. If there is none, throws UsageError, which suggests a similar name or
+/// lists all.
 [[nodiscard]] const Condition& require_condition(const Unit& unit, std::string_view name);
 /// Parses a value of the condition. Throws UsageError if it is not a number within the condition's range.
 [[nodiscard]] std::int64_t require_value(const Condition& condition, std::string_view written);
@@ -86,8 +87,7 @@ struct RoleArgument {
 
 /// Returns the description of a position word as text: "multiturn:12 position:24 gray".
 [[nodiscard]] std::string to_text(const WordFormat& word);
-/// Returns a setting "name=value" for each option that has an effect; a position word replaces the options that it
-/// covers.
+/// Returns a setting "name=value" for each option of the unit; a position word replaces the options that it covers.
 [[nodiscard]] std::vector<std::string> option_texts(const Unit& unit, const Options& options);
 
 /// Returns the flags of the field that have a name and are set in `bits`.
@@ -117,8 +117,8 @@ struct RoleArgument {
 /// Returns the name of a role, as "identity"; "" for `other`.
 [[nodiscard]] std::string_view name_of(Role role);
 
-/// Returns the validity of a field that depends on the position, from the reading of the same frame; other fields are
-/// always `valid`. All output of fields uses this rule.
+/// Returns the validity of a field that depends on position or turns, from the reading of the same frame. Other fields,
+/// and fields whose value the reading does not have, are `valid`. All output of fields uses this rule.
 [[nodiscard]] Validity validity_of(const FieldInfo& field, const Reading& reading);
 [[nodiscard]] bool holds(const FieldInfo& field, const Reading& reading);
 /// Returns `value`, the text of a field, marked by its validity: "74565 counts", "INVALID (74565 counts)" or "unknown
