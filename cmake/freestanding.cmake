@@ -8,7 +8,7 @@ absenc_settings(freestanding)
 target_link_libraries(freestanding PRIVATE absenc)
 
 set(linked "${CMAKE_CURRENT_BINARY_DIR}/freestanding.o")
-set(objects "$<TARGET_OBJECTS:absenc>;$<TARGET_OBJECTS:freestanding>")
+set(objects "$<TARGET_OBJECTS:absenc>;${absenc_objects};$<TARGET_OBJECTS:freestanding>")
 separate_arguments(machine_flags UNIX_COMMAND "${CMAKE_CXX_FLAGS}")
 add_custom_command(
   OUTPUT "${linked}.checked"

@@ -3,8 +3,6 @@
 """Tests the output of `absenc conform` and `absenc conform-host`. The tests in client/conform cover each clause and its
 mutants."""
 import json
-import pathlib
-import re
 import select
 import signal
 import time
@@ -15,31 +13,9 @@ import xml.etree.ElementTree
 from command_support import PATIENCE, EncoderCase, absenc, end, json_lines, read_line
 
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
-
-
 def content(path):
     with open(path, encoding="utf-8") as file:
         return file.read()
-
-
-class Documentation(unittest.TestCase):
-    def test_page_has_numbers_of_clauses(self):
-        """For each protocol, the page states three numbers: clauses tested by reading, clauses added by --changes, and
-        clauses for hosts."""
-        page = content(ROOT / "docs/test-a-drive.md")
-        listed = re.findall(r"Listed\{&(\w+)::(\w+),.*?(\w+)::(\w+)\}", content(ROOT / "absenc/protocol/all.cpp"))
-        self.assertGreater(len(listed), 10)
-        for folder, unit, host_folder, hosts in listed:
-            kind = unit.removesuffix("unit").removesuffix("_")
-            name = folder if kind in ("", "serial") else f"{folder}-{kind}"
-            reading, both = (
-                len(json.loads(absenc("conform", f"sim:{name}", "--json", "--readings", "1", *more).stdout)["clauses"])
-                for more in ((), ("--changes", "--yes")))
-            clauses = content(ROOT / f"absenc/protocol/{host_folder}/clauses.hpp")
-            count = int(re.search(rf"array<HostClause, (\d+)> {hosts}\b", clauses).group(1))
-            cells = [str(number or "") for number in (both, both - reading, count)]
-            self.assertIn("| " + " | ".join([name, *cells]).replace("|  ", "| ").rstrip() + " |", page)
 
 
 class Conform(EncoderCase):

@@ -284,7 +284,8 @@ class Tree:
         # The unit's vectors are checked when its unit.cpp is compiled, so compiling unit.cpp alone already reveals most
         # faults in a header.
         unit = path.relative_to(ROOT).with_name("unit.cpp")
-        first = [f"CMakeFiles/absenc.dir/{unit}.o"] if (ROOT / unit).exists() else []
+        library = "absenc-" + unit.relative_to("absenc/protocol").parts[0] if (ROOT / unit).exists() else ""
+        first = [f"CMakeFiles/{library}.dir/{unit}.o"] if library else []
         programs = sorted(programs, key=lambda program: program != self.last_own)
         for program in programs:
             for target in [*first, program.name]:
@@ -430,7 +431,7 @@ def choose(found, arguments):
         wanted = [
             one
             for one in mutants
-            if (not arguments.unit or unit in arguments.unit)
+            if (not arguments.units or unit in arguments.units)
             and (not arguments.rule or one[0].rule in arguments.rule)
             and (not arguments.file or str(one[1]).endswith(arguments.file))
             and (one[0].id in arguments.ids if arguments.ids else arguments.fine or one[0].rule in mutant_rules.COARSE or arguments.rule)
@@ -448,8 +449,8 @@ def choose(found, arguments):
 
 def parse():
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0], prog="./dev mutants")
-    parser.add_argument("ids", nargs="*", help="only these mutants")
-    parser.add_argument("--unit", action="append", help="a folder of absenc/protocol, or host; may be given again")
+    parser.add_argument("chosen", nargs="*", metavar="folder|id",
+                        help="only those in a folder of absenc/protocol or in host, or only the mutant with an id")
     parser.add_argument("--file", help="only those of this source: the end of its path")
     parser.add_argument("--rule", action="append", help="only those of this rule: never, half ...; may be given again")
     parser.add_argument("--fine", action="store_true", help="also terms, edges and constants (tests/mutant_rules.py)")
@@ -459,13 +460,16 @@ def parse():
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="at a time, each in a tree (%(default)s)")
     parser.add_argument("--list", action="store_true", help="show them, run nothing")
     parser.add_argument("--verbose", action="store_true", help="a line for each")
-    return parser.parse_args()
+    arguments = parser.parse_args()
+    arguments.ids = [one for one in arguments.chosen if ":" in one]
+    arguments.units = [one for one in arguments.chosen if ":" not in one]
+    return arguments
 
 
 def main():
     arguments = parse()
     folders = unit_folders()
-    for unit in arguments.unit or []:
+    for unit in arguments.units:
         if unit not in folders:
             sys.exit(f"mutants: no unit {unit}: there are {', '.join(folders)}")
     found = {unit: list(find_mutants(folder)) for unit, folder in folders.items()}

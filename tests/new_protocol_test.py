@@ -54,7 +54,7 @@ class NewProtocol(unittest.TestCase):
         unit = self.root / "absenc/protocol/my_encoder"
         self.assertNotIn("protocol_name", "".join(file.read_text() for file in unit.iterdir()))
         sources = [self.root / "absenc/protocol/all.cpp", unit / "unit.cpp", unit / "my_encoder_test.cpp",
-                   self.root / "kit_test.cpp",
+                   self.root / "kit_test.cpp", unit / "clauses.cpp",
                    *(self.root / "tests/kit" / name for name in ("decoding.cpp", "frames.cpp", "hosts.cpp"))]
         sources[3].write_text(KIT_TEST)
         program = self.root / "kit"

@@ -224,25 +224,39 @@ class Arduino(Case):
         self.assertEqual(output[:6], ["4660 74565", "bad_checksum"] * 3)
 
 
-@unittest.skipUnless(os.environ.get("ABSENC_FIRMWARE_ALL"), "compiles all of it twice: ./dev firmware")
 class FetchContent(Case):
-    UNITS = ("amt21", "biss", "e201", "encolink", "esl", "raa38", "ssi")
+    # Folders of absenc/protocol that tformat does not need.
+    OTHERS = {path.name for path in (ROOT / "absenc/protocol").iterdir() if path.is_dir()} - {"author", "tformat"}
 
-    def built(self, *options):
-        run("cmake", "-G", "Ninja", "-S", ROOT / "packages/fetchcontent", "-B", self.folder,
+    def built(self, library, *options):
+        """Builds the example with another library in place of its own, if `library` is another."""
+        example = (ROOT / "packages/fetchcontent/CMakeLists.txt").read_text()
+        self.assertIn(" absenc::tformat)", example)
+        (self.folder / "CMakeLists.txt").write_text(example.replace(" absenc::tformat)", f" {library})"))
+        shutil.copy(ROOT / "packages/fetchcontent/main.cpp", self.folder)
+        run("cmake", "-G", "Ninja", "-S", self.folder, "-B", self.folder / "build",
             f"-DFETCHCONTENT_SOURCE_DIR_ABSENC={ROOT}", *options)
-        run("cmake", "--build", self.folder)
-        return self.folder / "position"
+        run("cmake", "--build", self.folder / "build")
+        return self.folder / "build/position"
 
-    def test_builds_natively(self):
-        run(self.built("-DCMAKE_BUILD_TYPE=Debug"))
+    def test_compiles_only_one_protocol(self):
+        run(self.built("absenc::tformat", "-DCMAKE_BUILD_TYPE=Debug"))
+        objects = {path.relative_to(self.folder / "build/_deps/absenc-build/CMakeFiles") for path in self.folder.rglob("*.cpp.o")
+                   if "_deps" in path.parts}
+        self.assertTrue(objects)
+        for path in objects:
+            self.assertIn(path.parts[0], ("absenc-base.dir", "absenc-tformat.dir"))
+            self.assertIn(path.parts[2], LAYERS)
+            self.assertFalse(self.OTHERS & set(path.parts), path)
 
+    @unittest.skipUnless(os.environ.get("ABSENC_FIRMWARE_ALL"), "compiles all of it: ./dev firmware")
     def test_unused_units_take_no_space(self):
-        program = self.built("--toolchain", ROOT / "cmake/arm-none-eabi.cmake", "-DCMAKE_BUILD_TYPE=MinSizeRel",
+        program = self.built("absenc::absenc", "--toolchain", ROOT / "cmake/arm-none-eabi.cmake",
+                             "-DCMAKE_BUILD_TYPE=MinSizeRel",
                              "-DCMAKE_EXE_LINKER_FLAGS=--specs=nano.specs --specs=nosys.specs")
         symbols = run("arm-none-eabi-nm", "-C", program)
         self.assertIn("absenc::tformat::", symbols)
-        for unit in self.UNITS:
+        for unit in self.OTHERS:
             self.assertNotIn(f"absenc::{unit}::", symbols)
         # A program linked only with the sources that it needs must have the same size as the one with all sources
         # available.

@@ -130,22 +130,6 @@ class Readme(unittest.TestCase):
         for line in text.splitlines():
             self.assertTrue(len(line) <= 120 or line.startswith(("|", "!", "warning:", "good:")), line)
 
-    def test_readme_has_each_protocol(self):
-        listed = {line.split()[0] for line in self.listed().splitlines()[1:]}
-        text = (SOURCE / "README.md").read_text(encoding="utf-8")
-        families = text.split("## Encoders")[1].split("\n## ")[0]
-        self.assertLessEqual(listed, set(re.findall(r"`([\w-]+)`", families)))
-        adapters = text.split("## Adapters")[1].split("\n## ")[0]
-        self.assertLessEqual(listed, set(re.findall(r"[\w-]+", adapters)))
-
-    @staticmethod
-    def listed():
-        done = subprocess.run([ABSENC, "list"], capture_output=True, text=True, timeout=PATIENCE, check=True)
-        return done.stdout.split("\n\n")[0].strip()
-
-    def test_table_of_encoders_equals_list(self):
-        self.assertIn(self.listed(), (SOURCE / "docs/encoders.md").read_text(encoding="utf-8"))
-
     def test_programs_equal_examples(self):
         shown = [block for language, block in blocks((SOURCE / "docs/cpp.md").read_text(encoding="utf-8")) if language == "cpp"]
         examples = ["read_by_name.cpp", "read_position.cpp"]

@@ -11,23 +11,15 @@ import sys
 from pathlib import Path
 
 PLACEHOLDER = "protocol_name"
-RESERVED = {"absenc", "core", "link", "protocol", "host", "sim", "capture", "os", "command", "unit", "units"}
+# Names of other libraries, test programs and namespaces.
+RESERVED = {"absenc", "author", "base", "capture", "client", "command", "core", "cuse", "host", "kit", "link", "manual", "os",
+            "protocol", "python", "serve", "sim", "test", "unit", "units"}
 
 
 def list_unit(text, name):
-    """Returns the text of all.cpp with the unit `name` added: its include in order, its line at the end of `listed`."""
-    lines = text.splitlines()
-    include = f'#include "absenc/protocol/{name}/unit.hpp"'
-    existing = [i for i, line in enumerate(lines) if re.match(r'#include "absenc/protocol/\w+/unit\.hpp"', line)]
-    if existing:
-        at = next((i for i in existing if lines[i] > include), existing[-1] + 1)
-    else:
-        at = max(i for i, line in enumerate(lines) if line.startswith("#include")) + 1
-    lines.insert(at, include)
-    begin = next(i for i, line in enumerate(lines) if "listed = std::array{" in line)
-    end = next(i for i in range(begin, len(lines)) if lines[i] == "};")
-    lines.insert(end, f"    Listed{{&{name}::unit}},")
-    return "\n".join(lines) + "\n"
+    """Returns the text of all.cpp with a line for the unit `name` at the end of the list."""
+    last = [*re.finditer(r"^  one\(\w+, \w+\) \\\n", text, re.MULTILINE)][-1]
+    return f"{text[:last.end()]}  one({name}, unit) \\\n{text[last.end():]}"
 
 
 def main():
@@ -55,7 +47,8 @@ def main():
         print(f"absenc/protocol/{name}/{target.name}")
     all_cpp.write_text(listed, encoding="utf-8")
     print("absenc/protocol/all.cpp: one line more")
-    print("Next: ./dev test fails until the unit is written; CONTRIBUTING.md says in which order to write it.")
+    print(f"Next: ./dev unit {name} tries it, and fails until the document's own frames are in it; CONTRIBUTING.md says in "
+          "which order to write it.")
 
 
 if __name__ == "__main__":

@@ -1,72 +1,62 @@
 // SPDX-License-Identifier: Apache-2.0
-// The only file that includes every unit. A new protocol needs its folder, and here its includes and a line in
-// `listed`.
+// The only file that names every unit. A new protocol needs its folder and one line here.
 #include "absenc/protocol/all.hpp"
 
 #include <array>
 
-#include "absenc/protocol/amt21/clauses.hpp"
-#include "absenc/protocol/amt21/unit.hpp"
-#include "absenc/protocol/biss/clauses.hpp"
-#include "absenc/protocol/biss/unit.hpp"
-#include "absenc/protocol/e201/clauses.hpp"
-#include "absenc/protocol/e201/unit.hpp"
-#include "absenc/protocol/encolink/clauses.hpp"
-#include "absenc/protocol/encolink/unit.hpp"
-#include "absenc/protocol/esl/clauses.hpp"
-#include "absenc/protocol/esl/unit.hpp"
-#include "absenc/protocol/raa38/clauses.hpp"
-#include "absenc/protocol/raa38/unit.hpp"
-#include "absenc/protocol/ssi/clauses.hpp"
-#include "absenc/protocol/ssi/unit.hpp"
-#include "absenc/protocol/tformat/clauses.hpp"
-#include "absenc/protocol/tformat/unit.hpp"
+#include "absenc/protocol/clause.hpp"
+
+// One line for each unit: its folder, and the name of its descriptor there. Other names follow from these, so the list
+// is a macro. A build with only some units defines it on the compiler's command line (ABSENC_UNITS in CMakeLists.txt).
+// clang-format off
+#ifndef ABSENC_UNITS
+#define ABSENC_UNITS(one) \
+  one(tformat, unit) \
+  one(esl, unit) \
+  one(encolink, unit) \
+  one(encolink, spi_unit) \
+  one(biss, unit) \
+  one(ssi, unit) \
+  one(e201, unit) \
+  one(raa38, serial_unit) \
+  one(raa38, modbus_unit) \
+  one(raa38, can_unit) \
+  one(amt21, unit) \
+  one(biss, safety_unit) \
+  one(biss, chain_unit) \
+
+#endif
+// clang-format on
+
+#define DECLARE(folder, name)          \
+  namespace folder {                   \
+  extern const Unit name;              \
+  extern const Clauses name##_clauses; \
+  }
+#define UNIT(folder, name) &folder::name,
+#define CLAUSES(folder, name) &folder::name##_clauses,
 
 namespace absenc {
 
+ABSENC_UNITS(DECLARE)
+
 namespace {
 
-// A unit with the clauses of its document. The clauses are not in the unit's descriptor, because firmware links the
-// descriptor and tests nothing.
-struct Listed {
-  const Unit* unit;
-  std::span<const Clause> clauses{};
-  std::span<const HostClause> host_clauses{};
-};
+constexpr auto units = std::to_array<const Unit*>({ABSENC_UNITS(UNIT)});
+constexpr auto clauses = std::to_array<const Clauses*>({ABSENC_UNITS(CLAUSES)});
 
-constexpr auto listed = std::array{
-    Listed{&tformat::unit, tformat::clauses, tformat::host_clauses},
-    Listed{&esl::unit, esl::clauses, esl::host_clauses},
-    Listed{&encolink::unit, encolink::clauses, encolink::host_clauses},
-    Listed{&encolink::spi_unit, encolink::spi_clauses, encolink::spi_host_clauses},
-    Listed{&biss::unit, biss::clauses, biss::host_clauses},
-    Listed{&ssi::unit, ssi::clauses, ssi::host_clauses},
-    Listed{&e201::unit, e201::clauses, e201::host_clauses},
-    Listed{&raa38::serial_unit, raa38::serial_clauses, raa38::serial_host_clauses},
-    Listed{&raa38::modbus_unit, raa38::modbus_clauses, raa38::modbus_host_clauses},
-    Listed{&raa38::can_unit, raa38::can_clauses, raa38::can_host_clauses},
-    Listed{&amt21::unit, amt21::clauses, amt21::host_clauses},
-    Listed{&biss::safety_unit, biss::safety_clauses, biss::host_clauses},
-    Listed{&biss::chain_unit, biss::chain_clauses, biss::host_clauses},
-};
-
-constexpr auto units = [] {
-  std::array<const Unit*, listed.size()> all{};
-  for (std::size_t i = 0; i < all.size(); ++i) all[i] = listed[i].unit;
-  return all;
-}();
-
-Listed listed_as(const Unit& unit) {
-  for (const Listed& one : listed) {
-    if (one.unit == &unit) return one;
+const Clauses& listed_clauses(const Unit& unit) {
+  static constexpr Clauses none;
+  for (std::size_t i = 0; i < units.size(); ++i) {
+    if (units[i] == &unit) return *clauses[i];
   }
-  return {};
+  return none;
 }
 
 }  // namespace
 
-std::span<const Clause> clauses_of(const Unit& unit) { return listed_as(unit).clauses; }
-std::span<const HostClause> host_clauses_of(const Unit& unit) { return listed_as(unit).host_clauses; }
+std::span<const Clause> clauses_of(const Unit& unit) { return listed_clauses(unit).encoder; }
+std::span<const HostClause> host_clauses_of(const Unit& unit) { return listed_clauses(unit).host; }
 
 std::span<const Unit* const> all_units() { return units; }
 

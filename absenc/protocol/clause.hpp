@@ -157,6 +157,12 @@ struct HostClause {
 /// edges, so the test's controller checks the rule.
 inline constexpr std::string_view spi_mode_rule = "clock or sampling in another SPI mode than the encoder's";
 
+/// The clauses of a unit. They are not in its descriptor, because firmware links the descriptor and tests nothing.
+struct Clauses {
+  std::span<const Clause> encoder{};   ///< Clauses for encoders, in the order in which they are tested.
+  std::span<const HostClause> host{};  ///< Clauses for hosts.
+};
+
 /// Returns the clauses of this unit for encoders, in the order in which they are tested; empty if the unit has none.
 /// Defined in all.cpp, with the list of units.
 [[nodiscard]] std::span<const Clause> clauses_of(const Unit& unit);

@@ -72,8 +72,8 @@ constexpr auto commands = std::array{
         {"zero", Verb::zero, 0, "make this the zero of the turn", {}, true, false}),
 };
 constexpr auto vectors = std::array{
-    VectorText{"protocol_name-1", "a position", "invented", "", "5001", "123447", "singleturn=4660"},
-    VectorText{"protocol_name-2", "a wrong sum", "invented", "", "5001", "123448", "bad_checksum"},
+    VectorText{"position", "a position", "invented", "", "5001", "123447", "singleturn=4660"},
+    VectorText{"sum", "a wrong sum", "invented", "", "5001", "123448", "bad_checksum"},
 };
 
 constexpr Result<Request> guess_request(const Format& format, Bytes) { return request<Ask::position>(format); }

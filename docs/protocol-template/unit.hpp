@@ -7,6 +7,7 @@
 
 #include "absenc/protocol/author/device.hpp"
 #include "absenc/protocol/author/look.hpp"
+#include "absenc/protocol/clause.hpp"
 
 namespace absenc::protocol_name {
 
@@ -98,5 +99,6 @@ struct Protocol {
 };
 
 extern const Unit unit;
+extern const Clauses unit_clauses;  ///< The demands of its document.
 
 }  // namespace absenc::protocol_name

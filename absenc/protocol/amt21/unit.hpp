@@ -9,6 +9,7 @@
 #include "absenc/core/bits.hpp"
 #include "absenc/protocol/author/device.hpp"
 #include "absenc/protocol/author/look.hpp"
+#include "absenc/protocol/clause.hpp"
 
 namespace absenc::amt21 {
 
@@ -148,6 +149,7 @@ struct Protocol {
   }
 };
 
-extern const Unit unit;  ///< The protocol as a unit, for the list of units.
+extern const Unit unit;             ///< The protocol as a unit, for the list of units.
+extern const Clauses unit_clauses;  ///< The demands of its document.
 
 }  // namespace absenc::amt21

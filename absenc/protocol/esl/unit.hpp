@@ -2,10 +2,11 @@
 // The protocol unit of ESL (QS35), for the layers that know no protocol.
 #pragma once
 
-#include "absenc/protocol/unit.hpp"
+#include "absenc/protocol/clause.hpp"
 
 namespace absenc::esl {
 
-extern constinit const Unit unit;  ///< Descriptor of ESL.
+extern constinit const Unit unit;   ///< Descriptor of ESL.
+extern const Clauses unit_clauses;  ///< The demands of its document.
 
 }  // namespace absenc::esl

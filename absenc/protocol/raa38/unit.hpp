@@ -2,12 +2,15 @@
 // The RAA38S6 as units for the list of units: one for each kind of line.
 #pragma once
 
-#include "absenc/protocol/unit.hpp"
+#include "absenc/protocol/clause.hpp"
 
 namespace absenc::raa38 {
 
-extern constinit const Unit serial_unit;  ///< RAA38S6 on RS-485, RS-232 or RS-422.
-extern constinit const Unit modbus_unit;  ///< RAA38S6 with Modbus RTU.
-extern constinit const Unit can_unit;     ///< RAA38S6 on CAN.
+extern constinit const Unit serial_unit;   ///< RAA38S6 on RS-485, RS-232 or RS-422.
+extern constinit const Unit modbus_unit;   ///< RAA38S6 with Modbus RTU.
+extern constinit const Unit can_unit;      ///< RAA38S6 on CAN.
+extern const Clauses serial_unit_clauses;  ///< The demands on an RAA38S6 on RS-485.
+extern const Clauses modbus_unit_clauses;  ///< The demands on an RAA38S6 with Modbus RTU.
+extern const Clauses can_unit_clauses;     ///< The demands on an RAA38S6 on CAN.
 
 }  // namespace absenc::raa38

@@ -2,10 +2,11 @@
 // SSI as a unit for the list of units.
 #pragma once
 
-#include "absenc/protocol/unit.hpp"
+#include "absenc/protocol/clause.hpp"
 
 namespace absenc::ssi {
 
-extern const Unit unit;  ///< The protocol as a unit, for the list of units.
+extern const Unit unit;             ///< The protocol as a unit, for the list of units.
+extern const Clauses unit_clauses;  ///< The demands of its document.
 
 }  // namespace absenc::ssi

@@ -2,10 +2,11 @@
 // The protocol unit of the T-format, for the layers that know no protocol.
 #pragma once
 
-#include "absenc/protocol/unit.hpp"
+#include "absenc/protocol/clause.hpp"
 
 namespace absenc::tformat {
 
-extern constinit const Unit unit;  ///< Descriptor of the T-format.
+extern constinit const Unit unit;   ///< Descriptor of the T-format.
+extern const Clauses unit_clauses;  ///< The demands of its document.
 
 }  // namespace absenc::tformat

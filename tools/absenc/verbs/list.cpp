@@ -9,6 +9,7 @@
 #include "absenc/client/text/known_name.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/protocol/all.hpp"
+#include "absenc/protocol/clause.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/subcommand.hpp"
 #include "tools/absenc/text/field_text.hpp"
@@ -297,6 +298,16 @@ Json conditions_json(const Unit& unit) {
   });
 }
 
+// Returns what `conform` and `conform-host` test: the demands of the unit's document.
+Json clauses_json(const Unit& unit) {
+  const auto json = [](const auto& clause) {
+    return Json::object().set("id", clause.id).set("paragraph", clause.paragraph).set("words", clause.words);
+  };
+  return Json::object()
+      .set("encoder", Json::list(clauses_of(unit), json))
+      .set("host", Json::list(host_clauses_of(unit), json));
+}
+
 Json unit_json(const Unit& unit) {
   static constexpr std::array<std::string_view, 3> parities{"none", "odd", "even"};
   return Json::object()
@@ -316,7 +327,8 @@ Json unit_json(const Unit& unit) {
       .set("memory", memory_json(unit))
       .set("registers", registers_json(unit))
       .set("fields", fields_json(unit))
-      .set("conditions", conditions_json(unit));
+      .set("conditions", conditions_json(unit))
+      .set("clauses", clauses_json(unit));
 }
 
 Json name_json(std::string_view name, const EncoderAddress& uri) {

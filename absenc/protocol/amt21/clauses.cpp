@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Requirements of the protocol's document on encoder and host, each with its paragraph, for conformance tests.
-#pragma once
-
 #include <array>
 
-#include "absenc/protocol/clause.hpp"
+#include "absenc/protocol/amt21/unit.hpp"
 
 namespace absenc::amt21 {
+namespace {
 
 /// Requirements of the document that an encoder must fulfil.
-inline constexpr std::array<Clause, 7> clauses{{
+constexpr std::array<Clause, 7> clauses{{
     {"answer", "serial interface", "a request is answered", Demand::answered},
     {"answer-time", "serial interface",
      "the answer begins after the turn-around time of its rate: no later than a host waits", Demand::in_time},
@@ -30,12 +29,16 @@ inline constexpr std::array<Clause, 7> clauses{{
 }};
 
 /// Requirements of the document that a host must fulfil.
-inline constexpr std::array<HostClause, 4> host_clauses{{
+constexpr std::array<HostClause, 4> host_clauses{{
     {"asks", "serial interface", "requests are as drawn", HostDemand::asks},
     {"silence", "serial interface", "after no reply it asks again", HostDemand::after_silence},
     {"damage", "serial interface, checksum", "after a damaged reply it asks again", HostDemand::after_damage},
     {"turn", "serial interface", "a request waits until the reply before it is over", HostDemand::rule,
      "request during the encoder's transmission"},
 }};
+
+}  // namespace
+
+constinit const Clauses unit_clauses{clauses, host_clauses};
 
 }  // namespace absenc::amt21

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Requirements of the protocol's document on encoder and host, each with its paragraph, for conformance tests.
-#pragma once
-
 #include <array>
 
-#include "absenc/protocol/clause.hpp"
+#include "absenc/protocol/e201/unit.hpp"
 
 namespace absenc::e201 {
+namespace {
 
 /// Requirements of the document that an encoder must fulfil.
-inline constexpr std::array<Clause, 5> clauses{{
+constexpr std::array<Clause, 5> clauses{{
     {"answer", "BiSS C timing diagram, command 4", "4 is answered", Demand::answered},
     {"length", "BiSS C timing diagram, command 4", "the answer is 16 hexadecimal digits and CR", Demand::whole},
     {.id = "crc",
@@ -35,12 +34,12 @@ inline constexpr std::array<Clause, 5> clauses{{
 // ---- Requests of hosts that break a clause
 
 namespace script {
-inline constexpr std::array no_number{HostStep{{}, "4d 0d"}};
-inline constexpr std::array letter{HostStep{{}, "4d 41"}};
+constexpr std::array no_number{HostStep{{}, "4d 0d"}};
+constexpr std::array letter{HostStep{{}, "4d 41"}};
 }  // namespace script
 
 /// Requirements of the document that a host must fulfil.
-inline constexpr std::array<HostClause, 4> host_clauses{{
+constexpr std::array<HostClause, 4> host_clauses{{
     {"asks", "BiSS C timing diagram, command 4", "only commands of the interface are sent", HostDemand::asks},
     {"silence", "BiSS C timing diagram, command 4", "after no reply it asks again", HostDemand::after_silence},
     {"damage", "BiSS C timing diagram, CRC", "after a damaged reply it asks again", HostDemand::after_damage},
@@ -51,5 +50,9 @@ inline constexpr std::array<HostClause, 4> host_clauses{{
      .rule = "a command without its number",
      .breaks = {script::no_number, script::letter}},
 }};
+
+}  // namespace
+
+constinit const Clauses unit_clauses{clauses, host_clauses};
 
 }  // namespace absenc::e201

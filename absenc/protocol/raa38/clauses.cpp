@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Requirements of the protocol's document on encoder and host, each with its paragraph, for conformance tests.
-#pragma once
-
 #include <array>
 
-#include "absenc/protocol/clause.hpp"
+#include "absenc/protocol/raa38/unit.hpp"
 
 namespace absenc::raa38 {
+namespace {
 
 /// Requirements of the document that an encoder on RS-485 must fulfil.
-inline constexpr auto serial_clauses = std::array{
+constexpr auto serial_clauses = std::array{
     Clause{.id = "frames",
            .paragraph = "3.1.3, 3.1.5",
            .words = "a pulse, or a request on a bus, is answered by a frame",
@@ -48,7 +47,7 @@ inline constexpr auto serial_clauses = std::array{
 };
 
 /// Requirements of the document that an encoder with Modbus RTU must fulfil.
-inline constexpr std::array<Clause, 10> modbus_clauses{{
+constexpr std::array<Clause, 10> modbus_clauses{{
     {"answer", "3.1.7", "function 03 is answered", Demand::answered},
     {"length", "3.1.7 (5)", "an answer has as many bytes as its registers need", Demand::whole},
     {"crc", "3.1.7", "an answer ends with its CRC", Demand::checked},
@@ -89,7 +88,7 @@ inline constexpr std::array<Clause, 10> modbus_clauses{{
 }};
 
 /// Requirements of the document that an encoder on CAN must fulfil.
-inline constexpr auto can_clauses = std::array{
+constexpr auto can_clauses = std::array{
     Clause{"answer", "3.4.1 (3)", "command 80 is answered", Demand::answered},
     Clause{.id = "stream",
            .paragraph = "3.4.1 (2)",
@@ -133,39 +132,39 @@ inline constexpr auto can_clauses = std::array{
 
 namespace script {
 using std::chrono::milliseconds;
-inline constexpr std::array<std::int64_t, 1> negative{1};
-inline constexpr std::array parameter_3{HostStep{{}, "01 cc 03 35 01"}};
-inline constexpr std::array parameter_4{HostStep{{}, "01 cc 04 74 c3"}};
-inline constexpr std::array direction_often{HostStep{milliseconds(20), "set-direction", negative, 12}};
-inline constexpr std::array zero_often{HostStep{milliseconds(20), "zero", {}, 12}};
+constexpr std::array<std::int64_t, 1> negative{1};
+constexpr std::array parameter_3{HostStep{{}, "01 cc 03 35 01"}};
+constexpr std::array parameter_4{HostStep{{}, "01 cc 04 74 c3"}};
+constexpr std::array direction_often{HostStep{milliseconds(20), "set-direction", negative, 12}};
+constexpr std::array zero_often{HostStep{milliseconds(20), "zero", {}, 12}};
 
-inline constexpr std::array two_at_once{HostStep{{}, "bc aa b1 bc aa b1"}};
+constexpr std::array two_at_once{HostStep{{}, "bc aa b1 bc aa b1"}};
 // The reply begins 20 ms after the request (`acquisition_us`); a second request within that time breaks the rule
 // `turn`.
-inline constexpr std::array soon_again{HostStep{{}, "position"}, HostStep{milliseconds(5), "position"}};
+constexpr std::array soon_again{HostStep{{}, "position"}, HostStep{milliseconds(5), "position"}};
 
-inline constexpr HostStep enter{milliseconds(1), "7e5:0401000000000000"};
-inline constexpr std::array two_bytes{HostStep{{}, "220:8020"}};
-inline constexpr std::array seven_bytes{HostStep{{}, "220:80200000000000"}};
-inline constexpr std::array node_21{HostStep{{}, "220:8021000000000000"}};
-inline constexpr std::array node_0{HostStep{{}, "220:8000000000000000"}};
-inline constexpr std::array command_70{HostStep{{}, "220:7020000000000000"}};
-inline constexpr std::array command_81{HostStep{{}, "220:8120000000000000"}};
-inline constexpr std::array node_unprepared{HostStep{{}, "7e5:1121000000000000"}};
-inline constexpr std::array rate_unprepared{HostStep{{}, "7e5:1300030000000000"}};
-inline constexpr std::array configuration_44{enter, HostStep{milliseconds(1), "7e5:4400000000000000"}};
-inline constexpr std::array configuration_17{enter, HostStep{milliseconds(1), "7e5:1700000000000000"}};
-inline constexpr std::array number_0{enter, HostStep{milliseconds(1), "7e5:1100000000000000"}};
-inline constexpr std::array number_0_later{enter, HostStep{milliseconds(1), "7e5:1121000000000000"},
-                                           HostStep{milliseconds(1), "7e5:1100000000000000"}};
-inline constexpr std::array number_32{enter, HostStep{milliseconds(1), "7e5:1120000000000000"}};
-inline constexpr std::array rate_1{enter, HostStep{milliseconds(1), "7e5:1300010000000000"}};
-inline constexpr std::array rate_9{enter, HostStep{milliseconds(1), "7e5:1300090000000000"}};
-inline constexpr std::array rate_3{enter, HostStep{milliseconds(1), "7e5:1300030000000000"}};
+constexpr HostStep enter{milliseconds(1), "7e5:0401000000000000"};
+constexpr std::array two_bytes{HostStep{{}, "220:8020"}};
+constexpr std::array seven_bytes{HostStep{{}, "220:80200000000000"}};
+constexpr std::array node_21{HostStep{{}, "220:8021000000000000"}};
+constexpr std::array node_0{HostStep{{}, "220:8000000000000000"}};
+constexpr std::array command_70{HostStep{{}, "220:7020000000000000"}};
+constexpr std::array command_81{HostStep{{}, "220:8120000000000000"}};
+constexpr std::array node_unprepared{HostStep{{}, "7e5:1121000000000000"}};
+constexpr std::array rate_unprepared{HostStep{{}, "7e5:1300030000000000"}};
+constexpr std::array configuration_44{enter, HostStep{milliseconds(1), "7e5:4400000000000000"}};
+constexpr std::array configuration_17{enter, HostStep{milliseconds(1), "7e5:1700000000000000"}};
+constexpr std::array number_0{enter, HostStep{milliseconds(1), "7e5:1100000000000000"}};
+constexpr std::array number_0_later{enter, HostStep{milliseconds(1), "7e5:1121000000000000"},
+                                    HostStep{milliseconds(1), "7e5:1100000000000000"}};
+constexpr std::array number_32{enter, HostStep{milliseconds(1), "7e5:1120000000000000"}};
+constexpr std::array rate_1{enter, HostStep{milliseconds(1), "7e5:1300010000000000"}};
+constexpr std::array rate_9{enter, HostStep{milliseconds(1), "7e5:1300090000000000"}};
+constexpr std::array rate_3{enter, HostStep{milliseconds(1), "7e5:1300030000000000"}};
 }  // namespace script
 
 /// Requirements of the document that a host with Modbus RTU must fulfil.
-inline constexpr std::array<HostClause, 7> modbus_host_clauses{{
+constexpr std::array<HostClause, 7> modbus_host_clauses{{
     {"asks", "3.1.7", "requests are as drawn", HostDemand::asks},
     {"silence", "3.1.7", "after no reply it asks again", HostDemand::after_silence},
     {"damage", "3.1.7", "after a damaged reply it asks again", HostDemand::after_damage},
@@ -188,7 +187,7 @@ inline constexpr std::array<HostClause, 7> modbus_host_clauses{{
 }};
 
 /// Requirements that a host on a serial line must fulfil. Only in bus mode do bytes request a position.
-inline constexpr std::array<HostClause, 4> serial_host_clauses{{
+constexpr std::array<HostClause, 4> serial_host_clauses{{
     {"asks", "3.1.5 (1)", "requests are as drawn", HostDemand::asks},
     {"silence", "3.1.5 (1)", "after no reply it asks again", HostDemand::after_silence},
     {"damage", "3.1.5 (2)", "after a damaged reply it asks again", HostDemand::after_damage},
@@ -202,7 +201,7 @@ inline constexpr std::array<HostClause, 4> serial_host_clauses{{
 }};
 
 /// Requirements of the document that a host on CAN must fulfil.
-inline constexpr std::array<HostClause, 10> can_host_clauses{{
+constexpr std::array<HostClause, 10> can_host_clauses{{
     {"asks", "3.4.1 (3)", "requests are as drawn", HostDemand::asks},
     {"silence", "3.4.1 (3)", "after no reply it asks again", HostDemand::after_silence},
     {"damage", "3.4.1 (3)", "after a reply that is none it asks again", HostDemand::after_damage},
@@ -251,5 +250,11 @@ inline constexpr std::array<HostClause, 10> can_host_clauses{{
      .breaks = {script::rate_1, script::rate_9},
      .keeps = script::rate_3},
 }};
+
+}  // namespace
+
+constinit const Clauses serial_unit_clauses{serial_clauses, serial_host_clauses};
+constinit const Clauses modbus_unit_clauses{modbus_clauses, modbus_host_clauses};
+constinit const Clauses can_unit_clauses{can_clauses, can_host_clauses};
 
 }  // namespace absenc::raa38

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The clauses of the ESL document for encoders and hosts, with their paragraphs.
-#pragma once
-
 #include <array>
 
-#include "absenc/protocol/clause.hpp"
 #include "absenc/protocol/esl/frame.hpp"
+#include "absenc/protocol/esl/unit.hpp"
 
 namespace absenc::esl {
+namespace {
 
 // ---- Requests that no host sends
 
@@ -35,10 +34,10 @@ inline Result<std::size_t> unknown_id(const Options& values, MutableBytes reques
 }  // namespace request
 
 /// Alarms that command C clears, in both channels (mask of Reading::alarms). The other alarms need more (Table 8).
-inline constexpr std::int64_t cleared_by_c = alarms::xc_error | alarms::xc_error << 8;
+constexpr std::int64_t cleared_by_c = alarms::xc_error | alarms::xc_error << 8;
 
 /// Clauses of the ESL document for encoders.
-inline constexpr auto clauses = std::array{
+constexpr auto clauses = std::array{
     Clause{"answer", "Figure 2", "a read request is answered", Demand::answered},
     Clause{"answer-time", "Figure 2",
            "the answer begins 2.0 us after the request, which is typical: no later than a host waits", Demand::in_time},
@@ -113,29 +112,28 @@ inline constexpr auto clauses = std::array{
 namespace script {
 using std::chrono::microseconds;
 using std::chrono::milliseconds;
-inline constexpr std::array<std::int64_t, 1> page_0{0};
-inline constexpr std::array<std::int64_t, 2> byte_1{1, 5};
-inline constexpr std::array<std::int64_t, 2> byte_2{2, 5};
-inline constexpr std::array<std::int64_t, 1> at_1{1};
-inline constexpr std::array<std::int64_t, 1> at_2{2};
-inline constexpr HostStep select{milliseconds(20), "select-page", page_0};
+constexpr std::array<std::int64_t, 1> page_0{0};
+constexpr std::array<std::int64_t, 2> byte_1{1, 5};
+constexpr std::array<std::int64_t, 2> byte_2{2, 5};
+constexpr std::array<std::int64_t, 1> at_1{1};
+constexpr std::array<std::int64_t, 1> at_2{2};
+constexpr HostStep select{milliseconds(20), "select-page", page_0};
 
-inline constexpr std::array seven_clears{HostStep{microseconds(100), "clear-alarms", {}, 7},
-                                         HostStep{microseconds(100), "position"}};
-inline constexpr std::array one_zero{HostStep{microseconds(100), "zero"},
-                                     HostStep{microseconds(100), "clear-alarms", {}, 8}};
-inline constexpr std::array two_writes{select, HostStep{milliseconds(20), "memory-write", byte_1},
-                                       HostStep{milliseconds(5), "memory-write", byte_2}};
-inline constexpr std::array write_and_again{select, HostStep{milliseconds(20), "memory-write", byte_1},
-                                            HostStep{milliseconds(1), "memory-write", byte_1}};
-inline constexpr std::array asked_once{select, HostStep{milliseconds(20), "memory-read", at_1},
-                                       HostStep{milliseconds(20), "memory-read", at_2}};
-inline constexpr std::array asked_and_written{select, HostStep{milliseconds(20), "memory-read", at_1},
-                                              HostStep{milliseconds(20), "memory-write", byte_2}};
+constexpr std::array seven_clears{HostStep{microseconds(100), "clear-alarms", {}, 7},
+                                  HostStep{microseconds(100), "position"}};
+constexpr std::array one_zero{HostStep{microseconds(100), "zero"}, HostStep{microseconds(100), "clear-alarms", {}, 8}};
+constexpr std::array two_writes{select, HostStep{milliseconds(20), "memory-write", byte_1},
+                                HostStep{milliseconds(5), "memory-write", byte_2}};
+constexpr std::array write_and_again{select, HostStep{milliseconds(20), "memory-write", byte_1},
+                                     HostStep{milliseconds(1), "memory-write", byte_1}};
+constexpr std::array asked_once{select, HostStep{milliseconds(20), "memory-read", at_1},
+                                HostStep{milliseconds(20), "memory-read", at_2}};
+constexpr std::array asked_and_written{select, HostStep{milliseconds(20), "memory-read", at_1},
+                                       HostStep{milliseconds(20), "memory-write", byte_2}};
 }  // namespace script
 
 /// Clauses of the ESL document for hosts.
-inline constexpr std::array<HostClause, 12> host_clauses{{
+constexpr std::array<HostClause, 12> host_clauses{{
     {"asks", "Figure 2", "requests are as drawn", HostDemand::asks},
     {"silence", "Overview of Communication", "after no reply it asks again", HostDemand::after_silence},
     {"damage", "Figures 10 and 11", "after a damaged reply it asks again", HostDemand::after_damage},
@@ -170,5 +168,9 @@ inline constexpr std::array<HostClause, 12> host_clauses{{
     {"addressing", "Table 12", "ID 8 is not sent eight times in a row", HostDemand::rule,
      "ID 8 sent eight times in a row: dynamic addressing, which nothing describes"},
 }};
+
+}  // namespace
+
+constinit const Clauses unit_clauses{clauses, host_clauses};
 
 }  // namespace absenc::esl

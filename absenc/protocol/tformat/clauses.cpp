@@ -1,20 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // The clauses of the T-format document for encoders and hosts, with their paragraphs.
-#pragma once
-
 #include <array>
 
-#include "absenc/protocol/clause.hpp"
 #include "absenc/protocol/tformat/frame.hpp"
+#include "absenc/protocol/tformat/unit.hpp"
 
 namespace absenc::tformat {
+namespace {
 
 /// Alarms that a reset must clear (mask of ALMC). Over-heat is left out, because it returns as long as the encoder is
 /// hot.
-inline constexpr std::int64_t latched_alarms = alarms::latched & ~alarms::over_heat;
+constexpr std::int64_t latched_alarms = alarms::latched & ~alarms::over_heat;
 
 /// Clauses of the T-format document for encoders.
-inline constexpr auto clauses = std::array{
+constexpr auto clauses = std::array{
     Clause{"answer", "6.2.1", "a readout request is answered", Demand::answered},
     Clause{"answer-time", "8.1",
            "the answer begins 3 us after the request, which is typical: no later than a host waits", Demand::in_time},
@@ -113,34 +112,33 @@ inline constexpr auto clauses = std::array{
 namespace script {
 using std::chrono::microseconds;
 using std::chrono::milliseconds;
-inline constexpr std::array<std::int64_t, 2> byte_1{1, 5};
-inline constexpr std::array<std::int64_t, 2> byte_2{2, 5};
-inline constexpr std::array<std::int64_t, 1> at_1{1};
-inline constexpr std::array<std::int64_t, 1> at_2{2};
+constexpr std::array<std::int64_t, 2> byte_1{1, 5};
+constexpr std::array<std::int64_t, 2> byte_2{2, 5};
+constexpr std::array<std::int64_t, 1> at_1{1};
+constexpr std::array<std::int64_t, 1> at_2{2};
 
-inline constexpr std::array nine_zeros{HostStep{microseconds(100), "zero", {}, 9},
-                                       HostStep{microseconds(100), "position"}};
-inline constexpr std::array one_clear{HostStep{microseconds(100), "clear-alarms"},
-                                      HostStep{microseconds(100), "reset-multiturn", {}, 10}};
-inline constexpr std::array two_writes{HostStep{{}, "memory-write", byte_1},
-                                       HostStep{milliseconds(5), "memory-write", byte_2}};
-inline constexpr std::array write_and_again{HostStep{{}, "memory-write", byte_1},
-                                            HostStep{milliseconds(17), "memory-write", byte_1}};
-inline constexpr std::array other_after_busy{HostStep{{}, "memory-write", byte_1},
-                                             HostStep{milliseconds(5), "memory-read", at_1},
-                                             HostStep{milliseconds(20), "memory-read", at_2}};
-inline constexpr std::array write_after_busy{HostStep{{}, "memory-write", byte_1},
-                                             HostStep{milliseconds(5), "memory-read", at_2},
-                                             HostStep{milliseconds(20), "memory-write", byte_2}};
-inline constexpr std::array same_after_busy{HostStep{{}, "memory-write", byte_1},
-                                            HostStep{milliseconds(5), "memory-read", at_1},
-                                            HostStep{milliseconds(20), "memory-read", at_1}};
-inline constexpr std::array two_at_once{HostStep{{}, "1a 1a"}};
-inline constexpr std::array three_at_once{HostStep{{}, "1a 1a 1a"}};
+constexpr std::array nine_zeros{HostStep{microseconds(100), "zero", {}, 9}, HostStep{microseconds(100), "position"}};
+constexpr std::array one_clear{HostStep{microseconds(100), "clear-alarms"},
+                               HostStep{microseconds(100), "reset-multiturn", {}, 10}};
+constexpr std::array two_writes{HostStep{{}, "memory-write", byte_1},
+                                HostStep{milliseconds(5), "memory-write", byte_2}};
+constexpr std::array write_and_again{HostStep{{}, "memory-write", byte_1},
+                                     HostStep{milliseconds(17), "memory-write", byte_1}};
+constexpr std::array other_after_busy{HostStep{{}, "memory-write", byte_1},
+                                      HostStep{milliseconds(5), "memory-read", at_1},
+                                      HostStep{milliseconds(20), "memory-read", at_2}};
+constexpr std::array write_after_busy{HostStep{{}, "memory-write", byte_1},
+                                      HostStep{milliseconds(5), "memory-read", at_2},
+                                      HostStep{milliseconds(20), "memory-write", byte_2}};
+constexpr std::array same_after_busy{HostStep{{}, "memory-write", byte_1},
+                                     HostStep{milliseconds(5), "memory-read", at_1},
+                                     HostStep{milliseconds(20), "memory-read", at_1}};
+constexpr std::array two_at_once{HostStep{{}, "1a 1a"}};
+constexpr std::array three_at_once{HostStep{{}, "1a 1a 1a"}};
 }  // namespace script
 
 /// Clauses of the T-format document for hosts.
-inline constexpr std::array<HostClause, 11> host_clauses{{
+constexpr std::array<HostClause, 11> host_clauses{{
     {"asks", "6.2", "requests are as drawn", HostDemand::asks},
     {"silence", "8.4 Table 5 (1)", "after no reply it asks again", HostDemand::after_silence},
     {"damage", "6.3.4", "after a damaged reply it asks again", HostDemand::after_damage},
@@ -177,5 +175,9 @@ inline constexpr std::array<HostClause, 11> host_clauses{{
      "reset sent too fast: less than 40 us after the one before"},
     {"reset-standing", "10", "a reset is sent while the shaft stands", HostDemand::rule, "reset while the shaft turns"},
 }};
+
+}  // namespace
+
+constinit const Clauses unit_clauses{clauses, host_clauses};
 
 }  // namespace absenc::tformat

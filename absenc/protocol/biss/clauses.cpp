@@ -1,18 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // Requirements of the protocol's document on encoder and host, each with its paragraph, for conformance tests.
-#pragma once
-
 #include <array>
 
-#include "absenc/protocol/clause.hpp"
+#include "absenc/protocol/biss/unit.hpp"
 
 namespace absenc::biss {
+namespace {
 
 /// Errors of the bits before the data: idle bits, ACK, start bit and CDS.
-inline constexpr Errors header_errors = any_of(Error::bad_framing, Error::line_stuck);
+constexpr Errors header_errors = any_of(Error::bad_framing, Error::line_stuck);
 
 /// Requirements of the document on the registers of an encoder.
-inline constexpr std::array<Clause, 3> register_clauses{{
+constexpr std::array<Clause, 3> register_clauses{{
     {.id = "bank",
      .paragraph = "BiSS C Protocol Description rev D2, register 40",
      .words = "the bank that was selected is read again",
@@ -47,7 +46,7 @@ constexpr std::array<Clause, count + register_clauses.size()> with_registers(con
 }
 
 /// Requirements of the document on a BiSS-C encoder with one word.
-inline constexpr auto clauses = with_registers(std::array<Clause, 3>{{
+constexpr auto clauses = with_registers(std::array<Clause, 3>{{
     {"crc", "BiSS C timing diagram, CRC", "six bits of CRC, inverted, over position and status", Demand::checked},
     {.id = "header",
      .paragraph = "BiSS C timing diagram",
@@ -64,7 +63,7 @@ inline constexpr auto clauses = with_registers(std::array<Clause, 3>{{
 }});
 
 /// Requirements on a BiSS Safety encoder: a control word and a safety word, each with its own check.
-inline constexpr auto safety_clauses = with_registers(std::array<Clause, 4>{{
+constexpr auto safety_clauses = with_registers(std::array<Clause, 4>{{
     {"crc", "BiSS Safety, CPW and SPW", "CRC-6 over the control word, CRC-16 over the safety word, both inverted",
      Demand::checked},
     {.id = "header",
@@ -87,7 +86,7 @@ inline constexpr auto safety_clauses = with_registers(std::array<Clause, 4>{{
 }});
 
 /// Requirements on encoders in a chain.
-inline constexpr auto chain_clauses = with_registers(std::array<Clause, 2>{{
+constexpr auto chain_clauses = with_registers(std::array<Clause, 2>{{
     {"crc", "BiSS C timing diagram, CRC", "each encoder's CRC, inverted, over its own position and status",
      Demand::checked},
     {.id = "header",
@@ -98,7 +97,7 @@ inline constexpr auto chain_clauses = with_registers(std::array<Clause, 2>{{
 }});
 
 /// Requirements on the host of every BiSS unit: the timing of the line is the same for all.
-inline constexpr std::array<HostClause, 7> host_clauses{{
+constexpr std::array<HostClause, 7> host_clauses{{
     {"silence", "BiSS C timing diagram", "after SLO that stayed as it was it clocks again", HostDemand::after_silence},
     {"damage", "BiSS C timing diagram, CRC", "after a frame with a wrong CRC it clocks again",
      HostDemand::after_damage},
@@ -111,5 +110,11 @@ inline constexpr std::array<HostClause, 7> host_clauses{{
      "fewer clocks than the frame has bits"},
     {"mode", "BiSS C timing diagram, MA", "MA idles high", HostDemand::rule, spi_mode_rule},
 }};
+
+}  // namespace
+
+constinit const Clauses unit_clauses{clauses, host_clauses};
+constinit const Clauses safety_unit_clauses{safety_clauses, host_clauses};
+constinit const Clauses chain_unit_clauses{chain_clauses, host_clauses};
 
 }  // namespace absenc::biss

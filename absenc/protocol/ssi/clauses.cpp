@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Requirements of the protocol's document on encoder and host, each with its paragraph, for conformance tests.
-#pragma once
-
 #include <array>
 
-#include "absenc/protocol/clause.hpp"
+#include "absenc/protocol/ssi/unit.hpp"
 
 namespace absenc::ssi {
+namespace {
 
 /// Requirements of the document that an encoder must fulfil.
-inline constexpr std::array<Clause, 1> clauses{{
+constexpr std::array<Clause, 1> clauses{{
     {.id = "repeat",
      .paragraph = "3.5",
      .words = "when the clock goes on, the word comes again from its MSB",
@@ -21,7 +20,7 @@ inline constexpr std::array<Clause, 1> clauses{{
 }};
 
 /// Requirements of the document that a host must fulfil.
-inline constexpr std::array<HostClause, 5> host_clauses{{
+constexpr std::array<HostClause, 5> host_clauses{{
     {"silence", "3.5", "after a data line that stayed as it was it clocks again", HostDemand::after_silence},
     {"speed", "3.5", "the clock is within the limits of the encoder", HostDemand::rule,
      "clock outside min_clock_khz to max_clock_khz"},
@@ -30,5 +29,9 @@ inline constexpr std::array<HostClause, 5> host_clauses{{
     {"clocks", "3.5", "each bit of the word has its clock", HostDemand::rule, "fewer clocks than the word has bits"},
     {"mode", "3.5", "the clock idles high", HostDemand::rule, spi_mode_rule},
 }};
+
+}  // namespace
+
+constinit const Clauses unit_clauses{clauses, host_clauses};
 
 }  // namespace absenc::ssi

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Requirements of the protocol's document on encoder and host, each with its paragraph, for conformance tests.
-#pragma once
-
 #include <array>
 
-#include "absenc/protocol/clause.hpp"
+#include "absenc/protocol/encolink/unit.hpp"
 
 namespace absenc::encolink {
+namespace {
 
 /// Requirements of the document that an encoder must fulfil.
-inline constexpr auto clauses = std::array{
+constexpr auto clauses = std::array{
     Clause{"answer", "UART, Communication parameters", "a request is answered", Demand::answered},
     Clause{.id = "stream",
            .paragraph = "UART, Communication parameters",
@@ -55,7 +54,7 @@ inline constexpr auto clauses = std::array{
 };
 
 /// Requirements of the document that an encoder on SPI must fulfil.
-inline constexpr auto spi_clauses = std::array{
+constexpr auto spi_clauses = std::array{
     Clause{"answer", "SPI timing diagram", "the encoder drives its output while it is selected", Demand::answered},
     Clause{"crc", "SPI, Channel 1", "the inverted CRC of polynomial 97 is right", Demand::checked},
     Clause{.id = "channel-2",
@@ -81,13 +80,13 @@ inline constexpr auto spi_clauses = std::array{
 // ---- Requests that break the clause `access`: a second register access before the first is answered
 
 namespace script {
-inline constexpr std::chrono::milliseconds pause{1};
-inline constexpr std::array keys_again{
+constexpr std::chrono::milliseconds pause{1};
+constexpr std::array keys_again{
     HostStep{pause, "00 00"}, HostStep{pause, "00 cd"},        HostStep{pause, "00 ef"},
     HostStep{pause, "00 89"}, HostStep{pause, "00 ab"},        HostStep{pause, "00 59"},
     HostStep{pause, "00 00"}, HostStep{pause, "00 02"},        HostStep{pause, "00 00", {}, 3},
     HostStep{pause, "00 10"}, HostStep{pause, "00 00", {}, 2}, HostStep{pause, "00 cd"}};
-inline constexpr std::array zeros_and_keys{
+constexpr std::array zeros_and_keys{
     HostStep{pause, "00 00"}, HostStep{pause, "00 cd"},        HostStep{pause, "00 ef"},
     HostStep{pause, "00 89"}, HostStep{pause, "00 ab"},        HostStep{pause, "00 59"},
     HostStep{pause, "00 00"}, HostStep{pause, "00 02"},        HostStep{pause, "00 00", {}, 3},
@@ -95,7 +94,7 @@ inline constexpr std::array zeros_and_keys{
 }  // namespace script
 
 /// Requirements of the document that a host on SPI must fulfil.
-inline constexpr std::array<HostClause, 8> spi_host_clauses{{
+constexpr std::array<HostClause, 8> spi_host_clauses{{
     {"asks", "SPI, Channel 1", "the first byte of a frame is a command", HostDemand::asks},
     {"silence", "SPI, Channel 1", "after a data line that stayed as it was it asks again", HostDemand::after_silence},
     {"damage", "SPI, Channel 1", "after a damaged frame it asks again", HostDemand::after_damage},
@@ -115,7 +114,7 @@ inline constexpr std::array<HostClause, 8> spi_host_clauses{{
 }};
 
 /// Requirements of the document that a host on a UART must fulfil.
-inline constexpr std::array<HostClause, 4> host_clauses{{
+constexpr std::array<HostClause, 4> host_clauses{{
     {"asks", "UART, Channel 1", "requests are two bytes, command and data", HostDemand::asks},
     {"silence", "UART, Channel 1", "after no reply it asks again", HostDemand::after_silence},
     {"damage", "UART, Channel 1", "after a damaged reply it asks again", HostDemand::after_damage},
@@ -126,5 +125,10 @@ inline constexpr std::array<HostClause, 4> host_clauses{{
      .rule = "register access before the last one was answered",
      .breaks = {script::keys_again, script::zeros_and_keys}},
 }};
+
+}  // namespace
+
+constinit const Clauses unit_clauses{clauses, host_clauses};
+constinit const Clauses spi_unit_clauses{spi_clauses, spi_host_clauses};
 
 }  // namespace absenc::encolink
