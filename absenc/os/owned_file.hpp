@@ -28,7 +28,7 @@ struct FileIdentity {
 class OwnedFile {
  public:
   /// Opens and locks the file at `path`; creates an empty file if none exists. Throws Failure: `in_use` if another
-  /// process owns it, `unsupported` if it is not a regular file.
+  /// process owns it, `unsupported` if it is not a regular file, `system`.
   explicit OwnedFile(const std::string& path);
 
   /// Returns whether the constructor created the file, because it was missing.
