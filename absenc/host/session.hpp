@@ -25,7 +25,7 @@ namespace absenc::host {
 struct Counters {
   std::uint64_t good = 0;       ///< conversations that ended well
   std::uint64_t repeated = 0;   ///< repeated attempts, each after an error
-  std::uint64_t late = 0;       ///< replies on the line, to any session, that arrived after their timeout and were dropped
+  std::uint64_t late = 0;       ///< replies on the line, to any session, that arrived too late and were dropped
   std::uint64_t discarded = 0;  ///< damaged frames of streams, whether an error reported them or not
   std::array<std::uint64_t, error_texts.size()>
       errors{};  ///< number of errors of each kind, also of repeated attempts; indexed by Error

@@ -19,8 +19,8 @@ namespace absenc::os {
 
 /// Base class of all byte stream ports. `begin` and `wait` throw Failure, Interrupted (os/signals.hpp) or Ended.
 ///
-/// A transfer begins at `at`, never earlier; `begin` blocks until then. `timer` is reported if the `at` of a wait was
-/// later than the last event and the last call of `now`.
+/// A transfer begins at `at`, earlier only by the send slack; `begin` blocks until then. `timer` is reported if the
+/// `at` of a wait was later than the last event and the last call of `now`.
 class StreamPort : public Port<std::uint8_t> {
  public:
   StreamPort(const StreamPort&) = delete;
@@ -58,7 +58,7 @@ class StreamPort : public Port<std::uint8_t> {
   /// bytes before the write returns. Default false: the time after the write.
   void set_read_at_once(bool yes) { read_at_once_ = yes; }
   [[nodiscard]] Time end() const { return end_; }
-  /// Returns the end of the last transfer or pulse.
+  /// Returns the end of the last transfer or pulse or pulse.
   [[nodiscard]] Time sent_at() const { return sent_at_; }
 
   /// Returns the poller; a derived port adds its descriptors.

@@ -1,6 +1,5 @@
-// SPDX-License-Identifier: Apache-2.0
-// HTTP server without knowledge of encoders: one thread for all connections, responses from any thread, and a limit for
-// each resource that a client can use. Only http.cpp and http_request.cpp use libmicrohttpd.
+// SPDX-License-Identifier: Apache-2.0 HTTP server without knowledge of encoders: one thread for all connections,
+// responses from any thread, and a limit for each resource that a client can use. Only http.cpp uses libmicrohttpd.
 #pragma once
 
 #include <cstdint>
@@ -63,7 +62,8 @@ class Stream {
   /// Returns whether the connection of the stream has ended.
   [[nodiscard]] bool over() const;
   [[nodiscard]] std::uint64_t dropped() const;
-  /// Returns when the client last received data of this stream.
+  /// Returns when the connection last asked for data of this stream, which it does when the client has received the
+  /// earlier data; before that, when the stream was made.
   [[nodiscard]] Time taken_at() const;
 
  private:
@@ -91,7 +91,7 @@ class HttpServer {
   using Handler = std::function<void(const Request&, Reply)>;
 
   /// `handler` is called in the connection thread for each request and must return quickly. `vital`: paths that are
-  /// answered even when too many connections are open. Throws Failure.
+  /// answered even when too many connections are open. Throws client::Failure.
   HttpServer(os::Listener listener, Handler handler, std::vector<std::string> vital);
   /// Aborts responses that are still being sent. Threads that write to a Stream must have ended before.
   ~HttpServer();

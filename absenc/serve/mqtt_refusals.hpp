@@ -41,7 +41,7 @@ class MqttRefusals {
 
   /// Returns whether the pause of a refused topic has ended; true only once for each pause.
   [[nodiscard]] bool take_due(Time now);
-  /// Returns a sentence that names the refused topics; "" if no topic is refused.
+  /// Returns a sentence that names one refused topic and the number of the others; "" if no topic is refused.
   [[nodiscard]] std::string text() const;
   [[nodiscard]] bool has_suspects() const { return !suspects_.empty(); }
 

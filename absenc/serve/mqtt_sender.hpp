@@ -38,7 +38,7 @@ class MqttSender {
 
  private:
   struct Outstanding {
-    std::int64_t message = 0;  // id of the message in the spool; 0: a retained state, which is not in the spool
+    std::int64_t message = 0;  // id of the message in the spool; 0: a retained message, which is not in the spool
     std::string topic{};
   };
 

@@ -97,7 +97,7 @@ void Spool::write_waiting() {
   notes_.push_back(fmt::format("the spool {} can be written again", path_));
 }
 
-// Writes the waiting messages that fit into one write. Returns false when no message waits.
+// Writes the waiting messages that fit into one write. Returns false when neither a message nor a reading number waits.
 bool Spool::write_some() {
   if (memory_.empty() && unwritten_numbers_.empty()) return false;
   std::string bytes;

@@ -16,8 +16,8 @@ namespace {
 
 constexpr std::string_view part_suffix = ".part";
 
-// Returns the size limit of one file of the spool. The limit is smaller on a small disk, because only deleting a whole
-// file frees space.
+// Returns the size limit of one file of the spool. The limit is smaller if the disk has little free space, because only
+// deleting a whole file frees space.
 std::size_t part_bytes(std::int64_t most, const std::string& folder) {
   std::error_code error;
   const std::uintmax_t free = fs::space(folder, error).available;
@@ -78,8 +78,8 @@ void Spool::load_part(std::int64_t number) {
   }
 }
 
-// Handles spool files that were removed or moved while open. The newest file is still open and can be read; the
-// messages of the others are lost.
+// Handles spool files that were removed or moved while open. The newest file is still open and can be read. If the
+// folder was removed, the messages of the other files are lost.
 void Spool::check_folder() {
   if (folder_ && folder_->is_there() && (newest_ == nullptr || newest_->log().is_there())) return;
   if (folder_) {

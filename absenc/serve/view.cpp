@@ -161,7 +161,7 @@ Json bad_json(const Details& details) {
 }
 
 // Sets the number of positions per turn or along the scale; null if only a reply reports that number and no reply was
-// received.
+// received, or if it has more than 62 bits.
 void set_scale(Json& json, const Watch& watch, const Snapshot& snapshot) {
   Resolution known = watch.address().unit->resolution(watch.address().options);
   const Reading& reading = snapshot.last.reading;

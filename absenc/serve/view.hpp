@@ -35,8 +35,8 @@ namespace absenc::serve {
 [[nodiscard]] client::Json points(const Watch& watch, std::span<const Point> taken);
 
 /// Returns the last minute of all encoders as
-/// {"encoders":[{"encoder":name,"seconds":[[at_s,position,speed],...]},...]}: last position and mean speed of the last
-/// 60 seconds with readings; null if the position or the speed was invalid.
+/// {"encoders":[{"encoder":name,"seconds":[[at_s,position,speed],...]},...]}: the last position and the mean speed of
+/// each of the last 60 seconds with readings; null if no position was valid or no speed was known.
 [[nodiscard]] client::Json last_minute(const Fleet::Watches& watches);
 
 /// Statistics of the server.
