@@ -32,7 +32,8 @@ std::string speed_text(const Sample& sample) {
   return fmt::format("   {} {}", to_text(*sample.measured_speed()), speed_unit(sample.reading));
 }
 
-/// Prints readings and failures; a message is not repeated while it stays the same.
+/// Prints readings and failures. The advice for a failure, and the message that the port is absent, are not repeated
+/// while they stay the same.
 class Display {
  public:
   /// With `speeds`, the line of a reading contains the speed of a shaft that turns.
