@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A drive with a T-format encoder: a timer requests positions, the UART's interrupts run the conversations, and the
-// main program evaluates the readings. Between two series of readings it clears an alarm and writes to
-// the encoder's memory.
+// main program evaluates the readings. Between two series of readings it clears an alarm and writes to the encoder's
+// memory.
 //
 //   drive POSITIONS SINGLETURN MULTITURN LATENCY_MS: number of readings, the position that each
 //   must report, and the latency of the line

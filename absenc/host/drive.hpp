@@ -1,5 +1,5 @@
-// SPDX-License-Identifier: Apache-2.0 Runs a machine on a port until the machine is done or the caller stops it: the
-// loop of programs that may wait.
+// SPDX-License-Identifier: Apache-2.0
+// Runs a machine on a port until the machine is done or the caller stops it: the loop of programs that may wait.
 #pragma once
 
 #include "absenc/link/port.hpp"

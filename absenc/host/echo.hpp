@@ -1,7 +1,8 @@
-// SPDX-License-Identifier: Apache-2.0 Removes the local echo of an RS-485 adapter from the received bytes: by count,
-// not by comparison, because a valid reply may equal its request byte for byte. The removed bytes are compared with the
-// request to detect a disturbed line. In automatic mode the filter decides whether the adapter echoes: an echo begins
-// like the request; then the number of bytes decides, and where that is ambiguous, which bytes are a valid reply.
+// SPDX-License-Identifier: Apache-2.0
+// Removes the local echo of an RS-485 adapter from the received bytes: by count, not by comparison, because a valid
+// reply may equal its request byte for byte. The removed bytes are compared with the request to detect a disturbed
+// line. In automatic mode the filter decides whether the adapter echoes: an echo begins like the request; then the
+// number of bytes decides, and where that is ambiguous, which bytes are a valid reply.
 #pragma once
 
 #include <cstdint>

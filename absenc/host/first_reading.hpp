@@ -1,6 +1,6 @@
-// SPDX-License-Identifier: Apache-2.0 Decides whether a position can be trusted. Encoders send well-formed wrong
-// positions while they start, and no checksum detects all damage: a position is trusted when it is near enough to the
-// one before.
+// SPDX-License-Identifier: Apache-2.0
+// Decides whether a position can be trusted. Encoders send well-formed wrong positions while they start, and no
+// checksum detects all damage: a position is trusted when it is near enough to the one before.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// SPDX-License-Identifier: Apache-2.0 Tests of ReplyGuard and of sessions, mostly with a virtual T-format encoder, in
-// virtual time.
+// SPDX-License-Identifier: Apache-2.0
+// Tests of ReplyGuard and of sessions, mostly with a virtual T-format encoder, in virtual time.
 #include "absenc/host/session.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,5 @@
-// SPDX-License-Identifier: Apache-2.0 Exceptions that the functions and classes of this folder throw.
+// SPDX-License-Identifier: Apache-2.0
+// Exceptions that the functions and classes of this folder throw.
 #pragma once
 
 #include <cstdint>

@@ -58,7 +58,7 @@ class StreamPort : public Port<std::uint8_t> {
   /// bytes before the write returns. Default false: the time after the write.
   void set_read_at_once(bool yes) { read_at_once_ = yes; }
   [[nodiscard]] Time end() const { return end_; }
-  /// Returns the end of the last transfer or pulse or pulse.
+  /// Returns the end of the last transfer or pulse.
   [[nodiscard]] Time sent_at() const { return sent_at_; }
 
   /// Returns the poller; a derived port adds its descriptors.
@@ -90,7 +90,7 @@ class StreamPort : public Port<std::uint8_t> {
   bool read_at_once_ = false;
 
   Waiting<std::uint8_t> waiting_;
-  Time sent_at_{};  // end of the last transfer
+  Time sent_at_{};  // end of the last transfer or pulse
   // Greatest time by which the last transfer may have ended before `sent_at_`.
   Time sent_late_{};
   bool sent_pending_ = false;  // whether the event `sent` is still to be reported

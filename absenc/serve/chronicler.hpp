@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: Apache-2.0 Writes the history in its own thread, once a second and when a caller waits for
-// it, so that a slow disk delays no other thread.
+// SPDX-License-Identifier: Apache-2.0
+// Writes the history in its own thread, once a second and when a caller waits for it, so that a slow disk delays no
+// other thread.
 #pragma once
 
 #include <chrono>

@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: Apache-2.0 Selects the HTTP connection to close when too many are open: one address cannot
-// shut out others, and of its connections the one that is idle for longest is closed first.
+// SPDX-License-Identifier: Apache-2.0
+// Selects the HTTP connection to close when too many are open: one address cannot shut out others, and of its
+// connections the one that is idle for longest is closed first.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: Apache-2.0 HTTP server without knowledge of encoders: one thread for all connections,
-// responses from any thread, and a limit for each resource that a client can use. Only http.cpp uses libmicrohttpd.
+// SPDX-License-Identifier: Apache-2.0
+// HTTP server without knowledge of encoders: one thread for all connections, responses from any thread, and a limit for
+// each resource that a client can use. Only http.cpp uses libmicrohttpd.
 #pragma once
 
 #include <cstdint>

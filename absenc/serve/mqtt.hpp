@@ -31,8 +31,8 @@ struct MqttHealth {
   // By encoder: number of its last reading that is in the spool or was sent.
   std::map<std::string, std::uint64_t> taken{};
 
-  /// Returns the state of MQTT: "none" without a broker, "good", "away" while the broker is not connected and messages
-  /// wait on disk, or "failing" while readings are dropped or the spool cannot be written.
+  /// Returns the state of MQTT: "none" without a broker, "good", "away" while the broker is not connected (messages
+  /// then wait in the spool), or "failing" while readings are dropped or the spool cannot be written.
   [[nodiscard]] std::string_view state() const;
   [[nodiscard]] client::Json json() const;
   /// Returns the metrics of MQTT in the text format of Prometheus.

@@ -120,7 +120,7 @@ class Card {
     const text = JSON.stringify(shown);
     if (text === this.shownWords) return;
     this.shownWords = text;
-    // A long reason is reduced to its first sentence; the page of the encoder shows all of it.
+    // A text without a title is reduced to its first sentence; the page of the encoder shows all of it.
     const first = (words) => /^.*?[.!?](?= [A-Z]|$)/.exec(words)?.[0] ?? words;
     this.words.replaceChildren(...shown.map(([kind, strong, words]) => element("p", {class: kind}, element("strong", {}, strong), element("span", {class: "more"}, strong && words ? " " : "", ...rich(strong ? words : first(words))))));
   }

@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: Apache-2.0 Requests to the server, with the token, and the event stream of the server, which
-// reports a lost connection within `PATIENCE` ms.
+// SPDX-License-Identifier: Apache-2.0
+// Requests to the server, with the token, and the event stream of the server, which reports a lost connection within
+// `PATIENCE` ms.
 
 let token = sessionStorage.getItem("token") ?? "";
 
