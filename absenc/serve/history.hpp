@@ -85,7 +85,7 @@ class HistoryWriter {
   /// after a day of newer rows was recorded, because the clock may be wrong.
   void trim();
 
-  /// Returns why the last `write` or `trim` failed; "" after a successful `write`.
+  /// Returns why the constructor, the last `write` or `trim` failed; "" after a successful `write`.
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
   [[nodiscard]] std::uint64_t lost() const { return lost_; }
   /// Returns sentences about changes of the history file and about losses since the last call.

@@ -23,7 +23,7 @@ struct Request {
   std::string method;  // HTTP method: "GET", "POST" ...
   std::string path;
   std::multimap<std::string, std::string> query;
-  std::string peer;  // IP address of the client that is connected
+  std::string peer;  // IP address of the connected client; Api replaces it by the one that a proxy reports
   std::string host;  // value of header Host; "" if it is missing; the same holds for the headers below
   std::string origin;
   std::string fetch_site;
@@ -43,13 +43,14 @@ struct Response {
 };
 
 /// The body of a response, which is produced while it is sent. Texts wait in a bounded queue until the client has
-/// received the earlier ones. A slow client loses the oldest unsent texts and delays no thread.
+/// received the earlier ones. A slow client delays no thread: the oldest queued texts are dropped, but the first one
+/// stays, because a part of it may be sent.
 class Stream {
  public:
   using Text = std::shared_ptr<const std::string>;
 
-  /// `most`: greatest number of queued texts. `on_empty` is called in the connection thread when the queue is empty; it
-  /// must return quickly.
+  /// `most`: greatest number of queued texts, at least 2. `on_empty` is called in the connection thread when the queue
+  /// is empty; it must return quickly.
   explicit Stream(std::string type, std::size_t most = 64, std::function<void()> on_empty = {});
   ~Stream();
   Stream(const Stream&) = delete;

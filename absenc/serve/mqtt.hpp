@@ -28,7 +28,7 @@ struct MqttHealth {
   std::uint64_t sent = 0;           // messages that the broker has acknowledged since the start
   std::uint64_t dropped = 0;        // readings lost since the start: spool full or not writable, or disk too slow
   std::uint64_t client_deaths = 0;  // unexpected ends of the MQTT client process since the start
-  // By encoder: number of its last reading that is in the spool or was sent.
+  // By encoder: number of its last reading that is on disk or was sent.
   std::map<std::string, std::uint64_t> taken{};
 
   /// Returns the state of MQTT: "none" without a broker, "good", "away" while the broker is not connected (messages
@@ -42,7 +42,7 @@ struct MqttHealth {
 class Mqtt {
  public:
   /// `fleet` and `server_events` must outlive this object. Throws Failure if the spool or a file of the connection
-  /// cannot be used.
+  /// cannot be used, os::Failure if the MQTT client process cannot be started.
   Mqtt(const MqttSettings& settings, const Fleet& fleet, ServerEvents& server_events);
   /// Spools the remaining readings. A connected broker has one second to receive them.
   ~Mqtt();

@@ -60,7 +60,8 @@ class MqttClient {
   /// Returns whether the MQTT client process ended unexpectedly: its library ends it at some malformed packets.
   [[nodiscard]] bool died() const { return died_; }
 
-  /// Sends a message to the broker. Returns the number that the acknowledgement of this message will have.
+  /// Sends a message to the broker. Returns the number that the acknowledgement of this message will have; with QoS 0
+  /// only a refusal is acknowledged.
   int publish(const std::string& topic, const std::string& payload, int qos, bool retain);
 
   struct Acknowledgement {

@@ -40,7 +40,7 @@ OrderResult run_command(Encoder& encoder, const Order& order) {
   return success(command, change.now, change.was_so ? "it had this value already" : change.note, change.state);
 }
 
-// Reads settings and memory, one request after the other. A request that the encoder refuses, or that its options
+// Reads settings or registers, one request after the other. A request that the encoder refuses, or that its options
 // exclude, is reported with its reason; `done` returns the first reason if no request was answered.
 class OptionalReads {
  public:

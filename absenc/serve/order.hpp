@@ -48,7 +48,7 @@ struct Order {
 [[nodiscard]] Order settings_order(const Unit& unit, std::string_view setting);
 /// Returns an order that reads memory page `page`; below 0: the addresses that a memory dump contains. Throws
 /// UsageError if the unit has no such memory, or the addresses are too many for one request. For a unit with registers
-/// the order reads all of them.
+/// the order reads all readable ones.
 [[nodiscard]] Order memory_order(const Unit& unit, std::int64_t page);
 [[nodiscard]] Order examination_order();
 

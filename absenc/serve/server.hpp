@@ -31,8 +31,8 @@ class Server {
   /// Starts reading and serving: all threads run when it returns. Throws UsageError, Failure, os::Failure,
   /// os::Interrupted.
   explicit Server(const Choices& choices);
-  /// Stops all threads. Waits for a reading in progress, and up to a second for a broker to receive the spooled
-  /// messages.
+  /// Stops all threads. Waits for a reading or a command in progress, and up to a second for a broker to receive the
+  /// spooled messages.
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Size of one write in bytes; it is small, because a nearly full disk may still accept a small one.
+// Approximate size of one write in bytes; it is small, because a nearly full disk may still accept a small one.
 constexpr std::size_t write_size = 65536;
 
 std::int64_t memory_bytes(std::int64_t most) { return std::clamp<std::int64_t>(most / 16, 64'000, 4'000'000); }

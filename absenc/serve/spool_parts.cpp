@@ -150,7 +150,7 @@ void Spool::drop_part(std::size_t index, const std::string& why) {
   fs::remove(path_of(part.number), ignored);
 }
 
-// Counts the messages of `part` that are still readable; the others are reported as dropped.
+// Counts the messages of `part` that are readable and not acknowledged; the unreadable ones are reported as dropped.
 void Spool::recount(Part& part) {
   Counts readable;
   std::int64_t bytes = 0;
@@ -170,8 +170,8 @@ void Spool::recount(Part& part) {
   drop(lost, fmt::format("{} cannot be read from byte {} of {} on", path_of(part.number), offset, part.bytes));
 }
 
-// Deletes files whose messages are all acknowledged, except the last file, which has the reading numbers. While the
-// disk cannot be written, the last file is shortened instead.
+// Deletes files whose messages are all acknowledged, except the last file, which has the reading numbers. If its
+// messages are all acknowledged while the disk cannot be written, the last file is shortened.
 void Spool::tidy() {
   if (newest_ != nullptr && !condition_.trouble.empty() && parts_.back().waiting.messages == 0) {
     if (newest_->log().shrink_to(spool_record(facts_))) {

@@ -50,8 +50,8 @@ Json alarms_json(const Unit& unit, const Reading& reading, const std::vector<Rai
   return all;
 }
 
-// Returns the status flags. Status flags are no alarms, but encoders without alarms report their condition only by
-// them.
+// Returns the names of the status flags that are set; null if none is set and no field reports all its flags. Status
+// flags are no alarms, but encoders without alarms report their condition only by them.
 Json status_json(const Unit& unit, const Reading& reading) {
   Json all = Json::array();
   const std::vector<Flags> channels = status_of(unit, reading);

@@ -26,8 +26,8 @@ namespace absenc::serve {
 /// Returns whether the encoder of `watch` is linear: its positions are in mm instead of degrees.
 [[nodiscard]] bool is_linear(const Watch& watch);
 
-/// Returns the overview of an encoder, and its counters, latencies, last bad exchanges, the fields of the last reply,
-/// and its commands with their arguments.
+/// Returns the overview of an encoder, its counters, latencies, last bad exchanges, the fields of the last reply, which
+/// settings and memory can be read, and its commands with their arguments.
 [[nodiscard]] client::Json details(const Watch& watch);
 
 /// Returns plot points of an encoder as {"encoder":name,"points":[[at_ms,position,speed,speed_uncertainty],...]}; an

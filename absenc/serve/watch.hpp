@@ -72,7 +72,7 @@ struct Snapshot {
   bool has_reading = false;
   std::optional<double> place{};  // last valid position, as in `Point`
   client::Sample last{};          // last reading; current only in state `live`
-  std::string message{};          // reason why the encoder is not live; "" if it is
+  std::string message{};          // reason why the encoder is not live; "" if it is, or in state `silent`
   host::Counters counters{};
   std::uint64_t readings = 0;
   std::uint64_t losses = 0;

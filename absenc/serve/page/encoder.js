@@ -39,7 +39,7 @@ export class EncoderPage {
   constructor(main, bar, name, values) {
     this.name = name;
     this.trace = name;
-    this.points = [];     // points of the live plot as [at_ms, position, speed]
+    this.points = [];     // points of the live plot as [at_ms, position, speed, uncertainty of the speed]
     this.events = [];
     this.loss = 0;        // number of connection losses: a response to a request from before a loss is ignored
     this.hasHistory = true;
