@@ -246,7 +246,7 @@ std::vector<std::string_view> command_names(const Unit& unit) {
   return names;
 }
 
-// Returns the names of makers, families and models, each once, without names of two words, which bash would split.
+// Returns the names of makers, families and models, each once, without names of several words, which bash would split.
 std::set<std::string_view> known_names(std::span<const Unit* const> units) {
   std::set<std::string_view> names;
   for (const Unit* unit : units) {

@@ -48,7 +48,8 @@ enum class Doubt : std::uint8_t {
 [[nodiscard]] std::string alarms_in_words(const Unit& unit, const Reading& reading);
 
 /// Sets the keys singleturn_valid and multiturn_valid if the reading has these parts, and "alarms", of all channels
-/// together, if the unit has alarms. null means that no reply reports the value.
+/// together, if the unit has alarms. null means that no reply reports the value; for the alarms, that none is raised
+/// and not all are reported.
 void set_state(Json& json, const Unit& unit, const Reading& reading);
 
 /// Returns millimetres as text "0.125", with no more decimals than one count of `unit_um` micrometres has.
