@@ -65,7 +65,7 @@ function decoded(text) {
   }
 }
 
-/** Returns the values encoder, tab, range and unit, as far as they are in the fragment of the address, so that links to a view can be shared. */
+/** Returns encoder, tab, range and unit, as far as the fragment of the address has them: a view can be shared. */
 function place() {
   const values = new URLSearchParams();
   for (const part of location.hash.slice(1).split("&")) {

@@ -22,7 +22,7 @@ export function setText(node, text) {
   }
 }
 
-/** The following three functions write only a changed value, because each write makes the browser compute styles again. */
+/** The next three functions write only a changed value, because each write makes the browser compute styles again. */
 export function setClass(node, name) {
   if (node.className !== name) node.className = name;
 }

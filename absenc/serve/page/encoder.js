@@ -297,7 +297,7 @@ export class EncoderPage {
       if (point[0] - (this.points.at(-1)?.[0] ?? 0) >= LEAST_MS) this.points.push(point);
     }
     while (this.points.length > MOST_POINTS) this.points.shift();
-    if (this.range === "live") this.changed = true;  // points do not change a plot of the history: loadPast() and refresh() redraw it
+    if (this.range === "live") this.changed = true;  // loadPast() and refresh() redraw plots of the history
   }
 
   /** Returns the plot's rows, from the points or the history, in the selected unit. */

@@ -198,7 +198,7 @@ export class Overview {
     card.seed(seconds);
   }
 
-  /** Shows a state of the server. With many encoders the page is redrawn less often than states arrive, to limit the load. */
+  /** Shows a state of the server. With many encoders the page is redrawn less often than states arrive: less load. */
   show(state) {
     const wait = state.encoders.length > MANY && this.cards.size > 0 ? this.drawn + DRAW_MS * state.encoders.length - performance.now() : 0;
     clearTimeout(this.later);

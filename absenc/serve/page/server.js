@@ -25,7 +25,10 @@ export async function request(path, values = {}, method = "GET") {
   return {status: answer.status, body: await answer.json()};
 }
 
-/** Returns {tokens, name}: whether the server has tokens, and the name of this tab's token. Forgets a token that the server does not accept. */
+/**
+ * Returns {tokens, name}: whether the server has tokens, and the name of this tab's token. Forgets a token that the
+ * server does not accept.
+ */
 export async function tokenInfo() {
   const {status, body} = await request("api/token");
   if (status === 200) return body;
