@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // A drive with a T-format encoder: a timer requests positions, the UART's interrupts run the conversations, and the
-// main program evaluates the readings. Meanwhile it clears an alarm and writes to the encoder's memory.
+// main program evaluates the readings. Between two series of readings it clears an alarm and writes to the encoder's
+// memory.
 //
-//   drive POSITIONS SINGLETURN MULTITURN LATENCY_MS: number of readings, and the position that each must report
+//   drive POSITIONS SINGLETURN MULTITURN LATENCY_MS: number of readings, the position that each
+//   must report, and the latency of the line
 #include <array>
 #include <new>
 

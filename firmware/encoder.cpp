@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A T-format encoder: the device role in the UART's interrupts, on a shaft that stands still or turns evenly.
 //
-//   encoder SINGLETURN MULTITURN RPM LATENCY_MS: position at the start, and speed
+//   encoder SINGLETURN MULTITURN RPM LATENCY_MS: position at the start, speed, and the latency of the
+//   line
 //
 // It runs until the emulator ends, and prints the rules of the document that its host violates.
 #include <new>
@@ -46,7 +47,7 @@ class Encoder {
     device_.raise_alarms(tformat::alarms::over_heat);
   }
 
-  // ---- Functions called by interrupts
+  // ---- Functions called by interrupts, or with interrupts disabled
 
   void start(Time now) { carrier_.start(device_, now); }
   void tick(Time now) { carrier_.tick(now); }

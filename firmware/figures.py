@@ -3,7 +3,8 @@
 
 Measures the cost of reading a position in firmware: sizes of the programs reader-*.elf in FOLDER minus those of the base,
 and their instructions and stack on an emulated machine. Writes FIGURES.json and the table in docs/firmware.md. With
---check it compares instead: every figure must be within 3 % of the table, and the compiler must be the same."""
+--check it compares instead: every figure must be within 3 % of that in FIGURES.json, and the compiler must be the
+same."""
 import json
 import os
 import re

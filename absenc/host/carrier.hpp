@@ -32,7 +32,7 @@ class Carrier {
     machine_ = &machine;
     expected_ = gathered_ = 0;
     sending_ = waiting_ = item_received_ = false;
-    silence_reported_ = true;  // no silence is reported until a transfer is sent
+    silence_reported_ = true;  // no silence is reported before a transfer is sent or an item is received
     take_steps(now);
   }
   /// Returns whether a conversation runs.
@@ -45,9 +45,9 @@ class Carrier {
     silent_since_ = now;
     deliver({.kind = Event<Item>::Kind::sent, .at = now});
   }
-  /// Reports received items; they are dropped while no conversation runs. Single characters are gathered until the
-  /// machine's expected number has arrived or the line is silent, as a DMA channel does: gathering one takes little
-  /// time.
+  /// Reports received items; they are dropped while no conversation runs. Single characters are gathered, as a DMA
+  /// channel does, until as many as the machine expects, at most 16, have arrived, or the line is silent or reports an
+  /// error: gathering one takes little time.
   void received(std::span<const Item> items, Time now) {
     if (items.size() == 1 && gathered_ + 1u < expected_) return gather(items.front(), now);
     take_input(items, now);
@@ -58,8 +58,8 @@ class Carrier {
     deliver_input({.kind = Event<Item>::Kind::line_error, .at = now});
   }
 
-  /// Begins the pending transfer, or reports a silence or timer, if its time is reached. Call it at `due()`; more calls
-  /// do no harm. Calls that are late make the reports late, but do not report a silence that there was not.
+  /// Begins the pending transfer or pulse, or reports a silence or timer, if its time is reached. Call it at `due()`;
+  /// more calls do no harm. Calls that are late make the reports late, but do not report a silence that there was not.
   void tick(Time now) {
     if (now < due()) return;
     deliver_gathered();
@@ -77,7 +77,8 @@ class Carrier {
     at_ = never;
     deliver({.kind = Event<Item>::Kind::timer, .at = now});
   }
-  /// Returns the time at which `tick` must be called; `never`: not before something is sent or received.
+  /// Returns the time at which `tick` must be called; `never`: not before a conversation starts, or something is sent
+  /// or received.
   [[nodiscard]] Time due() const {
     if (!is_busy()) return never;
     return waiting_ ? step_.at : std::min(at_, silence_end());
@@ -125,8 +126,8 @@ class Carrier {
     return silence_reported_ || limit == Time{} ? never : silent_since_ + limit + latency_;
   }
 
-  // Takes the machine's steps until it waits. A transfer or pulse that begins later is stored in `step_`; the limits of
-  // the silence after it are in the wait step that follows.
+  // Takes the machine's steps until it waits or is done. A transfer or pulse that begins later is stored in `step_`;
+  // the limits of the silence after it are in the wait step that follows.
   void take_steps(Time now) {
     for (;;) {
       const Step<Item> step = machine_->next(now);

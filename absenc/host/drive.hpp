@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a machine on a port until it is done: the loop of every program that may wait.
+// Runs a machine on a port until the machine is done or the caller stops it: the loop of programs that may wait.
 #pragma once
 
 #include "absenc/link/port.hpp"
@@ -7,7 +7,7 @@
 namespace absenc::host {
 
 /// Runs `machine` on `port`. `on_emit()` is called for every `emit` step and returns whether to continue. Returns true
-/// when the machine is done, false when `on_emit` stopped it. Exceptions of the port pass through.
+/// when the machine is done, false when `on_emit` stopped it. Exceptions of the port and of `on_emit` pass through.
 template <class Item, class OnEmit>
 bool drive(Machine<Item>& machine, Port<Item>& port, OnEmit&& on_emit) {
   // Between two events the machine is given the time of the last event: reading the clock more often costs time and

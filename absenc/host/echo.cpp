@@ -93,7 +93,8 @@ bool EchoFilter::is_reply(Bytes bytes) const {
 }
 
 // Decides whether the held bytes, which begin like the request, begin with its echo. Their number decides; if they are
-// enough for echo and reply, there is no echo if the first part is a valid reply and the part after the echo is not.
+// enough for echo and reply, there is no echo if the bytes are a valid reply from the first byte on, but not from the
+// length of the request on.
 void EchoFilter::decide(Time at) {
   const std::size_t echo = sent_.size();
   const bool echo_and_reply = held_.size() >= reply_due_ + echo;

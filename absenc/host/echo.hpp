@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Removes the local echo of an RS-485 adapter from the received bytes: by count, not by comparison, because a valid
 // reply may equal its request byte for byte. The removed bytes are compared with the request to detect a disturbed
-// line. The filter alone decides whether the adapter echoes: by the number of bytes, and where that is ambiguous by
-// which bytes are a valid reply.
+// line. In automatic mode the filter decides whether the adapter echoes: an echo begins like the request; then the
+// number of bytes decides, and where that is ambiguous, which bytes are a valid reply.
 #pragma once
 
 #include <cstdint>
@@ -27,7 +27,7 @@ class EchoFilter final : public Machine<std::uint8_t> {
   explicit EchoFilter(EchoMode mode) : mode_(mode) {}
 
   /// Sets the unit that decides whether a reply is valid; `unit` and `options` must outlive the filter's use. Without a
-  /// unit the number of bytes alone decides.
+  /// unit no reply counts as valid, so that the number of bytes decides.
   void use_unit(const Unit& unit, const Options& options) {
     unit_ = &unit;
     options_ = &options;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the removal of an adapter's echo in a session.
+// Tests the removal of an adapter's echo, in a session and in the filter alone.
 #include "absenc/host/echo.hpp"
 
 #include <gtest/gtest.h>

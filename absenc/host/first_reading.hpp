@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Decides whether a position can be trusted. Encoders send well-formed wrong positions while they start, and no
-// checksum detects all damage: a position is trusted when the next one is near enough to it.
+// checksum detects all damage: a position is trusted when it is near enough to the one before.
 #pragma once
 
 #include <cstdint>
@@ -32,7 +32,7 @@ class FirstReading {
   }
 
   /// Returns whether `reading` is ready and valid, and near enough to the stored position; false if no position is
-  /// stored. Then stores the position of `reading` for the next comparison.
+  /// stored. Then calls `keep` with `reading`.
   constexpr bool confirms(const Reading& reading) {
     const bool agrees = is_near(reading);
     keep(reading);
@@ -60,14 +60,13 @@ class FirstReading {
     if (!has_step_ || moved / most_excess > reached || distance(step_, place.bits) <= allowed) return false;
     return distance(step - step_, place.bits) <= least(allowed, most_judged(place.bits) / 8);
   }
-  /// Returns whether the shaft can have moved from the stored position to that of `reading` in the time between their
-  /// latch times.
+  /// Does the same with the time between the latch times of the stored position and of `reading`.
   [[nodiscard]] constexpr bool is_near(const Reading& reading) const {
     return is_near(reading, reading.latched - latched_);
   }
 
-  /// Returns whether the shaft can move less than 15/32 of the counted range in the time `between` at its highest
-  /// speed. If not, or if `reading` has no position, a wrong position can hardly be detected.
+  /// Returns whether even at its highest speed the shaft moves by less than 15/32 of the counted range in the time
+  /// `between`; false if `reading` has no position. If false, a wrong position can hardly be detected.
   [[nodiscard]] constexpr bool can_judge(const Reading& reading, Time between) const {
     const Place place = place_of(reading);
     return place.bits != 0 && reach(place, between) < most_judged(place.bits);
@@ -83,7 +82,7 @@ class FirstReading {
   }
 
  private:
-  // A position in counts, with the turns if they are valid.
+  // A position in counts, with the turns if they are valid and fit in 64 bits together with it.
   struct Place {
     std::uint64_t counts = 0;
     std::uint8_t bits = 0;  // number of bits of `counts`; 0: no position

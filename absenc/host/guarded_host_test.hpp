@@ -20,8 +20,8 @@ class GuardedHost {
   }
 
   /// Runs `conversation`. Returns whether the conversation ended within the time `limit`; one that sends a request for
-  /// each result without end counts as ended at its first result. `may_repeat`: whether its requests may be repeated
-  /// because they only read.
+  /// each result without end counts as ended at its first result. False also if the options of the constructor are
+  /// invalid. `may_repeat`: whether its requests may be repeated because they only read.
   [[nodiscard]] bool run(Conversation<Item>& conversation, Time limit, bool may_repeat = true) {
     streams_ = conversation.asks();
     emitted_ = false;
@@ -51,8 +51,8 @@ class GuardedHost {
   bool emitted_ = false;
 };
 
-/// Returns the number of faults that can turn wrong bytes into a valid frame. All other faults leave frames intact, so
-/// no wrong reading may follow from these other faults.
+/// Returns how many of the injected faults were of kinds that can turn wrong bytes into a valid frame. All other faults
+/// leave frames intact, so no wrong reading may follow from these other faults.
 [[nodiscard]] inline std::uint64_t changed_bytes(const sim::FaultyDevice& faulty) {
   using sim::FaultKind;
   std::uint64_t sum = 0;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests unwrapping and velocity with random motions, below and above the speed at which they are valid.
+// Tests Reach with random speeds, and unwrapping and velocity with random motions, below and above the speed at which
+// they are valid.
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 

@@ -29,8 +29,8 @@ class OutstandingRequests {
     Request request;            ///< Items of the request.
     std::size_t expect = 0;     ///< Number of items of the reply to this request; 0: unknown before it ends.
     Buffer<Time, 4> sent_at{};  ///< Times at which the request was sent and not lost, the oldest first.
-    /// Time at which the oldest lost request was sent. Lost: the line was silent after it, so most likely no reply
-    /// follows.
+    /// Time at which the oldest lost request counts as sent (see `mark_lost`). Lost: the line was silent after it, so
+    /// most likely no reply follows, or four newer ones are stored.
     Time lost_first{};
     Time lost_last{};   ///< Time at which the newest lost request was sent.
     unsigned lost = 0;  ///< Number of lost requests.
@@ -82,8 +82,8 @@ class OutstandingRequests {
   void remove_oldest(Entry& entry);
   /// Removes all entries.
   void clear() { entries_.clear(); }
-  /// Returns the longest time between two consecutive outstanding requests, whatever their bytes, or from the last one
-  /// until `now`.
+  /// Returns the longest time between two consecutively added requests since the list was empty, whatever their bytes,
+  /// or the time from the last one until `now` if that is longer.
   [[nodiscard]] Time longest_interval(Time now) const { return std::max(longest_interval_, now - newest_); }
   /// Removes the entries whose newest request was sent before `before`.
   void remove_older(Time before);
@@ -96,7 +96,7 @@ class OutstandingRequests {
   const Unit* unit_ = nullptr;
   const Options* options_ = nullptr;
   Buffer<Entry, most> entries_{};
-  Time newest_{};            // when the newest outstanding request was sent
+  Time newest_{};            // when the last added request was sent
   Time longest_interval_{};  // longest time between two consecutively added requests since the list was empty
 };
 

@@ -168,8 +168,8 @@ Step<Item> ReplyGuard<Item>::next(Time now) {
   }
 }
 
-// Returns the conversation's next step; if that is a request, enters delaying. The step is constructed in place,
-// because steps are large and this runs for each event.
+// Returns the conversation's next step; if that is a request, enters delaying and returns the step of that phase. The
+// step is constructed in place, because steps are large and this runs for each event.
 template <class Item>
 Step<Item> ReplyGuard<Item>::forward(Time now) {
   Step<Item> step = next_of_conversation(now);
@@ -182,8 +182,8 @@ Step<Item> ReplyGuard<Item>::forward(Time now) {
   return step;
 }
 
-// Feeds the events of `Report` to the conversation one by one. Returns the first step after an event that is not
-// `wait`, or the next step after all events.
+// Feeds the events of `Report` to the conversation one by one. Returns the first step that is not `wait`, or the step
+// after the last event.
 template <class Item>
 Step<Item> ReplyGuard<Item>::next_of_conversation(Time now) {
   while (report_event()) {
@@ -432,7 +432,7 @@ void ReplyGuard<Item>::count_late(Entry* entry, Time at) {
   if (entry != nullptr) {
     sent_at = entry->sent_at.empty() ? entry->lost_last : entry->sent_at[0];
     // The first late reply may answer any of several equal requests, so the lateness is measured from the newest one;
-    // the next late reply corrects it. On CAN the reply may also have been unsolicited.
+    // the next late reply corrects it. This is not done on CAN, where the reply may also have been unsolicited.
     if (!is_can && expected_lateness_ == Time{}) sent_at = entry->newest();
   }
   expected_lateness_ = std::max(expected_lateness_, std::min(at - sent_at, longest_lateness));

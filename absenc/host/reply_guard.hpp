@@ -14,15 +14,16 @@
 
 namespace absenc::host {
 
-/// A filter between a conversation and its line. A request without a reply is outstanding until its reply arrives, or
-/// until a reply arrives that can only answer a later request: a line keeps the order of replies.
+/// A filter between a conversation and its line. A request without a reply is outstanding until its reply arrives, or a
+/// reply that can only answer a later request (a line keeps the order of replies), until listening ends, or for ten
+/// seconds. If eight different requests are outstanding, all are given up after a silence.
 ///
 ///   phase       entered when                     received items       left when                             next phase
 ///   ----------  -------------------------------  -------------------  ------------------------------------  ----------
 ///   forwarding  a conversation is attached, or   go to the            the conversation wants to send a      delaying
 ///               an exchange has ended            conversation         request
-///   delaying    a request is to be sent          are dropped, late    the line was silent long enough: the
-///                                                replies counted      request is sent;
+///   delaying    a request is to be sent          are dropped, late    the line was silent long enough, or is
+///                                                replies counted      noisy for 100 ms: the request is sent;
 ///                                                                       no request is outstanding           forwarding
 ///                                                                       others are outstanding              matching
 ///   matching    a request was sent while others  are stored           a reply answers this request only;
@@ -33,15 +34,17 @@ namespace absenc::host {
 ///                                                replies counted      repeated where it may be, else a
 ///                                                                     timeout is reported                   forwarding
 ///
-/// Delaying ends at once for a request that is not outstanding. The same request is sent again when the line was silent
-/// for four times the longest timeout and for 3/2 of the latest reply's lateness. Half of that is enough where no reply
-/// was late yet, and nothing is waited for an encoder that did not answer twice.
+/// Delaying ends at once for a request that is not outstanding, unless it demands a pause, items still arrive, or the
+/// list of outstanding requests is full. The same request is sent again when the line was silent for four times the
+/// longest timeout and for 3/2 of the expected lateness, with an upper limit of 2.5 to 10 s. Where no reply was late
+/// yet, half of that is enough, and the guard does not wait for an encoder that did not answer twice.
 ///
 /// Listening lasts for 5/4 of the lateness that the stored reply would have: if it was late, the reply of the present
-/// request follows within that time. Where no earlier reply was nearly as late, half a second plus 5/4 of the longest
-/// interval between the requests is enough, because a line that delays every reply keeps their intervals.
+/// request follows within that time. Except on CAN, a shorter time is enough where the expected lateness is at most
+/// half of that: 5/4 of the longest interval between the requests after the stored reply, and at least half a second,
+/// because a line that delays every reply keeps their intervals.
 ///
-/// The guard knows no protocol: Unit::decode decides whether a reply can answer a request. On CAN an unsolicited reply
+/// The guard knows no protocol: Unit::check decides whether a reply can answer a request. On CAN an unsolicited reply
 /// cannot be told from a late one. Tests compare each reading with the true shaft (tests/late_reply_test.cpp) and
 /// accept no wrong reading.
 template <class Item>
@@ -165,7 +168,7 @@ class ReplyGuard final : public Machine<Item> {
   OutstandingRequests<Item> outstanding_;
   // Longest time from a request to the silence that showed that its reply is missing.
   Time longest_timeout_{};
-  // Time by which a reply may be late. Listening that ends without another reply reduces it.
+  // Time by which a reply may be late. Each end of listening reduces it by 1/16.
   Time expected_lateness_{};
   Time greatest_lateness_{};
   std::uint64_t late_replies_ = 0;

@@ -25,7 +25,7 @@ namespace absenc::host {
 struct Counters {
   std::uint64_t good = 0;       ///< conversations that ended well
   std::uint64_t repeated = 0;   ///< repeated attempts, each after an error
-  std::uint64_t late = 0;       ///< replies that arrived after their timeout and were dropped
+  std::uint64_t late = 0;       ///< replies on the line, to any session, that arrived too late and were dropped
   std::uint64_t discarded = 0;  ///< damaged frames of streams, whether an error reported them or not
   std::array<std::uint64_t, error_texts.size()>
       errors{};  ///< number of errors of each kind, also of repeated attempts; indexed by Error
@@ -61,7 +61,7 @@ template <class Item>
 class Session {
  public:
   /// `unit`, `port` and `storage` must outlive the session. `storage` holds one conversation at a time:
-  /// unit.host_storage bytes, aligned for any type. `attempts`: how often a repeatable command is tried.
+  /// unit.host_storage bytes, aligned for any type. `attempts`: how often a repeatable command is tried at most.
   Session(const Unit& unit, const Options& options, Port<Item>& port, std::span<std::byte> storage,
           EchoMode echo = EchoMode::off, unsigned attempts = 3)
       : unit_(&unit),
@@ -77,7 +77,7 @@ class Session {
   /// Runs one command to its end, a repeatable one up to `attempts` times. `on_emit(conversation)` is called for each
   /// result but the last and returns whether to continue; a conversation that streams stops at its first result. The
   /// returned conversation has the result or the error and is valid until the next call; null: the unit cannot run the
-  /// command.
+  /// command, or `storage` is too small.
   template <class OnEmit>
   const Conversation<Item>* run(const Command& command, Arguments arguments, OnEmit&& on_emit) {
     streaming_ = false;
@@ -91,8 +91,8 @@ class Session {
     return run(command, arguments, [](const Conversation<Item>&) { return true; });
   }
 
-  /// Runs `command` as `run` does, but a conversation that streams continues where it stopped, if `command` is the last
-  /// one.
+  /// Runs `command` as `run` does, but a conversation that streams continues where it stopped, if `command` was also
+  /// the last command.
   const Conversation<Item>* next(const Command& command, Arguments arguments = {}) {
     if (command_ != &command) streaming_ = false;
     return attempt(command, arguments, [](const Conversation<Item>&) { return true; });
@@ -274,9 +274,8 @@ class Session {
     return current_ = unit_->host(options_, command, arguments, storage_).template of<Item>();
   }
 
-  // Returns whether the reply guard is used for `command`; false without a guard. On a link whose clock the host drives
-  // no reply is late. On a CAN bus only commands that read are guarded: other nodes send too, and a listener receives
-  // all frames.
+  // Returns whether the reply guard is used for `command`. On a link whose clock the host drives no reply is late. On a
+  // CAN bus only commands that read the position are guarded: other nodes send too, and a listener receives all frames.
   [[nodiscard]] bool guarded(const Command& command) const {
     if (unit_->link == LinkKind::can) return command.verb == Verb::read || command.verb == Verb::read_part;
     return unit_->link != LinkKind::spi && unit_->link != LinkKind::clocked;

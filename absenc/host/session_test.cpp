@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of sessions with a virtual T-format encoder, in virtual time.
+// Tests of ReplyGuard and of sessions, mostly with a virtual T-format encoder, in virtual time.
 #include "absenc/host/session.hpp"
 
 #include <gtest/gtest.h>
@@ -122,7 +122,6 @@ TEST(Session, RepeatsRepeatableCommands) {
   EXPECT_EQ(bench.device->answer_count(), 6u);  // 3 more position requests; the reset of the zero command is never sent
 }
 
-// The document permits 51 us for a reading: request, 3 us, 11 characters.
 TEST(Session, FeedsStatisticsWithEveryAttempt) {
   Bench bad(EchoMode::off, always(sim::FaultKind::corrupt));
   Statistics<std::uint8_t> statistics;
@@ -141,6 +140,7 @@ TEST(Session, FeedsStatisticsWithEveryAttempt) {
   EXPECT_EQ(statistics.latencies().longest(), std::chrono::microseconds(47));
 }
 
+// The document permits 51 us for a reading: request, 3 us, 11 characters.
 TEST(Session, LeavesTheBusNoIdleTime) {
   Bench bench(EchoMode::off);
   constexpr int readings = 1000;
@@ -168,7 +168,7 @@ TEST(Session, ShowsTheSecondOfTwoReadingsThatAgree) {
   EXPECT_EQ(bench.device->answer_count(), before + 3);
 }
 
-// Each attempt reports the frame that explains its timeout, also while a late reply may arrive.
+// The last attempt, too, reports the frame that explains its timeout, although a late reply may arrive.
 TEST(Session, ReplyWithWrongKindOfIdentifierExplainsTimeout) {
   struct Extended final : Machine<CanFrame> {
     void feed(const Event<CanFrame>& event) override {
@@ -272,7 +272,7 @@ TEST(SessionGuard, TurnsConfirmAfterALongPause) {
   EXPECT_EQ(bench.answers_of_a_reading(), 3u);
 }
 
-// A reading takes 55 us, in which the shaft turns nearly once, so a second reading tells no more than the first.
+// A reading takes 51 us, in which the shaft turns nearly once, so a second reading tells no more than the first.
 TEST(SessionGuard, RefusesHalfATurnIfSecondReadingTakesTooLong) {
   Bench bench(EchoMode::off, {}, 3, {no_turns});
   bench.session->set_speed_limit({.rpm = 1'000'000});

@@ -9,8 +9,8 @@
 
 namespace absenc::host {
 
-/// Highest speed that a shaft or carriage is assumed to have. A limit always exists: without one, turns during a pause
-/// between readings were lost unnoticed (0.40 turns were shown instead of 10.40).
+/// Highest speed that a shaft or carriage is assumed to have. The default is a limit, because without one turns during
+/// a pause between readings were lost unnoticed (0.40 turns were shown instead of 10.40).
 struct SpeedLimit {
   /// Speed limit of rotary encoders in revolutions per minute. Default: the specified speed of the fastest supported
   /// encoders.
@@ -37,7 +37,7 @@ inline constexpr unsigned most_excess = 4;
 
 /// Returns the upper limit for the time between two readings: at the speed limit the position then changes by 15/32 of
 /// the counted range. That is half of it, less a margin for noise and for latch times that are not known to the
-/// microsecond. `never` for a speed limit of 0.
+/// microsecond. `never` for a speed limit of 0, or if Time cannot hold the result.
 [[nodiscard]] constexpr Time longest_gap(const Resolution& resolution, const SpeedLimit& limit) {
   const bool linear = resolution.unit_um > 0;
   const unsigned bits = linear ? resolution.singleturn_bits : resolution.multiturn_bits;

@@ -158,7 +158,7 @@ class Statistics {
   [[nodiscard]] const Latencies& latencies() const { return latencies_; }
   /// Returns how many failed exchanges are stored, at most `most_stored`.
   [[nodiscard]] std::size_t kept() const { return std::min<std::size_t>(bad_count_, most_stored); }
-  /// Returns a stored failed exchange; `number` 0 is the last one, 1 the one before it.
+  /// Returns a stored failed exchange; `number` 0 is the last one, 1 the one before it, up to `kept()` - 1.
   [[nodiscard]] const BadExchange<Item>& bad(std::size_t number) const {
     return bad_[(bad_count_ - 1 - number) % most_stored];
   }

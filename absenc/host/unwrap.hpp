@@ -14,7 +14,7 @@ namespace absenc::host {
 /// A continuous position: adds the shorter of the two distances from each reading to the next. That is right while the
 /// position changes by less than half of the counted range: half a revolution for a single-turn encoder. The counted
 /// range follows from the readings, not from the options. If the position can have changed by more at the speed limit,
-/// it is read from the encoder again.
+/// it starts again with the encoder's own turns and counts.
 class Unwrapper {
  public:
   /// How a reading joins the positions before it.
@@ -22,7 +22,7 @@ class Unwrapper {
     ignored,    ///< the reading has no valid position
     started,    ///< the first position, which is the encoder's own
     continued,  ///< the distance since the reading before was added
-    restarted,  ///< the pause was too long to know the distance: the position is read from the encoder again
+    restarted,  ///< the pause was too long to know the distance: the position starts again with the encoder's own
   };
 
   /// Makes a continuous position of a shaft that moves within `limit`. `times` is the meaning of Reading::latched.

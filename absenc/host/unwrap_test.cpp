@@ -130,7 +130,7 @@ TEST(Unwrapper, UsesSpeedOfLinearEncoder) {
 }
 
 TEST(Unwrapper, ReadingsThatArriveTogetherMayBeFarApart) {
-  // At 600 rpm half a turn takes 50 ms. A host that was delayed for 100 ms receives four frames at once.
+  // At 600 rpm half a turn takes 50 ms. A host that was delayed for 100 ms receives the waiting frames within 1 ms.
   Unwrapper unwrapper(SpeedLimit{.rpm = 600}, Times::arrived);
   unwrapper.add(singleturn(0, 0ms));
   EXPECT_EQ(unwrapper.add(singleturn(10, 25ms)), Joined::continued);
@@ -186,7 +186,7 @@ TEST(LongestGap, IsNearlyHalfOfTheRangeAtFullSpeed) {
 }
 
 TEST(Unwrapper, DoesNotJoinPositionsThatMayHaveBeenLatchedTooFarApart) {
-  // At 10 000 rpm half a turn takes 3 ms. The requests were 1 ms apart, but the second reply was late, so the encoder
+  // At 10 000 rpm half a turn takes 3 ms. The requests were 1 ms apart, but the third reply was late, so the encoder
   // may have latched late, too.
   Unwrapper unwrapper;
   unwrapper.add(singleturn(0, 0ms), {0ms, 1ms});

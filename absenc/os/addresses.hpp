@@ -13,8 +13,9 @@ namespace absenc::os {
 using Addresses = std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)>;
 
 /// Returns the addresses of `host`: a name or an address, an IPv6 address also in brackets. `socket_type` is for
-/// example SOCK_STREAM, `flags` for example AI_PASSIVE. Throws Failure `not_found` with the text `before` + `host` +
-/// `behind`, for example "the host " and " is not known", if there are none.
+/// example SOCK_STREAM, `flags` for example AI_PASSIVE. If the look-up fails, throws Failure `not_found` with a text
+/// that begins with `before` + `host` + `behind`; `before` and `behind` are for example "the host " and " is not
+/// known".
 [[nodiscard]] Addresses look_up(const std::string& host, std::uint16_t port, int socket_type, int flags,
                                 const std::string& before, const std::string& behind = {});
 

@@ -20,10 +20,10 @@ class Channel {
 
   [[nodiscard]] int get() const { return end_.get(); }
   /// Sends as many of `bytes` as there is room for and removes them from `bytes`. Returns false if the other end is
-  /// closed.
+  /// closed or on another error.
   [[nodiscard]] bool send(std::string& bytes) const;
   /// Appends the received bytes to `bytes`, at most 65536 per call. Returns false if the other end is closed and
-  /// everything was received.
+  /// everything was received, or on another error.
   [[nodiscard]] bool receive(std::string& bytes) const;
 
  private:
@@ -45,7 +45,7 @@ class ChildProcess {
   [[nodiscard]] const Channel& channel() const { return channel_; }
   [[nodiscard]] pid_t number() const { return number_; }
   /// Waits up to `longest` for the process to end, then kills it. Returns how it ended, "by signal 6 (Aborted)" or
-  /// "with status 1"; "" for status 0 or if it was killed here.
+  /// "with status 1"; "" for status 0, if it was killed here, and for later calls.
   std::string end(Time longest);
 
  private:

@@ -17,8 +17,8 @@ namespace absenc::os {
 /// bytes of the device. As on a wire, bytes that no program reads are lost. A pause ends a frame when it exceeds the
 /// gap limit of the step by the latency: 2 ms by default, 0.2 ms where the device expects no more bytes.
 ///
-/// After a `configure` step the device receives bytes from a terminal only if the terminal has the same rate (within 1
-/// %) or the default rate (the kernel's 38400 baud), which means no rate. TCP clients have no rate either: the device
+/// After a `configure` step the device receives bytes from the terminal only if the terminal has the same rate (within
+/// 1 %) or the default rate (the kernel's 38400 baud), which means no rate. TCP clients have no rate either: the device
 /// receives their bytes at every rate. So a wrong change of the rate shows without hardware. Devices that share the
 /// line (sim::Bus) are not affected by rates.
 class EmulatorPort final : public StreamPort {

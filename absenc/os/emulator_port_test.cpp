@@ -47,7 +47,7 @@ TEST(EmulatorPort, TalksToASerialPort) {
   SerialPort host(device.path(), fast);
   host.begin(transfer(request));
   EXPECT_EQ(receive(device), request);
-  EXPECT_EQ(device.wait({.at = never, .gap = 1ns}).kind, Kind::silence);  // the default latency of 2 ms ends the frame
+  EXPECT_EQ(device.wait({.at = never, .gap = 1ns}).kind, Kind::silence);  // 0.2 ms after the gap limit the frame ends
   const Data reply{1, 2, 3};
   device.begin(transfer(reply));
   EXPECT_EQ(receive(host), reply);

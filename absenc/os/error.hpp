@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Exceptions that the ports of this folder throw.
+// Exceptions that the functions and classes of this folder throw.
 #pragma once
 
 #include <cstdint>
@@ -10,17 +10,18 @@
 
 namespace absenc::os {
 
-/// A failure of a port. `what()` reports to the user what happened and what to try.
+/// A failure of a port, a file or another object of the operating system. `what()` reports to the user what happened
+/// and what to try.
 class Failure : public std::runtime_error {
  public:
   /// Kind of a failure of a port.
   enum class Kind : std::uint8_t {
-    not_found,      ///< no such port, host or listener
-    no_permission,  ///< the port exists, but this user may not open it
-    in_use,         ///< another program uses the port
+    not_found,      ///< no such port, host, listener or folder
+    no_permission,  ///< the port or file exists, but this user may not open it
+    in_use,         ///< another program uses the port or file, or a new file would replace another
     unsupported,    ///< this port cannot do what was requested
     bad_rate,       ///< this port does not support the requested baud rate
-    lost,           ///< the port existed and has disappeared
+    lost,           ///< the port or file existed and has disappeared
     system,         ///< any other error of the operating system
   };
 
@@ -58,13 +59,15 @@ class Failure : public std::runtime_error {
 // Interrupted and Ended below are std::exceptions, so that a program whose `main` catches std::exception ends in order.
 // Code that catches std::exception and continues must catch these two first.
 
-/// Thrown by every wait in this folder after SIGINT or SIGTERM (os/signals.hpp).
+/// Thrown after SIGINT or SIGTERM by `wait_for` (os/signals.hpp), `Poller::wait`, and all ports and functions that wait
+/// with them.
 struct Interrupted : std::exception {
   /// Returns the text "interrupted".
   [[nodiscard]] const char* what() const noexcept override { return "interrupted"; }
 };
 
-/// Thrown by a port when the time set by its `set_end` is reached, and by every wait when a CancelCheck returns true.
+/// Thrown by a port when the time set by its `set_end` is reached, and by the waits that throw Interrupted when a
+/// CancelCheck returns true.
 struct Ended : std::exception {
   /// Returns the text "cancelled".
   [[nodiscard]] const char* what() const noexcept override { return "cancelled"; }

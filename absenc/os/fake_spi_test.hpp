@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Test replacement for the kernel behind an SPI port. It logs all requests.
+// Test replacement for the kernel behind an SPI port. It logs the written settings and the messages.
 #pragma once
 
 #include <fcntl.h>

@@ -11,11 +11,11 @@ namespace absenc::os {
 
 /// Base class of all CAN ports. `now`, `begin` and `wait` throw Failure, Interrupted (os/signals.hpp) or Ended.
 ///
-/// A transfer begins at `at`, never earlier; `begin` blocks until then. A frame received before a transfer began, or
-/// before `now` was called, is reported with a time not later than that transfer or call, however long the frame waited
-/// in a queue. Because replies on CAN carry no number, the machine recognises such an old frame only by its time.
-/// `sent` carries the time before the frame was handed to the kernel, because the kernel does not report when the
-/// controller has sent it; so a reply is never older than `sent`. `timer` is reported as by StreamPort.
+/// A transfer begins at `at`, earlier only by the send slack; `begin` blocks until then. A frame received before a
+/// transfer began, or before `now` was called, is reported with a time not later than that transfer or call, however
+/// long the frame waited in a queue. Because replies on CAN carry no number, the machine recognises such an old frame
+/// only by its time. `sent` carries the time before the frame was handed to the kernel, because the kernel does not
+/// report when the controller has sent it; so a reply is never older than `sent`. `timer` is reported as by StreamPort.
 class FramePort : public Port<CanFrame> {
  public:
   FramePort() = default;

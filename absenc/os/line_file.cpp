@@ -105,7 +105,7 @@ void OutputFile::require_there() const {
 
 void OutputFile::sync() {
   require_there();
-  // A pipe or /dev/null cannot be synchronised and need not be.
+  // Some file systems cannot synchronise a file.
   if (::fsync(file_.get()) < 0 && errno != EINVAL && errno != EROFS) throw system_failure("writing " + path_, errno);
 }
 

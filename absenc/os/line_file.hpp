@@ -17,7 +17,7 @@ class OutputFile {
   /// Waits until the content is on the disk. Throws Failure, also as `require_there` does.
   void sync();
   /// Throws Failure `lost` if the path does not lead to this file any more or the file was truncated: nobody would find
-  /// further data. Checks nothing before the file has its name.
+  /// further data. Throws Failure `system` if that cannot be checked. Checks nothing before the file has its name.
   void require_there() const;
 
   [[nodiscard]] const std::string& path() const { return path_; }

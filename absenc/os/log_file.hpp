@@ -15,7 +15,7 @@ namespace absenc::os {
 class OwnedFolder {
  public:
   /// Creates the folder at `path` if it is missing, but not its parent, and locks it. Throws Failure: `in_use` if
-  /// another process owns it, `not_found` if its parent is missing.
+  /// another process owns it, `not_found` if its parent is missing, `system`.
   explicit OwnedFolder(const std::string& path);
 
   /// Returns whether the path still leads to this folder: the folder may have been removed, moved or replaced.
@@ -38,7 +38,7 @@ class LogFile {
   /// Replaces the existing byte at `offset`, which needs no room on the disk. Returns 0 or a value of errno.
   [[nodiscard]] int replace(std::size_t offset, char byte) const;
   /// Replaces the whole content by `bytes`, which must not be longer, so that no room on the disk is needed. Returns
-  /// false if `bytes` is longer or was not written completely.
+  /// false if `bytes` is longer, or on an error; the content may then be a mixture of both.
   [[nodiscard]] bool shrink_to(std::string_view bytes);
   /// Returns up to `size` bytes of the file from `offset`; fewer at its end. Throws Failure.
   [[nodiscard]] std::string read(std::size_t offset, std::size_t size) const;

@@ -19,7 +19,7 @@ struct FileIdentity {
   bool operator==(const FileIdentity&) const = default;
 };
 
-/// Returns the identity of the file at `path`; its `number` is 0 if there is none.
+/// Returns the identity of the file at `path`; its `number` is 0 if there is none or stat(2) fails.
 [[nodiscard]] FileIdentity identity_of(const std::string& path);
 
 /// A file that this process owns: it is locked (flock) for the lifetime of the object, also while it is replaced. The
@@ -28,7 +28,7 @@ struct FileIdentity {
 class OwnedFile {
  public:
   /// Opens and locks the file at `path`; creates an empty file if none exists. Throws Failure: `in_use` if another
-  /// process owns it, `unsupported` if it is not a regular file.
+  /// process owns it, `unsupported` if it is not a regular file, `system`.
   explicit OwnedFile(const std::string& path);
 
   /// Returns whether the constructor created the file, because it was missing.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Waits for bytes on a few descriptors, for a deadline and for Ctrl-C with one system call, whatever the number of
-// descriptors. Ports use it instead of `wait_for` for this reason.
+// Waits for bytes on a few descriptors, for a deadline and for SIGINT or SIGTERM, mostly with one system call, whatever
+// the number of descriptors. Ports use it instead of `wait_for` for this reason.
 #pragma once
 
 #include <array>

@@ -63,7 +63,7 @@ std::string lock_holder(const struct stat& file) {
   return {};
 }
 
-// Returns a process that has the file open; only processes of the same user can be inspected.
+// Returns another process that has the file open; "" if none is found. Only root can inspect processes of other users.
 std::string opener(const fs::path& file) {
   std::error_code ignored;
   for (const auto& process : fs::directory_iterator("/proc", ignored)) {

@@ -12,8 +12,8 @@
 
 namespace absenc::os {
 
-/// Makes SIGINT and SIGTERM end every wait of this folder, even if the parent process ignored them (as a shell does for
-/// background programs). Call it early in main; further calls change nothing. Throws Failure.
+/// Makes SIGINT and SIGTERM end the waits of this file and of the ports, even if the parent process ignored them (as a
+/// shell does for background programs). Call it early in main; further calls change nothing. Throws Failure.
 void catch_interrupts();
 
 /// Returns whether SIGINT or SIGTERM was received since `catch_interrupts`, for loops that never wait.
@@ -21,11 +21,13 @@ void catch_interrupts();
 
 /// Returns a descriptor that is readable after SIGINT or SIGTERM; -1 before `catch_interrupts`.
 [[nodiscard]] int interrupt_descriptor();
-/// Takes a pending signal out of `interrupt_descriptor`. Returns false if another thread has taken it.
+/// Takes a pending signal out of `interrupt_descriptor`. Returns false if none is pending, for example because another
+/// thread has taken it.
 bool take_interrupt();
 
-/// While an object exists, every longer wait of this thread calls `over` every 20 ms and throws Ended if it returns
-/// true: for conditions that no descriptor reports, such as a signal handled by an interpreter, or another thread.
+/// While an object exists, the waits of this file and of the ports in this thread call `over` after each 20 ms without
+/// an event and throw Ended if it returns true: for conditions that no descriptor reports, such as a signal handled by
+/// an interpreter, or another thread.
 class CancelCheck {
  public:
   /// `over` must outlive the object; an empty function is never called.

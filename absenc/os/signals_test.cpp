@@ -20,8 +20,7 @@ class Signals : public ::testing::Test {
  protected:
   Signals() { catch_interrupts(); }
 
-  // Sends `signal` to this thread after `milliseconds`. SIGALRM also interrupts the system call, but must not end the
-  // wait.
+  // Sends `signal` to this thread after `milliseconds`.
   static void signal_in(int milliseconds, int signal) {
     static pthread_t target;
     target = ::pthread_self();
@@ -77,6 +76,7 @@ TEST_F(Signals, EndWaitOnBusyLine) {
   EXPECT_THROW(wait_for(watched, never), Interrupted);
 }
 
+// SIGALRM interrupts the system call, but must not end the wait.
 TEST_F(Signals, OfOtherKindsDoNotEndAWait) {
   struct sigaction action {};
   action.sa_handler = [](int) {};

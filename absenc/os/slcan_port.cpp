@@ -32,8 +32,8 @@ void SlcanLine::write(Bytes text) { bytes_->begin({.kind = ByteStep::Kind::trans
 void SlcanLine::collect(Time deadline) {
   received_any_ = false;
   deadline = reach(bytes_->now()) ? Time{} : std::min(deadline, due());
-  // If the deadline is past, all available bytes are read, in any number of reads; otherwise the reads end after the
-  // first event.
+  // If the deadline is past, all available bytes are read, in at most `most_reads` reads; otherwise the reads end after
+  // the first event.
   const bool everything = deadline <= bytes_->now();
   for (unsigned reads = 0; reads < most_reads && (everything || !received_any_); ++reads) {
     const Time now = bytes_->now();
@@ -198,7 +198,7 @@ Time SlcanAdapter::duration(const CanFrame& frame) const {
   return Time(std::chrono::seconds(1)) * bits / std::max<std::int64_t>(1, rate_);
 }
 
-// Executes a command of the host. Returns false if the command is unknown or not allowed now.
+// Executes a command of the host. Returns false if the command is unknown, has a wrong argument, or is not allowed now.
 bool SlcanAdapter::execute(Bytes line) {
   const auto letter = static_cast<char>(line[0]);
   switch (letter) {

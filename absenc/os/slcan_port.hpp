@@ -39,7 +39,7 @@ class SlcanLine : public FramePort {
 class SlcanPort final : public SlcanLine {
  public:
   /// `name` is for example "/dev/ttyACM0" and is used in messages. Throws Failure: `bad_rate` if the adapter does not
-  /// support the bit rate or refuses it, `system` if it refuses to open.
+  /// support the bit rate or refuses it, `system` if it refuses to open. Passes on the exceptions of `bytes`.
   SlcanPort(std::shared_ptr<Port<std::uint8_t>> bytes, std::string name, const LineSettings& settings);
   ~SlcanPort() override;
 
@@ -75,7 +75,7 @@ class SlcanAdapter final : public SlcanLine {
   [[nodiscard]] std::uint64_t lost() const { return lost_; }
   /// Returns the number of frames refused because the queue was full.
   [[nodiscard]] std::uint64_t overflowed() const { return overflowed_; }
-  /// Returns the number of lines of the host that are no valid command or frame.
+  /// Returns the number of lines of the host that are no known command and no valid frame.
   [[nodiscard]] std::uint64_t garbage() const { return garbage_; }
 
  private:

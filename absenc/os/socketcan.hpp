@@ -35,8 +35,8 @@ struct CanKernel {
 /// here are not received; those of other programs on the same interface are.
 class SocketCan final : public FramePort {
  public:
-  /// Opens the CAN interface `interface`. Throws Failure, whose text names the command to type. `kernel` must outlive
-  /// the port.
+  /// Opens the CAN interface `interface`. Throws Failure, whose text names a command to type where one helps. `kernel`
+  /// must outlive the port.
   explicit SocketCan(const std::string& interface, const LineSettings& settings,
                      CanKernel& kernel = system_can_kernel());
 

@@ -11,7 +11,7 @@ namespace absenc::os {
 
 namespace {
 
-constexpr Time deselected_time = std::chrono::microseconds(10);  // pause that the kernel makes between two transfers
+constexpr Time deselected_time = std::chrono::microseconds(10);  // time for which the kernel deselects the chip
 
 constexpr std::size_t most_received = 4096;  // limit in bytes for a chip that stays selected: no device reads more
 

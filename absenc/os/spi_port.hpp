@@ -32,8 +32,8 @@ struct SpiChoice {
   std::optional<std::uint8_t> mode;    // SPI mode, 0 to 3
 };
 
-/// A port on an SPI controller, locked against other programs that use locks. `begin` and `wait` throw Failure or
-/// Interrupted (os/signals.hpp).
+/// A port on an SPI controller, locked against other programs that use locks. `begin` and `wait` throw Failure,
+/// Interrupted or Ended (os/signals.hpp).
 ///
 /// A transfer begins at `at`, never earlier, and `begin` blocks until it is over. On an `spi` link the transfer
 /// receives at least `expect` bytes; on a `clocked` link nothing is sent but clocks. A controller clocks whole bytes:
@@ -41,7 +41,8 @@ struct SpiChoice {
 /// as by StreamPort.
 class SpiPort final : public Port<std::uint8_t> {
  public:
-  /// Opens the controller at `path`, /dev/spidevB.C; `kind` spi or clocked. `kernel` must outlive the port.
+  /// Opens the controller at `path`, /dev/spidevB.C; `kind` spi or clocked, otherwise throws invalid_argument. `kernel`
+  /// must outlive the port. Throws Failure.
   SpiPort(const std::string& path, LinkKind kind, const LineSettings& settings, const SpiChoice& choice = {},
           SpiKernel& kernel = system_kernel());
   SpiPort(const SpiPort&) = delete;

@@ -38,9 +38,10 @@ struct SpidevSettings {
 };
 
 /// A simulated spidev device: implements Documentation/spi/spidev.rst with the kernel module's own limits. The
-/// controller sends words of 8 bits on one wire at every speed, and refuses mode flags that change the chip select. It
-/// begins in mode 0, the default without an entry in the device tree. It never reads memory of the requesting program
-/// itself but returns the ranges that it needs, as the kernel requires of CUSE; tests read them by pointer.
+/// controller sends words of 8 bits on one wire at every speed, and refuses all mode flags but CPHA, CPOL and
+/// LSB_FIRST. It begins in mode 0, the default without an entry in the device tree. It never reads memory of the
+/// requesting program itself but returns the ranges that it needs, as the kernel requires of CUSE; tests read them by
+/// pointer.
 class Spidev {
  public:
   explicit Spidev(SpiDevice& device);
@@ -51,7 +52,8 @@ class Spidev {
 
   /// Handles an ioctl. `in` is the content of the memory ranges `in` that the last SpidevReply requested, empty at
   /// first; `room` is the total size of the ranges `out` of that reply. Errors: ENOTTY (no request of spidev), EINVAL,
-  /// EMSGSIZE (more than 4096 bytes in a direction, or more than 255 buffers).
+  /// EMSGSIZE (more than 4096 bytes in a direction, more than 255 buffers, or more than 2^31 - 1 bytes with those that
+  /// have no buffer).
   [[nodiscard]] SpidevReply control(unsigned long request, std::uint64_t address, Bytes in, std::size_t room, Time now);
   [[nodiscard]] SpidevReply read(std::size_t size, Time now);
   [[nodiscard]] SpidevReply write(Bytes bytes, Time now);

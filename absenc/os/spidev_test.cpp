@@ -65,7 +65,7 @@ struct SpidevTest : ::testing::Test {
     return spidev.control(_IOC(_IOC_WRITE, SPI_IOC_MAGIC, 0, count * sizeof(spi_ioc_transfer)), 0x1000, list_and_bytes,
                           room, 1ms);
   }
-  // Returns the errno with which a message of one transfer is refused.
+  // Returns the errno with which a message of one transfer is refused; 0 if it is not.
   int refused(const TransferFields& transfer) {
     const SpidevReply reply = message(bytes_of(transfer), 1, 0);
     return -reply.result;

@@ -19,8 +19,8 @@ namespace absenc::os {
 
 /// Base class of all byte stream ports. `begin` and `wait` throw Failure, Interrupted (os/signals.hpp) or Ended.
 ///
-/// A transfer begins at `at`, never earlier; `begin` blocks until then. `timer` is reported if the `at` of a wait was
-/// later than the last event and the last call of `now`.
+/// A transfer begins at `at`, earlier only by the send slack; `begin` blocks until then. `timer` is reported if the
+/// `at` of a wait was later than the last event and the last call of `now`.
 class StreamPort : public Port<std::uint8_t> {
  public:
   StreamPort(const StreamPort&) = delete;
@@ -90,7 +90,7 @@ class StreamPort : public Port<std::uint8_t> {
   bool read_at_once_ = false;
 
   Waiting<std::uint8_t> waiting_;
-  Time sent_at_{};  // end of the last transfer
+  Time sent_at_{};  // end of the last transfer or pulse
   // Greatest time by which the last transfer may have ended before `sent_at_`.
   Time sent_late_{};
   bool sent_pending_ = false;  // whether the event `sent` is still to be reported

@@ -11,7 +11,7 @@
 
 namespace absenc::os {
 
-/// Returns the first line of the file at `path`; "" if the file does not exist.
+/// Returns the first line of the file at `path`; "" if the file cannot be read or is empty.
 [[nodiscard]] inline std::string first_line(const std::filesystem::path& path) {
   std::ifstream file(path);
   std::string line;

@@ -14,7 +14,8 @@ namespace absenc::os {
 class TcpPort final : public DescriptorPort {
  public:
   /// Connects to `host`: a name, an IPv4 address, or an IPv6 address with or without brackets. Tries every address of a
-  /// name, for 3 s in total. Throws Failure: `not_found`, `lost` (no connection in time), `system`.
+  /// name, for 3 s in total. Throws Failure: `not_found`, `lost` (no connection in time), `system`; throws Interrupted
+  /// and Ended as `wait_for` does.
   TcpPort(const std::string& host, std::uint16_t port);
 
  private:

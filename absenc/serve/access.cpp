@@ -22,15 +22,15 @@ constexpr Time time_of_guesses = std::chrono::seconds(60);
 constexpr std::size_t most_addresses = 1000;
 constexpr std::string_view wrong_token = "the token is wrong: the server's token file has no such token";
 
-// Returns whether host names or URL schemes are equal as HTTP defines it: ASCII, ignoring case.
+// Returns whether host names, origins or authentication schemes are equal as HTTP defines it: ASCII, ignoring case.
 bool equals_ignoring_case(std::string_view one, std::string_view other) {
   const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; };
   return std::equal(one.begin(), one.end(), other.begin(), other.end(),
                     [&](char a, char b) { return lower(a) == lower(b); });
 }
 
-// Returns whether two secrets are equal. The comparison takes the same time wherever they differ, so that the time does
-// not reveal how much of a guess is right.
+// Returns whether two secrets are equal. The comparison of secrets of one length takes the same time wherever they
+// differ, so that the time does not reveal how much of a guess is right.
 bool same_secret(std::string_view one, std::string_view other) {
   if (one.size() != other.size()) return false;
   unsigned difference = 0;
@@ -102,8 +102,8 @@ std::uint64_t Access::wrong_tokens() const {
   return wrong_tokens_;
 }
 
-// Counts a wrong token and returns whether the address may try again. However many guesses arrive, only two of them add
-// an event to the history: the first of a minute, and the one that exceeds the limit.
+// Counts a wrong token and returns whether the address may try again. However many guesses arrive from an address in a
+// minute, only two of them add an event to the history: the first one, and the one that exceeds the limit.
 bool Access::may_try_again(const std::string& peer) const {
   const Time now = os::now();
   const std::lock_guard lock(mutex_);
@@ -152,7 +152,7 @@ bool Access::is_from_own_page(const Request& request) const {
 }
 
 // Returns whether the request needs a token. A proxy does not always add its header. With a configured proxy, even a
-// read request from this computer therefore needs a token.
+// read request from this computer therefore needs a token, if the server has tokens.
 bool Access::needs_token(const Request& request, Right right) const {
   if (right == Right::open || right == Right::change || !on_loopback_) return right != Right::open;
   return has_tokens() && (request.is_forwarded || !public_origin_.empty());

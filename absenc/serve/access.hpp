@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decides which requests are allowed. On loopback everybody on this computer may read. A request needs a token if it
-// comes from elsewhere, if it comes through a proxy and the server has tokens, and if it changes an encoder.
+// Decides which requests are allowed. Requests for the page itself and the health check need no token. A request that
+// changes an encoder needs one. Every other request needs one if the server does not listen on loopback. If it listens
+// on loopback, everybody on this computer may read and poll without a token, except that a server with tokens demands
+// one if a proxy is configured or has forwarded the request.
 #pragma once
 
 #include <cstdint>
@@ -32,8 +34,8 @@ class Access {
     std::string public_url{};  // URL at which a proxy on this computer shows the page; "": no proxy
     bool on_loopback = false;  // whether the server listens on loopback, so no other computer can reach it directly
   };
-  /// Throws Failure when the token file cannot be read, users outside its group may read it, or a token is shorter than
-  /// 16 characters; throws UsageError when `choices` are inconsistent. `server_events` must outlive this object.
+  /// Throws Failure as `read_secrets` does, also for a token that is shorter than 16 characters; throws UsageError when
+  /// `choices` are inconsistent or `public_url` is invalid. `server_events` must outlive this object.
   Access(const Choices& choices, ServerEvents& server_events);
 
   /// Reads the token file again: a token that was removed from the file becomes invalid at once. Throws Failure like

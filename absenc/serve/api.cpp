@@ -216,8 +216,8 @@ void Api::post(const Request& request, const Reply& reply) {
   reply.send(response);
 }
 
-// Returns the response to a health check. The server is healthy while it can answer and can store readings. Faults of
-// encoders are in /metrics.
+// Returns the response to a health check. The server is healthy while it can answer, and can store and send (MQTT) what
+// it is to store and send. Faults of encoders are in /metrics.
 Response Api::health() const {
   std::size_t live = 0;
   const Fleet::Watches watches = fleet_->all();
@@ -237,7 +237,8 @@ Response Api::health() const {
                            .set("mqtt_dropped", mqtt.dropped));
 }
 
-// Returns a response that states whether the server has tokens, and the name of the token in the request.
+// Returns a response that states whether the server has tokens, and the name of the token in the request; refuses a
+// wrong token.
 Response Api::token(const Request& request) const {
   const std::string who = access_->token_name(request);
   if (who.empty() && !request.authorization.empty()) return access_->refuse_token(request);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes the history once a second in its own thread, so that a slow disk delays nothing else.
+// Writes the history in its own thread, once a second and when a caller waits for it, so that a slow disk delays no
+// other thread.
 #pragma once
 
 #include <chrono>
@@ -44,8 +45,8 @@ class Chronicler {
   /// Adds events that are written to the history. `added` is the number of events since the start, including
   /// `server_events` (ServerEvents::added).
   void add(const std::vector<ServerEvent>& server_events, std::uint64_t added);
-  /// Calls `then` in the history thread once the first `added` server events are in the history file, where kill -9
-  /// does not lose them, or writing them has failed.
+  /// Calls `then` in the history thread, or in the destructor, once the first `added` server events are in the history
+  /// file, where kill -9 does not lose them, or writing them has failed.
   void when_written(std::uint64_t added, std::function<void()> then);
 
   struct Health {

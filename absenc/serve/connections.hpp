@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Selects the HTTP connection to close when too many are open: one address cannot shut out others, and the connection
-// that is idle for longest is closed first.
+// Selects the HTTP connection to close when too many are open: one address cannot shut out others, and of its
+// connections the one that is idle for longest is closed first.
 #pragma once
 
 #include <cstddef>
@@ -26,8 +26,9 @@ class Connections {
   /// `end` closes the connection of a socket; the server calls `remove` for it at once or later.
   explicit Connections(std::function<void(int socket)> end) : end_(std::move(end)) {}
 
-  /// Adds a connection. When a limit is exceeded, closes the connection that is idle for longest; if none is idle, this
-  /// connection belongs to the reserve or is closed.
+  /// Adds a connection. If the address of `peer` exceeds its limit, closes its connection that is idle for longest; if
+  /// all together exceed theirs, closes that of the address with the most idle ones. If none is idle, this connection
+  /// belongs to the reserve or is closed.
   void add(Id id, int socket, std::string peer, Time now);
   void remove(Id id) { open_.erase(id); }
   /// Records that a whole request was received: the connection is not idle until `await_request`.

@@ -18,7 +18,7 @@ class Fleet {
 
   /// `names` are encoder addresses as for `absenc read`; empty: all encoders of absenc.toml. `rate`: readings per
   /// second of encoders without `rate_hz` in the file; 0: as fast as possible. `server_events` must outlive this
-  /// object. Throws UsageError.
+  /// object. Throws UsageError, os::Interrupted.
   Fleet(std::vector<std::string> names, double rate, ServerEvents& server_events);
   ~Fleet();
   Fleet(const Fleet&) = delete;
@@ -28,7 +28,8 @@ class Fleet {
   void end();
 
   /// Reads absenc.toml again. Encoders with unchanged settings continue without interruption. Throws UsageError: then
-  /// all encoders continue as before. Returns the changes in words. Call it from one thread only.
+  /// all encoders continue as before. Throws os::Interrupted after SIGINT or SIGTERM. Returns the changes in words.
+  /// Call it from one thread only.
   std::string reload();
 
   [[nodiscard]] Watches all() const;

@@ -37,8 +37,9 @@ class HistoryReader {
   HistoryReader(const HistoryReader&) = delete;
   HistoryReader& operator=(const HistoryReader&) = delete;
 
-  /// Returns the history of an encoder in at most `most` rows; each row covers as many seconds as this limit requires:
-  /// [[at_s, least, mean, greatest, speed least, mean, greatest, readings, errors],...]
+  /// Returns {"encoder","step_s","rows"}: the history of an encoder in at most `most` rows; each row covers `step_s`
+  /// seconds, as many as this limit requires: [[at_s, least, mean, greatest, speed least, mean, greatest, readings,
+  /// errors],...]
   [[nodiscard]] client::Json seconds(const std::string& encoder, Range range, std::int64_t most);
   /// Returns the newest `most` events of `encoder`; for "" those of all encoders and of the server.
   [[nodiscard]] client::Json server_events(const std::string& encoder, Range range, std::int64_t most);
@@ -76,17 +77,18 @@ class HistoryWriter {
     std::string encoder;
     Second second;
   };
-  /// Writes all rows and events, or none when the disk is full, and counts those that are lost. Starts a new file if
-  /// the old one was moved, removed, replaced, truncated or damaged; a damaged file is renamed.
+  /// Writes all rows and events, or none on an error, and counts those that are lost. Starts a new file if the old one
+  /// was moved, removed, truncated or damaged, and renames a truncated or damaged one. Continues in a file that has
+  /// replaced the old one.
   void write(const std::vector<Entry>& seconds, const std::vector<ServerEvent>& server_events);
   /// Deletes rows beyond the limits of age and file size; fast when no row is beyond them. Age alone deletes rows only
   /// after a day of newer rows was recorded, because the clock may be wrong.
   void trim();
 
-  /// Returns why the last `write` or `trim` failed; "" after a successful `write`.
+  /// Returns why the constructor, the last `write` or `trim` failed; "" after a successful `write`.
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
   [[nodiscard]] std::uint64_t lost() const { return lost_; }
-  /// Returns sentences about changes of the history file since the last call.
+  /// Returns sentences about changes of the history file and about losses since the last call.
   [[nodiscard]] std::vector<std::string> take_notes();
   [[nodiscard]] HistoryReader& reader() { return reader_; }
 
@@ -109,7 +111,7 @@ class HistoryWriter {
   HistoryLimits limits_;
   std::string trouble_;
   std::uint64_t lost_ = 0;
-  std::uint64_t unreported_losses_ = 0;  // number of rows lost since the last event about losses
+  std::uint64_t unreported_losses_ = 0;  // number of rows and events lost since the last note about losses
   std::int64_t lost_since_ms_ = 0;
   std::vector<std::string> notes_;
 };

@@ -83,8 +83,8 @@ HistoryFile::HistoryFile(const std::string& path) : path_(path), owned_file_(loc
   note_written();
 }
 
-// Returns whether the database file is shorter than its header states. The header has the page size at byte 16 and the
-// number of pages at byte 28: https://www.sqlite.org/fileformat.html, 1.3.
+// Returns whether the database file is shorter than its header states, or has no header. The header has the page size
+// at byte 16 and the number of pages at byte 28: https://www.sqlite.org/fileformat.html, 1.3.
 bool HistoryFile::is_truncated() const {
   constexpr std::string_view magic{"SQLite format 3\0", 16};
   const std::string header = owned_file_->beginning(32);

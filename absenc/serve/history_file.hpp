@@ -20,7 +20,7 @@ struct HistoryInUse : client::Failure {
 
 class HistoryFile {
  public:
-  /// Opens the file, or creates it. Throws HistoryInUse, DamagedFile, Failure.
+  /// Opens the file, or creates it. Throws HistoryInUse, DamagedFile, client::Failure, os::Failure.
   explicit HistoryFile(const std::string& path);
 
   [[nodiscard]] Sqlite& sqlite() { return *sqlite_; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests that the history keeps its rows when the calendar clock is wrong.
+// Tests the history: wrong calendar clocks, the limits of age and size, a second writer, and repeated seconds.
 #include "absenc/serve/history.hpp"
 
 #include <gtest/gtest.h>

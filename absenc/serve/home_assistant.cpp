@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// MQTT discovery of Home Assistant (https://www.home-assistant.io/integrations/mqtt/): one device for each encoder, one
-// entity for each of its values. An entity is unavailable while the server is offline or the encoder is not live.
+// MQTT discovery of Home Assistant (https://www.home-assistant.io/integrations/mqtt/): one device for each encoder,
+// with entities for position, speed, turns (only of a rotary encoder) and alarms. An entity is unavailable while the
+// server is offline or the encoder is not live.
 #include <fmt/format.h>
 
 #include <string>
@@ -15,7 +16,7 @@ using namespace client;
 
 namespace {
 
-/// Returns `text` reduced to the characters that an object id may have: letters, digits, - and _.
+/// Returns `text` in the characters that an object id may have: letters, digits, - and _; any other byte becomes _XX.
 std::string object_id(std::string_view text) {
   std::string id = topic_level(text);
   for (char& c : id) {

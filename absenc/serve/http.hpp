@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // HTTP server without knowledge of encoders: one thread for all connections, responses from any thread, and a limit for
-// each resource that a client can use. Only http.cpp and http_request.cpp use libmicrohttpd.
+// each resource that a client can use. Only http.cpp uses libmicrohttpd.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,7 @@ struct Request {
   std::string method;  // HTTP method: "GET", "POST" ...
   std::string path;
   std::multimap<std::string, std::string> query;
-  std::string peer;  // IP address of the client that is connected
+  std::string peer;  // IP address of the connected client; Api replaces it by the one that a proxy reports
   std::string host;  // value of header Host; "" if it is missing; the same holds for the headers below
   std::string origin;
   std::string fetch_site;
@@ -43,13 +43,14 @@ struct Response {
 };
 
 /// The body of a response, which is produced while it is sent. Texts wait in a bounded queue until the client has
-/// received the earlier ones. A slow client loses the oldest unsent texts and delays no thread.
+/// received the earlier ones. A slow client delays no thread: the oldest queued texts are dropped, but the first one
+/// stays, because a part of it may be sent.
 class Stream {
  public:
   using Text = std::shared_ptr<const std::string>;
 
-  /// `most`: greatest number of queued texts. `on_empty` is called in the connection thread when the queue is empty; it
-  /// must return quickly.
+  /// `most`: greatest number of queued texts, at least 2. `on_empty` is called in the connection thread when the queue
+  /// is empty; it must return quickly.
   explicit Stream(std::string type, std::size_t most = 64, std::function<void()> on_empty = {});
   ~Stream();
   Stream(const Stream&) = delete;
@@ -63,7 +64,8 @@ class Stream {
   /// Returns whether the connection of the stream has ended.
   [[nodiscard]] bool over() const;
   [[nodiscard]] std::uint64_t dropped() const;
-  /// Returns when the client last received data of this stream.
+  /// Returns when the connection last asked for data of this stream, which it does when the client has received the
+  /// earlier data; before that, when the stream was made.
   [[nodiscard]] Time taken_at() const;
 
  private:
@@ -91,7 +93,7 @@ class HttpServer {
   using Handler = std::function<void(const Request&, Reply)>;
 
   /// `handler` is called in the connection thread for each request and must return quickly. `vital`: paths that are
-  /// answered even when too many connections are open. Throws Failure.
+  /// answered even when too many connections are open. Throws client::Failure.
   HttpServer(os::Listener listener, Handler handler, std::vector<std::string> vital);
   /// Aborts responses that are still being sent. Threads that write to a Stream must have ended before.
   ~HttpServer();

@@ -22,17 +22,17 @@ struct MqttHealth {
   bool connected = false;
   // Why the broker is not connected, what it refuses, or why the spool cannot be written; "" without an error.
   std::string trouble{};
-  bool failing = false;       // whether new readings cannot be spooled, or the spool is full and drops the oldest
+  bool failing = false;       // whether new readings cannot be spooled, or readings were dropped within the last 30 s
   std::uint64_t waiting = 0;  // number of messages in the spool
   std::int64_t waiting_bytes = 0;
   std::uint64_t sent = 0;           // messages that the broker has acknowledged since the start
-  std::uint64_t dropped = 0;        // readings lost since the start, because the spool was full or could not be written
+  std::uint64_t dropped = 0;        // readings lost since the start: spool full or not writable, or disk too slow
   std::uint64_t client_deaths = 0;  // unexpected ends of the MQTT client process since the start
-  // By encoder: number of its last reading that is in the spool or was sent.
+  // By encoder: number of its last reading that is on disk or was sent.
   std::map<std::string, std::uint64_t> taken{};
 
-  /// Returns the state of MQTT: "none" without a broker, "good", "away" while the broker is not connected and messages
-  /// wait on disk, or "failing" while readings are dropped.
+  /// Returns the state of MQTT: "none" without a broker, "good", "away" while the broker is not connected (messages
+  /// then wait in the spool), or "failing" while readings are dropped or the spool cannot be written.
   [[nodiscard]] std::string_view state() const;
   [[nodiscard]] client::Json json() const;
   /// Returns the metrics of MQTT in the text format of Prometheus.
@@ -42,7 +42,7 @@ struct MqttHealth {
 class Mqtt {
  public:
   /// `fleet` and `server_events` must outlive this object. Throws Failure if the spool or a file of the connection
-  /// cannot be used.
+  /// cannot be used, os::Failure if the MQTT client process cannot be started.
   Mqtt(const MqttSettings& settings, const Fleet& fleet, ServerEvents& server_events);
   /// Spools the remaining readings. A connected broker has one second to receive them.
   ~Mqtt();

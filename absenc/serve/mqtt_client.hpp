@@ -41,7 +41,8 @@ struct MqttIdentity {
 /// A connection to a broker through the MQTT client process. Not thread-safe: one thread creates, uses and destroys it.
 class MqttClient {
  public:
-  /// Starts the MQTT client process. Throws Failure when a file that `broker` names cannot be used.
+  /// Starts the MQTT client process. Throws client::Failure when a file that `broker` names cannot be used or the
+  /// process does not respond; throws os::Failure when it cannot be started.
   MqttClient(const Broker& broker, const MqttIdentity& identity, MqttVersion version);
   MqttClient(const MqttClient&) = delete;
   MqttClient& operator=(const MqttClient&) = delete;
@@ -56,10 +57,11 @@ class MqttClient {
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
   /// Returns whether the broker does not support this version of MQTT.
   [[nodiscard]] bool wrong_version() const { return wrong_version_; }
-  /// Returns whether the MQTT client process ended unexpectedly, as its library does at some malformed packets.
+  /// Returns whether the MQTT client process ended unexpectedly: its library ends it at some malformed packets.
   [[nodiscard]] bool died() const { return died_; }
 
-  /// Sends a message to the broker. Returns the number that the acknowledgement of this message will have.
+  /// Sends a message to the broker. Returns the number that the acknowledgement of this message will have; with QoS 0
+  /// only a refusal is acknowledged.
   int publish(const std::string& topic, const std::string& payload, int qos, bool retain);
 
   struct Acknowledgement {

@@ -18,7 +18,7 @@ using namespace client;
 namespace {
 
 constexpr std::size_t most_in_a_message = 250;  // greatest number of readings in a message, about 15 kB
-// Time between two events about dropped readings; these events are messages too.
+// Shortest time between two events about dropped readings; these events are messages too.
 constexpr Time drop_report_interval = std::chrono::seconds(10);
 constexpr Time drop_display_time = std::chrono::seconds(30);  // the health of MQTT shows dropped readings for this time
 

@@ -18,7 +18,7 @@ namespace absenc::serve {
 
 class MqttCollector {
  public:
-  /// Starts the collector thread. All arguments must outlive this object. Throws Failure if the spool cannot be used.
+  /// Starts the collector thread. All arguments must outlive this object.
   MqttCollector(const MqttSettings& settings, Spool& spool, const Fleet& fleet, ServerEvents& server_events);
   /// Spools the remaining readings and events.
   ~MqttCollector();

@@ -41,7 +41,8 @@ struct Retained {
 /// no position, because a retained position would become outdated.
 [[nodiscard]] Retained encoder_state(const std::string& prefix, const Watch& watch, const Snapshot& snapshot);
 
-/// Returns the discovery messages from which Home Assistant creates an encoder's entities: PREFIX/sensor/.../config.
+/// Returns the discovery messages from which Home Assistant creates an encoder's entities. Their topics begin with the
+/// prefix of Home Assistant: homeassistant/sensor/.../config, homeassistant/binary_sensor/.../config.
 [[nodiscard]] std::vector<Retained> home_assistant_entities(const MqttSettings& settings, const Watch& watch);
 /// Returns the topics of all discovery messages that an encoder of this name may have.
 [[nodiscard]] std::vector<std::string> home_assistant_topics(const MqttSettings& settings, std::string_view encoder);

@@ -3,8 +3,9 @@
 // still sent.
 //
 // An MQTT 5 broker refuses a message with a reason. Other brokers just close the connection, so every topic without an
-// acknowledgement is a suspect. From the second such close on, suspects are sent one at a time, until the broker has
-// either acknowledged the topic or closed the connection at it.
+// acknowledgement is a suspect. From the second such close in a row on, if it comes soon after the start of the
+// connection, suspects are sent one at a time, until the broker has either acknowledged the topic or closed the
+// connection at it.
 #pragma once
 
 #include <cstddef>
@@ -41,7 +42,7 @@ class MqttRefusals {
 
   /// Returns whether the pause of a refused topic has ended; true only once for each pause.
   [[nodiscard]] bool take_due(Time now);
-  /// Returns a sentence that names the refused topics; "" if no topic is refused.
+  /// Returns a sentence that names one refused topic and the number of the others; "" if no topic is refused.
   [[nodiscard]] std::string text() const;
   [[nodiscard]] bool has_suspects() const { return !suspects_.empty(); }
 

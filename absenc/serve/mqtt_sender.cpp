@@ -31,8 +31,9 @@ constexpr Time first_pause = 500ms;  // pause before the second attempt to conne
 constexpr Time longest_pause = 5s;
 constexpr Time time_to_connect = 10s;
 constexpr Time time_to_finish = 1s;
-constexpr Time stable_time = 10s;  // after a connection that lasted this long, the next pause is `first_pause` again
-// Minimum time between two events about a connection that is often lost; a lasting connection is reported at once.
+constexpr Time stable_time = 10s;  // a connection that lasted this long and acknowledged a message resets the pause
+// Minimum time between two events about a connection that is often lost; one that lasts for `stable_time` is reported
+// then.
 constexpr Time connection_report_interval = 60s;
 
 }  // namespace
@@ -67,7 +68,7 @@ void MqttSender::work(const std::stop_token& stop) {
       run_connection(stop);
     } catch (const Failure& failure) {
       set_lost(failure.what());
-    } catch (const os::Failure& failure) {  // the name of the broker cannot be resolved
+    } catch (const os::Failure& failure) {  // for example, the name of the broker cannot be resolved
       set_lost(failure.what());
     }
     if (version_ != tried) continue;

@@ -23,7 +23,7 @@ namespace absenc::serve {
 
 class MqttSender {
  public:
-  /// All arguments must outlive this object. Throws Failure if a file for the connection cannot be used.
+  /// All arguments must outlive this object. Throws what the constructor of MqttClient throws.
   MqttSender(const MqttSettings& settings, Spool& spool, const Fleet& fleet, ServerEvents& server_events);
   /// Ends the sender thread. A connected broker has one second to receive the remaining messages.
   ~MqttSender();
@@ -38,7 +38,7 @@ class MqttSender {
 
  private:
   struct Outstanding {
-    std::int64_t message = 0;  // id of the message in the spool; 0: a retained state, which is not in the spool
+    std::int64_t message = 0;  // id of the message in the spool; 0: a retained message, which is not in the spool
     std::string topic{};
   };
 
@@ -80,7 +80,7 @@ class MqttSender {
   std::map<std::string, std::string> retained_;  // by topic: condition of the retained message that was sent last
   Time next_states_{};
   Time next_values_{};
-  bool has_acknowledged_ = false;  // whether the broker has acknowledged a message on this connection
+  bool has_acknowledged_ = false;  // whether the broker has acknowledged a spooled message on this connection
   Time connected_at_{};
   bool connection_reported_ = false;  // whether an event has reported this connection
   Time next_connection_report_{};

@@ -60,7 +60,7 @@ class WireReader {
   /// `most`: largest allowed size of a frame in bytes.
   explicit WireReader(std::size_t most) : most_(most) {}
 
-  /// Received bytes of frames that are not complete yet; the caller appends to them.
+  /// Received bytes that `next` has not returned as a frame yet; the caller appends to them.
   std::string bytes{};
   /// Returns the next complete frame; nothing if no frame is complete. Throws client::Failure at an invalid size or
   /// kind.

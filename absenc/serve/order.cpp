@@ -40,7 +40,7 @@ OrderResult run_command(Encoder& encoder, const Order& order) {
   return success(command, change.now, change.was_so ? "it had this value already" : change.note, change.state);
 }
 
-// Reads settings and memory, one request after the other. A request that the encoder refuses, or that its options
+// Reads settings or registers, one request after the other. A request that the encoder refuses, or that its options
 // exclude, is reported with its reason; `done` returns the first reason if no request was answered.
 class OptionalReads {
  public:
@@ -76,7 +76,7 @@ class OptionalReads {
  private:
   Encoder* encoder_;
   const Between* between_;
-  bool has_sent_ = false;  // whether a read request was sent before
+  bool has_sent_ = false;  // whether a request was tried before
   bool was_sent_ = false;
   bool answered_ = false;
   std::string first_;
@@ -114,7 +114,7 @@ Json row_for_people(const Column& column, const Value& value) {
       .set("meaning", column.meaning);
 }
 
-// Reads settings. `wanted` is the command that reads one setting; null: all settings.
+// Reads settings. `wanted` is the command that reads one setting; null: all settings and the identification.
 OrderResult read_settings(Encoder& encoder, const Command* wanted, const Between& between) {
   Json identity = Json::object();
   Json settings = Json::object();

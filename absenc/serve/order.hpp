@@ -18,7 +18,7 @@ namespace absenc::serve {
 struct OrderResult {
   bool good = false;
   std::string text{};
-  client::Json json{};  // fields of the reply to a command; null for other orders
+  client::Json json{};  // fields of the reply to a command; for other orders the whole response
   client::ChangeState change = client::ChangeState::none;
 };
 
@@ -36,7 +36,7 @@ struct Order {
   client::MemoryImage addresses{};
   std::string who{};
   std::function<void(const OrderResult&)>
-      done{};  // function that is called once in the encoder's thread, after the event about the order was added
+      done{};  // called once: in the encoder's thread after the order's event, or where a waiting order is given up
 
   /// Returns the name of the order for messages: "zero", "doctor".
   [[nodiscard]] std::string_view name() const;
@@ -47,7 +47,8 @@ struct Order {
 /// UsageError if the unit has no setting, or not this one.
 [[nodiscard]] Order settings_order(const Unit& unit, std::string_view setting);
 /// Returns an order that reads memory page `page`; below 0: the addresses that a memory dump contains. Throws
-/// UsageError if the unit has no such memory, or the addresses are too many for one request.
+/// UsageError if the unit has no such memory, or the addresses are too many for one request. For a unit with registers
+/// the order reads all readable ones.
 [[nodiscard]] Order memory_order(const Unit& unit, std::int64_t page);
 [[nodiscard]] Order examination_order();
 
@@ -60,7 +61,7 @@ struct Order {
 [[nodiscard]] client::Json shown_values(const client::Answer& answer);
 
 /// Returns which settings and memory of an encoder of this unit can be read:
-/// {"settings":[names],"memory":[{"page","first","count","meaning","in_dump"}],"registers":n}
+/// {"settings":[names],"memory":[{"page","pages","first","count","meaning","in_dump"}],"registers":n}
 [[nodiscard]] client::Json readable_json(const Unit& unit);
 
 }  // namespace absenc::serve

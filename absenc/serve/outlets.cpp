@@ -89,7 +89,7 @@ struct HostAndPort {
   std::optional<std::uint16_t> port;
 };
 
-// Parses "HOST:PORT", "HOST" or "[IPV6]:PORT".
+// Parses "HOST:PORT", "HOST", "[IPV6]:PORT" or "[IPV6]"; returns nothing for an invalid text.
 std::optional<HostAndPort> host_and_port(std::string_view written) {
   const std::size_t bracket = written.rfind(']');
   const std::size_t colon = written.find(':', bracket == std::string_view::npos ? 0 : bracket);

@@ -43,7 +43,8 @@ struct OutletOption {
   std::string value;
 };
 
-/// Reads absenc.toml, if it exists, applies the options, and returns the settings of MQTT and UDP. Throws UsageError.
+/// Reads absenc.toml, if it exists, applies the options, and returns the settings of MQTT and UDP. Throws UsageError,
+/// Failure (see `state_file`).
 [[nodiscard]] Outlets read_outlets(const std::vector<OutletOption>& options);
 
 }  // namespace absenc::serve

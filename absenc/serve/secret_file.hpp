@@ -13,11 +13,11 @@ struct Secret {
 };
 
 /// Reads a file of lines NAME SECRET and returns all of them. `least` is the minimum length of a secret; `title` names
-/// the secrets in errors. Throws Failure if users outside the file's group may access the file, the group may write it,
-/// a line is invalid, or the file has no line.
+/// the secrets in errors. Throws Failure if the file cannot be read, users outside its group may access it, the group
+/// may write it, a line is invalid, or the file has no line.
 [[nodiscard]] std::vector<Secret> read_secrets(const std::string& title, const std::string& path, std::size_t least);
 
-/// Reads a file with one line, and returns user name and password.
+/// Returns user name and password from the first line of the file at `path`. Throws as `read_secrets` does.
 [[nodiscard]] Secret read_secret(const std::string& path);
 
 }  // namespace absenc::serve

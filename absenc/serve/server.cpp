@@ -59,7 +59,7 @@ struct Server::Parts {
   ~Parts() {
     publisher.request_stop();
     publisher.join();
-    http.reset();  // HTTP ends first: requests use the other parts
+    http.reset();  // HTTP ends before the parts that its requests use
     fleet.end();   // before distribute_events is called, so that the events of the last commands are distributed
     distribute_events();
     sending.change_to({});

@@ -28,10 +28,11 @@ struct Choices {
 
 class Server {
  public:
-  /// Starts reading and serving: all threads run when it returns. Throws UsageError, Failure, os::Failure.
+  /// Starts reading and serving: all threads run when it returns. Throws UsageError, Failure, os::Failure,
+  /// os::Interrupted.
   explicit Server(const Choices& choices);
-  /// Stops all threads. Waits for a reading in progress, and up to a second for a broker to receive the spooled
-  /// messages.
+  /// Stops all threads. Waits for a reading or a command in progress, and up to a second for a broker to receive the
+  /// spooled messages.
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
@@ -43,7 +44,7 @@ class Server {
   [[nodiscard]] std::string history_trouble() const;
   /// Reads absenc.toml and the token file again and returns the changes in words. Throws UsageError if a file is
   /// invalid: the encoders and outlets then continue as before. Throws Failure or os::Failure if an outlet cannot be
-  /// started. Call it from one thread only.
+  /// started, and os::Interrupted. Call it from one thread only.
   std::string reload();
 
  private:

@@ -24,7 +24,7 @@ namespace absenc::serve {
 struct ServerEvent {
   std::int64_t at_ms = 0;
   std::string encoder{};  // name of the encoder of the event; "": the server itself
-  // Kind of the event, one of alarm, alarm_over, acknowledged, failing, silent, lost, back, restarted, ended, examined,
+  // Kind of the event, one of alarm, alarm_over, acknowledged, failing, lost, back, restarted, ended, examined,
   // command, change, history, mqtt, access.
   std::string kind{};
   std::string text{};

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Size of one write in bytes; it is small, because a nearly full disk may still accept a small one.
+// Approximate size of one write in bytes; it is small, because a nearly full disk may still accept a small one.
 constexpr std::size_t write_size = 65536;
 
 std::int64_t memory_bytes(std::int64_t most) { return std::clamp<std::int64_t>(most / 16, 64'000, 4'000'000); }
@@ -97,7 +97,7 @@ void Spool::write_waiting() {
   notes_.push_back(fmt::format("the spool {} can be written again", path_));
 }
 
-// Writes the waiting messages that fit into one write. Returns false when no message waits.
+// Writes the waiting messages that fit into one write. Returns false when neither a message nor a reading number waits.
 bool Spool::write_some() {
   if (memory_.empty() && unwritten_numbers_.empty()) return false;
   std::string bytes;

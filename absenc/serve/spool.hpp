@@ -2,8 +2,8 @@
 // Stores messages on disk until a broker has acknowledged them: kill -9 loses no stored message.
 //
 // The spool is a folder of append-only files (spool_file.hpp). A file whose messages are all acknowledged is deleted,
-// so sending from a full disk needs no free space. While the disk cannot be written, new messages wait in memory, up to
-// a limit, and are sent from there.
+// except the newest one, so sending from a full disk needs no free space. While the disk cannot be written, new
+// messages wait in memory, up to a limit, and are sent from there.
 #pragma once
 
 #include <cstddef>
@@ -70,7 +70,7 @@ class Spool {
 
   struct Dropped {
     Counts counts{};
-    std::string why{};  // reason why the latest messages were dropped
+    std::string why{};  // reason of the last drop
   };
   /// Returns how many messages were dropped since the last call, and why.
   [[nodiscard]] Dropped take_dropped();

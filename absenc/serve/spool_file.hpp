@@ -23,7 +23,7 @@ struct Message {
   std::uint64_t readings = 0;  // number of readings in the message
 };
 
-/// Returns the bytes that a message needs in the spool: its texts and the record around them.
+/// Returns about how many bytes a message needs in the spool: its texts and the record around them.
 [[nodiscard]] inline std::int64_t spool_bytes(const Message& message) {
   return static_cast<std::int64_t>(message.topic.size() + message.payload.size()) + 32;
 }

@@ -16,8 +16,8 @@ namespace {
 
 constexpr std::string_view part_suffix = ".part";
 
-// Returns the size limit of one file of the spool. The limit is smaller on a small disk, because only deleting a whole
-// file frees space.
+// Returns the size limit of one file of the spool. The limit is smaller if the disk has little free space, because only
+// deleting a whole file frees space.
 std::size_t part_bytes(std::int64_t most, const std::string& folder) {
   std::error_code error;
   const std::uintmax_t free = fs::space(folder, error).available;
@@ -78,8 +78,8 @@ void Spool::load_part(std::int64_t number) {
   }
 }
 
-// Handles spool files that were removed or moved while open. The newest file is still open and can be read; the
-// messages of the others are lost.
+// Handles spool files that were removed or moved while open. The newest file is still open and can be read. If the
+// folder was removed, the messages of the other files are lost.
 void Spool::check_folder() {
   if (folder_ && folder_->is_there() && (newest_ == nullptr || newest_->log().is_there())) return;
   if (folder_) {
@@ -150,7 +150,7 @@ void Spool::drop_part(std::size_t index, const std::string& why) {
   fs::remove(path_of(part.number), ignored);
 }
 
-// Counts the messages of `part` that are still readable; the others are reported as dropped.
+// Counts the messages of `part` that are readable and not acknowledged; the unreadable ones are reported as dropped.
 void Spool::recount(Part& part) {
   Counts readable;
   std::int64_t bytes = 0;
@@ -170,8 +170,8 @@ void Spool::recount(Part& part) {
   drop(lost, fmt::format("{} cannot be read from byte {} of {} on", path_of(part.number), offset, part.bytes));
 }
 
-// Deletes files whose messages are all acknowledged, except the last file, which has the reading numbers. While the
-// disk cannot be written, the last file is shortened instead.
+// Deletes files whose messages are all acknowledged, except the last file, which has the reading numbers. If its
+// messages are all acknowledged while the disk cannot be written, the last file is shortened.
 void Spool::tidy() {
   if (newest_ != nullptr && !condition_.trouble.empty() && parts_.back().waiting.messages == 0) {
     if (newest_->log().shrink_to(spool_record(facts_))) {

@@ -19,7 +19,7 @@ struct DamagedFile : client::Failure {
   using client::Failure::Failure;
 };
 
-/// An open SQLite database. All functions throw client::Failure with SQLite's error text.
+/// An open SQLite database. A function that fails throws client::Failure with SQLite's error text, or DamagedFile.
 class Sqlite {
  public:
   enum class For : std::uint8_t { writing, reading };

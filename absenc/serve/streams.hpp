@@ -23,8 +23,9 @@ class Streams {
   static constexpr Time stall_time = std::chrono::seconds(5);
 
   /// Opens an event stream. `trace`: the encoder whose plot points the stream sends; "": none. `peer`: IP address of
-  /// the client. At the limit of streams, the address with the most streams loses one to an address with fewer, or
-  /// `peer` loses a stream whose client has stalled; if neither is possible, returns null.
+  /// the client. At the limit of streams, the address with the most streams loses one to an address with at least two
+  /// fewer. Otherwise, and at the limit of streams of one address, `peer` loses a stream whose client has stalled. If
+  /// no stream can be closed, returns null.
   [[nodiscard]] std::shared_ptr<Stream> open(const std::string& trace, const std::string& peer);
 
   /// Sends a server-sent event to all streams.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sends every reading as a JSON datagram, in the format of PlotJuggler, in its own thread. Datagrams without a receiver
-// are lost.
+// Sends good readings as JSON datagrams, one each, in the format of PlotJuggler, in its own thread. Datagrams without a
+// receiver are lost.
 #pragma once
 
 #include <condition_variable>

@@ -50,8 +50,8 @@ Json alarms_json(const Unit& unit, const Reading& reading, const std::vector<Rai
   return all;
 }
 
-// Returns the status flags. Status flags are no alarms, but encoders without alarms report their condition only by
-// them.
+// Returns the names of the status flags that are set; null if none is set and no field reports all its flags. Status
+// flags are no alarms, but encoders without alarms report their condition only by them.
 Json status_json(const Unit& unit, const Reading& reading) {
   Json all = Json::array();
   const std::vector<Flags> channels = status_of(unit, reading);
@@ -161,7 +161,7 @@ Json bad_json(const Details& details) {
 }
 
 // Sets the number of positions per turn or along the scale; null if only a reply reports that number and no reply was
-// received.
+// received, or if it has more than 62 bits.
 void set_scale(Json& json, const Watch& watch, const Snapshot& snapshot) {
   Resolution known = watch.address().unit->resolution(watch.address().options);
   const Reading& reading = snapshot.last.reading;

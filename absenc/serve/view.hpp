@@ -26,8 +26,8 @@ namespace absenc::serve {
 /// Returns whether the encoder of `watch` is linear: its positions are in mm instead of degrees.
 [[nodiscard]] bool is_linear(const Watch& watch);
 
-/// Returns the overview of an encoder, and its counters, latencies, last bad exchanges, the fields of the last reply,
-/// and its commands with their arguments.
+/// Returns the overview of an encoder, its counters, latencies, last bad exchanges, the fields of the last reply, which
+/// settings and memory can be read, and its commands with their arguments.
 [[nodiscard]] client::Json details(const Watch& watch);
 
 /// Returns plot points of an encoder as {"encoder":name,"points":[[at_ms,position,speed,speed_uncertainty],...]}; an
@@ -35,8 +35,8 @@ namespace absenc::serve {
 [[nodiscard]] client::Json points(const Watch& watch, std::span<const Point> taken);
 
 /// Returns the last minute of all encoders as
-/// {"encoders":[{"encoder":name,"seconds":[[at_s,position,speed],...]},...]}: last position and mean speed of the last
-/// 60 seconds with readings; null if the position or the speed was invalid.
+/// {"encoders":[{"encoder":name,"seconds":[[at_s,position,speed],...]},...]}: the last position and the mean speed of
+/// each of the last 60 seconds with readings; null if no position was valid or no speed was known.
 [[nodiscard]] client::Json last_minute(const Fleet::Watches& watches);
 
 /// Statistics of the server.

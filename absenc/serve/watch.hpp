@@ -72,7 +72,7 @@ struct Snapshot {
   bool has_reading = false;
   std::optional<double> place{};  // last valid position, as in `Point`
   client::Sample last{};          // last reading; current only in state `live`
-  std::string message{};          // reason why the encoder is not live; "" if it is
+  std::string message{};          // reason why the encoder is not live; "" if it is, or in state `silent`
   host::Counters counters{};
   std::uint64_t readings = 0;
   std::uint64_t losses = 0;
@@ -80,26 +80,27 @@ struct Snapshot {
   std::uint64_t errors_last_minute = 0;
   std::vector<RaisedAlarm> raised{};
   double rate = 0;           // rate of readings, per second
-  LatencyFigures latency{};  // latencies of the replies, as of at most one second ago
+  LatencyFigures latency{};  // latencies of the replies, updated at most once a second
 };
 
 /// Additional data for the detailed view of one encoder.
 struct Details {
   std::vector<client::BadExchangeText> bad{};  // bad exchanges of the encoder, newest first
-  client::Json fields{};                       // fields of the last reply, at most one second old
-  client::Json reply{};                        // fields of the last reply for people, as in `shown_values`
+  client::Json fields{};                       // fields of a recent reply, updated at most once a second
+  client::Json reply{};                        // the same reply for people, as in `shown_values`
 };
 
 class Watch {
  public:
-  /// Starts a thread that reads the encoder `rate` times per second. The first reading is `offset` after the start.
-  /// `server_events` must outlive this object.
+  /// Starts a thread that reads the encoder `rate` times per second; 0: as fast as possible. The first reading is
+  /// `offset` after the start. `server_events` must outlive this object.
   Watch(std::string name, const client::EncoderAddress& address, double rate, Time offset, ServerEvents& server_events);
   ~Watch();
   Watch(const Watch&) = delete;
   Watch& operator=(const Watch&) = delete;
 
-  /// Requests the reading thread to end, which happens within the time of one reading.
+  /// Requests the reading thread to end, which happens within the time of one reading, or when a running command has
+  /// ended.
   void request_stop() { thread_.request_stop(); }
   /// Waits until the reading thread has ended. The destructor calls `request_stop` and `wait`.
   void wait();

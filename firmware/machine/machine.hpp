@@ -18,7 +18,7 @@ void print(std::uint64_t number);
 /// Ends the emulator with status 0 if `good`, otherwise 1.
 [[noreturn]] void end(bool good);
 /// Returns the number in the emulator's argument `index`, where 0 is the first after the program's name; `otherwise` if
-/// it is missing.
+/// it is missing or does not begin with a digit.
 [[nodiscard]] std::uint32_t argument(unsigned index, std::uint32_t otherwise);
 
 /// Starts the clock: `on_tick` is called every `period`, at most 0.5 s.

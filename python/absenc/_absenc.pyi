@@ -44,10 +44,10 @@ class Reading:
         """Whether the revolutions are valid; None: not reported, or the encoder has none."""
     @property
     def alarms(self) -> Optional[list[str]]:
-        """Names of the raised alarms; []: all are reported clear; None: not all are reported."""
+        """Names of the raised alarms; []: all are reported clear; None: none is raised, but not all are reported."""
     @property
     def status(self) -> Optional[list[str]]:
-        """Names of the status flags that are set; None: not reported."""
+        """Names of the status flags that are set; None: none is set, and not all are reported."""
     @property
     def time_s(self) -> float:
         """Time at which the position was latched, in seconds of time.monotonic()."""

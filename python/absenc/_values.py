@@ -16,7 +16,8 @@ Field = Union[None, bool, int, float, str, bytes, tuple[str, ...]]
 
 
 def natural(name: str, value: float, least: int = 0, most: int = 2**32 - 1) -> int:
-    """Returns the argument `name` as int; 24e6 is as good as 24000000. Raises UsageError outside of the limits."""
+    """Returns the argument `name` as int; 24e6 is as good as 24000000. Raises UsageError for another value: no whole
+    number, or outside of the limits."""
     if not isinstance(value, Real) or value != value // 1 or not least <= value <= most:
         raise UsageError(f"{name} is a whole number from {least} to {most}, not {value!r}")
     return int(value)

@@ -145,12 +145,13 @@ class Encoder:
         return f"<absenc.Encoder {self.address}>"
 
     def close(self) -> None:
-        """Closes the port. Calls that wait in other threads raise Cancelled."""
+        """Closes the port. Calls that wait for a reply in other threads raise Cancelled; loops over samples, and
+        recordings, end."""
         self._encoder.close()
 
     def read(self) -> Reading:
         """Reads the position with all alarms. A position that no second reading confirms is invalid:
-        `Reading.angle_deg` is None. Raises EncoderError, PortError."""
+        `Reading.angle_deg` is None. Raises EncoderError, PortError, Cancelled; UsageError after `close`."""
         return self._encoder.read()
 
     def samples(self, *, rate: float = 0, count: int = 0) -> Samples:
@@ -251,7 +252,7 @@ class Encoder:
 
     @property
     def counters(self) -> dict[str, int]:
-        """Number of exchanges so far: "good", and each error by its name."""
+        """Number of exchanges so far: "good", and each error that occurred, by its name."""
         return self._encoder.counters()
 
 

@@ -64,7 +64,7 @@ class Protocol:
 
     def decode(self, reply: Frame, *, request: Frame = b"", model: str = "", **options: Value) -> dict[str, Field]:
         """Checks a reply like a host and returns its fields; for an empty reply, those of the request. Invalid values
-        are None. Raises a subclass of EncoderError that names the kind of error."""
+        are None. Raises a subclass of EncoderError that names the kind of error; UsageError for wrong arguments."""
         return _absenc.decode_frame(self.id, _plain(reply), _plain(request), model, texts(options))
 
     def encode(self, command: str, *values: int, model: str = "", **options: Value) -> Union[bytes, str]:

@@ -114,9 +114,9 @@ class Port(NamedTuple):
 def doctor(
     text: str, *, seconds: float = 3, readings: int = 100_000, turning_s: float = 0, **options: Value
 ) -> Examination:
-    """Examines port, line and encoder, and reads for `seconds`; changes nothing. A port that cannot be opened is a
-    finding. With `turning_s` it reads for this time while the user turns the shaft. Text and options are as for
-    `open`. Raises UsageError."""
+    """Examines port, line and encoder, and reads for `seconds` or until it has `readings`; changes nothing. A port that
+    cannot be opened is a finding. With `turning_s` it reads for this time while the user turns the shaft. Text and
+    options are as for `open`. Raises UsageError."""
     if not seconds > 0:
         raise UsageError(f"seconds is greater than 0, not {seconds!r}")
     found = json.loads(
@@ -142,7 +142,8 @@ def probe(
     protocol: str, replies: Sequence[str], requests: Sequence[str] = (), *, model: str = "", **options: Value
 ) -> Probed:
     """Finds options that the protocol's document leaves open, from captured frames. `replies` and `requests` are
-    hexadecimal, in the same order; "" for one that is missing or unknown. Raises UsageError."""
+    frames as text (see `absenc.protocols.Frame`), in the same order; "" for one that is missing or unknown. Raises
+    UsageError."""
     found = json.loads(_absenc.probe(protocol, model, texts(options), list(replies), list(requests)))
     found["evidence"] = [OptionEvidence(**one) for one in found["evidence"]]
     return Probed(**found)

@@ -63,7 +63,7 @@ class PyEncoder {
   PyEncoder(const PyEncoder&) = delete;
   PyEncoder& operator=(const PyEncoder&) = delete;
 
-  /// Throws the exception that a Python signal handler raised during the wait for samples.
+  /// Throws the exception that a Python signal handler raised during the wait for samples or a recording.
   void check() { watch_.rethrow(); }
 
   void close() {
@@ -120,13 +120,14 @@ class PySamples {
 std::int64_t whole_number(const Argument& argument, const py::handle& value) {
   try {
     return py::cast<std::int64_t>(value);
-  } catch (const py::cast_error&) {  // the value is not a number, or has more than 64 bits
+  } catch (const py::cast_error&) {  // the value is no whole number, or has more than 64 bits
     throw client::UsageError(std::string(argument.name) + " is " + std::string(py::repr(value)) +
                              ", but must be a whole number of up to 64 bits");
   }
 }
 
-/// Returns the arguments in the order of the command; missing arguments have their defaults. Throws UsageError.
+/// Returns the arguments in the order of the command. Missing ones before a named one have their defaults; missing ones
+/// at the end are left out. Throws UsageError.
 std::vector<std::int64_t> arguments_of(const Command& command, const py::args& args, const py::kwargs& named) {
   std::vector<std::int64_t> values;
   if (args.size() > command.arguments.size()) {

@@ -51,7 +51,7 @@ def test_info_has_no_failures(address):
 
 
 def test_encodes_and_decodes_requests(unit):
-    """An encoded request is decoded as one, and a request with another start and end is refused."""
+    """An encoded request is decoded as one. With another start, of bytes also with another end, it is refused."""
     requests = []
     for command in unit.commands.values():
         if command.arguments:

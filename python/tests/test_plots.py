@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests the plots of examples/plots.py."""
+"""Tests the plots of python/examples/plots.py."""
 import os
 import subprocess
 import sys

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads the options that describe a capture, for the verbs decode, identify and crc find.
+// Reads the options that describe a capture, for the verbs decode and identify.
 #pragma once
 
 #include <string_view>

@@ -123,7 +123,7 @@ std::string Console::alarms(VirtualDevice& device, std::string_view names, bool 
   return fmt::format("{} {}", raise ? "raised" : "lowered", fmt::join(all, ", "));
 }
 
-// Sets the rates of the faults named in `wanted`, such as "drop=0.1 bit=0.01"; faults that are not named keep their
+// Sets the rates of the faults named in `wanted`, such as "drop=0.1 corrupt=0.01"; faults that are not named keep their
 // rates, "none" sets all rates to 0. Returns all faults with a rate above 0.
 std::string Console::faults(VirtualDevice& device, std::string_view wanted) {
   sim::FaultRates rates = device.fault_rates();

@@ -19,7 +19,7 @@ class Console {
   /// `unit` and the encoders must outlive the console. The encoders all belong to `unit` and are numbered from 1.
   Console(const Unit& unit, std::vector<VirtualDevice*> devices) : unit_(unit), devices_(std::move(devices)) {}
 
-  /// Executes the lines that wait on standard input, and prints one line to standard output for each.
+  /// Executes the lines that wait on standard input, and prints one line to standard output for each that is not blank.
   void look(Time now);
   /// Returns whether standard input has ended or standard output was closed.
   [[nodiscard]] bool ended() const { return lines_.ended() || unheard_; }

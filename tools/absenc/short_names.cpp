@@ -73,7 +73,7 @@ Names middles(std::span<const std::string> names) {
   return cuts;
 }
 
-// Returns the names cut to `width` bytes, each with its position in the list before it: "3 tfo..=7" is the third name.
+// Returns the names cut to `width` bytes, each after its number in the list: "3 tfo..=7" is the third name.
 Names numbered(std::span<const std::string> names, std::size_t width) {
   Names cuts;
   for (const std::string& name : names) {

@@ -12,7 +12,7 @@
 namespace absenc::tool {
 
 struct Parameter {
-  std::string_view name;   // "unit" is the name of an argument, "--count" that of an option
+  std::string_view name;   // "encoder" is the name of an argument, "--count" that of an option
   std::string_view value;  // placeholder of the option's value in help; "": the option has no value
   std::string_view meaning;
   std::string_view fallback{};  // the default in words, for help; "": none

@@ -246,7 +246,7 @@ std::vector<std::string_view> command_names(const Unit& unit) {
   return names;
 }
 
-// Returns the names of makers, families and models, each once, without names of two words, which bash would split.
+// Returns the names of makers, families and models, each once, without names of several words, which bash would split.
 std::set<std::string_view> known_names(std::span<const Unit* const> units) {
   std::set<std::string_view> names;
   for (const Unit* unit : units) {
@@ -258,8 +258,8 @@ std::set<std::string_view> known_names(std::span<const Unit* const> units) {
   return names;
 }
 
-// Returns the names of the settings that `config get` and `config set` accept: commands that read a setting, and those
-// that write a setting which cannot be read.
+// Returns the names of settings for `config get` and `config set`: commands that read a setting, and those that write a
+// setting which cannot be read (only for `config set`).
 std::vector<std::string_view> setting_names(const Unit& unit) {
   std::vector<std::string_view> names;
   for (const Command& command : unit.commands) {

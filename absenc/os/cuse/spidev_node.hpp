@@ -17,7 +17,8 @@ namespace absenc::os {
 class SpidevNode {
  public:
   /// Creates /dev/`name`, which is removed with the object. `spidev` must outlive it. Throws Failure: `not_found` (the
-  /// kernel module is not loaded), `no_permission`, `in_use` (the name), `unsupported` (the name is invalid), `system`.
+  /// kernel module is not loaded), `no_permission`, `in_use` (the name), `unsupported` (the name is invalid), `lost`,
+  /// `system`; throws Interrupted and Ended as `wait_for` does.
   SpidevNode(const std::string& name, Spidev& spidev);
   SpidevNode(const SpidevNode&) = delete;
   SpidevNode& operator=(const SpidevNode&) = delete;

@@ -29,7 +29,7 @@ function lose(why, refused = false) {
   view.lose(refused ? why : undefined);
 }
 
-// Shows an error, and also the token dialog, because the server may require a token for reading.
+// Shows an error, and also the token button, because the server may require a token for reading.
 function explain(why, refused) {
   lose(why, refused);
   tokenButton.hidden = false;
@@ -65,7 +65,7 @@ function decoded(text) {
   }
 }
 
-/** Returns {encoder, tab, range, unit} from the fragment of the address, so that links to a view can be shared. */
+/** Returns encoder, tab, range and unit, as far as the fragment of the address has them: a view can be shared. */
 function place() {
   const values = new URLSearchParams();
   for (const part of location.hash.slice(1).split("&")) {

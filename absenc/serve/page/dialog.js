@@ -55,7 +55,7 @@ export async function askToken() {
   await ask("Token", "Use it", [tokenLabel(input)], () => tryToken(input.value.trim()));
 }
 
-/** Asks for consent to acknowledge an alarm, and for a token if this tab has none. Returns whether it was given. */
+/** Asks for consent to acknowledge an alarm, and for a token if this tab has none. Returns whether the user agreed. */
 export async function askAcknowledge(name, alarm) {
   const {name: who} = await tokenInfo();
   const token = tokenField();

@@ -22,7 +22,7 @@ export function setText(node, text) {
   }
 }
 
-/** These functions write only a changed value, because each write makes the browser compute styles again. */
+/** The next three functions write only a changed value, because each write makes the browser compute styles again. */
 export function setClass(node, name) {
   if (node.className !== name) node.className = name;
 }
@@ -99,7 +99,7 @@ export function scale() {
 }
 
 const SPARK_S = 60;
-const SPARK_LOST_S = 15;  // width of the area of a small plot that marks the time without readings, in seconds
+const SPARK_LOST_S = 15;  // greatest width of the area of a small plot that marks the time without readings, in seconds
 
 /** Creates the small plot of the last minute. */
 export function spark() {

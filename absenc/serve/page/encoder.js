@@ -39,7 +39,7 @@ export class EncoderPage {
   constructor(main, bar, name, values) {
     this.name = name;
     this.trace = name;
-    this.points = [];     // points of the live plot as [at_ms, position, speed]
+    this.points = [];     // points of the live plot as [at_ms, position, speed, uncertainty of the speed]
     this.events = [];
     this.loss = 0;        // number of connection losses: a response to a request from before a loss is ignored
     this.hasHistory = true;
@@ -297,7 +297,7 @@ export class EncoderPage {
       if (point[0] - (this.points.at(-1)?.[0] ?? 0) >= LEAST_MS) this.points.push(point);
     }
     while (this.points.length > MOST_POINTS) this.points.shift();
-    if (this.range === "live") this.changed = true;  // plots of the history are redrawn by refresh() only
+    if (this.range === "live") this.changed = true;  // loadPast() and refresh() redraw plots of the history
   }
 
   /** Returns the plot's rows, from the points or the history, in the selected unit. */

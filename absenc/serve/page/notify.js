@@ -36,7 +36,7 @@ function showNotification(title, body, tag, hash) {
   };
 }
 
-/** Notifies about an event; the name of the alarm or the kind of loss is the title. */
+/** Notifies about an alarm or a loss; the title names the encoder, and the alarm or the kind of loss. */
 export function notify({kind, encoder, text}) {
   if (!KINDS.includes(kind)) return;
   const [name, ...rest] = kind === "alarm" ? text.split(": ") : [eventKind(kind)[1], text];

@@ -120,7 +120,7 @@ class Card {
     const text = JSON.stringify(shown);
     if (text === this.shownWords) return;
     this.shownWords = text;
-    // A long reason is reduced to its first sentence; the page of the encoder shows all of it.
+    // A text without a title is reduced to its first sentence; the page of the encoder shows all of it.
     const first = (words) => /^.*?[.!?](?= [A-Z]|$)/.exec(words)?.[0] ?? words;
     this.words.replaceChildren(...shown.map(([kind, strong, words]) => element("p", {class: kind}, element("strong", {}, strong), element("span", {class: "more"}, strong && words ? " " : "", ...rich(strong ? words : first(words))))));
   }
@@ -198,7 +198,7 @@ export class Overview {
     card.seed(seconds);
   }
 
-  /** Shows a state of the server. With many encoders it is redrawn less often than states arrive, to limit the load. */
+  /** Shows a state of the server. With many encoders the page is redrawn less often than states arrive: less load. */
   show(state) {
     const wait = state.encoders.length > MANY && this.cards.size > 0 ? this.drawn + DRAW_MS * state.encoders.length - performance.now() : 0;
     clearTimeout(this.later);

@@ -44,8 +44,8 @@ function gridLines(quantity) {
   };
 }
 
-// Kinds of events that are drawn as marks. A label that would overlap others is omitted; the history tab lists all
-// events.
+// Kinds of events that are drawn as marks. A label that would overlap others is omitted; the history tab lists events
+// of all kinds.
 const MARKED = ["alarm", "lost", "silent", "ended", "restarted"];
 export const isMarked = (event) => MARKED.includes(event.kind);
 export const markText = (event) => (event.kind === "alarm" ? plain(event.text.split(":")[0]) : eventKind(event.kind)[1]);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Requests to the server, with the token, and the event stream of the server, which reports a lost connection at once.
+// Requests to the server, with the token, and the event stream of the server, which reports a lost connection within
+// `PATIENCE` ms.
 
 let token = sessionStorage.getItem("token") ?? "";
 
@@ -24,7 +25,10 @@ export async function request(path, values = {}, method = "GET") {
   return {status: answer.status, body: await answer.json()};
 }
 
-/** Returns {tokens, name}: whether the server has tokens, and the name of this tab's token. Forgets a wrong token. */
+/**
+ * Returns {tokens, name}: whether the server has tokens, and the name of this tab's token. Forgets a token that the
+ * server does not accept.
+ */
 export async function tokenInfo() {
   const {status, body} = await request("api/token");
   if (status === 200) return body;
@@ -59,13 +63,13 @@ export async function download(path, values, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), 10000);
 }
 
+const PATIENCE = 1500;
+const PAUSE = 500;
+
 /**
  * The server's event stream. It is opened again when it ends, or when nothing arrives for `PATIENCE` ms. This class
  * parses server-sent events itself, because EventSource cannot send a token.
  */
-const PATIENCE = 1500;
-const PAUSE = 500;
-
 export class Events {
   constructor(trace, {onEvent, onLost}) {
     this.trace = trace;

@@ -147,7 +147,7 @@ export function fieldText(value, missing = "INVALID") {
   return Array.isArray(value) ? value.map(plain).join(", ") || "none" : String(value);
 }
 
-/** Severity and text of each kind of event. */
+/** Severity and text of kinds of events; other kinds have the severity "plain" and their own name. */
 const EVENT_KINDS = {
   alarm: ["bad", "alarm raised"], alarm_over: ["good", "alarm over"], acknowledged: ["plain", "acknowledged"], lost: ["bad", "lost"], silent: ["warn", "no reply"],
   failing: ["warn", "replies fail"], back: ["good", "back"], restarted: ["warn", "position restarted"], ended: ["bad", "stopped"],

@@ -26,7 +26,7 @@ using namespace std::chrono_literals;
 
 constexpr std::size_t most_lines = 200;
 constexpr Time between_summaries = 100ms;
-// Shortest time between two traced good readings; other alarms and failures are traced at once.
+// Shortest time between two traced good readings; a reading with changed alarms, and a failure, are traced at once.
 constexpr Time between_lines = 200ms;
 
 // Converts a time of os::now, which reads the steady clock, for functions of the standard library.

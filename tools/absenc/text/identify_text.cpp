@@ -58,7 +58,7 @@ void show_table(std::span<const Candidate> candidates) {
   print_line(table(rows));
 }
 
-// Prints the identity that each candidate reported, as "  1 says: serial_number 12, device_id 41 62" for candidate 1.
+// Prints the identity that each candidate reported, as "1 says: serial_number 12, device_id 41 62" for candidate 1.
 void show_identities(std::span<const Candidate> candidates) {
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     const Answer& identity = candidates[i].identity;

@@ -36,8 +36,8 @@ enum class Doubt : std::uint8_t {
 [[nodiscard]] std::string place_text(const Reading& reading, Doubt doubt = Doubt::none);
 
 /// Returns flags as text: "no alarms", "alarms: over_heat", "alarms not reported" or "alarms: counting_error (not
-/// reported: over_speed)"; for flags of a status "status clear" or "status: alarm". At most four unreported flags are
-/// named.
+/// reported: over_speed)"; for flags of a status "status clear" or "status: alarm". Unreported flags are named if they
+/// are at most four, and not all flags.
 [[nodiscard]] std::string flags_text(const Unit& unit, const Flags& flags);
 
 /// Returns one line for each set flag, with its meaning and what the user should do; "" if no flag is set. With
@@ -48,7 +48,8 @@ enum class Doubt : std::uint8_t {
 [[nodiscard]] std::string alarms_in_words(const Unit& unit, const Reading& reading);
 
 /// Sets the keys singleturn_valid and multiturn_valid if the reading has these parts, and "alarms", of all channels
-/// together, if the unit has alarms. null means that no reply reports the value.
+/// together, if the unit has alarms. null means that no reply reports the value; for the alarms, that none is raised
+/// and not all are reported.
 void set_state(Json& json, const Unit& unit, const Reading& reading);
 
 /// Returns millimetres as text "0.125", with no more decimals than one count of `unit_um` micrometres has.

@@ -29,7 +29,7 @@ struct Measurement {
 
 Measurement measure(Connection& encoder, double seconds) {
   Measurement measurement;
-  encoder.read();  // this reading is not measured: the first one reads the position twice and detects echo
+  encoder.read();  // not measured: the first readings confirm the position and detect echo
   const Time start = os::now();
   const Time end = start + Time(static_cast<std::int64_t>(seconds * 1e9));
   const Time processor_before = os::processor_time();

@@ -15,7 +15,7 @@ namespace absenc::tool {
 
 namespace {
 
-// Prints the encoded request of a command. Unit::encode stores a clocked word or a CAN frame in bytes too.
+// Prints the encoded request of a command. On CAN and clocked links Unit::encode writes text, which is parsed here.
 int run_encode(const Invocation& invocation) {
   const Unit& unit = require_unit(invocation.text("protocol"));
   const Options options = require_options(unit, invocation.text("--model"), invocation.texts("--option"));

@@ -146,8 +146,8 @@ bool is_capture(std::string_view where) {
   return std::filesystem::is_regular_file(where, error) || std::filesystem::is_directory(where, error);
 }
 
-// Throws UsageError for the name of a missing file, which would otherwise be taken for a port. CAN interfaces have
-// names like can0, ports of this computer are below /dev.
+// Throws Failure for the name of a missing file, which would otherwise be taken for a port. CAN interfaces have names
+// like can0, ports of this computer are below /dev.
 void refuse_missing_file(std::string_view where) {
   const std::filesystem::path path(where);
   std::error_code error;

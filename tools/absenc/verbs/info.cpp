@@ -169,11 +169,12 @@ class Survey {
 
   Json answers = Json::object();
   Rows rows;
-  std::string below;              // text printed below the rows: alarms in words, and why a position is doubtful
+  // Text below the rows: with `all` the reading; alarms in words, and why a position is doubtful.
+  std::string below;
   std::vector<Trouble> troubles;  // first failure with each kind of error
 
  private:
-  // Adds rows whose names are not in the table yet: several commands may report the same value.
+  // Adds those of the rows that are not in the table yet: several commands may report the same value.
   void add_new(Rows more) {
     for (std::vector<std::string>& row : more) {
       if (std::find(rows.begin(), rows.end(), row) == rows.end()) rows.push_back(std::move(row));

@@ -205,7 +205,7 @@ Json models_json(const Unit& unit) {
   });
 }
 
-// Returns `json` with the key "role" if the field, option or argument has a role.
+// Returns `json` with the key "role" if the field or option has a role.
 Json with_role(Json json, Role role) {
   const std::string_view name = name_of(role);
   return name.empty() ? json : json.set("role", name);

@@ -18,7 +18,8 @@ using namespace client;
 
 /// Writes the bytes of `wanted` that differ from the encoder's, as the options --yes, --json and --dry-run state;
 /// returns the exit status. If writing ends early, it prints which bytes were written, which were not, and which may
-/// have been. All addresses of `wanted` must be writable. Throws UsageError if it must ask without a terminal.
+/// have been. All addresses of `wanted` must be writable. Throws UsageError if it must ask without a terminal, and the
+/// exceptions of `open_encoder`.
 int change_memory(const Invocation& invocation, const EncoderAddress& uri, const MemoryImage& wanted,
                   MemoryAccess access);
 

@@ -72,7 +72,7 @@ RecordingSettings settings_of(const Invocation& invocation) {
   return settings;
 }
 
-// Prints a summary of the recording. `whole`: the files were completed without an error.
+// Prints a summary of the recording. `whole`: no file of it was removed, replaced or cut.
 void summarize_recording(const Recording& recording, const Encoder& live, bool whole) {
   std::string text = fmt::format("{} readings and {} failures in {} {}", recording.counts().readings,
                                  recording.counts().failures, to_text(os::now() - recording.start()),

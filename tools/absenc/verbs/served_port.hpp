@@ -23,7 +23,7 @@ using namespace client;
 /// once. Throws os::Failure if the port cannot be opened at the start, or does not support a rate that the encoder
 /// sets.
 void serve_port(Machine<std::uint8_t>& device, const EncoderAddress& uri, Time end);
-/// Runs a virtual encoder like `serve_port`, on a CAN interface such as "vcan0".
+/// Runs a virtual encoder like `serve_port`, but on a CAN interface such as "vcan0", and without the send slack.
 void serve_interface(Machine<CanFrame>& device, const std::string& interface, const LineSettings& line, Time end);
 
 }  // namespace absenc::tool
