@@ -255,7 +255,7 @@ struct CommandOf {
     }
   }
   /// Constructs the conversation of the command in `storage`. It is a Refusal if the encoder lacks the command. Returns
-  /// an empty Any if options or arguments contradict the command, or the storage is too small.
+  /// an empty Any if `possible` or `can_ask` returns false, or if the storage is too small.
   [[nodiscard]] Any<Conversation> run(const Format& format, Arguments arguments, std::span<std::byte> storage) const {
     const std::string_view why = missing != nullptr ? missing(format) : std::string_view{};
     if (!why.empty()) return make_host<Refusal<ItemOf<P>>>(storage, Error::unsupported, why);

@@ -229,7 +229,7 @@ Buffer<OptionValue, 2> find_change(const Profile& profile, Bytes reply) {
     found.push_back({option_parity_scope, profile.parity_scope == ParityScope::all ? 0 : 1});
     return found;
   }
-  if (explain(profile, capture) == Check::passed) return found;  // the reply has another error
+  if (explain(profile, capture) == Check::passed) return found;  // the reply is valid: no option explains the error
   for (const OptionValue& one : changes.view()) {
     if (explain(changed(profile, one), capture) != Check::passed) continue;
     found.push_back(one);

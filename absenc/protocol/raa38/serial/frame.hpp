@@ -262,7 +262,7 @@ struct Protocol {
   static constexpr std::size_t expected(const Format& format, const Request&, Bytes) { return format.frame_bytes(); }
   /// Returns false: a reply with an error may be incomplete, so the host awaits more bytes.
   static constexpr bool is_whole(const Format&, Error) { return false; }
-  /// Returns the bytes of `reply` as they are sent.
+  /// Returns the bytes of the reply with `position`, as they are sent.
   static constexpr FrameBytes encode_reply(const Format& format, const Request&, const Position& position) {
     return encode_position(format, position);
   }
