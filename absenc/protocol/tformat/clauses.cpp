@@ -12,6 +12,9 @@ namespace {
 /// hot.
 constexpr std::int64_t latched_alarms = alarms::latched & ~alarms::over_heat;
 
+constexpr std::array<std::int64_t, 1> first_byte{0};   // address of the user's EEPROM
+constexpr std::array<std::int64_t, 1> closed_byte{6};  // address of page 7 behind those that are open for the user
+
 /// Clauses of the T-format document for encoders.
 constexpr auto clauses = std::array{
     Clause{"answer", "6.2.1", "a readout request is answered", Demand::answered},
@@ -57,7 +60,7 @@ constexpr auto clauses = std::array{
            .paragraph = "9.4 Table 6 (6)",
            .words = "a request to the EEPROM with a wrong CRC gets the data of data ID 3",
            .demand = Demand::reacts,
-           .ask = {.wire = "ea 00 eb"},
+           .ask = {.command = "memory-read", .arguments = first_byte, .wrong_end = true},
            .reaction = Reaction::reply,
            .as = "position"},
     Clause{.id = "eeprom-write",
@@ -85,7 +88,7 @@ constexpr auto clauses = std::array{
            .paragraph = "9.4 Table 6 (2)",
            .words = "an address that is not open for the user gets the data of data ID 3",
            .demand = Demand::page_closed,
-           .ask = {.wire = "ea 06 ec"},
+           .ask = {.command = "memory-read", .arguments = closed_byte},
            .reaction = Reaction::reply,
            .as = "position",
            .page = 7,
