@@ -89,9 +89,13 @@ class TestsOfEveryUnit(Copy):
         shutil.copy(BUILD / "libabsenc.a", cls.library)
         run("ar", "d", cls.library, "all.cpp.o")
         for source in (cls.root / "absenc/protocol/all.cpp", cls.unit / "unit.cpp", cls.unit / "clauses.cpp"):
-            target = cls.root / f"my_encoder_{source.name}.o"
-            run(*COMPILE, "-fPIC", "-I", cls.root, "-c", source, "-o", target)
-            run("ar", "r", cls.library, target)
+            cls.compile(source)
+
+    @classmethod
+    def compile(cls, source):
+        target = cls.root / f"my_encoder_{source.name}.o"
+        run(*COMPILE, "-fPIC", "-I", cls.root, "-c", source, "-o", target)
+        run("ar", "r", cls.library, target)
 
     def linked(self, target):
         """Links a program of the build with the new library in place of its own."""
@@ -107,6 +111,23 @@ class TestsOfEveryUnit(Copy):
 
     def test_kit(self):
         self.passes(self.linked("tests/kit_test"), "*my_encoder*")
+
+    def test_kit_computes_open_checksum(self):
+        source = self.unit / "unit.cpp"
+        text = source.read_text(encoding="utf-8")
+        open_text = text.replace('"500151", "01123447"', '"5001..", "011234.."')
+        self.assertNotEqual(open_text, text)
+        try:
+            source.write_text(open_text, encoding="utf-8")
+            self.compile(source)
+            done = subprocess.run([self.linked("tests/kit_test"), "--gtest_filter=Units/Kit.DecodesVectors/my_encoder"],
+                                  capture_output=True, text=True, check=False)
+        finally:
+            source.write_text(text, encoding="utf-8")
+            self.compile(source)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn('request is not complete: paste "500151"\n', done.stdout)
+        self.assertIn('reply is not complete: paste "01123447"\n', done.stdout)
 
     def test_client(self):
         self.passes(self.linked("tests/client_test"), "Units/*Clauses.*my_encoder*")

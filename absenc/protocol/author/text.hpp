@@ -14,7 +14,7 @@
 namespace absenc::author {
 
 /// A test vector as text: a frame with the fields, or the error, that decoding must give. A value in `fields` is an
-/// integer, a real number if it has a point, or a text. Frames are hexadecimal, or plain text if
+/// integer, a real number if it has a point, or a text. Frames are hexadecimal, or plain text on clocked links and if
 /// Declaration::frames_are_texts. A checksum can be left open: `..` for a byte, `.` for a bit of a clocked frame. Such
 /// a vector compiles; the kit's test of the unit fails, and prints the complete frame.
 struct VectorText {

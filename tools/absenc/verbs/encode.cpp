@@ -19,7 +19,7 @@ namespace absenc::tool {
 namespace {
 
 // Returns the settings in the texts of --reply, each "NAME=VALUE NAME=VALUE".
-std::vector<std::string> settings_of(std::span<const std::string> texts) {
+std::vector<std::string> reply_settings(std::span<const std::string> texts) {
   std::vector<std::string> settings;
   for (const std::string& text : texts) {
     std::istringstream words(text);
@@ -30,7 +30,7 @@ std::vector<std::string> settings_of(std::span<const std::string> texts) {
 
 // Returns the reply of a virtual encoder with these settings to the request of the command.
 std::string reply_of(const Invocation& invocation, const Unit& unit, const Command& command, Arguments arguments) {
-  std::vector<std::string> settings = settings_of(invocation.texts("--reply"));
+  std::vector<std::string> settings = reply_settings(invocation.texts("--reply"));
   for (const std::string& option : invocation.texts("--option")) settings.push_back(option);
   if (invocation.has("--model")) settings.push_back(fmt::format("model={}", invocation.text("--model")));
   const Attempted answered = answer_of(parse_address(fmt::format("sim:{}", unit.id), settings), command, arguments);
@@ -39,7 +39,7 @@ std::string reply_of(const Invocation& invocation, const Unit& unit, const Comma
                                text_of(answered.error).description, text_of(answered.error).advice));
 }
 
-// Prints the encoded request of a command. Unit::encode stores a clocked word or a CAN frame in bytes too.
+// Prints the encoded request of a command. On CAN and clocked links Unit::encode writes text, which is parsed here.
 int run_encode(const Invocation& invocation) {
   const Unit& unit = require_unit(invocation.text("protocol"));
   const Options options = require_options(unit, invocation.text("--model"), invocation.texts("--option"));
