@@ -120,24 +120,25 @@ constexpr std::array<std::int64_t, 2> byte_2{2, 5};
 constexpr std::array<std::int64_t, 1> at_1{1};
 constexpr std::array<std::int64_t, 1> at_2{2};
 
-constexpr std::array nine_zeros{HostStep{microseconds(100), "zero", {}, 9}, HostStep{microseconds(100), "position"}};
-constexpr std::array one_clear{HostStep{microseconds(100), "clear-alarms"},
-                               HostStep{microseconds(100), "reset-multiturn", {}, 10}};
-constexpr std::array two_writes{HostStep{{}, "memory-write", byte_1},
-                                HostStep{milliseconds(5), "memory-write", byte_2}};
-constexpr std::array write_and_again{HostStep{{}, "memory-write", byte_1},
-                                     HostStep{milliseconds(17), "memory-write", byte_1}};
-constexpr std::array other_after_busy{HostStep{{}, "memory-write", byte_1},
-                                      HostStep{milliseconds(5), "memory-read", at_1},
-                                      HostStep{milliseconds(20), "memory-read", at_2}};
-constexpr std::array write_after_busy{HostStep{{}, "memory-write", byte_1},
-                                      HostStep{milliseconds(5), "memory-read", at_2},
-                                      HostStep{milliseconds(20), "memory-write", byte_2}};
-constexpr std::array same_after_busy{HostStep{{}, "memory-write", byte_1},
-                                     HostStep{milliseconds(5), "memory-read", at_1},
-                                     HostStep{milliseconds(20), "memory-read", at_1}};
-constexpr std::array two_at_once{HostStep{{}, "1a 1a"}};
-constexpr std::array three_at_once{HostStep{{}, "1a 1a 1a"}};
+constexpr auto nine_zeros =
+    std::array{HostStep{microseconds(100), "zero", {}, 9}, HostStep{microseconds(100), "position"}};
+constexpr auto one_clear =
+    std::array{HostStep{microseconds(100), "clear-alarms"}, HostStep{microseconds(100), "reset-multiturn", {}, 10}};
+constexpr auto two_writes =
+    std::array{HostStep{{}, "memory-write", byte_1}, HostStep{milliseconds(5), "memory-write", byte_2}};
+constexpr auto write_and_again =
+    std::array{HostStep{{}, "memory-write", byte_1}, HostStep{milliseconds(17), "memory-write", byte_1}};
+constexpr auto other_after_busy =
+    std::array{HostStep{{}, "memory-write", byte_1}, HostStep{milliseconds(5), "memory-read", at_1},
+               HostStep{milliseconds(20), "memory-read", at_2}};
+constexpr auto write_after_busy =
+    std::array{HostStep{{}, "memory-write", byte_1}, HostStep{milliseconds(5), "memory-read", at_2},
+               HostStep{milliseconds(20), "memory-write", byte_2}};
+constexpr auto same_after_busy =
+    std::array{HostStep{{}, "memory-write", byte_1}, HostStep{milliseconds(5), "memory-read", at_1},
+               HostStep{milliseconds(20), "memory-read", at_1}};
+constexpr auto two_at_once = std::array{HostStep{{}, "1a 1a"}};
+constexpr auto three_at_once = std::array{HostStep{{}, "1a 1a 1a"}};
 }  // namespace script
 
 /// Clauses of the T-format document for hosts.
