@@ -12,7 +12,6 @@ namespace {
 
 using namespace author;
 using Dialog = DialogOf<Protocol>;
-using Found = Looked<Protocol>;
 
 template <Ask ask>
 constexpr Request request(const Format& format, Arguments = {}) {
@@ -21,7 +20,7 @@ constexpr Request request(const Format& format, Arguments = {}) {
 
 // ---- Procedures: each reads like its paragraph of the document
 
-Procedure set_zero(Dialog& dialog, Found& found) {
+Procedure set_zero(Dialog& dialog, Looked<Protocol>& found) {
   const Request position = request<Ask::position>(dialog.format());
   co_await may_set_zero(dialog, found, position);
   co_await dialog.ask(request<Ask::zero>(dialog.format())).or_say("whether the encoder obeyed is not known");
@@ -64,13 +63,15 @@ constexpr Values values_of_request(const Format&, const Request& asked) { return
 constexpr Values values_of_reply(const Format&, const Request& asked, const Reply& reply) {
   return {.encoder_address = asked.address, .singleturn = reply.singleturn};
 }
-constexpr Values values_of_found(const Format&, const Found& found) { return {.singleturn = found.reply.singleturn}; }
+constexpr Values values_of_found(const Format&, const Looked<Protocol>& found) {
+  return {.singleturn = found.reply.singleturn};
+}
 
 constexpr Report<Protocol> report{
     .put_request = put_values<fields, values_of_request>,
     .put_reply = put_values<fields, values_of_reply>,
 };
-constexpr Finding<Format, Found> found{.put = put_values<fields, values_of_found>};
+constexpr Finding<Format, Looked<Protocol>> found{.put = put_values<fields, values_of_found>};
 
 constexpr auto commands = std::array{
     reading<report, request<Ask::position>>({"position", Verb::read, 0, "position"}),

@@ -94,8 +94,8 @@ constexpr std::array<Example, 4> encode_examples{{
 const Subcommand encode_subcommand{
     "encode",
     "print the request of a command, or the reply to it, as it goes over the wire",
-    "Only the request that does the command's work: a procedure may need others before and after it. The reply is that "
-    "to the last request of the command.",
+    "Only the request that does the command's work: a procedure may need others before and after it.\n"
+    "The reply is that to the last request of the command.",
     encode_parameters,
     encode_examples,
     run_encode};
