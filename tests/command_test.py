@@ -172,6 +172,15 @@ class ListAndVectors(Case):
         for word in ["tformat", "TS5700N8500", "23-bit", "RS-485 half duplex, 2.5 Mbit/s"]:
             self.assertIn(word, result.stdout)
 
+    def test_encode_prints_reply_with_values(self):
+        reply = absenc("encode", "tformat", "position", "--reply", "singleturn=74565 multiturn=4660")
+        self.assert_good(reply)
+        self.assertEqual(reply.stdout.strip(), GOOD_REPLY)
+        both = absenc("encode", "biss", "position", "--reply", "singleturn=1000", "--json")
+        decoded = absenc("decode", "biss", "--hex", json.loads(both.stdout)["reply"], "--json")
+        self.assertEqual(json.loads(decoded.stdout)["fields"]["singleturn"], 1000)
+        self.assert_wrong_usage(absenc("encode", "tformat", "position", "--reply", "singletrun=1"), "singletrun")
+
     def test_list_shows_details_of_unit(self):
         result = absenc("list", "tformat")
         self.assert_good(result)

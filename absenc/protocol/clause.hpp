@@ -67,11 +67,16 @@ inline constexpr Errors form_errors = any_of(Error::bad_framing, Error::unexpect
 
 /// A request that the test of a clause sends, and that reading a position never sends.
 struct Ask {
-  std::string_view wire{};  ///< bytes of the request in hexadecimal: "a2"
-  /// Writes the request into `request` and returns its length, for requests that depend on the options. Null: `wire` or
-  /// `wrong_end` states the request.
+  /// The whole request on the wire: bytes in hexadecimal, "ea 00 ea", or a CAN frame, "1ff:022b".
+  std::string_view wire{};
+  /// Name of the command whose one request is sent, with its checksum, if `wire` is empty; "": the command that reads
+  /// the position.
+  std::string_view command{};
+  std::span<const std::int64_t> arguments{};  ///< Arguments of `command`; those left out have their defaults.
+  bool wrong_end = false;                     ///< Whether the last byte of the request of `command` has a wrong bit.
+  /// Writes the request into `request` and returns its length, for requests that depend on the options and that no
+  /// command sends. Null: `wire` or the request of `command` is sent.
   Result<std::size_t> (*make)(const Options& options, MutableBytes request) = nullptr;
-  bool wrong_end = false;  ///< true: the request is that for a position, with a wrong bit in its last byte
   /// Bit rate of the request in 1/1000 of the line's rate: a slower request has its last bit where the receiver expects
   /// the stop bit. 0: the line's rate.
   std::uint32_t permille = 0;

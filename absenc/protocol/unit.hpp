@@ -136,6 +136,12 @@ struct Expected {
   std::string_view text{};  ///< Expected bytes of a text or bytes field.
 };
 
+/// Consecutive bytes of a vector's frame that its author left open. On clocked links: bits.
+struct OpenBytes {
+  std::size_t first = 0;  ///< Index of the first open byte.
+  std::size_t count = 0;  ///< Number of open bytes; 0: the frame is complete.
+};
+
 /// A test vector: a frame with the fields, or the error, that decoding must give. On clocked links request and reply
 /// are texts of 0 and 1; on CAN links texts such as "1ff:022b000000000000".
 struct Vector {
@@ -147,6 +153,11 @@ struct Vector {
   Bytes reply;                         ///< Bytes of the reply.
   std::span<const Expected> fields{};  ///< Expected values of all fields; empty if `error` is set.
   Error error = Error::none;           ///< Expected error; `Error::none`: the frame is valid.
+  OpenBytes open_request{};            ///< Bytes of the request that the tests are to compute.
+  OpenBytes open_reply{};              ///< Bytes of the reply that the tests are to compute.
+
+  /// Returns whether no byte is left open.
+  [[nodiscard]] constexpr bool is_complete() const { return open_request.count == 0 && open_reply.count == 0; }
 };
 
 /// A captured exchange on a link that carries bytes: a request and the reply to it. Either may be missing.

@@ -10,8 +10,8 @@ namespace {
 constexpr std::array<Clause, 5> clauses{{
     {"answer", "invented 1", "a request is answered", Demand::answered},
     {"answer-time", "invented 1", "the reply begins no later than a host waits", Demand::in_time},
-    {"length", "invented 1", "a reply has three bytes", Demand::whole},
-    {"sum", "invented 1", "the third byte is the sum of the others and the address", Demand::checked},
+    {"length", "invented 1", "a reply has four bytes", Demand::whole},
+    {"sum", "invented 1", "the fourth byte is the sum of the others", Demand::checked},
     {"address", "invented 2", "a request to another address is not answered", Demand::foreign_silent},
 }};
 

@@ -12,7 +12,6 @@ namespace {
 
 using namespace author;
 using Dialog = DialogOf<Protocol>;
-using Found = Looked<Protocol>;
 
 template <Ask ask>
 constexpr Request request(const Format& format, Arguments = {}) {
@@ -21,7 +20,7 @@ constexpr Request request(const Format& format, Arguments = {}) {
 
 // ---- Procedures: each reads like its paragraph of the document
 
-Procedure set_zero(Dialog& dialog, Found& found) {
+Procedure set_zero(Dialog& dialog, Looked<Protocol>& found) {
   const Request position = request<Ask::position>(dialog.format());
   co_await may_set_zero(dialog, found, position);
   co_await dialog.ask(request<Ask::zero>(dialog.format())).or_say("whether the encoder obeyed is not known");
@@ -48,23 +47,31 @@ class Encoder final : public BusDevice<Protocol, Encoder, 4> {  // 4: bytes of i
 // ---- Options, fields, commands and declaration
 
 struct Values {
+  std::optional<std::uint8_t> encoder_address{};
   std::optional<std::uint16_t> singleturn{};
 };
 
-constexpr auto options = OptionsOf{option<&Format::address>("address", "of the encoder on its line", 0, 255)};
+constexpr auto options = OptionsOf{
+    with_role<Role::encoder>(option<&Format::address>("address", "of the encoder on its line", 0, 255)),
+};
 constexpr auto models = std::array{ModelText{"unnamed", "one sentence", 6000, ""}};
 constexpr auto fields =
-    fields_of<Values>(field<&Values::singleturn>("singleturn", "counts", "position within the turn", Role::position));
+    fields_of<Values>(field<&Values::encoder_address>("encoder_address", "", "address of the request", Role::encoder),
+                      field<&Values::singleturn>("singleturn", "counts", "position within the turn", Role::position));
 
-constexpr Values values_of_request(const Format&, const Request&) { return {}; }
-constexpr Values values_of_reply(const Format&, const Request&, const Reply& reply) { return {reply.singleturn}; }
-constexpr Values values_of_found(const Format&, const Found& found) { return {found.reply.singleturn}; }
+constexpr Values values_of_request(const Format&, const Request& asked) { return {.encoder_address = asked.address}; }
+constexpr Values values_of_reply(const Format&, const Request& asked, const Reply& reply) {
+  return {.encoder_address = asked.address, .singleturn = reply.singleturn};
+}
+constexpr Values values_of_found(const Format&, const Looked<Protocol>& found) {
+  return {.singleturn = found.reply.singleturn};
+}
 
 constexpr Report<Protocol> report{
     .put_request = put_values<fields, values_of_request>,
     .put_reply = put_values<fields, values_of_reply>,
 };
-constexpr Finding<Format, Found> found{.put = put_values<fields, values_of_found>};
+constexpr Finding<Format, Looked<Protocol>> found{.put = put_values<fields, values_of_found>};
 
 constexpr auto commands = std::array{
     reading<report, request<Ask::position>>({"position", Verb::read, 0, "position"}),
@@ -72,8 +79,8 @@ constexpr auto commands = std::array{
         {"zero", Verb::zero, 0, "make this the zero of the turn", {}, true, false}),
 };
 constexpr auto vectors = std::array{
-    VectorText{"position", "a position", "invented", "", "5001", "123447", "singleturn=4660"},
-    VectorText{"sum", "a wrong sum", "invented", "", "5001", "123448", "bad_checksum"},
+    VectorText{"position", "a position", "invented", "", "500151", "01123447", "encoder_address=1 singleturn=4660"},
+    VectorText{"sum", "a wrong sum", "invented", "", "500151", "01123448", "bad_checksum"},
 };
 
 constexpr Result<Request> guess_request(const Format& format, Bytes) { return request<Ask::position>(format); }

@@ -9,6 +9,7 @@
 #include "absenc/protocol/author/look.hpp"
 #include "absenc/protocol/clause.hpp"
 
+/// Maker and encoder.
 namespace absenc::protocol_name {
 
 using namespace std::chrono_literals;
@@ -23,7 +24,7 @@ struct Format {
   [[nodiscard]] constexpr Resolution resolution() const { return {.singleturn_bits = 16}; }
 };
 
-enum class Ask : std::uint8_t { position = 0x50, zero = 0x5A };
+enum class Ask : std::uint8_t { position = 0x50, zero = 0xAF };
 
 struct Request {
   Ask ask = Ask::position;
@@ -38,7 +39,7 @@ struct Protocol {
   using Format = protocol_name::Format;
   using Request = protocol_name::Request;
   using Reply = protocol_name::Reply;
-  static constexpr std::size_t longest_reply = 3;
+  static constexpr std::size_t longest_reply = 4;
 
   static constexpr author::HostTimes host_times(const Format&) {
     return {.answer_limit = answer_limit, .gap_limit = 50us};
@@ -48,35 +49,41 @@ struct Protocol {
     return {.repeats = request.ask == Ask::position ? 2u : 0u};
   }
 
-  // Request: code, then address of the encoder.
-  static constexpr ByteBuffer<2> encode(const Format&, const Request& request) {
-    ByteBuffer<2> bytes;
+  static constexpr std::uint8_t sum(Bytes bytes) {
+    unsigned sum = 0;
+    for (const std::uint8_t byte : bytes) sum += byte;
+    return static_cast<std::uint8_t>(sum & 0xFF);
+  }
+
+  // Request: code, address of the encoder, and their sum.
+  static constexpr ByteBuffer<3> encode(const Format&, const Request& request) {
+    ByteBuffer<3> bytes;
     bytes.push_back(static_cast<std::uint8_t>(request.ask));
     bytes.push_back(request.address);
+    bytes.push_back(sum(bytes));
     return bytes;
   }
   static constexpr std::size_t request_size(const Format&, Bytes begin) {
-    return begin[0] == 0x50 || begin[0] == 0x5A ? 2 : 0;
+    return begin[0] == 0x50 || begin[0] == 0xAF ? 3 : 0;
   }
   static constexpr Result<Request> decode_request(const Format& format, Bytes bytes) {
-    if (bytes.size() != 2) return Error::wrong_length;
+    if (bytes.size() != 3) return Error::wrong_length;
+    if (bytes[2] != sum(bytes.first(2))) return Error::bad_checksum;
     if (request_size(format, bytes) == 0) return Error::bad_framing;
     return Request{static_cast<Ask>(bytes[0]), bytes[1]};
   }
 
-  // Reply: position, high byte first, then the sum of all bytes and the address.
+  // Reply: address of the encoder, position with its high byte first, and the sum of these.
   static constexpr std::size_t reply_size(const Format&, const Request&) { return longest_reply; }
   static constexpr std::size_t expected(const Format&, const Request&, Bytes) { return longest_reply; }
   // after an error more bytes may follow, so the host waits for silence
   static constexpr bool is_whole(const Format&, Error) { return false; }
-  static constexpr std::uint8_t sum(std::uint8_t address, std::uint8_t high, std::uint8_t low) {
-    return static_cast<std::uint8_t>(address + high + low);
-  }
   static constexpr ByteBuffer<longest_reply> encode_reply(const Format&, const Request& request, const Reply& reply) {
-    const auto high = static_cast<std::uint8_t>(reply.singleturn >> 8);
-    const auto low = static_cast<std::uint8_t>(reply.singleturn & 0xFF);
     ByteBuffer<longest_reply> bytes;
-    for (const std::uint8_t byte : {high, low, sum(request.address, high, low)}) bytes.push_back(byte);
+    bytes.push_back(request.address);
+    bytes.push_back(static_cast<std::uint8_t>(reply.singleturn >> 8));
+    bytes.push_back(static_cast<std::uint8_t>(reply.singleturn & 0xFF));
+    bytes.push_back(sum(bytes));
     return bytes;
   }
   /// Decodes a reply. Put the checks in this order: length, checksum, echo or address, refusal, fixed bits, range,
@@ -84,8 +91,9 @@ struct Protocol {
   static constexpr Result<Reply> decode(const Format&, const Request& request, Bytes bytes) {
     if (bytes.empty()) return Error::timeout;
     if (bytes.size() != longest_reply) return Error::wrong_length;
-    if (bytes[2] != sum(request.address, bytes[0], bytes[1])) return Error::bad_checksum;
-    return Reply{static_cast<std::uint16_t>(bytes[0] << 8 | bytes[1])};
+    if (bytes[3] != sum(bytes.first(3))) return Error::bad_checksum;
+    if (bytes[0] != request.address) return Error::unexpected_reply;
+    return Reply{static_cast<std::uint16_t>(bytes[1] << 8 | bytes[2])};
   }
   static constexpr Reading reading(const Format&, const Request&, const Reply& reply) {
     return author::position_reading(reply.singleturn, 16);

@@ -22,6 +22,24 @@ class Decoding {
     if (seen.reading) reading_shows(seen);
   }
 
+  // Fails for a vector with open bytes, and tells what they must be.
+  void complete() {
+    std::vector<std::uint8_t> request(vector_.request.begin(), vector_.request.end());
+    std::vector<std::uint8_t> reply(vector_.reply.begin(), vector_.reply.end());
+    const auto is_valid = [&] {
+      ReportedFields seen;
+      return unit_.decode(options_, frame_of(unit_, request).frame(), {}, seen) == Error::none;
+    };
+    const auto is_as_stated = [&] {
+      ReportedFields seen;
+      const Error error =
+          unit_.decode(options_, frame_of(unit_, request).frame(), frame_of(unit_, reply).frame(), seen);
+      return error == Error::none && seen.fields == expected_fields(vector_);
+    };
+    if (close("request", request, vector_.open_request, is_valid))
+      close("reply", reply, vector_.open_reply, is_as_stated);
+  }
+
   // Checks that a request without a reply is no evidence against the options of the vector it comes from.
   void unanswered() {
     if (unit_.probe == nullptr) return;
@@ -82,6 +100,42 @@ class Decoding {
   }
 
  private:
+  // Tries each value of the open bytes of a frame, and reports the frames that are good. Returns whether there is one,
+  // to which `frame` then is set.
+  template <class IsGood>
+  bool close(std::string_view name, std::vector<std::uint8_t>& frame, OpenBytes open, IsGood is_good) {
+    if (open.count == 0) return true;
+    const bool is_bits = unit_.link == LinkKind::clocked;
+    const std::size_t bits = open.count * (is_bits ? 1 : 8);
+    constexpr std::size_t most_bits = 16;
+    std::vector<std::vector<std::uint8_t>> good;
+    for (std::uint32_t value = 0; bits <= most_bits && value >> bits == 0; ++value) {
+      for (std::size_t i = 0; i < open.count; ++i) {
+        frame[open.first + i] = static_cast<std::uint8_t>(is_bits ? '0' + (value >> i & 1) : value >> 8 * i & 0xFF);
+      }
+      if (is_good()) good.push_back(frame);
+    }
+    require(false, [&] {
+      std::string text = std::string(name) + " is not complete: ";
+      if (bits > most_bits) return text + "it has more than 16 open bits, too many to try";
+      if (good.empty()) return text + "with no value of its open bytes does it decode to what the vector states";
+      text += "paste \"" + pasted(good.front()) + "\"";
+      return good.size() == 1 ? text
+                              : text + ", or another of " + std::to_string(good.size()) + " that decode to the same";
+    });
+    if (good.empty()) return false;
+    frame = good.front();
+    return true;
+  }
+  [[nodiscard]] std::string pasted(const std::vector<std::uint8_t>& frame) const {
+    if (unit_.link == LinkKind::clocked) return {frame.begin(), frame.end()};
+    std::string text;
+    for (const std::uint8_t byte : frame) {
+      for (const int digit : {byte >> 4, byte & 15}) text += "0123456789ABCDEF"[digit];
+    }
+    return text;
+  }
+
   template <class Text>
   void require(bool holds, Text&& text) {
     findings_.require(holds, [&] { return std::string(vector_.id) + " " + text(); });
@@ -164,6 +218,10 @@ Findings check_decoding(const Unit& unit) {
     findings.require(options.has_value(), [&] { return std::string(vector.id) + " has options that do not exist"; });
     if (!options) continue;
     Decoding decoding(unit, vector, *options, findings);
+    if (!vector.is_complete()) {
+      decoding.complete();
+      continue;
+    }
     decoding.whole();
     if (vector.error != Error::none) continue;
     decoding.unanswered();

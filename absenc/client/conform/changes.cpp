@@ -168,7 +168,7 @@ void ChangeTester::test_busy(const Clause& clause, ClauseResult& result) {
 void ChangeTester::test_closed(const Clause& clause, ClauseResult& result) {
   save({.look = [this] { return std::int64_t{read_byte(0, 0)}; }, .write = [](std::int64_t) {}});
   static_cast<void>(read_byte(clause.page, clause.address));
-  const SingleExchange sent = line_.send(parse_wire_text(unit_.link, "a request", clause.ask.wire).bytes);
+  const SingleExchange sent = line_.send(request_of_ask(unit_, line_.options(), clause.ask));
   const bool as_demanded = reply_error(unit_, line_.options(), clause.as, {sent.request, sent.reply}) == Error::none;
   const std::string seen = exchange_text(unit_.link, sent.request.frame(), sent.reply.frame());
   // proves that the encoder still replies, and selects the page of the byte

@@ -83,6 +83,24 @@ bool holds(const Unit& unit, const Options& options, std::string_view need) {
 
 }  // namespace
 
+std::vector<std::uint8_t> request_of_ask(const Unit& unit, const Options& options, const Ask& ask) {
+  if (!ask.wire.empty()) {
+    if (unit.link == LinkKind::can) return {ask.wire.begin(), ask.wire.end()};
+    return parse_wire_text(unit.link, "a request", ask.wire).bytes;
+  }
+  std::vector<std::uint8_t> request(longest_request);
+  const Command* const command = ask.command.empty() ? find_command(unit, Verb::read) : find_command(unit, ask.command);
+  std::vector<std::int64_t> arguments(ask.arguments.begin(), ask.arguments.end());
+  while (arguments.size() < command->arguments.size()) {
+    arguments.push_back(command->arguments[arguments.size()].default_value);
+  }
+  const Result<std::size_t> size =
+      ask.make != nullptr ? ask.make(options, request) : unit.encode(options, *command, arguments, request);
+  request.resize(size ? *size : 0);
+  if (ask.wrong_end && !request.empty()) request.back() ^= 1;
+  return request;
+}
+
 std::string reason_against(const Unit& unit, const Options& options, const Clause& clause) {
   std::string_view rest = clause.needs;
   while (!rest.empty()) {

@@ -19,6 +19,10 @@ namespace absenc::client {
 // greatest number of bytes of a request; on CAN, of characters of its text
 inline constexpr std::size_t longest_request = 64;
 
+/// Returns the request that a clause asks for, as bytes, or as text for a CAN bus; empty if it does not exist with
+/// these options.
+[[nodiscard]] std::vector<std::uint8_t> request_of_ask(const Unit& unit, const Options& options, const Ask& ask);
+
 inline void conclude(ClauseResult& result, bool kept, std::string evidence) {
   result.verdict = kept ? Verdict::kept : Verdict::broken;
   result.evidence = std::move(evidence);

@@ -202,16 +202,11 @@ bool was_sent(const EncoderAddress& address, const Clause& clause, const TapPort
   const Unit& unit = *address.unit;
   std::vector<std::uint8_t> wanted(longest_request);
   Result<std::size_t> size = Error::unsupported;
-  if (clause.ask.make != nullptr) size = clause.ask.make(address.options, wanted);
-  if (!clause.ask.wire.empty()) {
-    wanted = parse_wire_text(unit.link, "a request", clause.ask.wire).bytes;
+  if (clause.demand == Demand::reacts || clause.demand == Demand::page_closed) {
+    wanted = request_of_ask(unit, address.options, clause.ask);
     size = wanted.size();
   }
   if (!clause.command.empty()) size = unit.encode(address.options, *find_command(unit, clause.command), {}, wanted);
-  if (clause.ask.wrong_end) {
-    size = unit.encode(address.options, *find_command(unit, Verb::read), {}, wanted);
-    if (size) wanted[*size - 1] ^= 1;
-  }
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
     if (size && *size > 0) {
       wanted.resize(*size);

@@ -368,24 +368,8 @@ class Tester {
     conclude(result, as_demanded != 0, fmt::format("{} of {} times; {}", as_demanded, times, last));
   }
   std::optional<Attempted> ask(const Ask& ask) {
-    return send_instead([&](std::vector<Item>& request) { request = items_of(bytes_of(ask, request)); }, ask.permille);
-  }
-  [[nodiscard]] std::vector<std::uint8_t> bytes_of(const Ask& ask, const std::vector<Item>& request) const {
-    if (ask.make != nullptr) {
-      std::vector<std::uint8_t> made(longest_request);
-      const auto size = ask.make(options_, made);
-      made.resize(size ? *size : 0);
-      return made;
-    }
-    if constexpr (!is_can) {
-      if (ask.wrong_end) {
-        std::vector<std::uint8_t> wrong = request;
-        if (!wrong.empty()) wrong.back() ^= 1;
-        return wrong;
-      }
-    }
-    if constexpr (is_can) return {ask.wire.begin(), ask.wire.end()};
-    return parse_wire_text(unit_.link, "a request", ask.wire).bytes;
+    const std::vector<std::uint8_t> bytes = request_of_ask(unit_, options_, ask);
+    return send_instead([&](std::vector<Item>& request) { request = items_of(bytes); }, ask.permille);
   }
   [[nodiscard]] Compliance reaction_of(const Clause& clause, const Attempted& one) const {
     if (is_silent(one)) {

@@ -124,9 +124,16 @@ struct Tables {
       const VectorParts parts = parts_of(text);
       const Bytes request = taken(bytes, parts.request.size());
       const Bytes reply = taken(bytes, parts.reply.size());
-      made[i] = {
-          text.id,    text.meaning, text.source, text.options, request, reply, taken(fields, parts.fields.size()),
-          parts.error};
+      made[i] = {text.id,
+                 text.meaning,
+                 text.source,
+                 text.options,
+                 request,
+                 reply,
+                 taken(fields, parts.fields.size()),
+                 parts.error,
+                 parts.open_request,
+                 parts.open_reply};
     }
     return made;
   }();

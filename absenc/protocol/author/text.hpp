@@ -15,7 +15,8 @@ namespace absenc::author {
 
 /// A test vector as text: a frame with the fields, or the error, that decoding must give. A value in `fields` is an
 /// integer, a real number if it has a point, or a text. Frames are hexadecimal, or plain text on clocked links and if
-/// Declaration::frames_are_texts.
+/// Declaration::frames_are_texts. A checksum can be left open: `..` for a byte, `.` for a bit of a clocked frame. Such
+/// a vector compiles; the kit's test of the unit fails, and prints the complete frame.
 struct VectorText {
   std::string_view id;       ///< Identifier of the vector, unique within the unit.
   std::string_view meaning;  ///< The case that the vector shows, as a phrase.
@@ -31,6 +32,8 @@ struct VectorText {
 void fields_of_a_vector_are_name_equals_value_or_the_name_of_an_error();
 /// Is declared but never defined: a call at compile time is an error whose message contains this function's name.
 void a_frame_of_a_vector_is_hexadecimal_and_has_at_most_128_bytes();
+/// Is declared but never defined: a call at compile time is an error whose message contains this function's name.
+void open_bytes_of_a_frame_are_not_consecutive();
 /// Is declared but never defined: a call at compile time is an error whose message contains this function's name.
 void this_model_has_an_option_or_a_value_that_the_unit_does_not_have();
 
@@ -77,8 +80,8 @@ struct VectorParts {
   constexpr VectorParts() = default;
   /// Parses `text`. `frames_are_texts`: the frames are plain text, not hexadecimal.
   constexpr VectorParts(const VectorText& text, bool frames_are_texts) {
-    append(request, text.request, frames_are_texts);
-    append(reply, text.reply, frames_are_texts);
+    append(request, open_request, text.request, frames_are_texts);
+    append(reply, open_reply, text.reply, frames_are_texts);
     for (std::size_t i = 1; i < error_texts.size(); ++i) {
       if (error_texts[i].name == text.fields) error = static_cast<Error>(i);
     }
@@ -96,16 +99,28 @@ struct VectorParts {
   ByteBuffer<128> reply{};        ///< Bytes of the reply.
   Buffer<Expected, 24> fields{};  ///< Expected fields with their values.
   Error error = Error::none;      ///< Expected error; `Error::none`: fields are expected.
+  OpenBytes open_request{};       ///< Bytes of the request that are left open.
+  OpenBytes open_reply{};         ///< Bytes of the reply that are left open.
 
  private:
-  static constexpr void append(ByteBuffer<128>& bytes, std::string_view hex, bool is_text) {
+  static constexpr void leave_open(OpenBytes& open, std::size_t index) {
+    if (open.count == 0) open.first = index;
+    if (open.first + open.count++ != index) open_bytes_of_a_frame_are_not_consecutive();
+  }
+  static constexpr void append(ByteBuffer<128>& bytes, OpenBytes& open, std::string_view hex, bool is_text) {
+    const bool is_bits = is_text && hex.find_first_not_of("01.") == std::string_view::npos;
     for (std::size_t i = 0; is_text && i < hex.size(); ++i) {
+      if (is_bits && hex[i] == '.') leave_open(open, i);
       if (!bytes.push_back(static_cast<std::uint8_t>(hex[i]))) {
         a_frame_of_a_vector_is_hexadecimal_and_has_at_most_128_bytes();
       }
     }
     if (is_text) return;
     for (std::size_t i = 0; i < hex.size(); i += 2) {
+      if (hex.substr(i, 2) == ".." && bytes.push_back(0)) {
+        leave_open(open, i / 2);
+        continue;
+      }
       if (i + 1 == hex.size() || hex_digit(hex[i]) < 0 || hex_digit(hex[i + 1]) < 0 ||
           !bytes.push_back(static_cast<std::uint8_t>(hex_digit(hex[i]) << 4 | hex_digit(hex[i + 1])))) {
         a_frame_of_a_vector_is_hexadecimal_and_has_at_most_128_bytes();

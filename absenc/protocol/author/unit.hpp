@@ -287,7 +287,7 @@ struct Descriptor {
                        [&](const OptionValue& one) { return values.values[one.option] == one.value; });
   }
 
-  /// Returns whether decoding a vector gives the fields or the error that it states.
+  /// Returns whether decoding a vector gives the fields or the error that it states, or the vector is not complete.
   static constexpr bool holds(const Vector& vector) {
     Options values;
     bool known = resolve(vector.options, {}, values);
@@ -299,6 +299,7 @@ struct Descriptor {
       values = of_model;
       break;
     }
+    if (!vector.is_complete()) return known;
     VectorCheck check(vector.fields);
     return known && decode_vector(values, vector, check) == vector.error && check.all();
   }

@@ -34,8 +34,8 @@ constexpr std::array<Clause, 5> clauses{{
 // ---- Requests of hosts that break a clause
 
 namespace script {
-constexpr std::array no_number{HostStep{{}, "4d 0d"}};
-constexpr std::array letter{HostStep{{}, "4d 41"}};
+constexpr auto no_number = std::array{HostStep{{}, "4d 0d"}};
+constexpr auto letter = std::array{HostStep{{}, "4d 41"}};
 }  // namespace script
 
 /// Requirements of the document that a host must fulfil.

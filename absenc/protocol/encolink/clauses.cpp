@@ -81,16 +81,16 @@ constexpr auto spi_clauses = std::array{
 
 namespace script {
 constexpr std::chrono::milliseconds pause{1};
-constexpr std::array keys_again{
-    HostStep{pause, "00 00"}, HostStep{pause, "00 cd"},        HostStep{pause, "00 ef"},
-    HostStep{pause, "00 89"}, HostStep{pause, "00 ab"},        HostStep{pause, "00 59"},
-    HostStep{pause, "00 00"}, HostStep{pause, "00 02"},        HostStep{pause, "00 00", {}, 3},
-    HostStep{pause, "00 10"}, HostStep{pause, "00 00", {}, 2}, HostStep{pause, "00 cd"}};
-constexpr std::array zeros_and_keys{
-    HostStep{pause, "00 00"}, HostStep{pause, "00 cd"},        HostStep{pause, "00 ef"},
-    HostStep{pause, "00 89"}, HostStep{pause, "00 ab"},        HostStep{pause, "00 59"},
-    HostStep{pause, "00 00"}, HostStep{pause, "00 02"},        HostStep{pause, "00 00", {}, 3},
-    HostStep{pause, "00 10"}, HostStep{pause, "00 00", {}, 3}, HostStep{pause, "00 cd"}};
+constexpr auto keys_again =
+    std::array{HostStep{pause, "00 00"}, HostStep{pause, "00 cd"},        HostStep{pause, "00 ef"},
+               HostStep{pause, "00 89"}, HostStep{pause, "00 ab"},        HostStep{pause, "00 59"},
+               HostStep{pause, "00 00"}, HostStep{pause, "00 02"},        HostStep{pause, "00 00", {}, 3},
+               HostStep{pause, "00 10"}, HostStep{pause, "00 00", {}, 2}, HostStep{pause, "00 cd"}};
+constexpr auto zeros_and_keys =
+    std::array{HostStep{pause, "00 00"}, HostStep{pause, "00 cd"},        HostStep{pause, "00 ef"},
+               HostStep{pause, "00 89"}, HostStep{pause, "00 ab"},        HostStep{pause, "00 59"},
+               HostStep{pause, "00 00"}, HostStep{pause, "00 02"},        HostStep{pause, "00 00", {}, 3},
+               HostStep{pause, "00 10"}, HostStep{pause, "00 00", {}, 3}, HostStep{pause, "00 cd"}};
 }  // namespace script
 
 /// Requirements of the document that a host on SPI must fulfil.

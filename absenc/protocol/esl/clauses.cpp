@@ -119,17 +119,18 @@ constexpr std::array<std::int64_t, 1> at_1{1};
 constexpr std::array<std::int64_t, 1> at_2{2};
 constexpr HostStep select{milliseconds(20), "select-page", page_0};
 
-constexpr std::array seven_clears{HostStep{microseconds(100), "clear-alarms", {}, 7},
-                                  HostStep{microseconds(100), "position"}};
-constexpr std::array one_zero{HostStep{microseconds(100), "zero"}, HostStep{microseconds(100), "clear-alarms", {}, 8}};
-constexpr std::array two_writes{select, HostStep{milliseconds(20), "memory-write", byte_1},
-                                HostStep{milliseconds(5), "memory-write", byte_2}};
-constexpr std::array write_and_again{select, HostStep{milliseconds(20), "memory-write", byte_1},
-                                     HostStep{milliseconds(1), "memory-write", byte_1}};
-constexpr std::array asked_once{select, HostStep{milliseconds(20), "memory-read", at_1},
-                                HostStep{milliseconds(20), "memory-read", at_2}};
-constexpr std::array asked_and_written{select, HostStep{milliseconds(20), "memory-read", at_1},
-                                       HostStep{milliseconds(20), "memory-write", byte_2}};
+constexpr auto seven_clears =
+    std::array{HostStep{microseconds(100), "clear-alarms", {}, 7}, HostStep{microseconds(100), "position"}};
+constexpr auto one_zero =
+    std::array{HostStep{microseconds(100), "zero"}, HostStep{microseconds(100), "clear-alarms", {}, 8}};
+constexpr auto two_writes = std::array{select, HostStep{milliseconds(20), "memory-write", byte_1},
+                                       HostStep{milliseconds(5), "memory-write", byte_2}};
+constexpr auto write_and_again = std::array{select, HostStep{milliseconds(20), "memory-write", byte_1},
+                                            HostStep{milliseconds(1), "memory-write", byte_1}};
+constexpr auto asked_once = std::array{select, HostStep{milliseconds(20), "memory-read", at_1},
+                                       HostStep{milliseconds(20), "memory-read", at_2}};
+constexpr auto asked_and_written = std::array{select, HostStep{milliseconds(20), "memory-read", at_1},
+                                              HostStep{milliseconds(20), "memory-write", byte_2}};
 }  // namespace script
 
 /// Clauses of the ESL document for hosts.

@@ -133,34 +133,34 @@ constexpr auto can_clauses = std::array{
 namespace script {
 using std::chrono::milliseconds;
 constexpr std::array<std::int64_t, 1> negative{1};
-constexpr std::array parameter_3{HostStep{{}, "01 cc 03 35 01"}};
-constexpr std::array parameter_4{HostStep{{}, "01 cc 04 74 c3"}};
-constexpr std::array direction_often{HostStep{milliseconds(20), "set-direction", negative, 12}};
-constexpr std::array zero_often{HostStep{milliseconds(20), "zero", {}, 12}};
+constexpr auto parameter_3 = std::array{HostStep{{}, "01 cc 03 35 01"}};
+constexpr auto parameter_4 = std::array{HostStep{{}, "01 cc 04 74 c3"}};
+constexpr auto direction_often = std::array{HostStep{milliseconds(20), "set-direction", negative, 12}};
+constexpr auto zero_often = std::array{HostStep{milliseconds(20), "zero", {}, 12}};
 
-constexpr std::array two_at_once{HostStep{{}, "bc aa b1 bc aa b1"}};
+constexpr auto two_at_once = std::array{HostStep{{}, "bc aa b1 bc aa b1"}};
 // The reply begins 20 ms after the request (`acquisition_us`); a second request within that time breaks the rule
 // `turn`.
-constexpr std::array soon_again{HostStep{{}, "position"}, HostStep{milliseconds(5), "position"}};
+constexpr auto soon_again = std::array{HostStep{{}, "position"}, HostStep{milliseconds(5), "position"}};
 
 constexpr HostStep enter{milliseconds(1), "7e5:0401000000000000"};
-constexpr std::array two_bytes{HostStep{{}, "220:8020"}};
-constexpr std::array seven_bytes{HostStep{{}, "220:80200000000000"}};
-constexpr std::array node_21{HostStep{{}, "220:8021000000000000"}};
-constexpr std::array node_0{HostStep{{}, "220:8000000000000000"}};
-constexpr std::array command_70{HostStep{{}, "220:7020000000000000"}};
-constexpr std::array command_81{HostStep{{}, "220:8120000000000000"}};
-constexpr std::array node_unprepared{HostStep{{}, "7e5:1121000000000000"}};
-constexpr std::array rate_unprepared{HostStep{{}, "7e5:1300030000000000"}};
-constexpr std::array configuration_44{enter, HostStep{milliseconds(1), "7e5:4400000000000000"}};
-constexpr std::array configuration_17{enter, HostStep{milliseconds(1), "7e5:1700000000000000"}};
-constexpr std::array number_0{enter, HostStep{milliseconds(1), "7e5:1100000000000000"}};
-constexpr std::array number_0_later{enter, HostStep{milliseconds(1), "7e5:1121000000000000"},
-                                    HostStep{milliseconds(1), "7e5:1100000000000000"}};
-constexpr std::array number_32{enter, HostStep{milliseconds(1), "7e5:1120000000000000"}};
-constexpr std::array rate_1{enter, HostStep{milliseconds(1), "7e5:1300010000000000"}};
-constexpr std::array rate_9{enter, HostStep{milliseconds(1), "7e5:1300090000000000"}};
-constexpr std::array rate_3{enter, HostStep{milliseconds(1), "7e5:1300030000000000"}};
+constexpr auto two_bytes = std::array{HostStep{{}, "220:8020"}};
+constexpr auto seven_bytes = std::array{HostStep{{}, "220:80200000000000"}};
+constexpr auto node_21 = std::array{HostStep{{}, "220:8021000000000000"}};
+constexpr auto node_0 = std::array{HostStep{{}, "220:8000000000000000"}};
+constexpr auto command_70 = std::array{HostStep{{}, "220:7020000000000000"}};
+constexpr auto command_81 = std::array{HostStep{{}, "220:8120000000000000"}};
+constexpr auto node_unprepared = std::array{HostStep{{}, "7e5:1121000000000000"}};
+constexpr auto rate_unprepared = std::array{HostStep{{}, "7e5:1300030000000000"}};
+constexpr auto configuration_44 = std::array{enter, HostStep{milliseconds(1), "7e5:4400000000000000"}};
+constexpr auto configuration_17 = std::array{enter, HostStep{milliseconds(1), "7e5:1700000000000000"}};
+constexpr auto number_0 = std::array{enter, HostStep{milliseconds(1), "7e5:1100000000000000"}};
+constexpr auto number_0_later = std::array{enter, HostStep{milliseconds(1), "7e5:1121000000000000"},
+                                           HostStep{milliseconds(1), "7e5:1100000000000000"}};
+constexpr auto number_32 = std::array{enter, HostStep{milliseconds(1), "7e5:1120000000000000"}};
+constexpr auto rate_1 = std::array{enter, HostStep{milliseconds(1), "7e5:1300010000000000"}};
+constexpr auto rate_9 = std::array{enter, HostStep{milliseconds(1), "7e5:1300090000000000"}};
+constexpr auto rate_3 = std::array{enter, HostStep{milliseconds(1), "7e5:1300030000000000"}};
 }  // namespace script
 
 /// Requirements of the document that a host with Modbus RTU must fulfil.

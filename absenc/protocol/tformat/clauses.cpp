@@ -12,6 +12,9 @@ namespace {
 /// hot.
 constexpr std::int64_t latched_alarms = alarms::latched & ~alarms::over_heat;
 
+constexpr std::array<std::int64_t, 1> first_byte{0};   // address of the user's EEPROM
+constexpr std::array<std::int64_t, 1> closed_byte{6};  // address of page 7 behind those that are open for the user
+
 /// Clauses of the T-format document for encoders.
 constexpr auto clauses = std::array{
     Clause{"answer", "6.2.1", "a readout request is answered", Demand::answered},
@@ -57,7 +60,7 @@ constexpr auto clauses = std::array{
            .paragraph = "9.4 Table 6 (6)",
            .words = "a request to the EEPROM with a wrong CRC gets the data of data ID 3",
            .demand = Demand::reacts,
-           .ask = {.wire = "ea 00 eb"},
+           .ask = {.command = "memory-read", .arguments = first_byte, .wrong_end = true},
            .reaction = Reaction::reply,
            .as = "position"},
     Clause{.id = "eeprom-write",
@@ -85,7 +88,7 @@ constexpr auto clauses = std::array{
            .paragraph = "9.4 Table 6 (2)",
            .words = "an address that is not open for the user gets the data of data ID 3",
            .demand = Demand::page_closed,
-           .ask = {.wire = "ea 06 ec"},
+           .ask = {.command = "memory-read", .arguments = closed_byte},
            .reaction = Reaction::reply,
            .as = "position",
            .page = 7,
@@ -117,24 +120,25 @@ constexpr std::array<std::int64_t, 2> byte_2{2, 5};
 constexpr std::array<std::int64_t, 1> at_1{1};
 constexpr std::array<std::int64_t, 1> at_2{2};
 
-constexpr std::array nine_zeros{HostStep{microseconds(100), "zero", {}, 9}, HostStep{microseconds(100), "position"}};
-constexpr std::array one_clear{HostStep{microseconds(100), "clear-alarms"},
-                               HostStep{microseconds(100), "reset-multiturn", {}, 10}};
-constexpr std::array two_writes{HostStep{{}, "memory-write", byte_1},
-                                HostStep{milliseconds(5), "memory-write", byte_2}};
-constexpr std::array write_and_again{HostStep{{}, "memory-write", byte_1},
-                                     HostStep{milliseconds(17), "memory-write", byte_1}};
-constexpr std::array other_after_busy{HostStep{{}, "memory-write", byte_1},
-                                      HostStep{milliseconds(5), "memory-read", at_1},
-                                      HostStep{milliseconds(20), "memory-read", at_2}};
-constexpr std::array write_after_busy{HostStep{{}, "memory-write", byte_1},
-                                      HostStep{milliseconds(5), "memory-read", at_2},
-                                      HostStep{milliseconds(20), "memory-write", byte_2}};
-constexpr std::array same_after_busy{HostStep{{}, "memory-write", byte_1},
-                                     HostStep{milliseconds(5), "memory-read", at_1},
-                                     HostStep{milliseconds(20), "memory-read", at_1}};
-constexpr std::array two_at_once{HostStep{{}, "1a 1a"}};
-constexpr std::array three_at_once{HostStep{{}, "1a 1a 1a"}};
+constexpr auto nine_zeros =
+    std::array{HostStep{microseconds(100), "zero", {}, 9}, HostStep{microseconds(100), "position"}};
+constexpr auto one_clear =
+    std::array{HostStep{microseconds(100), "clear-alarms"}, HostStep{microseconds(100), "reset-multiturn", {}, 10}};
+constexpr auto two_writes =
+    std::array{HostStep{{}, "memory-write", byte_1}, HostStep{milliseconds(5), "memory-write", byte_2}};
+constexpr auto write_and_again =
+    std::array{HostStep{{}, "memory-write", byte_1}, HostStep{milliseconds(17), "memory-write", byte_1}};
+constexpr auto other_after_busy =
+    std::array{HostStep{{}, "memory-write", byte_1}, HostStep{milliseconds(5), "memory-read", at_1},
+               HostStep{milliseconds(20), "memory-read", at_2}};
+constexpr auto write_after_busy =
+    std::array{HostStep{{}, "memory-write", byte_1}, HostStep{milliseconds(5), "memory-read", at_2},
+               HostStep{milliseconds(20), "memory-write", byte_2}};
+constexpr auto same_after_busy =
+    std::array{HostStep{{}, "memory-write", byte_1}, HostStep{milliseconds(5), "memory-read", at_1},
+               HostStep{milliseconds(20), "memory-read", at_1}};
+constexpr auto two_at_once = std::array{HostStep{{}, "1a 1a"}};
+constexpr auto three_at_once = std::array{HostStep{{}, "1a 1a 1a"}};
 }  // namespace script
 
 /// Clauses of the T-format document for hosts.

@@ -2,7 +2,10 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <sstream>
 
+#include "absenc/client/emulation/answer.hpp"
+#include "absenc/client/port/address.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
 #include "tools/absenc/error.hpp"
@@ -14,6 +17,27 @@
 namespace absenc::tool {
 
 namespace {
+
+// Returns the settings in the texts of --reply, each "NAME=VALUE NAME=VALUE".
+std::vector<std::string> reply_settings(std::span<const std::string> texts) {
+  std::vector<std::string> settings;
+  for (const std::string& text : texts) {
+    std::istringstream words(text);
+    for (std::string word; words >> word;) settings.push_back(word);
+  }
+  return settings;
+}
+
+// Returns the reply of a virtual encoder with these settings to the request of the command.
+std::string reply_of(const Invocation& invocation, const Unit& unit, const Command& command, Arguments arguments) {
+  std::vector<std::string> settings = reply_settings(invocation.texts("--reply"));
+  for (const std::string& option : invocation.texts("--option")) settings.push_back(option);
+  if (invocation.has("--model")) settings.push_back(fmt::format("model={}", invocation.text("--model")));
+  const Attempted answered = answer_of(parse_address(fmt::format("sim:{}", unit.id), settings), command, arguments);
+  if (!answered.exchange.reply.frame().empty()) return to_wire_text(unit.link, answered.exchange.reply.frame());
+  throw UsageError(fmt::format("the virtual encoder sends no reply to {}: {}. Try: {}", command.name,
+                               text_of(answered.error).description, text_of(answered.error).advice));
+}
 
 // Prints the encoded request of a command. On CAN and clocked links Unit::encode writes text, which is parsed here.
 int run_encode(const Invocation& invocation) {
@@ -34,26 +58,34 @@ int run_encode(const Invocation& invocation) {
                               ? parse_wire_text(unit.link, command.name, std::string(encoded.begin(), encoded.end()))
                               : WireFrame{.bytes = {encoded.begin(), encoded.end()}, .bits = 0, .can = {}};
   const std::string request = to_wire_text(unit.link, frame.frame());
-  if (invocation.has("--json")) {
-    print_line(Json::object().set("protocol", unit.id).set("command", command.name).set("request", request).line());
-  } else {
-    print_line(request);
+  Json json = Json::object().set("protocol", unit.id).set("command", command.name).set("request", request);
+  std::string text = request;
+  if (invocation.has("--reply")) {
+    text = reply_of(invocation, unit, command, arguments);
+    json.set("reply", text);
   }
+  print_line(invocation.has("--json") ? json.line() : text);
   return exit_good;
 }
 
-constexpr std::array<Parameter, 6> encode_parameters{{
+constexpr std::array<Parameter, 7> encode_parameters{{
     parameter::protocol,
     parameter::command,
     parameter::arguments,
+    {"--reply", "NAME=VALUE",
+     "print the reply of a virtual encoder with these values, as for sim:: singleturn, multiturn, "
+     "alarm, condition, options of the protocol; several with a space between them, or given more than once",
+     "", false, true},
     parameter::model,
     parameter::protocol_option,
     parameter::json,
 }};
 
-constexpr std::array<Example, 3> encode_examples{{
+constexpr std::array<Example, 4> encode_examples{{
     {"absenc encode tformat position", "1A: the request that asks for everything"},
     {"absenc encode tformat memory-write 5 0x42", "32 05 42 75: the request that writes 42 to address 5"},
+    {"absenc encode tformat position --reply \"singleturn=74565 multiturn=4660\"",
+     "1A 00 45 23 01 11 34 12 00 00 4A: the reply at this position"},
     {"absenc encode biss memory-write 5 0x42", "the bits of CDM, one behind each frame"},
 }};
 
@@ -61,8 +93,9 @@ constexpr std::array<Example, 3> encode_examples{{
 
 const Subcommand encode_subcommand{
     "encode",
-    "print the request of a command as it goes over the wire",
-    "Only the request that does the command's work: a procedure may need others before and after it.",
+    "print the request of a command, or the reply to it, as it goes over the wire",
+    "Only the request that does the command's work: a procedure may need others before and after it.\n"
+    "The reply is that to the last request of the command.",
     encode_parameters,
     encode_examples,
     run_encode};
