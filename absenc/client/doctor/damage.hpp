@@ -53,6 +53,8 @@ template <class Is>
 
 /// Returns the settings ("model=23-bit") that change the options `now` into `wanted`; empty if both are equal.
 [[nodiscard]] std::vector<std::string> settings_to_set(const Unit& unit, const Options& wanted, const Options& now);
+/// Returns how well the encoder could be read with the user's settings: "no good reply", "3 of 24 replies good".
+[[nodiscard]] std::string good_as_said(std::size_t good, std::size_t tried);
 /// Returns options as the settings that give them, "model=23-bit", or "the usual settings".
 [[nodiscard]] std::string said_settings(const Unit& unit, const Options& options);
 

@@ -129,7 +129,7 @@ class Doctor {
       try {
         std::optional<os::WakeupWatch> watch;
         if (surroundings_.on_the_clock && address_.port_kind != PortKind::sim) watch.emplace();
-        examiner.read(*read_, choices_.readings, choices_.limit, seen_.readings);
+        examiner.observe(*read_, choices_.readings, choices_.limit, seen_);
         if (watch) seen_.woken_late = watch->latest();
         if (any_good() && choices_.turning > Time{}) {
           tell("turn the shaft by hand now");
@@ -145,7 +145,8 @@ class Doctor {
     }
     // Other bit rates are tried only on a silent CAN bus, because they would destroy frames of other devices.
     const bool disturbs = std::is_same_v<Item, CanFrame> && any_heard();
-    if (none_good() && !seen_.never_silent && seen_.lateness == Time{} && !disturbs) try_others<Item>();
+    const bool may_be_settings = none_good() && !seen_.never_silent && seen_.lateness == Time{};
+    if (may_be_settings && !disturbs && !is_adapter()) try_others<Item>();
     if constexpr (std::is_same_v<Item, std::uint8_t>) {
       if (may_be_another(address_) && seen_.trials.empty() && is_unexplained()) identify_others();
       if (address_.port_kind != PortKind::sim && seen_.trials.empty() && !any_heard() && !seen_.refusal)
@@ -161,6 +162,19 @@ class Doctor {
   }
   [[nodiscard]] bool any_heard() const {
     return std::any_of(seen_.readings.begin(), seen_.readings.end(), [](const Attempted& one) { return one.heard; });
+  }
+
+  // Returns whether a change of bytes by an adapter explains the damaged replies. Other settings are not tried then:
+  // the changed bytes may be a good reply of another format. A missing 8th bit is no such explanation, because replies
+  // of text never have one.
+  [[nodiscard]] bool is_adapter() const {
+    const Case one{*address_.unit, address_.options, seen_, count_good(seen_.readings)};
+    All all;
+    for (const Attempted& attempt : seen_.readings) {
+      if (attempt.error != Error::none && attempt.heard) all.push_back(&attempt);
+    }
+    const std::optional<Finding> adapter = damage_by_adapter(one, all);
+    return adapter && adapter->finding_kind != FindingKind::seven_bits;
   }
 
   // Scans the bus, and stores the encoder's address if two encoders share it.
@@ -234,12 +248,12 @@ class Doctor {
     if (count_good(attempts) == first_readings) read_again<std::uint8_t>();
   }
 
-  // Replaces the silent readings by new ones, because the encoder replies now.
+  // Takes readings once more, after the silent ones, because the encoder replies now.
   template <class Item>
   void read_again() {
     tell("reading");
     Examiner<Item> examiner(address_, surroundings_.open(address_), choices_.over);
-    examiner.read(*read_, choices_.readings, choices_.limit, seen_.readings);
+    examiner.observe(*read_, choices_.readings, choices_.limit, seen_);
     examiner.conclude(seen_);
   }
 
@@ -268,7 +282,8 @@ class Doctor {
     constexpr std::array unsure{
         FindingKind::no_answer,     FindingKind::only_echo,      FindingKind::baud_pattern,
         FindingKind::extra_bytes,   FindingKind::bytes_missing,  FindingKind::other_checksum,
-        FindingKind::contradictory, FindingKind::always_damaged, FindingKind::direction_unswitched};
+        FindingKind::contradictory, FindingKind::always_damaged, FindingKind::direction_unswitched,
+        FindingKind::same_address};
     return std::ranges::find(unsure, first->finding_kind) != unsure.end();
   }
 

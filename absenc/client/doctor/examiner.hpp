@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "absenc/client/doctor/observations.hpp"
+#include "absenc/client/doctor/stream_frames.hpp"
 #include "absenc/client/port/link.hpp"
 #include "absenc/client/port/runner.hpp"
 
@@ -20,6 +21,8 @@ class Examiner {
   Examiner(const EncoderAddress& address, Link link, std::function<bool()> over)
       : link_(std::move(link)),
         runner_(address),
+        unit_(*address.unit),
+        options_(address.options),
         streams_(address.unit->streams != nullptr && address.unit->streams(address.options)) {
     if constexpr (std::is_same_v<Item, CanFrame>) {
       runner_.attach(*link_.frames, link_.latency);
@@ -54,15 +57,37 @@ class Examiner {
   /// Takes up to `count` readings within `limit` and adds them to `into`. Ends early if the first ones bring no good
   /// reply. Throws the exceptions of the port.
   void read(const Command& command, std::size_t count, Time limit, std::vector<Attempted>& into) {
-    const auto attempt = [&] {
-      Attempted one = runner_.once(command);
-      // Listens for three characters after a good reply: a second encoder's reply follows at once, or would collide
-      // with the next request.
-      const Time behind = 3 * runner_.character();
-      if (one.error == Error::none && behind != Time{} && !streams_) runner_.settle(behind, longest_reply);
-      return one;
-    };
-    runner_.repeat({.count = count, .limit = limit, .patience = never, .least = longest_gap}, attempt, into);
+    runner_.repeat(
+        series(count, limit), [&] { return attempt_reading(command); }, into);
+  }
+
+  /// Takes readings as `read` does and adds them to `seen`, with the failed requests that a reading repeated, or with
+  /// what a stream shows beside its good frames.
+  void observe(const Command& command, std::size_t count, Time limit, Observations& seen) {
+    if constexpr (std::is_same_v<Item, CanFrame>) {
+      read(command, count, limit, seen.readings);
+    } else {
+      const std::size_t before = seen.readings.size();
+      std::vector<Attempted> failed;  // failed requests of the present reading
+      StreamBytes stream;
+      std::vector<Time> arrivals;
+      const Hook hook(runner_, [&](const LineExchange<Item>& line) { record_failure(line, failed); });
+      const auto attempt = [&] {
+        failed.clear();
+        Attempted one = attempt_reading(command);
+        // The last request is part of the reading itself.
+        if (!failed.empty() && failed.back().began == runner_.last().sent_at) failed.pop_back();
+        std::ranges::move(failed, std::back_inserter(seen.repeated));
+        if (!streams_) return one;
+        const Time arrived = runner_.last().marks.empty() ? Time{} : runner_.last().marks.back().at;
+        arrivals.push_back(arrivals.empty() ? arrived : std::max(arrived, arrivals.back()));
+        stream.append(runner_.last());
+        return one;
+      };
+      runner_.repeat(series(count, limit), attempt, seen.readings);
+      // An encoder that sends a frame for each pulse is polled, too.
+      if (streams_ && before == 0 && runner_.port().requests == 0) conclude_stream(stream, arrivals, seen);
+    }
   }
 
   /// Runs a command that is no reading of the position, such as a scan, and passes the fields of its reply to `sink` if
@@ -88,6 +113,73 @@ class Examiner {
   }
 
  private:
+  /// Calls a function for each exchange of the runner, as long as this object lives.
+  class Hook {
+   public:
+    Hook(Runner<Item>& runner, std::function<void(const LineExchange<Item>&)> function) : runner_(runner) {
+      runner_.on_exchange = std::move(function);
+    }
+    Hook(const Hook&) = delete;
+    Hook& operator=(const Hook&) = delete;
+    ~Hook() { runner_.on_exchange = nullptr; }
+
+   private:
+    Runner<Item>& runner_;
+  };
+
+  static Series series(std::size_t count, Time limit) {
+    return {.count = count, .limit = limit, .patience = never, .least = longest_gap};
+  }
+
+  Attempted attempt_reading(const Command& command) {
+    Attempted one = runner_.once(command);
+    // Listens for three characters after a good reply: a second encoder's reply follows at once, or would collide with
+    // the next request.
+    const Time behind = 3 * runner_.character();
+    if (one.error == Error::none && behind != Time{} && !streams_) runner_.settle(behind, longest_reply);
+    return one;
+  }
+
+  // Adds the exchange to `failed` if its request was not answered or its reply is damaged. Lines of characters only: on
+  // SPI a reply may answer the request before.
+  void record_failure(const LineExchange<Item>& line, std::vector<Attempted>& failed) const {
+    Attempted one;
+    runner_.keep_exchange(one);
+    one.began = line.sent_at;
+    const Frame request = one.exchange.request.frame();
+    const bool has_characters = unit_.link == LinkKind::half_duplex || unit_.link == LinkKind::full_duplex;
+    if (!has_characters || line.answer == Time{} ||
+        (unit_.is_answered != nullptr && !unit_.is_answered(options_, request)))
+      return;
+    one.error = one.answered ? unit_.check(options_, request, one.exchange.reply.frame()) : Error::timeout;
+    if (one.error != Error::none) failed.push_back(std::move(one));
+  }
+
+  void conclude_stream(const StreamBytes& stream, const std::vector<Time>& arrivals, Observations& seen) const {
+    seen.is_stream = true;
+    const auto is_good = [](const Attempted& one) { return one.error == Error::none; };
+    const auto good = static_cast<std::size_t>(std::ranges::count_if(seen.readings, is_good));
+    std::vector<Attempted> frames = frames_between_pauses(unit_, options_, stream);
+    if (good * 20 < seen.readings.size() + 1) {
+      // The reading of a stream goes on to the next good frame, so hardly any good frame means hardly any reading: the
+      // frames themselves are examined instead; without any frames, the first bytes.
+      if (frames.empty() && !stream.bytes.empty()) {
+        constexpr std::size_t most_shown = 256;
+        Attempted& last = seen.readings.back();
+        last.heard = last.answered = true;
+        last.raw.assign(stream.bytes.begin(),
+                        stream.bytes.begin() + static_cast<std::ptrdiff_t>(std::min(stream.bytes.size(), most_shown)));
+        last.exchange.reply.bytes = last.raw;
+      }
+      if (!frames.empty()) seen.readings = std::move(frames);
+      return;
+    }
+    std::erase_if(frames, is_good);
+    seen.damaged_frames = std::move(frames);
+    seen.doubled = count_doubled(seen.readings, arrivals);
+    if (arrivals.size() == seen.readings.size()) insert_missing_frames(seen.readings, arrivals);
+  }
+
   static constexpr unsigned pieces = 5;
   static constexpr Time piece_time = std::chrono::milliseconds(20);
   static constexpr std::size_t most_heard = 4096;
@@ -97,6 +189,8 @@ class Examiner {
 
   Link link_;
   Runner<Item> runner_;
+  const Unit& unit_;
+  Options options_;
   bool streams_;
 };
 

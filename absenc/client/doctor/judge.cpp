@@ -181,9 +181,7 @@ void judge_line(const Case& one, std::vector<Finding>& findings) {
         {fmt::format("{}", seen.line_errors), fmt::format("{}", seen.readings.size()), fmt::format("{}", one.good)}));
   }
   for (const Trial& trial : seen.trials) {
-    const std::string as_said = trial.good_as_said == 0
-                                    ? "no good reply"
-                                    : fmt::format("{} of {} replies good", trial.good_as_said, trial.tried_as_said);
+    const std::string as_said = good_as_said(trial.good_as_said, trial.tried_as_said);
     findings.push_back(finding(trial.finding_kind, {trial.said, trial.setting, fmt::format("{}", trial.good),
                                                     fmt::format("{}", trial.tried), as_said, trial.command}));
   }
@@ -200,7 +198,7 @@ void judge_line(const Case& one, std::vector<Finding>& findings) {
   const std::string inverted = in_doubt ? inversion(one) : "";
   if (!inverted.empty()) {
     findings.push_back(finding(FindingKind::line_inverted, {inverted}));
-  } else if (seen.never_silent && one.good * 10 < seen.readings.size() * 9 + 1) {
+  } else if (seen.never_silent && one.good * 100 < seen.readings.size() * 99 + 1) {
     findings.push_back(finding(FindingKind::never_silent, {fmt::format("{}", seen.unsolicited.size()),
                                                            to_text(seen.listened), hex(seen.unsolicited, 8)}));
   }
@@ -322,7 +320,7 @@ Examination judge(const Unit& unit, const Options& options, const Observations& 
     } else {
       const bool is_nobody = silent == result.tried;
       result.findings.push_back(is_nobody ? finding(FindingKind::no_answer, {all, ""})
-                                          : finding(FindingKind::sometimes_silent, {fmt::format("{}", failed), all}));
+                                          : some_silence(seen, failed, result.tried));
     }
   }
   for (Finding& found : result.findings) suit(found, seen.place);

@@ -24,12 +24,12 @@ using ByteList = std::vector<std::uint8_t>;
 
 bool is_damaged(const Attempted& one) { return one.error != Error::none && one.heard; }
 
-// Returns the names of all errors of the damaged replies: "bad_checksum, wrong_length".
-std::string errors_of(const std::vector<Attempted>& readings) {
+// Returns the names of all errors of these replies: "bad_checksum, wrong_length".
+std::string errors_of(const All& all) {
   std::vector<std::string_view> names;
-  for (const Attempted& one : readings) {
-    const std::string_view name = text_of(one.error).name;
-    if (is_damaged(one) && std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  for (const Attempted* one : all) {
+    const std::string_view name = text_of(one->error).name;
+    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
   }
   return fmt::format("{}", fmt::join(names, ", "));
 }
@@ -38,9 +38,9 @@ bool is_good(const Case& one, const Frame& request, Bytes reply) { return decode
 
 // ---- Judges for lines on which no reply is good
 
-All damaged(const Case& one) {
+All damaged(const std::vector<Attempted>& attempts) {
   All all;
-  for (const Attempted& attempt : one.seen.readings) {
+  for (const Attempted& attempt : attempts) {
     if (is_damaged(attempt)) all.push_back(&attempt);
   }
   return all;
@@ -123,8 +123,8 @@ std::optional<Finding> single_bits(const Case& one, const All& all) {
   const std::size_t mended = mended_by_one_bit(one, all);
   if (mended == 0) return {};
   return finding(FindingKind::damaged_bits,
-                 {fmt::format("{}", all.size()), fmt::format("{}", one.seen.readings.size()),
-                  errors_of(one.seen.readings), fmt::format("{} would be good with one bit changed", mended)});
+                 {fmt::format("{}", all.size()), fmt::format("{}", one.seen.readings.size()), errors_of(all),
+                  fmt::format("{} would be good with one bit changed", mended)});
 }
 
 // Returns whether the reply is good by itself but is no reply to this request.
@@ -241,10 +241,31 @@ std::size_t unreported(const std::vector<Attempted>& readings) {
   return count;
 }
 
+All heard(const std::vector<Attempted>& attempts) {
+  All all;
+  for (const Attempted& attempt : attempts) {
+    if (attempt.heard) all.push_back(&attempt);
+  }
+  return all;
+}
+
+bool is_silent(const Attempted& one) { return one.error != Error::none && !one.heard; }
+
+// Returns the damaged replies to requests that were repeated, without good replies beside other bytes, and without
+// replies in which the encoder refuses a request. Returns none if more requests were not answered: a late reply may
+// collide with the reply to the next request.
+All damaged_requests(const Case& one) {
+  All all = damaged(one.seen.repeated);
+  std::erase_if(all, [&](const Attempted* attempt) { return is_refusal(*attempt) || has_good_part(one, *attempt); });
+  const auto silent = static_cast<std::size_t>(std::ranges::count_if(one.seen.repeated, is_silent));
+  return silent >= all.size() ? All{} : all;
+}
+
 Finding some_damage(const Case& one, const All& all) {
   const std::size_t more = unreported(one.seen.readings);
   std::vector<std::string> values{fmt::format("{}", all.size() + more),
-                                  fmt::format("{}", one.seen.readings.size() + more), errors_of(one.seen.readings)};
+                                  fmt::format("{}", one.seen.readings.size() + one.seen.repeated.size() + more),
+                                  errors_of(all)};
   const ByteList usual = usual_reply(one.seen.readings);
   if (usual.empty()) return finding(FindingKind::sometimes_damaged, values);
   constexpr std::size_t few = 3;  // greatest number of bits that a short disturbance, as long as one bit, changes
@@ -269,8 +290,14 @@ Finding some_damage(const Case& one, const All& all) {
 
 }  // namespace
 
+Finding some_silence(const Observations& seen, std::size_t silent, std::size_t all) {
+  return finding(FindingKind::sometimes_silent,
+                 {fmt::format("{}", silent), fmt::format("{}", all),
+                  seen.is_stream ? "frames of the stream did not come" : "requests were not answered"});
+}
+
 void judge_bad_frames(const Case& one, std::vector<Finding>& findings) {
-  const All all = damaged(one);
+  const All all = damaged(one.seen.readings);
   if (all.empty()) return;
   constexpr std::array looks{stuck_data,     own_echo,       damage_by_adapter, two_frames, extra_bytes,
                              other_settings, single_bits,    bytes_missing,     refusal,    contradictory,
@@ -282,8 +309,8 @@ void judge_bad_frames(const Case& one, std::vector<Finding>& findings) {
     }
   }
   if (all.size() * 10 < one.seen.readings.size()) return;  // silence is the main fault, which another judge reports
-  findings.push_back(finding(FindingKind::always_damaged,
-                             {fmt::format("{}", all.size()), errors_of(one.seen.readings), shown(*all.front())}));
+  findings.push_back(
+      finding(FindingKind::always_damaged, {fmt::format("{}", all.size()), errors_of(all), shown(*all.front())}));
 }
 
 Finding finding_of(const Unit& unit, const Options& options, PortKind place, const Attempted& last, bool usually_good,
@@ -295,7 +322,7 @@ Finding finding_of(const Unit& unit, const Options& options, PortKind place, con
   if (late && last.error == Error::timeout) return suited(finding(FindingKind::reply_late, {"", "", "", ""}));
   if (usually_good) {
     return suited(last.heard ? finding(FindingKind::sometimes_damaged, {"", "", ""})
-                             : finding(FindingKind::sometimes_silent, {"", ""}));
+                             : finding(FindingKind::sometimes_silent, {"", "", ""}));
   }
   // A single frame can show that another model is connected, like the many frames of an examination.
   const auto& [request, reply] = last.exchange;
@@ -311,10 +338,28 @@ Finding finding_of(const Unit& unit, const Options& options, PortKind place, con
 }
 
 void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
-  All all = damaged(one);
-  if (std::optional<Finding> adapter = damage_by_adapter(one, all)) {
+  All all = damaged(one.seen.readings);
+  const All repeated = damaged_requests(one);
+  // The reading of a stream goes on to the next good frame, so its damaged frames are those between the pauses.
+  const All of_stream = damaged(one.seen.damaged_frames);
+  if (std::optional<Finding> adapter = damage_by_adapter(one, one.seen.is_stream ? of_stream : all)) {
     findings.push_back(std::move(*adapter));
     return;
+  }
+  if (one.seen.doubled > 0) {
+    const std::string frame = shown(one.seen.readings.front());
+    findings.push_back(finding(FindingKind::extra_bytes,
+                               {fmt::format("{}", one.seen.doubled), fmt::format("{}", one.seen.readings.size()),
+                                fmt::format("{} {}", frame, frame)}));
+    return;
+  }
+  const auto is_out_of_range = [](const Attempted* attempt) { return attempt->error == Error::out_of_range; };
+  if (!all.empty() && std::ranges::all_of(all, is_out_of_range)) {
+    // The checksums are right: another format may fit all replies, the good ones, too.
+    if (std::optional<Finding> other = other_settings(one, heard(one.seen.readings))) {
+      findings.push_back(std::move(*other));
+      return;
+    }
   }
   if (std::optional<Finding> bursts = coming_and_going(one)) {
     findings.push_back(std::move(*bursts));
@@ -357,18 +402,18 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
     // A complete reply after a reply may be the next reply, if the first was late.
     const bool may_be_late = std::ranges::all_of(all, [&](const Attempted* one_of) { return holds_two(one, *one_of); });
     if (!may_be_late || !may_be_the_computer(one.seen, all.size())) findings.push_back(std::move(*extra));
-  } else if (!all.empty()) {
-    findings.push_back(some_damage(one, all));
+  } else if (!all.empty() || !repeated.empty()) {
+    All both = all;
+    both.insert(both.end(), repeated.begin(), repeated.end());
+    if (!all.empty() || !may_be_the_computer(one.seen, repeated.size())) findings.push_back(some_damage(one, both));
   }
-  const auto silent =
-      stuck.size() + static_cast<std::size_t>(std::count_if(
-                         one.seen.readings.begin(), one.seen.readings.end(),
-                         [](const Attempted& attempt) { return attempt.error != Error::none && !attempt.heard; }));
+  const std::size_t silent =
+      stuck.size() + static_cast<std::size_t>(std::ranges::count_if(one.seen.readings, is_silent) +
+                                              std::ranges::count_if(one.seen.repeated, is_silent));
   const std::size_t late = one.unit.link == LinkKind::can ? 0 : one.seen.late;
   // A late reply may make the next reading fail as well, so silent readings are compared with twice the late replies.
   if (silent > 2 * late && !may_be_the_computer(one.seen, silent)) {
-    findings.push_back(finding(FindingKind::sometimes_silent,
-                               {fmt::format("{}", silent), fmt::format("{}", one.seen.readings.size())}));
+    findings.push_back(some_silence(one.seen, silent, one.seen.readings.size() + one.seen.repeated.size()));
   }
 }
 

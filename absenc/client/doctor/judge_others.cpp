@@ -104,6 +104,10 @@ std::vector<std::string> settings_to_set(const Unit& unit, const Options& wanted
   return settings;
 }
 
+std::string good_as_said(std::size_t good, std::size_t tried) {
+  return good == 0 ? "no good reply" : fmt::format("{} of {} replies good", good, tried);
+}
+
 std::string said_settings(const Unit& unit, const Options& options) {
   const std::vector<std::string> settings = settings_for(unit, options);
   return settings.empty() ? "the usual settings" : fmt::format("{}", fmt::join(settings, ", "));
@@ -148,7 +152,8 @@ std::optional<Finding> other_settings(const Case& one, const All& all) {
   if (settings.empty()) return {};
   return finding(FindingKind::wrong_settings,
                  {said_settings(one.unit, one.options), fmt::format("{}", fmt::join(settings, ", ")),
-                  fmt::format("{}", best.evidence.explained), fmt::format("{}", exchanges.size()), "no good reply"});
+                  fmt::format("{}", best.evidence.explained), fmt::format("{}", exchanges.size()),
+                  good_as_said(one.good, one.seen.readings.size())});
 }
 
 std::optional<Finding> other_checksum(const Case& one, const All& all) {

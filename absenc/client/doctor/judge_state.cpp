@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <set>
 #include <string>
@@ -137,16 +138,29 @@ void judge_state(const Case& one, std::vector<Finding>& findings) {
   if (!is_explained) judge_validity(ready, is_damage, findings);
 }
 
+namespace {
+
+// Returns the natural logarithm of the number of ways to choose `some` of `all`.
+double log_choose(std::size_t all, std::size_t some) {
+  return std::lgamma(static_cast<double>(all + 1)) - std::lgamma(static_cast<double>(some + 1)) -
+         std::lgamma(static_cast<double>(all - some + 1));
+}
+
+}  // namespace
+
 std::optional<Finding> judge_start(const Case& one) {
-  constexpr std::size_t enough = 20;  // least number of good readings
+  constexpr double chance = 1e-3;  // greatest probability that failures at random times all come first
   const std::vector<Attempted>& readings = one.seen.readings;
   const auto first =
       std::ranges::find_if(readings, [](const Attempted& attempt) { return attempt.error == Error::none; });
-  const auto silent = static_cast<std::size_t>(first - readings.begin());
-  const bool was_silent = std::all_of(readings.begin(), first, [](const Attempted& attempt) { return !attempt.heard; });
-  if (silent < 4 || !was_silent || one.good < enough || silent + one.good != readings.size()) return {};
+  const auto failed = static_cast<std::size_t>(first - readings.begin());
+  if (failed < 2 || failed + one.good != readings.size()) return {};
+  const auto silent = std::count_if(readings.begin(), first, [](const Attempted& attempt) { return !attempt.heard; });
+  // The last failures may be damaged replies, because the encoder may begin to reply in the middle of a request.
+  if (static_cast<std::size_t>(silent) * 2 < failed || may_be_the_computer(one.seen, failed)) return {};
+  if (-log_choose(readings.size(), failed) > std::log(chance)) return {};
   return finding(FindingKind::starting,
-                 {fmt::format("nothing came for the first {}, and then all {} readings were good",
+                 {fmt::format("no good reply came for the first {}, and then all {} readings were good",
                               to_text(first->began - readings.front().began), one.good)});
 }
 

@@ -43,6 +43,9 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings);
 /// Returns the finding for an encoder that was powered on during the examination: at least four readings without any
 /// byte, then only good ones, at least 20. Otherwise returns nothing.
 [[nodiscard]] std::optional<Finding> judge_start(const Case& one);
+/// Returns the finding that `silent` of `all` requests were not answered, or that as many frames of a stream did not
+/// come.
+[[nodiscard]] Finding some_silence(const Observations& seen, std::size_t silent, std::size_t all);
 void judge_state(const Case& one, std::vector<Finding>& findings);
 void judge_position(const Case& one, const std::vector<Attempted>& readings, bool by_hand,
                     std::vector<Finding>& findings);

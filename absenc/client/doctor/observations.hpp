@@ -49,11 +49,17 @@ struct Observations {
   Time listened{};
   bool never_silent = false;  // whether the line was never silent while doctor listened
   std::vector<Attempted> readings{};
-  std::vector<Attempted> turned{};  // readings that were taken while the user turned the shaft by hand
-  std::uint64_t line_errors = 0;    // number of line errors that the port reported; on CAN, of error frames
-  std::uint64_t late = 0;           // number of replies that began after their timeout or answered an older request
-  Time lateness{};                  // greatest time from a request to its late reply; 0: no reply was late
-  std::uint64_t overfull = 0;       // number of good replies with further bytes after them that no request explains
+  // Failed requests that readings repeated, in the order of time: a reading may be good although its first request was
+  // not answered. The last request of a reading is not here, but in `readings`.
+  std::vector<Attempted> repeated{};
+  std::vector<Attempted> damaged_frames{};  // damaged frames of a stream, cut at the pauses between frames
+  std::size_t doubled = 0;                  // number of frames of a stream that arrived twice
+  bool is_stream = false;                   // whether the encoder sends frames without requests
+  std::vector<Attempted> turned{};          // readings that were taken while the user turned the shaft by hand
+  std::uint64_t line_errors = 0;            // number of line errors that the port reported; on CAN, of error frames
+  std::uint64_t late = 0;      // number of replies that began after their timeout or answered an older request
+  Time lateness{};             // greatest time from a request to its late reply; 0: no reply was late
+  std::uint64_t overfull = 0;  // number of good replies with further bytes after them that no request explains
   std::vector<std::uint8_t> overfull_example{};
   std::size_t most_behind = 0;  // greatest number of further bytes after a good reply
   std::vector<Trial> trials{};

@@ -163,7 +163,7 @@ constexpr auto table = std::to_array<Words>({
     {FindingKind::sometimes_damaged, "sometimes_damaged", warning, "{0} of {1} replies are damaged ({2})",
      "noise, reflections or a loose contact",
      "check termination, shielding and plugs; run doctor again at standstill to see which bits"},
-    {FindingKind::sometimes_silent, "sometimes_silent", warning, "{0} of {1} requests were not answered",
+    {FindingKind::sometimes_silent, "sometimes_silent", warning, "{0} of {1} {2}",
      "some requests do not arrive, or a contact is loose",
      "check plugs, supply and termination; a busy computer needs latency=MS behind the encoder"},
     {FindingKind::comes_and_goes, "comes_and_goes", warning, "{0} of {1} readings failed, in {2} bursts{3}",

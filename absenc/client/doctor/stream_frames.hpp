@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a stream shows beside its good frames: the bytes of an encoder that sends frames without requests, cut at the
+// pauses between them, and the frames that did not come.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "absenc/client/doctor/observations.hpp"
+
+namespace absenc::client {
+
+/// The bytes received from a stream, with the times of their arrival.
+struct StreamBytes {
+  /// A time, and the number of bytes that had arrived by then.
+  struct Mark {
+    Time at{};
+    std::size_t bytes = 0;
+  };
+  std::vector<std::uint8_t> bytes{};
+  std::vector<Mark> marks{};
+
+  /// Appends the bytes received during one reading; the bytes of a very long examination are left out.
+  void append(const LineExchange<std::uint8_t>& line);
+};
+
+/// Returns the stream's bytes between two pauses, good or damaged, as replies without a request. The shortest pause
+/// that ends a frame is found from the bytes: it makes most pieces equally long. Returns nothing if no pause does.
+[[nodiscard]] std::vector<Attempted> frames_between_pauses(const Unit& unit, const Options& options,
+                                                           const StreamBytes& stream);
+
+/// Inserts a failed reading (Error::timeout) for each frame that did not come, if the frames come at a regular rate.
+/// `arrivals` are the times at which the frames of `readings` arrived. Frames that were received but damaged
+/// (Attempted::discarded) are not missing, nor is a late one.
+void insert_missing_frames(std::vector<Attempted>& readings, const std::vector<Time>& arrivals);
+
+/// Returns the number of good frames that arrived twice, directly one after the other, although the position changes;
+/// 0 if hardly any other frame did.
+[[nodiscard]] std::size_t count_doubled(const std::vector<Attempted>& readings, const std::vector<Time>& arrivals);
+
+}  // namespace absenc::client
