@@ -177,7 +177,7 @@ class Encoder {
   [[nodiscard]] const Options& options() const;
   /// Returns the settings of the address that describe joint and motor.
   [[nodiscard]] const Joint& joint() const;
-  /// Returns a sentence for each setting of the port that could be better. The encoder must be connected.
+  /// Returns a sentence for each setting of the port that could be better; none while it is not connected.
   [[nodiscard]] const std::vector<std::string>& notes() const;
   /// Returns the counts of all conversations: good ones, errors by kind, repeated attempts.
   [[nodiscard]] const host::Counters& counters() const;

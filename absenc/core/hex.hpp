@@ -67,12 +67,4 @@ consteval auto hex_bytes() {
 template <HexLiteral literal>
 inline constexpr auto hex = detail::hex_bytes<literal>();
 
-/// Static bytes that are the characters of a literal, without the terminating zero.
-template <HexLiteral literal>
-inline constexpr auto ascii = [] {
-  std::array<std::uint8_t, literal.view().size()> bytes{};
-  for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<std::uint8_t>(literal.view()[i]);
-  return bytes;
-}();
-
 }  // namespace absenc

@@ -64,7 +64,7 @@ HistoryWriter::HistoryWriter(std::string path, const HistoryLimits& limits)
     open();
   } catch (const HistoryInUse&) {
     throw;
-  } catch (const Failure& failure) {
+  } catch (const std::runtime_error& failure) {  // client::Failure or os::Failure
     trouble_ = failure.what();
     reader_.refuse(trouble_);
   }

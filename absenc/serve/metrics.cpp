@@ -91,7 +91,7 @@ std::string metrics(const Fleet::Watches& watches, const ServerFigures& figures)
   each("absenc_readings_total", "counter", "good readings", [](const Snapshot& s) { return s.readings; });
   each("absenc_losses_total", "counter", "number of port losses", [](const Snapshot& s) { return s.losses; });
   each("absenc_repeated_total", "counter", "repeated requests", [](const Snapshot& s) { return s.counters.repeated; });
-  each("absenc_age_seconds", "gauge", "age of the last reading, or of the last change of state",
+  each("absenc_age_seconds", "gauge", "time since the last reading; before the first one, since the start",
        [](const Snapshot& s) { return seconds_of(s.age); });
   each("absenc_rate_hertz", "gauge", "good readings per second", [](const Snapshot& s) { return s.rate; });
   page.metric("absenc_errors_total", "counter", "failed attempts by kind, including repetitions");

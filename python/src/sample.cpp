@@ -88,8 +88,10 @@ void bind_sample(py::module_& module) {
                              "Whether the position is valid; None: not reported.")
       .def_property_readonly("multiturn_valid", &PyReading::multiturn_valid,
                              "Whether the revolutions are valid; None: not reported, or the encoder has none.")
-      .def_property_readonly("alarms", &PyReading::alarms,
-                             "Names of the raised alarms; []: all are reported clear; None: not all are reported.")
+      .def_property_readonly(
+          "alarms", &PyReading::alarms,
+          "Names of the raised alarms; []: all are reported clear; None: none is raised, but not all are "
+          "reported.")
       .def_property_readonly("status", &PyReading::status,
                              "Names of the status flags that are set; None: not reported.")
       .def_property_readonly(

@@ -79,7 +79,7 @@ void assign(WireChannels& found, LinkKind link, std::span<const std::string> cha
     if (wire == wires.size()) {
       throw UsageError(fmt::format("--channel {} is one too many: the wires are {}", part, fmt::join(wires, ", ")));
     }
-    found.found = link == LinkKind::full_duplex;
+    found.assumed = link == LinkKind::full_duplex;
   }
   found.wires[wire] = find_channel(channels, part);
 }
@@ -135,7 +135,7 @@ WireChannels find_wires(LinkKind link, std::span<const std::string> channels, st
         std::any_of(found.wires.begin(), found.wires.end(), [](const auto& one) { return one.has_value(); });
     if (!any && !is_clocked(link) && channels.size() <= wires.size()) {
       for (unsigned i = 0; i < channels.size(); ++i) found.wires[i] = i;
-      found.found = link == LinkKind::full_duplex;
+      found.assumed = link == LinkKind::full_duplex;
     }
   }
   std::size_t missing = 0;

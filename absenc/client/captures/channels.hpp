@@ -20,7 +20,7 @@ namespace absenc::client {
 /// was not recorded.
 struct WireChannels {
   std::vector<std::optional<unsigned>> wires;
-  bool found = false;  // full duplex: true if neither --channel nor channel names show which wire is the host's
+  bool assumed = false;  // full duplex: true if neither --channel nor channel names show which wire is the host's
 };
 
 /// Assigns channels by --channel ("D0", "clock=D0"); without it, by the channels' names or, if no name fits, in order.

@@ -64,8 +64,13 @@ struct Decoded::Parts {
       hand_over();
     } catch (const Stopped&) {
     } catch (...) {
+      const std::exception_ptr failure = std::current_exception();
+      try {
+        if (filled > 0) hand_over();  // the rows before the failure
+      } catch (const Stopped&) {
+      }
       const std::lock_guard lock(mutex);
-      thrown = std::current_exception();
+      thrown = failure;
     }
     const std::lock_guard lock(mutex);
     ended = true;

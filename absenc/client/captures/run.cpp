@@ -175,8 +175,8 @@ CaptureRun::Lines CaptureRun::find_lines() const {
     lines.channels.push_back(*wires.wires[i]);
   }
   const std::size_t count = lines.settings.channel_count = lines.channels.size();
-  if (count == 1 && (wires.found || unit_.link == LinkKind::half_duplex)) lines.settings.channels[0] = Carries::both;
-  if (count == 2 && wires.found) lines.settings.channels = {Carries::detect, Carries::detect};
+  if (count == 1 && (wires.assumed || unit_.link == LinkKind::half_duplex)) lines.settings.channels[0] = Carries::both;
+  if (count == 2 && wires.assumed) lines.settings.channels = {Carries::detect, Carries::detect};
   return lines;
 }
 

@@ -104,7 +104,10 @@ class ConnectionOn final : public Connection {
 
   void disconnect() override { link_.reset(); }
   bool connected() const override { return link_ != nullptr; }
-  const std::vector<std::string>& notes() const override { return link_->link().notes; }
+  const std::vector<std::string>& notes() const override {
+    static const std::vector<std::string> none;
+    return link_ != nullptr ? link_->link().notes : none;
+  }
 
   Outcome read(host::Take take) override {
     const Command* command = uri().reads != nullptr ? uri().reads : find_command(unit(), Verb::read);

@@ -35,7 +35,10 @@ Procedure scan(DialogOf<P>& dialog, Nodes<addresses>& nodes) {
       continue;
     }
     const Result<typename P::Reply> second = co_await dialog.attempt(request_to(i)).once();
-    if (!first && !second && second.error() == Error::timeout) continue;
+    if (!first && !second && second.error() == Error::timeout) {
+      noise = 0;
+      continue;
+    }
     nodes.there[i] = any = true;
     // Two complete but invalid answers come from one encoder, so they are no clash.
     nodes.clash[i] = !first && !second && (is_damage(first.error()) || is_damage(second.error()));

@@ -80,7 +80,7 @@ Part<Error> read_registers(ControlDialog<F>& dialog, ControlMaster& master, Byte
   Error error = Error::none;
   const unsigned slave = dialog.format().slave;
   ByteBuffer<control_most> before;
-  for (unsigned attempt = 0; attempt < control_attempts; ++attempt) {
+  for (unsigned attempts = control_attempts; attempts > 0; --attempts) {
     master.read(slave, first, count);
     error = co_await run_control_frame(dialog, master);
     const Bytes data = master.frame().data;
@@ -97,7 +97,7 @@ Part<Error> read_registers(ControlDialog<F>& dialog, ControlMaster& master, Byte
     if (!stopped) co_return Error::none;
     first += static_cast<unsigned>(data.size());
     count -= data.size();
-    attempt = 0;
+    attempts = control_attempts + 1;  // the next register has all attempts
     before = {};
   }
   co_return error;

@@ -42,7 +42,7 @@ attr_t attributes_of(Style style, bool colours) {
 std::string shown(std::string_view text, std::size_t width) {
   std::string line(text.substr(0, width));
   std::replace_if(
-      line.begin(), line.end(), [](char c) { return c < ' ' || c == 0x7F; }, '?');
+      line.begin(), line.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
   return line;
 }
 
