@@ -37,6 +37,15 @@ struct BitView {
     return value << count | window(first) >> (register_bits - count);
   }
 
+  /// Returns the same as `load` for 1 to 64 bits. Where a machine word has 64 bits it needs no loop, so that decoders
+  /// of formats with few fields are fast; the code is repeated where it is called.
+  [[nodiscard, gnu::always_inline]] constexpr std::uint64_t load_quickly(std::size_t first, unsigned count) const {
+    if constexpr (register_bits < 64) return load(first, count);
+    const std::uint64_t begin = window(first);
+    if (count <= window_bits) return begin >> (64 - count);
+    return begin >> 32 << (count - 32) | std::uint64_t{window(first + 32)} >> (96 - count);
+  }
+
   /// Returns the index behind the run of equal bits that begins at `first`; `size` if the run reaches the end.
   [[nodiscard]] constexpr std::size_t end_of_run(std::size_t first) const {
     const std::size_t ones = first < size && (*this)[first] ? 0 : ~std::size_t{0};
@@ -47,14 +56,13 @@ struct BitView {
     return size;
   }
 
- private:
-  static constexpr unsigned register_bits = sizeof(std::size_t) * 8;
-  static constexpr unsigned window_bits = register_bits - 7;
+  static constexpr unsigned register_bits = sizeof(std::size_t) * 8;  ///< Number of bits of a machine word.
+  static constexpr unsigned window_bits = register_bits - 7;          ///< Number of bits that `window` always has.
 
-  // Returns one machine word whose top bit is the view's bit `first`. At least its top `window_bits` bits are the
-  // view's bits from `first` on; bits behind the last byte are 0.
+  /// Returns one machine word whose top bit is the view's bit `first`, which is less than eight for each byte. At least
+  /// its top `window_bits` bits are the view's bits from `first` on; bits behind the last byte are 0.
   [[nodiscard, gnu::always_inline]] constexpr std::size_t window(std::size_t first) const {
-    if (bytes.size() < sizeof(std::size_t)) return short_window(first);
+    if (bytes.size() < sizeof(std::size_t)) return short_window(bytes.data(), bytes.size(), first);
     const std::size_t at = std::min(first / 8, bytes.size() - sizeof(std::size_t));
     if (std::is_constant_evaluated()) {  // at compile time clang 14 has not instantiated `register_at` yet
       std::size_t value = 0;
@@ -63,6 +71,8 @@ struct BitView {
     }
     return register_at(at, std::make_index_sequence<sizeof(std::size_t)>{}) << (first - 8 * at);
   }
+
+ private:
   // Loads a machine word without a loop, so that the compiler emits a single load where the processor has one.
   template <std::size_t... i>
   [[nodiscard]] constexpr std::size_t register_at(std::size_t at, std::index_sequence<i...>) const {
@@ -70,10 +80,12 @@ struct BitView {
     return ((std::size_t{from[i]} << (register_bits - 8 - 8 * i)) | ...);
   }
   // Returns the same machine word as `window`, for views with fewer bytes than a machine word.
-  [[nodiscard, gnu::noinline]] constexpr std::size_t short_window(std::size_t first) const {
+  // The arguments fit into registers: a call with the address of a view would make every view live in memory.
+  [[nodiscard, gnu::noinline]] static constexpr std::size_t short_window(const std::uint8_t* bytes, std::size_t count,
+                                                                         std::size_t first) {
     std::size_t value = 0;
     unsigned shift = register_bits;
-    for (const std::uint8_t byte : bytes) value |= std::size_t{byte} << (shift -= 8);
+    for (std::size_t i = 0; i < count; ++i) value |= std::size_t{bytes[i]} << (shift -= 8);
     return value << first;
   }
 };

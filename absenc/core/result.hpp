@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 
 namespace absenc {
@@ -88,6 +89,10 @@ class [[nodiscard]] Result {
   constexpr Result(T&& value) : value_(std::move(value)) {}
   /// Makes a failed result that holds `error`, which is not `Error::none`.
   constexpr Result(Error error) : error_(error) {}
+  /// Makes a result that holds the value that `make` returns, which is constructed in place instead of moved.
+  template <class Make>
+  requires std::is_same_v<std::invoke_result_t<Make>, T>
+  [[gnu::always_inline]] constexpr explicit Result(Make make) : value_(make()) {}
 
   /// Returns whether the result holds a value, and no error.
   [[nodiscard]] constexpr bool has_value() const { return error_ == Error::none; }

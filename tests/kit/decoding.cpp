@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <memory>
 
 #include "tests/kit/frames.hpp"
 #include "tests/kit/kit.hpp"
@@ -141,8 +142,15 @@ class Decoding {
     findings_.require(holds, [&] { return std::string(vector_.id) + " " + text(); });
   }
 
-  Error decode(const OwnedFrame& reply, FieldSink& sink) const {
-    return unit_.decode(options_, request_.frame(), reply.frame(), sink);
+  // Decodes the frame, and checks that the decoder of many frames gives the same.
+  Error decode(const OwnedFrame& reply, ReportedFields& seen) {
+    const Error error = unit_.decode(options_, request_.frame(), reply.frame(), seen);
+    if (decoder_ == nullptr) return error;
+    ReportedFields many;
+    const Error same = decoder_->decode(request_.frame(), reply.frame(), many);
+    require(same == error && many.fields == seen.fields && many.readings == seen.readings,
+            [&] { return "decodes to something else among many frames: " + to_text(many.fields); });
+    return error;
   }
 
   // Checks that the decoder refuses the frame, and reports no field or reading together with the error.
@@ -207,6 +215,9 @@ class Decoding {
   Findings& findings_;
   OwnedFrame request_ = frame_of(unit_, vector_.request);
   OwnedFrame reply_ = frame_of(unit_, vector_.reply);
+  std::unique_ptr<std::byte[]> storage_ = std::make_unique<std::byte[]>(unit_.decoder_storage);
+  FrameDecoder* decoder_ =
+      unit_.decoder != nullptr ? unit_.decoder(options_, {storage_.get(), unit_.decoder_storage}) : nullptr;
 };
 
 }  // namespace

@@ -26,6 +26,7 @@ enum class Mistake : std::uint8_t {
   needs_more_storage,   // `host_storage` is smaller than the host needs
   overflows_storage,    // the host is constructed even if the storage is too small
   ignores_last_byte,    // `decode` ignores the last byte
+  differs_among_many,   // the decoder of many frames refuses a good frame
   wrong_bit_positions,  // the stated bit positions cover only a part of the position
   ignores_condition,    // the virtual encoder ignores its condition
   never_ends,           // the host waits for ever if no byte arrives
@@ -208,6 +209,10 @@ struct Toy {
     sink.put_reading(reading_of(*position));
     return Error::none;
   }
+  struct Refusing final : FrameDecoder {
+    Error decode(Frame, Frame, FieldSink&) const override { return Error::bad_checksum; }
+  };
+  static FrameDecoder* decoder(const Options&, std::span<std::byte> storage) { return new (storage.data()) Refusing; }
   static bool takes(Arguments arguments) { return arguments.empty() || mistake == Mistake::accepts_all_arguments; }
   static Result<std::size_t> encode(const Options&, const Command&, Arguments arguments, MutableBytes request) {
     if (mistake == Mistake::has_no_request || !takes(arguments)) return Error::invalid_argument;
@@ -263,6 +268,10 @@ inline constexpr Unit unit = [] {
   made.host_storage = sizeof(typename Made::Host) - (mistake == Mistake::needs_more_storage ? 8 : 0);
   made.device_storage = sizeof(typename Made::Encoder);
   made.decode = Made::decode;
+  if (mistake == Mistake::differs_among_many) {
+    made.decoder = Made::decoder;
+    made.decoder_storage = sizeof(typename Made::Refusing);
+  }
   made.encode = Made::encode;
   made.frame_end = Made::frame_end;
   made.host = Made::host;

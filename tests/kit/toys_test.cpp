@@ -94,6 +94,11 @@ TEST(KitToys, FindsDecoderThatIgnoresByte) {
               Contains(HasSubstr("bit 31 flipped is accepted")));
 }
 
+TEST(KitToys, FindsDecoderThatDiffersAmongManyFrames) {
+  EXPECT_THAT(check_decoding(toy::unit<Mistake::differs_among_many>).texts(),
+              Contains(HasSubstr("something else among many frames")));
+}
+
 TEST(KitToys, FindsWrongBitPositions) {
   EXPECT_THAT(check_places(toy::unit<Mistake::wrong_bit_positions>).texts(), Contains(HasSubstr("has more bits")));
 }

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -19,14 +20,21 @@ namespace absenc::capture {
 class Judge {
  public:
   /// `unit` must outlive the judge.
-  Judge(const Unit& unit, const Options& options) : unit_(&unit), options_(options), decoded_(options.has_word()) {}
+  Judge(const Unit& unit, const Options& options)
+      : unit_(&unit),
+        options_(options),
+        storage_(std::make_unique<std::byte[]>(unit.decoder_storage)),
+        decoded_(options.has_word()) {
+    if (unit.decoder != nullptr) decoder_ = unit.decoder(options, {storage_.get(), unit.decoder_storage});
+  }
 
   [[nodiscard]] const Unit& unit() const { return *unit_; }
 
   /// Decodes a request and its reply with the unit, and returns the error. `contents` then returns the decoded content.
   Error decode(const Frame& request, const Frame& reply) {
     decoded_.clear();
-    const Error error = unit_->decode(options_, request, reply, decoded_);
+    const Error error = decoder_ != nullptr ? decoder_->decode(request, reply, decoded_)
+                                            : unit_->decode(options_, request, reply, decoded_);
     if (error != Error::none) decoded_.clear();
     return error;
   }
@@ -113,6 +121,8 @@ class Judge {
 
   const Unit* unit_;
   Options options_;
+  std::unique_ptr<std::byte[]> storage_;  // of the decoder
+  FrameDecoder* decoder_ = nullptr;
   DecodedFields decoded_;
 };
 

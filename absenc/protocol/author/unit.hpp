@@ -54,13 +54,41 @@ struct Descriptor {
 
   /// Checks a frame and puts its fields into `sink`, as Unit::decode. Returns the first error.
   static constexpr Error decode(const Options& values, Frame asked, Frame frame, FieldSink& sink) {
-    if constexpr (declared.decode != nullptr) {
-      return declared.decode(declared.format(values), asked, frame, sink);
-    } else if constexpr (Clocked<P>) {
-      return decode_bits(declared.format(values), to_bits(frame), sink);
-    } else {
-      return decode_bytes(declared.format(values), asked, frame, sink);
+    return decode_by(declared.format(values), asked, frame, sink);
+  }
+  /// Checks a frame of an encoder with the format `f` and puts its fields into `sink`. `AnyFormat`: Format, or Format
+  /// compiled. Returns the first error.
+  template <class AnyFormat>
+  static constexpr Error decode_by(const AnyFormat& f, Frame asked, Frame frame, FieldSink& sink) {
+    if constexpr (declared.decode_control != nullptr) {
+      if (!asked.empty()) return declared.decode_control(asked, frame, sink);
     }
+    if constexpr (declared.decode != nullptr) {
+      return declared.decode(f, asked, frame, sink);
+    } else if constexpr (Clocked<P>) {
+      return decode_bits(f, to_bits(frame), sink);
+    } else {
+      return decode_bytes(f, asked, frame, sink);
+    }
+  }
+
+  /// Whether the protocol compiles formats, so that a decoder of many frames is faster than `decode`.
+  static constexpr bool compiles_formats = requires { typename Format::Compiled; };
+  /// Decodes frames by the compiled format of the options.
+  template <class F = Format>
+  class Decoder final : public FrameDecoder {
+   public:
+    explicit Decoder(const Options& values) : format_(declared.format(values)) {}
+    Error decode(Frame request, Frame reply, FieldSink& sink) const override {
+      return decode_by(format_, request, reply, sink);
+    }
+
+   private:
+    typename F::Compiled format_;
+  };
+  /// Constructs a decoder in `storage`, as Unit::decoder.
+  static FrameDecoder* decoder(const Options& values, std::span<std::byte> storage) {
+    return absenc::detail::make_in<Decoder<>>(storage, values);
   }
 
   /// Returns whether the options of the format `f` do not contradict each other.
@@ -71,7 +99,8 @@ struct Descriptor {
 
   /// Checks the bits of a transfer of a clocked link and puts their fields and reading into `sink`. Returns the first
   /// error.
-  static constexpr Error decode_bits(const Format& f, BitView bits, FieldSink& sink) {
+  template <class AnyFormat>
+  static constexpr Error decode_bits(const AnyFormat& f, const BitView& bits, FieldSink& sink) {
     if (!is_usable(f)) return Error::invalid_argument;
     const auto reply = P::decode(f, bits);
     if (!reply) return reply.error();
@@ -351,6 +380,10 @@ struct Descriptor {
     if constexpr (declared.report.explain != nullptr) unit.explain = explain;
     if constexpr (has_requests && declared.is_answered == nullptr) unit.is_answered = is_answered;
     if constexpr (has_requests) unit.pause = pause;
+    if constexpr (compiles_formats) {
+      unit.decoder = decoder;
+      unit.decoder_storage = sizeof(Decoder<>);
+    }
     return unit;
   }
 };

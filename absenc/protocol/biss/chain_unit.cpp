@@ -207,7 +207,7 @@ constexpr Declaration<ProtocolOf<ChainFormat>, VirtualEncoderOf<ChainFormat>> ch
     .line = line_of<ChainFormat>,
     .resolution = chain_resolution,
     .is_usable = is_chain_possible,
-    .decode = decode_frame<chain_report, is_chain_possible, ChainFormat>,
+    .decode_control = decode_control_frame,
     .encode = encode_control<ChainFormat>,
     .is_checked = is_chain_checked,
     .control_bit = control_bit,

@@ -231,21 +231,11 @@ constexpr LineSettings line_of(const F&) {
   return line_settings;  // the conversation sets the clock rate itself
 }
 
-/// Decodes a position frame into `sink` and returns its error. If `asked` is not empty, decodes a control frame
-/// instead: `asked` has its CDM bits, `answered` its CDS bits.
-template <const auto& report, auto is_usable, class F>
-constexpr Error decode_frame(const F& format, Frame asked, Frame answered, FieldSink& sink) {
-  if (!asked.empty()) {
-    const Result<ControlFrame> frame = decode_control(author::to_bits(asked), author::to_bits(answered));
-    if (!frame) return frame.error();
-    register_fields.put(sink, results_of(*frame, !answered.empty()));
-    return Error::none;
-  }
-  if (!is_usable(format)) return Error::invalid_argument;
-  const auto reply = detail::decoded(format, author::to_bits(answered));
-  if (!reply) return reply.error();
-  report.put_reply(sink, format, {}, *reply);
-  sink.put_reading(reading_of(format, *reply));
+/// Decodes a control frame into `sink` and returns its error: `asked` has its CDM bits, `answered` its CDS bits.
+inline Error decode_control_frame(Frame asked, Frame answered, FieldSink& sink) {
+  const Result<ControlFrame> frame = decode_control(author::to_bits(asked), author::to_bits(answered));
+  if (!frame) return frame.error();
+  register_fields.put(sink, results_of(*frame, !answered.empty()));
   return Error::none;
 }
 /// Returns the index of the CDS bit in a frame; no value if the frame ends before it.

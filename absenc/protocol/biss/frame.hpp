@@ -5,15 +5,18 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
+#include <type_traits>
 
 #include "absenc/core/bit_view.hpp"
 #include "absenc/core/result.hpp"
 #include "absenc/core/time.hpp"
 #include "absenc/link/line.hpp"
 #include "absenc/protocol/biss/check.hpp"
+#include "absenc/protocol/biss/compiled_channel.hpp"
 #include "absenc/protocol/word.hpp"
 
 namespace absenc::biss {
@@ -79,8 +82,11 @@ enum class RegisterOrder : std::uint8_t { big, little };
 /// Values of the option `register_byte_order`, in the order of RegisterOrder.
 inline constexpr std::array<std::string_view, 2> register_order_choices{"big", "little"};
 
+class CompiledFormat;
+
 /// Frame layout and settings of one encoder, as the unit's options select them.
 struct Format {
+  using Compiled = CompiledFormat;  ///< The format compiled (compiled_format.hpp), to decode many frames.
   WordFormat word = "position:19 error:1! warning:1!"_word;  ///< Layout of the position word.
   Check check{};                                             ///< Life counter and CRC that follow the position word.
   /// Whether the encoder is linear, and the length of a count.
@@ -181,7 +187,7 @@ constexpr Error take_data(const Source& source, const Bits& bits, std::size_t fi
 
 // Decodes the bits before the data: sets `first` to the index after the CDS bit, and ACK, delay and CDS in `head`.
 template <class ReplyType>
-constexpr Error take_head(BitView samples, std::size_t size, Cds cds, ReplyType& head, std::size_t& first) {
+constexpr Error take_head(const BitView& samples, std::size_t size, Cds cds, ReplyType& head, std::size_t& first) {
   if (samples.size == 0) return Error::wrong_length;
   const std::size_t idle = samples[0] ? samples.end_of_run(0) : 0;
   if (idle == samples.size) return Error::line_stuck;
@@ -198,7 +204,7 @@ constexpr Error take_head(BitView samples, std::size_t size, Cds cds, ReplyType&
 }
 
 template <class Source, class ReplyType>
-constexpr Error take_frame(const Source& source, BitView samples, Cds cds, ReplyType& reply) {
+constexpr Error take_frame(const Source& source, const BitView& samples, Cds cds, ReplyType& reply) {
   const unsigned size = data_bits(source.format);
   std::size_t first = 0;
   const Error error = take_head(samples, size, cds, reply, first);
@@ -212,11 +218,68 @@ constexpr Error take_frame(const Source& source, BitView samples, Cds cds, Reply
 }
 
 template <class Source>
-constexpr auto decode_by(const Source& source, BitView samples, Cds cds) {
+constexpr auto decode_by(const Source& source, const BitView& samples, Cds cds) {
   Result result = ReplyWith<typename Source::Word>{};
   const Error error = take_frame(source, samples, cds, *result);
   if (error != Error::none) result = error;
   return result;
+}
+
+// The samples before the data of a frame without errors.
+struct Head {
+  unsigned idle = 0;      // samples before the ACK
+  unsigned ack_bits = 0;  // zeros between them and the start bit
+  bool cds = false;
+
+  [[nodiscard]] constexpr std::size_t first() const { return std::size_t{idle} + ack_bits + 2; }
+  [[nodiscard]] constexpr unsigned delay_bits() const { return idle > idle_bits ? idle - idle_bits : 0; }
+};
+
+// Finds the data, `size` bits, of a frame whose start bit and CDS are in the first machine word, as they nearly always
+// are. Returns false for any other frame, and for one with an error.
+[[nodiscard, gnu::always_inline]] constexpr bool find_data(const BitView& samples, std::size_t size, Cds cds,
+                                                           Head& head) {
+  if (samples.bytes.size() < sizeof(std::size_t)) return false;
+  const std::size_t window = samples.window(0);
+  head.idle = static_cast<unsigned>(std::countl_one(window));
+  if (head.idle == BitView::register_bits) return false;
+  const std::size_t from_ack = window << head.idle;
+  if (from_ack == 0) return false;
+  head.ack_bits = static_cast<unsigned>(std::countl_zero(from_ack));
+  if (head.first() > BitView::register_bits || head.first() + size > samples.size) return false;
+  head.cds = (from_ack << head.ack_bits << 1 >> (BitView::register_bits - 1)) != 0;
+  return !head.cds || cds == Cds::any;
+}
+
+// Decodes a usual frame without errors by a compiled word and check; calls `otherwise` for any other frame. The reply
+// is constructed in place: it is as large as all that is computed for it.
+template <class Values, class Channel, class Otherwise>
+[[nodiscard, gnu::always_inline]] constexpr Result<ReplyWith<Values>> decode_compiled(const Channel& channel,
+                                                                                      const BitView& samples, Cds cds,
+                                                                                      Otherwise otherwise) {
+  Head head;
+  if (!find_data(samples, channel.bits(), cds, head)) return otherwise();
+  const typename Channel::Bits sent = channel.load(samples, head.first());
+  if (!channel.is_right(sent)) return otherwise();
+  return Result<ReplyWith<Values>>([&] {
+    return ReplyWith<Values>{.ack_bits = head.ack_bits,
+                             .word = channel.template values_of<Values>(sent),
+                             .life_counter = channel.life_counter_of(sent),
+                             .cds = head.cds,
+                             .crc = sent.crc,
+                             .delay_bits = head.delay_bits()};
+  });
+}
+
+// The word and check of a format that is known at compile time, with a table of just the rows that its bits need.
+template <const Format& format>
+inline constexpr CompiledChannel<std::conditional_t<(format.check.width > 8), std::uint16_t, std::uint8_t>,
+                                 (format.word.bits() + life_counter_bits + 3) / 4>
+    known_channel{format};
+
+template <const Format& format>
+[[nodiscard, gnu::noinline]] constexpr Result<ReplyTo<format>> decode_known(const BitView& samples, Cds cds) {
+  return decode_by(Known<format>{}, samples, cds);
 }
 
 // Appends word, life counter and CRC to `out`.
@@ -245,7 +308,7 @@ constexpr bool append_head(const ReplyType& head, std::size_t size, BitBuffer<Ca
 /// Decodes a frame from samples that begin while SLO is idle (1) or in the ACK (0). Samples after the CRC are ignored.
 /// Errors: wrong_length (no samples), line_stuck (all samples alike), bad_framing (no start bit, or CDS is 1 where it
 /// must be 0), truncated (the frame is longer than the samples), bad_checksum (CRC, or the parity of the word).
-[[nodiscard]] constexpr Result<Reply> decode(const Format& format, BitView samples, Cds cds = Cds::zero) {
+[[nodiscard]] constexpr Result<Reply> decode(const Format& format, const BitView& samples, Cds cds = Cds::zero) {
   return detail::decode_by(Given<Format>{format, format.word}, samples, cds);
 }
 
@@ -253,8 +316,14 @@ constexpr bool append_head(const ReplyType& head, std::size_t size, BitBuffer<Ca
 /// are those of `decode` with a format as an argument. The word in the result has the member `values` only if the
 /// format has further fields.
 template <const Format& format>
-[[nodiscard]] constexpr Result<ReplyTo<format>> decode(BitView samples, Cds cds = Cds::zero) {
-  return detail::decode_by(Known<format>{}, samples, cds);
+[[nodiscard]] constexpr Result<ReplyTo<format>> decode(const BitView& samples, Cds cds = Cds::zero) {
+  // A small processor has no use for two ways: its numbers of 64 bits are no faster, and its memory is small.
+  if constexpr (BitView::register_bits >= 64 && detail::known_channel<format>.is_possible()) {
+    return detail::decode_compiled<typename Known<format>::Word>(
+        detail::known_channel<format>, samples, cds, [&] { return detail::decode_known<format>(samples, cds); });
+  } else {
+    return detail::decode_by(Known<format>{}, samples, cds);
+  }
 }
 
 /// Appends idle bits, ACK, start bit, CDS, word and check to `out`; `reply.crc` is ignored. `silent`: bit n is set if

@@ -21,7 +21,7 @@ class ControlDialog;
 namespace detail {
 // Decodes a frame of any format. Argument-dependent lookup finds `decode`, so that formats can be declared later.
 template <class F>
-constexpr auto decoded(const F& format, BitView samples, Cds cds = Cds::zero) {
+constexpr auto decoded(const F& format, const BitView& samples, Cds cds = Cds::zero) {
   return decode(format, samples, cds);
 }
 }  // namespace detail
@@ -50,8 +50,11 @@ struct ProtocolOf {
   static constexpr unsigned all_clocks(const F& format) {
     return std::min(most_clocks, biss::clocks(format, format.latency + longest_delay, format.period()));
   }
-  /// Decodes a frame with all checks; returns the first error if one fails.
-  static constexpr Result<Reply> decode(const F& format, BitView samples) { return detail::decoded(format, samples); }
+  /// Decodes a frame with all checks; returns the first error if one fails. `AnyFormat`: F, or F compiled.
+  template <class AnyFormat>
+  static constexpr Result<Reply> decode(const AnyFormat& format, const BitView& samples) {
+    return detail::decoded(format, samples);
+  }
   /// Converts a reply to a reading.
   static constexpr Reading reading(const F& format, const Reply& reply) { return reading_of(format, reply); }
 };

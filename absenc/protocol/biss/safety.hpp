@@ -27,8 +27,11 @@ struct ChannelData {
   std::uint16_t crc = 0;          ///< CRC as the encoder sent it.
 };
 
+class CompiledSafetyFormat;
+
 /// Format of BiSS Safety: two position words of one encoder in a frame.
 struct SafetyFormat {
+  using Compiled = CompiledSafetyFormat;  ///< The format compiled (compiled_format.hpp), to decode many frames.
   /// Format of the control position word (CPW), which is sent first.
   Channel cpw{.word = "position:24 error:1! warning:1!"_word};
   /// Format of the safety position word (SPW).
@@ -80,7 +83,9 @@ constexpr Error take_channel(const Channel& channel, BitView samples, std::size_
 
 // Returns the upper bits of the position, with the turns above them if both words have turns: near zero, one count
 // changes the turns.
-constexpr std::uint64_t compared_bits(const Channel& channel, const Word& word, unsigned bits, unsigned turns) {
+template <std::size_t size>
+constexpr std::uint64_t compared_bits(const Channel& channel, const WordWith<size>& word, unsigned bits,
+                                      unsigned turns) {
   const std::uint64_t position = word.position >> (channel.word.bits_of(Meaning::position) - bits);
   return ((word.multiturn & low_mask(turns)) << bits | position) & low_mask(turns + bits);
 }
@@ -95,14 +100,22 @@ constexpr std::uint64_t compared_bits(const Channel& channel, const Word& word, 
 }
 
 /// Returns whether both words have the same position, within one count of the compared bits.
-[[nodiscard]] constexpr bool positions_agree(const SafetyFormat& format, const SafetyReply& reply) {
+template <std::size_t size>
+[[nodiscard]] constexpr bool positions_agree(const SafetyFormat& format, const WordWith<size>& cpw,
+                                             const WordWith<size>& spw) {
   const unsigned turns = std::min({format.cpw.word.bits_of(Meaning::multiturn),
                                    format.spw.word.bits_of(Meaning::multiturn), 64u - format.compare_bits});
   const unsigned bits = format.compare_bits;
-  const std::uint64_t difference = (detail::compared_bits(format.cpw, reply.cpw.word, bits, turns) -
-                                    detail::compared_bits(format.spw, reply.spw.word, bits, turns) + 1) &
-                                   low_mask(turns + bits);
+  const std::uint64_t difference =
+      (detail::compared_bits(format.cpw, cpw, bits, turns) - detail::compared_bits(format.spw, spw, bits, turns) + 1) &
+      low_mask(turns + bits);
   return difference <= 2;
+}
+
+/// Returns whether the life counter of a frame follows that of the frame before; true if either is unknown.
+[[nodiscard]] constexpr bool life_counter_follows(const SafetyFormat& format, unsigned life_counter) {
+  if (!format.spw.check.life_counter || format.previous_life_counter < 0) return true;
+  return life_counter == (static_cast<unsigned>(format.previous_life_counter + 1) & low_mask(life_counter_bits));
 }
 
 /// Decodes a frame of BiSS Safety. Errors: those of `decode` for one word, line_stuck also for a word and CRC of zeros
@@ -116,10 +129,8 @@ constexpr std::uint64_t compared_bits(const Channel& channel, const Word& word, 
   if (error == Error::none) error = detail::take_channel(format.cpw, samples, first, reply.cpw);
   if (error == Error::none) error = detail::take_channel(format.spw, samples, first + data_bits(format.cpw), reply.spw);
   if (error != Error::none) return error;
-  const bool counts = format.spw.check.life_counter && format.previous_life_counter >= 0;
-  const unsigned follows = static_cast<unsigned>(format.previous_life_counter + 1) & low_mask(life_counter_bits);
-  if (counts && reply.spw.life_counter != follows) return Error::sequence_mismatch;
-  if (!positions_agree(format, reply)) return Error::cross_check_failed;
+  if (!life_counter_follows(format, reply.spw.life_counter)) return Error::sequence_mismatch;
+  if (!positions_agree(format, reply.cpw.word, reply.spw.word)) return Error::cross_check_failed;
   return reply;
 }
 

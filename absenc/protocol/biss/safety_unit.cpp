@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "absenc/protocol/biss/commands.hpp"
+#include "absenc/protocol/biss/compiled_format.hpp"
 #include "absenc/protocol/biss/device.hpp"
 #include "absenc/protocol/biss/fields.hpp"
 #include "absenc/protocol/biss/unit.hpp"
@@ -200,7 +201,7 @@ constexpr Declaration<ProtocolOf<SafetyFormat>, VirtualEncoderOf<SafetyFormat>> 
     .line = line_of<SafetyFormat>,
     .resolution = safety_resolution,
     .is_usable = is_safety_possible,
-    .decode = decode_frame<safety_report, is_safety_possible, SafetyFormat>,
+    .decode_control = decode_control_frame,
     .encode = encode_control<SafetyFormat>,
     .is_checked = is_safety_checked,
     .control_bit = control_bit,

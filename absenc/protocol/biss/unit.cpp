@@ -5,6 +5,7 @@
 
 #include "absenc/protocol/author/unit.hpp"
 #include "absenc/protocol/biss/commands.hpp"
+#include "absenc/protocol/biss/compiled_format.hpp"
 #include "absenc/protocol/biss/device.hpp"
 #include "absenc/protocol/biss/fields.hpp"
 #include "absenc/protocol/biss/host.hpp"
@@ -113,7 +114,7 @@ constexpr Declaration<Protocol, VirtualEncoderOf<Format>> declaration{
     .line = line_of<Format>,
     .resolution = resolution_by,
     .is_usable = is_possible,
-    .decode = decode_frame<report, is_possible, Format>,
+    .decode_control = decode_control_frame,
     .encode = encode_control<Format>,
     .is_checked = is_checked,
     .bits = bits_in,

@@ -28,8 +28,11 @@ enum class AfterWord : std::uint8_t {
   separated,  ///< A zero, then the word again.
 };
 
+class CompiledFormat;
+
 /// Frame layout and settings of one encoder, as the unit's options select them.
 struct Format {
+  using Compiled = CompiledFormat;           ///< The format compiled (compiled_format.hpp), to decode many words.
   WordFormat word = "position:12"_word;      ///< Layout of the position word: its fields in the order of the line.
   AfterWord after_word = AfterWord::repeat;  ///< What the encoder sends after its word.
   /// Number of clocks after the word, whose bits are compared with `after_word`; with as many as the word has bits, the

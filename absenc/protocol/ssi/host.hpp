@@ -25,8 +25,11 @@ struct Protocol {
   }
   /// Returns the number of clocks of one reading.
   static constexpr unsigned clocks(const Format& format) { return ssi::clocks(format); }
-  /// Decodes a reply with all checks; returns the first error if one fails.
-  static constexpr Result<Word> decode(const Format& format, BitView bits) { return ssi::decode(format, bits); }
+  /// Decodes a reply with all checks; returns the first error if one fails. `AnyFormat`: Format, or Format compiled.
+  template <class AnyFormat>
+  static constexpr Result<Word> decode(const AnyFormat& format, const BitView& bits) {
+    return ssi::decode(format, bits);
+  }
   /// Converts a reply to a reading.
   static constexpr Reading reading(const Format& format, const Word& word) {
     WordContents contents = contents_of(format.word);

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "absenc/protocol/author/unit.hpp"
+#include "absenc/protocol/ssi/compiled_format.hpp"
 #include "absenc/protocol/ssi/device.hpp"
 #include "absenc/protocol/ssi/host.hpp"
 #include "absenc/protocol/ssi/vectors.hpp"
