@@ -1,10 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // Measures decoding and checking of frames: T-format compared with the same work and a bitwise CRC, BiSS compared with
-// the method of a motor controller.
+// the method of a motor controller. With bissc_extract.h of mjbots/moteus in an include folder, its decoder is the
+// reference, otherwise that of sampled_peer.hpp.
 #include <algorithm>
 #include <array>
+#include <span>
 
-#include "absenc/protocol/biss/frame.hpp"
+#if __has_include(<bissc_extract.h>)
+#include <bissc_extract.h>
+#endif
+
+#include "absenc/protocol/biss/compiled_format.hpp"
 #include "absenc/protocol/tformat/frame.hpp"
 #include "bench/ratio.hpp"
 #include "bench/sampled_peer.hpp"
@@ -50,76 +56,127 @@ void tformat_everything_reference(benchmark::State& state) {
 }
 BENCHMARK(tformat_everything_reference);
 
-// Inputs of the BiSS benchmarks: 64 samples of SLO with a frame of 32 bits. They are packed bits, as from an SPI
-// controller or an E201-9S, or one byte per sample, as from a port that a timer samples. Times of ACK and positions
-// differ.
-constexpr biss::Format known{.word = "position:32 error:1! warning:1!"_word};
+// ---- BiSS: formats of 19, 32 and 57 bits. Each is decoded as a format known at compile time, compiled when it is
+// chosen, and by the motor controller's decoder, which is the reference of both.
 
+template <unsigned bits>
+constexpr biss::Format format_of{.word = biss::word_with_status({.position = bits})};
+
+// Samples of SLO with a frame: packed bits, as from an SPI controller or an E201-9S, and one byte per sample, as from a
+// port that a timer samples.
+constexpr std::size_t samples_size = 96;
 struct Samples {
-  std::array<std::uint8_t, 8> packed;
-  alignas(4) std::array<std::uint8_t, 64> sampled;
+  std::array<std::uint8_t, samples_size / 8> packed;
+  alignas(4) std::array<std::uint8_t, samples_size> sampled;
+  std::uint64_t position;
 };
 
 constexpr unsigned pin = 5;
 
+// Returns frames with different times of ACK and positions.
+template <unsigned bits>
 std::array<Samples, 64> biss_samples() {
   std::array<Samples, 64> made{};
   for (std::uint64_t i = 0; i < made.size(); ++i) {
-    BitBuffer<64> samples;
-    biss::encode(known, {.ack_bits = static_cast<unsigned>(1 + i % 20), .word = {.position = i * 0x9E3779B1}}, samples);
-    while (samples.size() < 64) samples.append(0, 1);
-    std::copy_n(samples.bytes().begin(), 8, made[i].packed.begin());
-    for (std::size_t bit = 0; bit < 64; ++bit) made[i].sampled[bit] = samples.view()[bit] ? 1u << pin : 0;
+    made[i].position = i * 0x9E37'79B9'7F4A'7C15 >> (64 - bits);
+    BitBuffer<samples_size> samples;
+    biss::encode(format_of<bits>,
+                 {.ack_bits = static_cast<unsigned>(1 + i % 20), .word = {.position = made[i].position}}, samples);
+    while (samples.size() < samples_size) samples.append(0, 1);
+    std::copy_n(samples.bytes().begin(), made[i].packed.size(), made[i].packed.begin());
+    for (std::size_t bit = 0; bit < samples_size; ++bit) made[i].sampled[bit] = samples.view()[bit] ? 1u << pin : 0;
   }
   return made;
 }
 
 // Decodes frames and checks each decoded position; a wrong position ends the benchmark.
-template <class Decode>
+template <unsigned bits, class Decode>
 void run_biss(benchmark::State& state, Decode&& decode) {
-  const auto frames = biss_samples();
+  const auto frames = biss_samples<bits>();
   std::size_t i = 0;
   for (auto _ : state) {
-    const std::size_t frame = i++ % frames.size();
-    if (decode(frames[frame]) != (frame * 0x9E37'79B1 & 0xFFFF'FFFF)) {
+    const Samples& frame = frames[i++ % frames.size()];
+    if (decode(frame) != frame.position) {
       state.SkipWithError("a wrong position");
       break;
     }
   }
 }
 
-void biss_known_format(benchmark::State& state) {
-  run_biss(state, [](const Samples& samples) {
-    const auto reply = biss::decode<known>({samples.packed, 64});
+template <unsigned bits>
+void biss_known(benchmark::State& state) {
+  run_biss<bits>(state, [](const Samples& samples) {
+    const auto reply = biss::decode<format_of<bits>>({samples.packed, samples_size});
     benchmark::DoNotOptimize(reply);
-    return reply ? reply->word.position : 0;
+    return reply ? reply->word.position : ~std::uint64_t{0};
   });
 }
-BENCHMARK(biss_known_format);
 
-void biss_any_format(benchmark::State& state) {
-  biss::Format any = known;
-  benchmark::DoNotOptimize(any);
-  run_biss(state, [&any](const Samples& samples) {
-    const Result<biss::Reply> reply = biss::decode(any, {samples.packed, 64});
+template <unsigned bits>
+void biss_compiled(benchmark::State& state) {
+  biss::CompiledFormat compiled(format_of<bits>);
+  bench::hide(compiled);
+  run_biss<bits>(state, [&compiled](const Samples& samples) {
+    const Result<biss::Reply> reply = biss::decode(compiled, {samples.packed, samples_size});
     benchmark::DoNotOptimize(reply);
-    return reply ? reply->word.position : 0;
+    return reply ? reply->word.position : ~std::uint64_t{0};
   });
 }
-BENCHMARK(biss_any_format);
 
-// The motor controller's decoder, the reference of both BiSS benchmarks.
+// The format as it is, whose fields are looked up for each frame.
+template <unsigned bits>
+void biss_any(benchmark::State& state) {
+  biss::Format any = format_of<bits>;
+  bench::hide(any);
+  run_biss<bits>(state, [&any](const Samples& samples) {
+    const Result<biss::Reply> reply = biss::decode(any, {samples.packed, samples_size});
+    benchmark::DoNotOptimize(reply);
+    return reply ? reply->word.position : ~std::uint64_t{0};
+  });
+}
+
+// The motor controller's decoder is called, not inlined, so that it decodes any number of bits.
+#if __has_include(<bissc_extract.h>)
+using Peer = moteus::BisscExtractConfig;
+constexpr Peer peer_of(unsigned bits) { return {pin, static_cast<std::uint8_t>(bits), 6, false}; }
+[[gnu::noinline]] moteus::BisscExtractResult decode_by_peer(const Peer& peer, std::span<const std::uint8_t> samples) {
+  return moteus::ExtractBisscFrame(samples.data(), static_cast<std::uint32_t>(samples.size()), peer);
+}
+std::uint64_t position_of(const moteus::BisscExtractResult& result) {
+  return result.error == moteus::BisscExtractError::kNone ? result.data_value : ~std::uint64_t{0};
+}
+#else
+using Peer = bench::SampledPeer;
+constexpr Peer peer_of(unsigned bits) { return {pin, bits}; }
+[[gnu::noinline]] bench::SampledPosition decode_by_peer(const Peer& peer, std::span<const std::uint8_t> samples) {
+  return bench::take(peer, samples);
+}
+std::uint64_t position_of(const bench::SampledPosition& result) {
+  return result.error == bench::SampledPosition::Error::none ? result.position : ~std::uint64_t{0};
+}
+#endif
+
+template <unsigned bits>
 void biss_peer(benchmark::State& state) {
-  bench::SampledPeer peer{pin, 32};
-  benchmark::DoNotOptimize(peer);
-  run_biss(state, [&peer](const Samples& samples) {
-    const bench::SampledPosition result = bench::take(peer, samples.sampled);
+  Peer peer = peer_of(bits);
+  bench::hide(peer);
+  run_biss<bits>(state, [&peer](const Samples& samples) {
+    const auto result = decode_by_peer(peer, samples.sampled);
     benchmark::DoNotOptimize(result);
-    return result.error == bench::SampledPosition::Error::none ? result.position : 0;
+    return position_of(result);
   });
 }
-BENCHMARK(biss_peer)->Name("biss_known_format_reference");
-BENCHMARK(biss_peer)->Name("biss_any_format_reference");
+
+#define BISS_BENCHMARKS(bits)                                            \
+  BENCHMARK(biss_known<bits>)->Name("biss_known_" #bits);                \
+  BENCHMARK(biss_compiled<bits>)->Name("biss_compiled_" #bits);          \
+  BENCHMARK(biss_any<bits>)->Name("biss_any_" #bits);                    \
+  BENCHMARK(biss_peer<bits>)->Name("biss_known_" #bits "_reference");    \
+  BENCHMARK(biss_peer<bits>)->Name("biss_compiled_" #bits "_reference"); \
+  BENCHMARK(biss_peer<bits>)->Name("biss_any_" #bits "_reference")
+BISS_BENCHMARKS(19);
+BISS_BENCHMARKS(32);
+BISS_BENCHMARKS(57);
 
 }  // namespace
 

@@ -12,6 +12,13 @@
 
 namespace absenc::bench {
 
+/// Hides the value of `object` from the compiler. benchmark::DoNotOptimize may give g++ a register for a small object
+/// that is not constant, which then has another value.
+template <class Object>
+void hide(Object& object) {
+  asm volatile("" : : "r"(&object) : "memory");
+}
+
 /// Prints the usual table of results, then the ratios of the medians over all repetitions.
 class RatioReporter : public benchmark::ConsoleReporter {
  public:

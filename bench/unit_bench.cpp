@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Measures Unit::decode of every unit, as captures, `decode` and `identify` call it: options, checks, and output of
-// every field. The frames are the unit's valid vectors with a reply. The time per frame is compared with that of one
-// CRC over the reply's bytes, computed bit by bit.
+// every field; and Unit::decoder, as captures call it for many frames, of units that have one. The frames are the
+// unit's valid vectors with a reply. The time per frame is compared with that of one CRC over the reply's bytes,
+// computed bit by bit.
 #include <algorithm>
 #include <array>
 #include <cstdio>
 #include <cstdlib>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -88,6 +90,25 @@ void decode(benchmark::State& state, const Unit& unit) {
   }
 }
 
+void decode_many(benchmark::State& state, const Unit& unit) {
+  const std::vector<Sample> samples = samples_of(unit);
+  std::vector<std::unique_ptr<std::byte[]>> storage;
+  std::vector<FrameDecoder*> decoders;
+  for (const Sample& sample : samples) {
+    storage.push_back(std::make_unique<std::byte[]>(unit.decoder_storage));
+    decoders.push_back(unit.decoder(sample.options, {storage.back().get(), unit.decoder_storage}));
+  }
+  Sink sink;
+  std::size_t i = 0;
+  for (auto _ : state) {
+    const std::size_t at = i++ % samples.size();
+    if (decoders[at]->decode(samples[at].request.frame(), samples[at].reply.frame(), sink) != Error::none) {
+      state.SkipWithError("a good frame is refused");
+      break;
+    }
+  }
+}
+
 void reference(benchmark::State& state, const Unit& unit) {
   constexpr CrcParameters crc{16, 0x8005, 0xFFFF, true, true, 0};
   const std::vector<Sample> samples = samples_of(unit);
@@ -103,6 +124,11 @@ int main(int argc, char** argv) {
     if (samples_of(*unit).empty()) continue;
     benchmark::RegisterBenchmark(name.c_str(), [unit](benchmark::State& state) { decode(state, *unit); });
     benchmark::RegisterBenchmark((name + "_reference").c_str(),
+                                 [unit](benchmark::State& state) { reference(state, *unit); });
+    if (unit->decoder == nullptr) continue;
+    benchmark::RegisterBenchmark((name + "_many").c_str(),
+                                 [unit](benchmark::State& state) { decode_many(state, *unit); });
+    benchmark::RegisterBenchmark((name + "_many_reference").c_str(),
                                  [unit](benchmark::State& state) { reference(state, *unit); });
   }
   return absenc::bench::run_with_ratios(argc, argv);
