@@ -19,6 +19,12 @@ PATIENT = "latency=40"  # milliseconds that a busy machine may add to a reply
 # The check bits of these protocols accept so many damaged replies that they do not show how the bytes were changed.
 WEAK_CHECK = {"amt21"}
 
+# Findings that also explain what a protocol's frames become.
+ALSO = {
+    # Byte 00 of channel 2 is outside the checksum: a frame without it is a good frame of has_ch2=false.
+    ("encolink", "NUL lost"): "wrong_settings",
+}
+
 # Each row: name, fault, ids of the findings of which the verdict must name one. "good" means that doctor finds no
 # fault.
 PROXIED = [
@@ -116,12 +122,13 @@ class DoctorFaults(Case):
              faults.FaultProxy(make(), emulator.path) as proxy:
             found = self.examine(f"{unit}:{proxy.path}?{PATIENT}")
             # A fault that changed no byte (because no reply contained the byte) cannot be found. Fewer than ten changed
-            # replies only prove that replies are damaged, not how.
-            also = "good" if proxy.changed == 0 else "sometimes_damaged" if proxy.changed < 10 else ""
+            # replies only prove that replies are damaged, not how; a single one may be due to a busy computer.
+            also = "good sometimes_damaged" if proxy.changed <= 1 else "sometimes_damaged" if proxy.changed < 10 else ""
             if unit in WEAK_CHECK and wanted in BYTE_CHANGES:
                 also += " sometimes_damaged damaged_bits damaged_bursts"
             if what == "chatter" and proxy.requests == 0:  # a stream is never silent either
-                also += " always_damaged"
+                also += " always_damaged sometimes_damaged"
+            also += f" {ALSO.get((unit, what), '')}"
             self.assert_first(found, f"{wanted} {also}", f"{unit}: {what}")
             return f"{unit:14} {what:24} {first_of(found)} ({proxy.changed} changed)"
 
@@ -139,7 +146,8 @@ class DoctorFaults(Case):
         with Emulator(self.directory, *(["--model", actual] if actual else []), "--motion", "rpm=20", protocol=unit,
                       name=f"{unit}-{actual}-{said}") as emulator:
             found = self.examine(f"{unit}:{emulator.path}?{PATIENT}" + (f"&model={said}" if said else ""))
-            self.assert_first(found, "wrong_settings good", f"{unit}: {actual} read as {said}")
+            # stuck_bits: the encoder has fewer bits than the model, and always sends zeros in their place.
+            self.assert_first(found, "wrong_settings good stuck_bits", f"{unit}: {actual} read as {said}")
             return f"{unit:14} {actual or 'usual'} read as {said or 'usual'}: {found['verdict'][:100]}"
 
     def test_another_address(self):

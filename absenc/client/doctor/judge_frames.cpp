@@ -91,6 +91,16 @@ bool holds_two(const Case& one, const Attempted& attempt) {
   return false;
 }
 
+// Returns whether the attempt received a good reply to any request, followed by a good reply to its own.
+bool begins_with_reply(const Case& one, const Attempted& attempt) {
+  const Frame request = attempt.exchange.request.frame();
+  const Bytes bytes = attempt.exchange.reply.bytes;
+  for (std::size_t size = 2; size + 1 < bytes.size(); ++size) {
+    if (is_good(one, {}, bytes.first(size)) && is_good(one, request, bytes.subspan(size))) return true;
+  }
+  return false;
+}
+
 std::optional<Finding> two_frames(const Case& one, const All& all) {
   if (one.unit.link != LinkKind::half_duplex && one.unit.link != LinkKind::full_duplex) return {};
   const auto is_double = [&](const Attempted* attempt) { return holds_two(one, *attempt); };
@@ -353,8 +363,7 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
                                 fmt::format("{} {}", frame, frame)}));
     return;
   }
-  const auto is_out_of_range = [](const Attempted* attempt) { return attempt->error == Error::out_of_range; };
-  if (!all.empty() && std::ranges::all_of(all, is_out_of_range)) {
+  if (most(all, [](const Attempted& attempt) { return attempt.error == Error::out_of_range; })) {
     // The checksums are right: another format may fit all replies, the good ones, too.
     if (std::optional<Finding> other = other_settings(one, heard(one.seen.readings))) {
       findings.push_back(std::move(*other));
@@ -399,9 +408,13 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
                                {fmt::format("{}", one.seen.overfull), fmt::format("{}", one.seen.readings.size()),
                                 to_hex(example.first(std::min(example.size(), most_shown)))}));
   } else if (std::optional<Finding> extra = extra_bytes(one, all)) {
-    // A complete reply after a reply may be the next reply, if the first was late.
-    const bool may_be_late = std::ranges::all_of(all, [&](const Attempted* one_of) { return holds_two(one, *one_of); });
-    if (!may_be_late || !may_be_the_computer(one.seen, all.size())) findings.push_back(std::move(*extra));
+    // A late reply stands before the reply to the next request, whose own request seems not to be answered.
+    const bool are_late =
+        std::ranges::all_of(all, [&](const Attempted* one_of) { return begins_with_reply(one, *one_of); });
+    const auto silent = static_cast<std::size_t>(std::ranges::count_if(one.seen.readings, is_silent) +
+                                                 std::ranges::count_if(one.seen.repeated, is_silent));
+    const bool is_explained = are_late && (silent >= all.size() || may_be_the_computer(one.seen, all.size()));
+    if (!is_explained) findings.push_back(std::move(*extra));
   } else if (!all.empty() || !repeated.empty()) {
     All both = all;
     both.insert(both.end(), repeated.begin(), repeated.end());
