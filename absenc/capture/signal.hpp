@@ -45,6 +45,8 @@ struct Character {
   Tick end = 0;    // time of the end of the stop bit
   std::uint8_t value = 0;
   std::uint8_t channel = 0;  // index among the decoded channels, not among the file's channels
+  // Data bits above the eighth, until decode_async makes two characters of a byte each.
+  std::uint8_t high = 0;
   bool bad_parity = false;
   bool bad_stop = false;  // framing error; with value 0 and a line that stays low it is a break
   bool is_break = false;

@@ -34,6 +34,9 @@ struct LineSettings {
   std::uint32_t rate = 0;        ///< bits per second: baud rate, SPI or shift clock, CAN bit rate
   Parity parity = Parity::none;  ///< Parity of each character.
   std::uint8_t stop_bits = 1;    ///< Number of stop bits, 1 or 2.
+  /// Data bits of each character, 5 to 16, the lowest first. A character of more than 8 bits carries two bytes, the low
+  /// one first; the high one has zeros above the data. No UART has such characters.
+  std::uint8_t data_bits = 8;
   std::uint8_t spi_mode = 0;     ///< spi, clocked: 2 * CPOL + CPHA
   std::uint8_t idle_clocks = 0;  ///< clocked: number of clocks before the first bit, during which the line stays idle
   Time select_lead{};            ///< spi: minimum time from chip select to the first clock
@@ -55,12 +58,16 @@ struct LineSettings {
   [[nodiscard]] constexpr Time bits(std::uint64_t count) const {
     return Time((count * 1'000'000'000 + rate / 2) / rate);
   }
-  /// Returns the number of bits of one asynchronous character: start, 8 data, parity, stop.
+  /// Returns the number of bits of one asynchronous character: start, data, parity, stop.
   [[nodiscard]] constexpr unsigned character_bits() const {
-    return 9u + (parity == Parity::none ? 0u : 1u) + stop_bits;
+    return 1u + data_bits + (parity == Parity::none ? 0u : 1u) + stop_bits;
   }
+  /// Returns the number of bytes that one character carries, 1 or 2.
+  [[nodiscard]] constexpr unsigned character_bytes() const { return data_bits > 8 ? 2 : 1; }
   /// Returns the duration of one asynchronous character.
   [[nodiscard]] constexpr Time character() const { return bits(character_bits()); }
+  /// Returns the share of a character's duration that one byte has: half of it if two bytes share the character.
+  [[nodiscard]] constexpr Time byte_time() const { return character() / character_bytes(); }
 };
 
 }  // namespace absenc

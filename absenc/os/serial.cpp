@@ -121,6 +121,11 @@ void SerialPort::change_rate(std::uint32_t rate) {
 
 void SerialPort::apply(const LineSettings& settings) {
   if (settings.rate == 0) throw Failure(Failure::Kind::bad_rate, "a serial port needs a baud rate above 0");
+  if (settings.data_bits > 8 && !pseudo_) {
+    throw Failure(Failure::Kind::unsupported, "the port " + path_ + " is a UART, and no UART has " +
+                                                  std::to_string(settings.data_bits) +
+                                                  "-bit characters: decode a capture, or emulate with sim:");
+  }
   const std::optional<LineSettings> set = set_terminal(descriptor(), settings);
   if (!set) fail(errno);  // the port may disappear between two calls
   const LineSettings given = *set;
@@ -133,10 +138,12 @@ void SerialPort::apply(const LineSettings& settings) {
                       ": use that, or another adapter");
   }
   if (pseudo_) return;  // a pseudo-terminal has no line: parity is ignored and characters take no time
-  if (given.parity != settings.parity || given.stop_bits != settings.stop_bits) {
-    throw Failure(Failure::Kind::unsupported,
-                  "the port " + path_ + " cannot do " + std::string(name_of(settings.parity)) + " parity with " +
-                      std::to_string(settings.stop_bits) + " stop bits: use another adapter");
+  if (given.parity != settings.parity || given.stop_bits != settings.stop_bits ||
+      given.data_bits != settings.data_bits) {
+    throw Failure(Failure::Kind::unsupported, "the port " + path_ + " cannot do " + std::to_string(settings.data_bits) +
+                                                  " data bits, " + std::string(name_of(settings.parity)) +
+                                                  " parity and " + std::to_string(settings.stop_bits) +
+                                                  " stop bits: use another adapter");
   }
   set_character_time(settings.character());
 }

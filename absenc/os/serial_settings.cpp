@@ -4,6 +4,8 @@
 #include <asm/termbits.h>
 #include <sys/ioctl.h>
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <cerrno>
 
@@ -13,12 +15,16 @@ namespace {
 
 static_assert(sizeof(termios2) == sizeof(TerminalState));
 
+// Flags of 5, 6, 7 and 8 data bits.
+constexpr std::array<tcflag_t, 4> sizes{CS5, CS6, CS7, CS8};
+
 void write_line(termios2& state, const LineSettings& settings) {
   state.c_iflag = 0;
   state.c_oflag = 0;
   state.c_lflag = 0;
   state.c_cflag &= ~static_cast<tcflag_t>(CBAUD | CIBAUD | CSIZE | CSTOPB | PARENB | PARODD | CMSPAR | CRTSCTS);
-  state.c_cflag |= BOTHER | CS8 | CREAD | CLOCAL;
+  state.c_cflag |= BOTHER | CREAD | CLOCAL;
+  state.c_cflag |= sizes[std::min<std::size_t>(settings.data_bits, 8) - 5];
   if (settings.parity != Parity::none) state.c_cflag |= PARENB;
   if (settings.parity == Parity::odd) state.c_cflag |= PARODD;
   if (settings.stop_bits == 2) state.c_cflag |= CSTOPB;
@@ -34,6 +40,8 @@ LineSettings read_line(const termios2& state) {
   settings.rate = state.c_ospeed;
   if ((state.c_cflag & PARENB) != 0) settings.parity = (state.c_cflag & PARODD) != 0 ? Parity::odd : Parity::even;
   settings.stop_bits = (state.c_cflag & CSTOPB) != 0 ? 2 : 1;
+  const auto* const size = std::find(sizes.begin(), sizes.end(), state.c_cflag & CSIZE);
+  settings.data_bits = static_cast<std::uint8_t>(5 + (size - sizes.begin()));
   return settings;
 }
 

@@ -25,7 +25,7 @@ using TerminalState = std::array<std::byte, 44>;
 /// have disappeared.
 void restore_terminal(int descriptor, const TerminalState& state);
 
-/// Sets raw mode, 8 data bits, no flow control, and `settings`, after all written bytes have been sent. Returns the
+/// Sets raw mode, no flow control, and `settings` with up to 8 data bits, after all written bytes have been sent. Returns the
 /// settings that the driver has applied, which may differ; nothing on error, with errno set.
 std::optional<LineSettings> set_terminal(int descriptor, const LineSettings& settings);
 

@@ -13,10 +13,10 @@ namespace absenc::sim {
 /// Several devices on one half-duplex line, without bit timing. Not a Line, which is exact to the nanosecond.
 ///
 /// Every device receives the host's bytes and those of the other devices. Characters that are sent at the same time
-/// reach the line as their AND, as in Line, but aligned to whole characters.
+/// reach the line as their AND, as in Line, but aligned to whole bytes.
 class Bus final : public Machine<std::uint8_t> {
  public:
-  /// `devices` must outlive the bus. `character` is the duration of one character on the line.
+  /// `devices` must outlive the bus. `character` is the duration of one byte on the line.
   Bus(const std::vector<Machine<std::uint8_t>*>& devices, Time character);
 
   /// Processes an event that the port reports.

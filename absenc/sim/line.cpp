@@ -251,7 +251,7 @@ void Line<Item>::deadline(Node node) {
   }
   // No silence is reported while another node sends: the end of its character starts the limit again.
   if (busy_towards(state)) {
-    state.due = std::min(now_ + state.settings.character(), state.timer_due);
+    state.due = std::min(now_ + state.settings.byte_time(), state.timer_due);
     return;
   }
   state.silence.reported();

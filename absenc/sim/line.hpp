@@ -19,6 +19,9 @@ enum class NodeRole : std::uint8_t { host, device };
 /// One shared line with the machines on it. Hosts and devices are machines of the same kind; the role only decides who
 /// drives the clock (SPI, clocked), and which pair a full-duplex node drives.
 ///
+/// A character of more than 8 data bits carries two bytes, which arrive one after the other, each after half of the
+/// character's time.
+///
 /// Characters that overlap on one pair reach every receiver as the AND of both (an idle line is high); a character that
 /// begins during another one is received as part of that other one. CAN frames are arbitrated by identifier; the same
 /// identifier with other data is a `line_error` for every node. A node receives its own characters only with

@@ -52,7 +52,7 @@ struct Line<Item>::State {
   Time start{};                    ///< start of the transfer; CAN: start of the frame
   std::size_t index = 0;           ///< index of the item of `out` that is on the wire
   std::size_t on_wire = 0;         ///< number of items of `out` that have been, are or will be on the wire
-  Time each{};                     ///< duration of one character
+  Time each{};                     ///< duration of one byte
 
   /// Returns whether a transfer of this node has begun and has items left to send.
   [[nodiscard]] bool frame_pending() const {

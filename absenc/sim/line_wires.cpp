@@ -17,7 +17,7 @@ namespace {
 bool compatible(const LineSettings& a, const LineSettings& b) {
   const std::uint64_t larger = std::max(a.rate, b.rate);
   const std::uint64_t difference = larger - std::min(a.rate, b.rate);
-  return difference * 20 <= larger && a.parity == b.parity;
+  return difference * 20 <= larger && a.parity == b.parity && a.data_bits == b.data_bits;
 }
 
 // Returns the arbitration field as a number: 11 identifier bits, RTR or SRR, IDE, 18 identifier bits, RTR. The lower
@@ -73,7 +73,7 @@ bool Line<Item>::busy_towards(const State& node) const {
 template <class Item>
 void Line<Item>::begin_characters(Node node) {
   State& state = *nodes_[node];
-  state.each = state.settings.character();
+  state.each = state.settings.byte_time();
   state.on_wire = state.out.size();
   schedule(ScheduledEvent::Kind::character, now_ + state.each, node);
   frame_character(node);

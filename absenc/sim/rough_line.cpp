@@ -28,7 +28,7 @@ RoughLine<Item>::RoughLine(LinkKind kind, LineSettings settings, Machine<Item>& 
       settings_(settings),
       device_(device),
       random_(seed),
-      character_(settings.character()),
+      byte_time_(settings.byte_time()),
       host_rate_(settings.rate),
       device_rate_(settings.rate) {
   serve_device();
@@ -66,7 +66,7 @@ void RoughLine<Item>::begin(const Step<Item>& step) {
         deliver_request({&frame, 1});
       }
     } else if (!request_.empty()) {
-      run_until(time_ + character_ * static_cast<std::int64_t>(request_.size()));
+      run_until(time_ + byte_time_ * static_cast<std::int64_t>(request_.size()));
       deliver_request(request_);
     }
   }
@@ -78,7 +78,7 @@ template <class Item>
 void RoughLine<Item>::set_rate(std::uint32_t& end, std::uint32_t rate) {
   if (host_is_clock()) return;
   end = settings_.rate = rate;
-  character_ = settings_.character();
+  byte_time_ = settings_.byte_time();
 }
 
 template <class Item>
@@ -256,8 +256,8 @@ void RoughLine<Item>::send(const Step<Item>& step) {
       enqueue(begun, side_.end, side_.end, {&frame, 1});
     }
   } else {
-    side_.end += character_ * static_cast<std::int64_t>(out_.size());
-    enqueue(start, start + character_, side_.end, out_);
+    side_.end += byte_time_ * static_cast<std::int64_t>(out_.size());
+    enqueue(start, start + byte_time_, side_.end, out_);
   }
 }
 

@@ -119,7 +119,7 @@ class RoughLine final : public Port<Item> {
 
   Time time_{};
   Time last_event_at_{};
-  Time character_;
+  Time byte_time_;
   std::uint32_t host_rate_;
   std::uint32_t device_rate_;
   Side side_;

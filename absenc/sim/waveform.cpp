@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "absenc/core/bit_view.hpp"
+#include "absenc/core/bits.hpp"
 #include "absenc/sim/can_bits.hpp"
 
 namespace absenc::sim {
@@ -68,8 +69,9 @@ Waveform::Waveform(LinkKind kind, const LineSettings& settings, Sink& sink)
 
 void Waveform::observe(Line<std::uint8_t>& observed) {
   observed.observe([this, &observed](std::size_t sender, Time start, Time end, std::uint8_t byte) {
-    character(observed.role(sender), start, end, byte);
-    settle(observed.settled());
+    this->byte(observed.role(sender), start, end, byte);
+    // A character of two bytes is drawn after its second one, from the begin of the first.
+    settle(std::min({observed.settled(), first_bytes_[0].start, first_bytes_[1].start}));
   });
   observed.observe_transfers([this, &observed](const Line<std::uint8_t>::Transfer& seen) {
     transfer(seen);
@@ -98,19 +100,49 @@ void Waveform::comment(Time at, std::string words) {
   comments_.insert(behind, {at, std::move(words)});
 }
 
-void Waveform::character(NodeRole sender, Time start, Time end, std::uint8_t byte) {
+std::size_t Waveform::data_wire(NodeRole sender) const {
+  return kind_ == LinkKind::half_duplex ? line : sender == NodeRole::host ? host : device;
+}
+
+// Draws a byte, together with the other byte of its character if two share one.
+void Waveform::byte(NodeRole sender, Time start, Time end, std::uint8_t byte) {
+  if (settings_.character_bytes() == 1) return character(sender, start, end, byte);
+  FirstByte& first = first_bytes_[data_wire(sender)];
+  if (first.start != never && first.sender == sender && first.end == start) {
+    character(sender, std::exchange(first.start, never), end, static_cast<std::uint16_t>(byte << 8 | first.byte));
+    return;
+  }
+  draw_lone(first);
+  first = {sender, start, end, byte};
+}
+
+// Draws the first byte of a character whose second byte was never sent: the line rests at 1 instead.
+void Waveform::draw_lone(FirstByte& first) {
+  if (first.start == never) return;
+  const Time start = std::exchange(first.start, never);
+  character(first.sender, start, first.end + (first.end - start), static_cast<std::uint16_t>(0xFF00 | first.byte));
+}
+
+void Waveform::finish() {
+  for (FirstByte& first : first_bytes_) draw_lone(first);
+  settle(never);
+}
+
+void Waveform::character(NodeRole sender, Time start, Time end, std::uint16_t value) {
   const bool by_host = sender == NodeRole::host;
-  const std::size_t wire = kind_ == LinkKind::half_duplex ? line : by_host ? host : device;
+  const std::size_t wire = data_wire(sender);
   const unsigned bits = settings_.character_bits();
   const EvenDivision edge{start, end - start, bits};
   drive(wire, edge(0), edge(1));
-  for (unsigned i = 0; i < 8; ++i) {
-    if ((byte >> i & 1) == 0) drive(wire, edge(i + 1), edge(i + 2));
+  const unsigned data_bits = settings_.data_bits;
+  for (unsigned i = 0; i < data_bits; ++i) {
+    if ((value >> i & 1) == 0) drive(wire, edge(i + 1), edge(i + 2));
   }
-  const bool odd = std::popcount(byte) % 2 != 0;
+  const bool odd = std::popcount(value & low_mask(data_bits)) % 2 != 0;
   const bool parity = settings_.parity == Parity::even ? odd : !odd;
-  if (settings_.parity != Parity::none && !parity) drive(wire, edge(9), edge(10));
-  comment(start, (by_host ? "host " : "device ") + to_hex(Bytes(&byte, 1)));
+  if (settings_.parity != Parity::none && !parity) drive(wire, edge(data_bits + 1), edge(data_bits + 2));
+  const std::array<std::uint8_t, 2> bytes{static_cast<std::uint8_t>(value), static_cast<std::uint8_t>(value >> 8)};
+  comment(start, (by_host ? "host " : "device ") + to_hex(Bytes(bytes).first(settings_.character_bytes())));
   end_ = std::max(end_, end);
 }
 

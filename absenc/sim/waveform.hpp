@@ -2,6 +2,7 @@
 // Draws the wires of a simulated conversation: the times at which each wire changes its level.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -54,8 +55,8 @@ class Waveform {
   /// waveform must outlive the line.
   void observe(Line<CanFrame>& line);
 
-  /// Draws one asynchronous character.
-  void character(NodeRole sender, Time start, Time end, std::uint8_t byte);
+  /// Draws one asynchronous character with the data bits `value`.
+  void character(NodeRole sender, Time start, Time end, std::uint16_t value);
   /// Draws a transfer of an SPI or clocked link.
   void transfer(const Line<std::uint8_t>::Transfer& transfer);
   /// Draws a CAN frame.
@@ -66,7 +67,7 @@ class Waveform {
   /// Passes all changes and comments before `time` to the sink. No item drawn later may begin before `time`.
   void settle(Time time);
   /// Passes all remaining changes and comments to the sink.
-  void finish() { settle(never); }
+  void finish();
 
   /// Returns the wires; extra wires are added when their first pulse is drawn.
   [[nodiscard]] const std::vector<Wire>& wires() const { return wires_; }
@@ -86,6 +87,17 @@ class Waveform {
     std::string words;
   };
 
+  // The first byte of a character of two, whose second byte has not been on the line yet.
+  struct FirstByte {
+    NodeRole sender{};
+    Time start = never;  // never: there is none
+    Time end{};
+    std::uint8_t byte = 0;
+  };
+
+  void byte(NodeRole sender, Time start, Time end, std::uint8_t byte);
+  void draw_lone(FirstByte& first);
+  [[nodiscard]] std::size_t data_wire(NodeRole sender) const;
   void drive(std::size_t wire, Time from, Time to);
   void comment(Time at, std::string words);
   std::size_t pulse_wire(std::string_view name);
@@ -99,7 +111,8 @@ class Waveform {
   std::vector<int> drivers_;  // number of active drives of each wire
   // Level changes that the sink has not received yet, the earliest on top.
   std::priority_queue<LevelChange, std::vector<LevelChange>, std::greater<>> changes_;
-  std::vector<Comment> comments_;  // comments that the sink has not received, in the order of time
+  std::vector<Comment> comments_;           // comments that the sink has not received, in the order of time
+  std::array<FirstByte, 2> first_bytes_{};  // by the index of the data wire
   Time end_{};
 };
 

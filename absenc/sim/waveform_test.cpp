@@ -65,6 +65,45 @@ TEST(Waveform, NamesItsWires) {
   EXPECT_THAT(Picture(LinkKind::can, slow).vcd(), HasSubstr("! can $end\n"));
 }
 
+TEST(Waveform, DrawsCharactersOfFiveToSixteenDataBits) {
+  for (unsigned data_bits = 5; data_bits <= 16; ++data_bits) {
+    LineSettings settings = slow;
+    settings.data_bits = static_cast<std::uint8_t>(data_bits);
+    settings.parity = Parity::odd;
+    Picture picture(LinkKind::half_duplex, settings);
+    // All data bits but the highest are 1: the line is low in the start bit, in that bit, and in a parity bit of 0.
+    const unsigned value = (1u << (data_bits - 1)) - 1;
+    picture.character(NodeRole::host, 0us, settings.character(), static_cast<std::uint16_t>(value));
+    const bool parity = data_bits % 2 != 0;  // an even number of ones needs a 1
+    const unsigned end = data_bits + (parity ? 1 : 2);
+    EXPECT_EQ(body(picture).find("#" + std::to_string(1000 * data_bits) + "\n0!\n#" + std::to_string(1000 * end) +
+                                 "\n1!\n") != std::string::npos,
+              true)
+        << body(picture);
+  }
+}
+
+// Two bytes of a line share a character; a byte without a second one is drawn with ones.
+TEST(Waveform, DrawsTwoBytesAsOneCharacterOfSixteenBits) {
+  LineSettings settings = slow;
+  settings.data_bits = 16;
+  struct Once final : Machine<std::uint8_t> {
+    void feed(const ByteEvent&) override {}
+    ByteStep next(Time) override {
+      if (std::exchange(sent, true)) return {.at = never};
+      return {.kind = ByteStep::Kind::transfer, .out = bytes, .at = 10us};
+    }
+    std::array<std::uint8_t, 3> bytes{0x34, 0x12, 0x7F};
+    bool sent = false;
+  } host;
+  Picture picture(LinkKind::half_duplex, settings);
+  Line<std::uint8_t> line(LinkKind::half_duplex, settings);
+  picture.observe(line);
+  line.attach(NodeRole::host, host);
+  line.run_until(1ms);
+  EXPECT_THAT(picture.vcd(), HasSubstr("#10000 host 34 12 $end\n$comment #28000 host 7F FF $end"));
+}
+
 TEST(Waveform, CommentsListTheItems) {
   Picture waveform(LinkKind::full_duplex, slow);
   waveform.character(NodeRole::device, 7us, 17us, 0x00);

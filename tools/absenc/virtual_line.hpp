@@ -43,7 +43,7 @@ class VirtualLine {
       const LineSettings line = line_settings(unit, options);
       bus_ = std::make_unique<sim::FrameBus>(machines, line.rate);
     } else if (machines.size() > 1) {
-      bus_ = std::make_unique<sim::Bus>(machines, unit.line.with_some_rate().character());
+      bus_ = std::make_unique<sim::Bus>(machines, unit.line.with_some_rate().byte_time());
     }
   }
 

@@ -93,8 +93,10 @@ class WholeWay : public ::testing::TestWithParam<const Unit*> {
       EXPECT_EQ(decode_clocked(reader, wires, 1, sink).problem, "");
       return;
     }
-    const AsyncSettings each{
-        .baud = static_cast<double>(line.rate), .parity = line.parity, .stop_bits = line.stop_bits};
+    const AsyncSettings each{.baud = static_cast<double>(line.rate),
+                             .parity = line.parity,
+                             .stop_bits = line.stop_bits,
+                             .data_bits = line.data_bits};
     std::vector<AsyncLine> wires;
     if (unit.link == LinkKind::half_duplex) {
       wires = {{channel("line"), each}};

@@ -115,16 +115,17 @@ class MemoryReader final : public Reader {
 /// Draws the levels of an asynchronous line, tick by tick; an idle line is high.
 class Pen {
  public:
-  Pen(double bit, Parity parity, unsigned stop_bits) : bit_(bit), parity_(parity), stop_bits_(stop_bits) {}
+  Pen(double bit, Parity parity, unsigned stop_bits, unsigned data_bits = 8)
+      : bit_(bit), parity_(parity), stop_bits_(stop_bits), data_bits_(data_bits) {}
 
   void hold(bool level, double bits) {
     at_ += bits * bit_;
     levels.resize(std::max(levels.size(), static_cast<std::size_t>(at_)), level);
   }
-  void character(std::uint8_t value, bool good_parity = true, bool good_stop = true) {
+  void character(unsigned value, bool good_parity = true, bool good_stop = true) {
     hold(false, 1);
     bool odd = false;
-    for (unsigned i = 0; i < 8; ++i) {
+    for (unsigned i = 0; i < data_bits_; ++i) {
       const bool level = (value >> i & 1) != 0;
       odd = odd != level;
       hold(level, 1);
@@ -139,6 +140,7 @@ class Pen {
   double bit_;
   Parity parity_;
   unsigned stop_bits_;
+  unsigned data_bits_;
   double at_ = 0;
 };
 

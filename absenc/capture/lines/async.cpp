@@ -47,7 +47,7 @@ AsyncDecoder::Statistics& AsyncDecoder::Statistics::operator-=(const Statistics&
 AsyncDecoder::AsyncDecoder(const AsyncFormat& format, std::uint8_t channel, Start start)
     : format_(format),
       channel_(channel),
-      stop_(format.parity == Parity::none ? 9 : 10),
+      stop_(1 + format.data_bits + (format.parity == Parity::none ? 0 : 1)),
       length_(static_cast<Tick>(std::llround(format.bit * (stop_ + format.stop_bits)))),
       per_tick_(1 / format.bit),
       start_(start) {
@@ -91,16 +91,19 @@ std::size_t AsyncDecoder::walk(std::size_t start, Tick limit, Tick needed, Visit
 
 bool AsyncDecoder::wrong_parity(unsigned levels) const {
   if (format_.parity == Parity::none) return false;
-  return (std::popcount(levels >> 1 & 0x1FFu) % 2 != 0) != (format_.parity == Parity::odd);
+  const unsigned data_and_parity = levels >> 1 & ((2u << format_.data_bits) - 1);
+  return (std::popcount(data_and_parity) % 2 != 0) != (format_.parity == Parity::odd);
 }
 
 Character AsyncDecoder::character(const Candidate& candidate, Tick limit) const {
   const unsigned levels = candidate.levels;
+  const unsigned data = levels >> 1 & ((1u << format_.data_bits) - 1);
   const bool bad_stop = (levels >> stop_ & 1) == 0;
   return {.begin = candidate.begin,
           .end = std::min({candidate.begin + length_, candidate.next, limit}),
-          .value = static_cast<std::uint8_t>(levels >> 1),
+          .value = static_cast<std::uint8_t>(data),
           .channel = channel_,
+          .high = static_cast<std::uint8_t>(data >> 8),
           .bad_parity = wrong_parity(levels),
           .bad_stop = bad_stop,
           .is_break = bad_stop && (levels & ((2u << stop_) - 1)) == 0};

@@ -13,13 +13,14 @@
 
 namespace absenc::capture {
 
-/// Settings of an asynchronous line with 8 data bits, LSB first.
+/// Settings of an asynchronous line, whose characters have their data bits LSB first.
 struct AsyncFormat {
   double bit = 0;  // duration of a bit in ticks, at least 2.5; need not be a whole number
   bool idle_high = true;
   Parity parity = Parity::none;
   unsigned stop_bits = 1;  // number of stop bits, 1 or 2; only the first is checked, as in a receiver
   Tick glitch = 0;         // a level shorter than this is noise; 0: no filter
+  unsigned data_bits = 8;  // 5 to 16
 };
 
 /// A decoder of asynchronous characters, which decodes a capture part by part. A bit is the level at its middle,
@@ -89,7 +90,7 @@ class AsyncDecoder {
   AsyncFormat format_;
   std::uint8_t channel_;
   unsigned stop_;                  // index of the stop bit, counted from the start bit
-  std::array<Tick, 11> middle_{};  // time from the falling edge of the start bit to the middle of each bit, in ticks
+  std::array<Tick, 19> middle_{};  // time from the falling edge of the start bit to the middle of each bit, in ticks
   Tick length_;                    // duration of a character in ticks
   double per_tick_;                // number of bits per tick, at most 0.4
 

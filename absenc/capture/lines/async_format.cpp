@@ -143,7 +143,8 @@ std::optional<AsyncFormat> find_format(const Changes& changes, Tick first, Tick 
   double fewest = 0;
   for (const double bit : bits) {
     for (const bool idle_high : possible_idle(part, settings.idle)) {
-      const AsyncFormat format{bit, idle_high, settings.parity, settings.stop_bits, settings.glitch};
+      const AsyncFormat format{
+          bit, idle_high, settings.parity, settings.stop_bits, settings.glitch, settings.data_bits};
       const double found = faults(decoded(part, format), lengths, bit);
       if (best && found >= fewest - alike) continue;
       best = format;

@@ -17,6 +17,7 @@ struct AsyncSettings {
   unsigned stop_bits = 1;
   Idle idle = Idle::automatic;  // `low` means an inverted line
   Tick glitch = 0;              // a level shorter than this is noise, in ticks; 0: no filter
+  unsigned data_bits = 8;       // 5 to 16
 };
 
 /// Finds the format from the first changes of a line between `first` and `end`. It tries the given baud rate, or

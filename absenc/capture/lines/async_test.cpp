@@ -104,6 +104,67 @@ TEST(Async, ReportsWrongParity) {
   }
 }
 
+// Characters of 5 to 16 data bits, with every parity: values whose bits differ from their neighbours, and whose highest
+// bit decides.
+TEST(Async, DecodesCharactersOfFiveToSixteenDataBits) {
+  for (unsigned data_bits = 5; data_bits <= 16; ++data_bits) {
+    for (const Parity parity : {Parity::none, Parity::odd, Parity::even}) {
+      const unsigned mask = (1u << data_bits) - 1;
+      const std::vector<unsigned> wanted{0x1234 & mask, mask, 0, 1u << (data_bits - 1), 0xA5A5 & mask};
+      Pen pen(8, parity, 1, data_bits);
+      pen.hold(true, 20);
+      for (const unsigned value : wanted) pen.character(value);
+      pen.character(wanted[0], false);
+      pen.hold(true, 3);
+      const auto found = decoded(pen.levels, {.bit = 8, .parity = parity, .data_bits = data_bits});
+      ASSERT_EQ(found.size(), wanted.size() + 1) << data_bits;
+      for (std::size_t i = 0; i < wanted.size(); ++i) {
+        EXPECT_EQ(found[i].high << 8 | found[i].value, static_cast<int>(wanted[i])) << data_bits;
+        EXPECT_FALSE(found[i].bad_stop || found[i].bad_parity) << data_bits;
+      }
+      EXPECT_EQ(found.back().bad_parity, parity != Parity::none);
+      EXPECT_EQ(found[1].begin - found[0].begin, 8 * (2 + data_bits + (parity == Parity::none ? 0 : 1)));
+    }
+  }
+}
+
+// The bytes of a wide character share its time, on one line and on two, whether or not the rate is given.
+TEST(AsyncPipeline, MakesTwoCharactersOfOneWithMoreThanEightDataBits) {
+  for (const double baud : {0.0, 125e6}) {
+    Pen pen(8, Parity::none, 1, 16);
+    pen.hold(true, 40);
+    for (unsigned i = 0; i < 40; ++i) pen.character(0x1234 + 0x0517 * i);
+    pen.hold(true, 40);
+    Pen other(8, Parity::none, 1, 16);
+    other.hold(true, 50);
+    other.character(0xBEEF);
+    other.hold(true, 1);
+    other.levels.resize(pen.levels.size(), 1);
+    const Wires wires{{pen.levels, other.levels}};
+    for (const std::size_t lines : {1u, 2u}) {
+      MemoryReader reader(wires, Content::samples, 1000, 3);
+      std::vector<AsyncLine> settings;
+      for (unsigned i = 0; i < lines; ++i) settings.push_back({i, {.baud = baud, .data_bits = 16}});
+      const auto all = decoded(reader, settings);
+      ASSERT_EQ(all.outcome.problem, "");
+      std::vector<Character> found;
+      for (const Character& one : all.characters) {
+        if (one.channel == 0) found.push_back(one);
+      }
+      ASSERT_EQ(found.size(), 80u) << baud << " " << lines;
+      for (std::size_t i = 0; i < 40; ++i) {
+        const unsigned value = (0x1234 + 0x0517 * static_cast<unsigned>(i)) & 0xFFFF;
+        EXPECT_EQ(found[2 * i].value, value & 0xFF);
+        EXPECT_EQ(found[2 * i + 1].value, value >> 8);
+        EXPECT_EQ(found[2 * i].end, found[2 * i + 1].begin);
+        EXPECT_EQ(found[2 * i].begin, 320 + 144 * i);
+        EXPECT_EQ(found[2 * i].end, found[2 * i].begin + 72);
+      }
+      EXPECT_EQ(all.characters.size(), lines == 1 ? 80u : 82u);
+    }
+  }
+}
+
 TEST(Async, APulseShorterThanHalfABitIsNoStartBit) {
   Pen pen(8, Parity::none, 1);
   pen.hold(true, 12);

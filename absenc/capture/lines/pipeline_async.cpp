@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "absenc/capture/lines/blocks.hpp"
 #include "absenc/capture/lines/edges.hpp"
@@ -84,11 +85,28 @@ class AsyncDecoding {
     return least;
   }
 
+  // Replaces each character by two with a byte each, which share its time, the low byte first.
+  static void split(std::vector<Character>& characters) {
+    std::vector<Character> bytes;
+    bytes.reserve(2 * characters.size());
+    for (const Character& character : characters) {
+      Character byte = character;
+      byte.end = character.begin + (character.end - character.begin) / 2;
+      byte.high = 0;
+      bytes.push_back(byte);
+      byte.begin = std::exchange(byte.end, character.end);
+      byte.value = character.high;
+      bytes.push_back(byte);
+    }
+    characters.swap(bytes);
+  }
+
   // Delivers the characters of all lines that begin before `until`: no earlier character can follow on any line.
   // Returns false if the sink ends the decoding.
   bool deliver(Tick until) {
     const Tick end = std::min(until, end_);
     if (characters_.size() == 1) {
+      if (formats_[0].data_bits > 8) split(characters_[0]);
       const bool wanted = sink_({end, characters_[0], {}, formats_});
       characters_[0].clear();
       return wanted;
@@ -102,6 +120,7 @@ class AsyncDecoding {
     }
     std::stable_sort(ready_.begin(), ready_.end(),
                      [](const Character& a, const Character& b) { return a.begin < b.begin; });
+    if (formats_[0].data_bits > 8) split(ready_);
     return sink_({end, ready_, {}, formats_});
   }
 
@@ -198,7 +217,8 @@ std::string find_formats(const LevelReader& reader, std::span<const AsyncLine> l
   std::optional<double> bit;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const AsyncSettings& settings = lines[i].settings;
-    AsyncFormat format{0, settings.idle != Idle::low, settings.parity, settings.stop_bits, settings.glitch};
+    AsyncFormat format{
+        0, settings.idle != Idle::low, settings.parity, settings.stop_bits, settings.glitch, settings.data_bits};
     if (!unknown(settings)) {
       format.bit = static_cast<double>(ticks_per_second) / settings.baud;
     } else if (const auto found = first.format(i, settings, ticks_per_second)) {

@@ -28,7 +28,7 @@ class RequestWatch final : public Machine<Item> {
       : device_(device),
         unit_(*address.unit),
         options_(address.options),
-        character_(address.line.with_some_rate().character()) {}
+        character_(address.line.with_some_rate().byte_time()) {}
 
   void feed(const Event<Item>& event) override {
     look(event);

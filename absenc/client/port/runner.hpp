@@ -107,7 +107,7 @@ class Runner {
         storage_(std::make_unique<std::byte[]>(unit_.host_storage)),
         filter_(*this) {
     const bool characters = unit_.link == LinkKind::half_duplex || unit_.link == LinkKind::full_duplex;
-    if (characters) character_ = address.line.with_some_rate().character();
+    if (characters) character_ = address.line.with_some_rate().byte_time();
     port_.abort = [this] { return session_->abort(); };
     start_again(attempts);
   }
@@ -306,7 +306,7 @@ class Runner {
     if constexpr (!is_can) one.raw.assign(received.begin(), received.end());
   }
 
-  /// Returns the duration of a character on the line; 0 if the line carries no characters.
+  /// Returns the duration of a byte on the line; 0 if the line carries no characters.
   [[nodiscard]] Time character() const { return character_; }
   [[nodiscard]] WatchedPort<Item>& port() { return port_; }
   [[nodiscard]] const WatchedPort<Item>& port() const { return port_; }
@@ -388,7 +388,7 @@ class Runner {
   const Unit& unit_;
   Options options_;
   host::EchoMode echo_;
-  Time character_{};  // duration of a character; 0 if the line carries no characters
+  Time character_{};  // duration of a byte; 0 if the line carries no characters
   Time latency_{};
   WatchedPort<Item> port_;
   std::unique_ptr<std::byte[]> storage_;

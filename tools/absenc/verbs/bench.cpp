@@ -72,7 +72,7 @@ double line_share(const Connection& encoder, const Measurement& measurement) {
   const LineSettings& line = encoder.uri().line;
   const LinkKind link = encoder.unit().link;
   if (line.rate == 0 || (link != LinkKind::half_duplex && link != LinkKind::full_duplex)) return 0;
-  return static_cast<double>(measurement.items) * static_cast<double>(line.character().count()) /
+  return static_cast<double>(measurement.items) * static_cast<double>(line.byte_time().count()) /
          static_cast<double>(measurement.duration.count());
 }
 
