@@ -41,6 +41,7 @@ class Carrier {
   /// Reports that the last bit of the transfer, or of the pulse, was sent.
   void sent(Time now) {
     if (!is_busy() || !sending_) return;
+    if (has_more_frames()) return wait_for_frame(now);
     sending_ = item_received_ = silence_reported_ = false;
     silent_since_ = now;
     deliver({.kind = Event<Item>::Kind::sent, .at = now});
@@ -67,7 +68,7 @@ class Carrier {
     if (waiting_) {
       waiting_ = false;
       sending_ = true;
-      return line_->begin(step_);
+      return begin_stored();
     }
     if (now >= silence_end()) {
       silence_reported_ = true;
@@ -90,6 +91,21 @@ class Carrier {
  private:
   using Kind = typename Step<Item>::Kind;
 
+  [[nodiscard]] bool has_more_frames() const { return step_.frame != 0 && step_.out.size() > step_.frame; }
+  // Begins the transfer or pulse in `step_`, or the first of its frames.
+  void begin_stored() {
+    if (!has_more_frames()) return line_->begin(step_);
+    Step<Item> first = step_;
+    first.out = step_.out.first(step_.frame);
+    line_->begin(first);
+  }
+  // Drops the frame of `step_` that was sent; the others wait for the end of the pause.
+  void wait_for_frame(Time now) {
+    step_.out = step_.out.subspan(step_.frame);
+    step_.at = now + step_.width;
+    sending_ = false;
+    waiting_ = true;
+  }
   void gather(Item item, Time now) {
     items_[gathered_++] = item;
     item_received_ = true;
@@ -148,9 +164,10 @@ class Carrier {
           sending_ = !waiting_;
           silence_reported_ = true;
           expected_ = 0;
-          if (waiting_) {
-            step_ = step;
-          } else {
+          if (waiting_ || step.frame != 0) step_ = step;
+          if (!waiting_ && step.frame != 0) {
+            begin_stored();
+          } else if (!waiting_) {
             line_->begin(step);
           }
           break;
@@ -183,7 +200,7 @@ class Carrier {
   Time answer_{};
   Time gap_{};
   Time at_ = never;
-  Step<Item> step_{};  // transfer or pulse that waits for its time
+  Step<Item> step_{};  // transfer or pulse that waits for its time, or whose frames are being sent
   std::uint32_t silences_ = 0;
 };
 

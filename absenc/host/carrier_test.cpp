@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absenc/protocol/tformat/host.hpp"
@@ -71,6 +72,41 @@ struct Fed final : Machine<std::uint8_t> {
   Time gap = 1us;
   std::string all{};
 };
+
+// A machine whose request has three frames of two bytes, 10 us apart.
+struct Frames final : Machine<std::uint8_t> {
+  void feed(const ByteEvent& event) override { sent_at = event.kind == ByteEvent::Kind::sent ? event.at : never; }
+  ByteStep next(Time) override {
+    if (std::exchange(asked, true)) return {.at = never, .answer = 1us};
+    return {.kind = ByteStep::Kind::transfer, .frame = 2, .out = bytes, .at = begin, .width = 10us};
+  }
+  std::array<std::uint8_t, 6> bytes{1, 2, 3, 4, 5, 6};
+  Time begin{};
+  bool asked = false;
+  Time sent_at = never;
+};
+
+TEST_F(CarrierTest, SendsFramesOfARequestWithTheirPauses) {
+  for (const Time begin : {Time{}, Time(20us)}) {
+    Frames frames;
+    frames.begin = begin;
+    carrier.start(frames, 1us);
+    if (begin != Time{}) carrier.tick(begin);
+    EXPECT_EQ(line.sent, (std::vector<std::uint8_t>{1, 2}));
+    carrier.sent(30us);
+    EXPECT_EQ(carrier.due(), 40us);
+    carrier.tick(39us);
+    EXPECT_EQ(line.sent, (std::vector<std::uint8_t>{1, 2}));
+    carrier.tick(40us);
+    EXPECT_EQ(line.sent, (std::vector<std::uint8_t>{3, 4}));
+    carrier.sent(50us);
+    carrier.tick(60us);
+    EXPECT_EQ(line.sent, (std::vector<std::uint8_t>{5, 6}));
+    EXPECT_EQ(frames.sent_at, never);
+    carrier.sent(70us);
+    EXPECT_EQ(frames.sent_at, 70us);
+  }
+}
 
 TEST_F(CarrierTest, DeliversCharactersWhenAllExpectedOnesArrived) {
   const auto fed_by = [](const auto& play, Time gap = 1us, std::size_t due = 5) {

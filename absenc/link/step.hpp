@@ -36,6 +36,9 @@ struct Step {
   Kind kind = Kind::wait;  ///< requested action
   ExtraWire wire{};        ///< pulse: the wire to drive
   bool hold_low = false;   ///< transfer on a clocked link: the clock line, which idles high, is held low until `at`
+  /// Transfer on a line of characters: `out` is sent in frames of this number of items, with a pause of `width` between
+  /// two of them; 0: in one piece.
+  std::uint8_t frame = 0;
   std::span<const Item> out{};  ///< transfer: items to send; valid until the next feed
   std::size_t expect = 0;       ///< transfer, wait: number of items still expected; 0: unknown, or none
   /// Transfer on a clocked link: number of clocks. A device that drives more bits than hosts read sets the number of
@@ -46,8 +49,8 @@ struct Step {
   /// Transfer, wait: `silence` is reported when nothing is received for this time after `sent`; 0: no limit.
   Time answer{};
   Time gap{};  ///< transfer, wait: `silence` is reported when the line is quiet this long after an item; 0: no limit
-  /// Pulse: its duration. Transfer of a device on a clocked link: after `out` the device drives the data line low until
-  /// this time after the last clock edge.
+  /// Pulse: its duration. Transfer in frames: pause between two of them. Transfer of a device on a clocked link: after
+  /// `out` the device drives the data line low until this time after the last clock edge.
   Time width{};
 
   /// Transfer of a device on an SPI or clocked link: returns the byte that the host samples after `out` has ended, 0x00

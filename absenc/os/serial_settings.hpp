@@ -25,8 +25,8 @@ using TerminalState = std::array<std::byte, 44>;
 /// have disappeared.
 void restore_terminal(int descriptor, const TerminalState& state);
 
-/// Sets raw mode, no flow control, and `settings` with up to 8 data bits, after all written bytes have been sent. Returns the
-/// settings that the driver has applied, which may differ; nothing on error, with errno set.
+/// Sets raw mode, no flow control, and `settings` with up to 8 data bits, after all written bytes have been sent.
+/// Returns the settings that the driver has applied, which may differ; nothing on error, with errno set.
 std::optional<LineSettings> set_terminal(int descriptor, const LineSettings& settings);
 
 /// Returns whether `given` differs from `requested` by at most 1 %, so that UARTs at the two rates understand each

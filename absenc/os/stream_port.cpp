@@ -42,11 +42,20 @@ void StreamPort::begin(const ByteStep& step) {
 void StreamPort::transfer(const ByteStep& step) {
   // The first comparison avoids reading the clock for most transfers.
   if (step.at > waiting_.known_time() + send_slack_ && step.at > os::now() + send_slack_) reach(step.at);
+  std::span<const std::uint8_t> out = step.out;
+  for (; step.frame != 0 && out.size() > step.frame; out = out.subspan(step.frame)) {
+    write(out.first(step.frame));
+    reach(sent_at_ + step.width);
+  }
+  write(out);
+}
+
+void StreamPort::write(std::span<const std::uint8_t> out) {
   const Time before = os::now();
-  if (!step.out.empty()) write_all(step.out);
+  if (!out.empty()) write_all(out);
   const Time written = read_at_once_ ? before : os::now();
   const Time begun = std::max(written, sent_at_);
-  mark_sent(begun + character_time_ * static_cast<std::int64_t>(step.out.size()), begun - std::max(before, sent_at_));
+  mark_sent(begun + character_time_ * static_cast<std::int64_t>(out.size()), begun - std::max(before, sent_at_));
 }
 
 ByteEvent StreamPort::wait(const ByteStep& step) {

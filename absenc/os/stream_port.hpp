@@ -81,6 +81,7 @@ class StreamPort : public Port<std::uint8_t> {
   void pulse(const Step<std::uint8_t>& step);
   void mark_sent(Time at, Time late);
   void transfer(const Step<std::uint8_t>& step);
+  void write(std::span<const std::uint8_t> out);
 
   Poller poller_;
   Time latency_{};

@@ -280,6 +280,7 @@ struct ExtraWires {
 /// Times of an asynchronous line, which decoding its captures needs.
 struct LineTiming {
   unsigned pause_bits = 15;  ///< shortest silence that ends a frame, in bit times
+  Time frame_pause{};        ///< longest pause between the frames of one request; 0: a request is one frame
   /// Time from the end of a request to the begin of its reply, as the document states it; 0: unknown.
   Time turnaround{};
   Time turnaround_limit = std::chrono::milliseconds(100);  ///< longest time that hosts wait for a reply to begin

@@ -223,6 +223,7 @@ void Line<Item>::accept_step(Node node, const Step<Item>& step) {
   state.out.assign(step.out.begin(), step.out.end());
   state.on_wire = 0;
   state.bits = step.bits;
+  state.frame = step.frame;
   state.expect = step.expect;
   state.width = step.width;
   state.behind_out = step.behind_out();

@@ -42,6 +42,7 @@ struct Line<Item>::State {
   bool begun = false;                  ///< false while the transfer's `at` lies in the future
   std::vector<Item> out;               ///< items of the transfer that the node sends
   std::size_t bits = 0;                ///< spi, clocked: number of bits of the transfer
+  std::size_t frame = 0;               ///< number of items of each frame of `out`; 0: one frame
   std::size_t expect = 0;              ///< number of items that the node expects
   Time width{};  ///< `width` of the step: duration of the pulse, or time for which a device drives low
   std::uint8_t behind_out = 0xFF;  ///< spi, clocked: byte that the host samples after `out` has ended

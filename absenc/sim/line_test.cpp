@@ -57,6 +57,20 @@ TEST_F(LineTest, WakeTakesAStepWithoutAnEvent) {
   EXPECT_EQ(device.log, "17000 received 27000 received ");
 }
 
+// A request in frames: the receiver gets each byte at its time, the sender `sent` once, and the pause is silence.
+TEST_F(LineTest, SendsFramesWithPausesBetweenThem) {
+  const std::vector<Byte> five{1, 2, 3, 4, 5};
+  device.idle.gap = microseconds(7);
+  line.wake(device_node);
+  host.todo = Step<Byte>{.kind = Step<Byte>::Kind::transfer, .frame = 2, .out = five, .width = microseconds(8)};
+  line.wake(host_node);
+  line.run_until(microseconds(100));
+  EXPECT_EQ(device.log,
+            "10000 received 20000 received 27000 silence 38000 received 48000 received 55000 silence 66000 received "
+            "73000 silence ");
+  EXPECT_EQ(host.log, "66000 sent ");
+}
+
 TEST_F(LineTest, ReplaceCutsOffTransferInProgress) {
   host.todo = send_two;
   line.wake(host_node);

@@ -74,7 +74,7 @@ template <class Item>
 void Line<Item>::begin_characters(Node node) {
   State& state = *nodes_[node];
   state.each = state.settings.byte_time();
-  state.on_wire = state.out.size();
+  state.on_wire = state.frame == 0 ? state.out.size() : std::min(state.frame, state.out.size());
   schedule(ScheduledEvent::Kind::character, now_ + state.each, node);
   frame_character(node);
 }
@@ -101,8 +101,13 @@ void Line<Item>::end_character(Node node) {
   }
   if (observer_) observer_(node, from, now_, item);
   const std::uint64_t generation = sender.begin_generation;
-  const bool last = ++sender.index == sender.out.size();
-  if (last) {
+  const bool last = ++sender.index == sender.on_wire;
+  if (last && sender.on_wire < sender.out.size()) {
+    sender.out.erase(sender.out.begin(), sender.out.begin() + static_cast<std::ptrdiff_t>(sender.on_wire));
+    sender.on_wire = 0;
+    sender.begun = false;
+    schedule(ScheduledEvent::Kind::begin, now_ + sender.width, node);
+  } else if (last) {
     schedule(ScheduledEvent::Kind::finished, now_, node);
   } else {
     schedule(ScheduledEvent::Kind::character, now_ + sender.each, node);

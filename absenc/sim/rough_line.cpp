@@ -66,7 +66,9 @@ void RoughLine<Item>::begin(const Step<Item>& step) {
         deliver_request({&frame, 1});
       }
     } else if (!request_.empty()) {
-      run_until(time_ + byte_time_ * static_cast<std::int64_t>(request_.size()));
+      const std::size_t pauses = step.frame == 0 ? 0 : (request_.size() - 1) / step.frame;
+      run_until(time_ + byte_time_ * static_cast<std::int64_t>(request_.size()) +
+                step.width * static_cast<std::int64_t>(pauses));
       deliver_request(request_);
     }
   }

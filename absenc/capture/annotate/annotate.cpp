@@ -33,7 +33,7 @@ LineTicks line_ticks(const Unit& unit, double ticks_per_bit, std::uint64_t ticks
       ticks_per_second != 0 ? static_cast<double>(ticks_per_second) : ticks_per_bit * unit.line.with_some_rate().rate;
   const auto ticks = [](double count) { return std::max<Tick>(1, static_cast<Tick>(count)); };
   const auto ticks_of = [rate](Time time) { return static_cast<Tick>(static_cast<double>(time.count()) * rate / 1e9); };
-  return {.pause = ticks(ticks_per_bit * unit.timing.pause_bits),
+  return {.pause = std::max(ticks(ticks_per_bit * unit.timing.pause_bits), ticks_of(unit.timing.frame_pause)),
           .character = ticks(ticks_per_bit * unit.line.character_bits()),
           .turnaround = ticks_of(unit.timing.turnaround),
           .limit = ticks_of(unit.timing.turnaround_limit)};

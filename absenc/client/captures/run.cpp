@@ -185,7 +185,9 @@ CaptureOutcome CaptureRun::decode_lines(capture::Reader& reader, Lines lines, Sp
                                         const std::function<void(Tick)>& progress) const {
   std::vector<capture::AsyncLine> settings;
   for (const unsigned channel : lines.channels) {
-    settings.push_back({channel, {.baud = speed.baud, .parity = speed.parity, .stop_bits = line_.stop_bits, .data_bits = line_.data_bits}});
+    settings.push_back(
+        {channel,
+         {.baud = speed.baud, .parity = speed.parity, .stop_bits = line_.stop_bits, .data_bits = line_.data_bits}});
   }
   CaptureOutcome outcome;
   Guard guard;

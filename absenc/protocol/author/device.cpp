@@ -47,6 +47,7 @@ void Responder::feed(const ByteEvent& event) {
       break;
     case ByteEvent::Kind::sent: {
       transmitting_ = false;
+      replied(event.at);
       const ByteBuffer<64> kept = stored_;
       stored_.clear();
       for (const std::uint8_t byte : kept.view()) receive_byte(byte, event.at);
@@ -91,19 +92,20 @@ void Responder::end_run(Time at) {
 }
 
 void Responder::receive_byte(std::uint8_t byte, Time at) {
-  if (!is_on(at)) return;
+  if (!is_on(at) || at < turns_end_) return;
   if (transmitting_ && times_.keeps_requests) {
     stored_.push_back(byte);
     return;
   }
   if (transmitting_) return receive_while_transmitting(byte, at);
-  received_at_ = at;
+  const Time before = std::exchange(received_at_, at);
   if (damaged_ || refusing_) return;
   if (std::exchange(skip_begins_, false) && !begins_others_reply(byte)) skipping_ = 0;
   if (skipping_ != 0) {
     --skipping_;
     return;
   }
+  check_frame_pause(at, before);
   request_.push_back(byte);
   const std::size_t size = request_size(request_);
   if (size == 0) return search_again(at);
@@ -111,8 +113,16 @@ void Responder::receive_byte(std::uint8_t byte, Time at) {
   if (answer_count() > 0) expect(true, turn_rule, at);
   reply_.clear();
   longer_ = {};
+  turns_ = {};
   ended(respond(request_, at, reply_), at);
   request_.clear();
+}
+
+// Checks the pause before the byte that is received at `at`, if it begins a later frame of a request. Bytes that arrive
+// together do not show the pause between them.
+void Responder::check_frame_pause(Time at, Time before) {
+  if (times_.frame == 0 || request_.empty() || request_.size() % times_.frame != 0 || at == before) return;
+  expect(at - times_.character - (before - late_) >= times_.frame_pause, times_.frame_rule, at);
 }
 
 // Searches for a request at the later received bytes, because none begins with the first byte.
@@ -140,6 +150,7 @@ void Responder::ended(Answer answer, Time at) {
   switch (answer) {
     case Answer::sent:
       begin_reply(at + times_.answer_time + longer_);
+      turns_end_ = turns_ == Time{} ? Time{} : at + times_.answer_time + turns_;
       break;
     case Answer::refused:
       refusing_ = true;

@@ -20,10 +20,13 @@ namespace absenc::author {
 
 /// Times of a virtual encoder, as its document states them.
 struct DeviceTimes {
-  Time character{};    ///< duration of a character on the line
-  Time answer_time{};  ///< time from the end of a request to the begin of its reply
-  Time start_time{};   ///< time from power on until requests are answered
-  Time gap{};          ///< pause that ends an incomplete request or the reply of another encoder; 0: two characters
+  Time character{};        ///< duration of a character on the line; of a byte, if two bytes share a character
+  Time answer_time{};      ///< time from the end of a request to the begin of its reply
+  Time start_time{};       ///< time from power on until requests are answered
+  Time gap{};              ///< pause that ends an incomplete request or the reply of another encoder; 0: two characters
+  std::uint8_t frame = 0;  ///< bytes of each frame of a request; 0: a request is one frame
+  Time frame_pause{};      ///< shortest pause between two frames of a request
+  std::string_view frame_rule{};  ///< rule that hosts must keep this pause
   /// Whether requests received during a transmission are stored and answered afterwards, as on full-duplex lines.
   bool keeps_requests = false;
 };
@@ -70,6 +73,14 @@ class Responder : public EncoderOn<std::uint8_t> {
   };
   /// Delays the present reply by `time`. To be called from `respond`.
   void take_longer(Time time) { longer_ = time; }
+  /// States that all encoders of the line answer the present request in turn: this one `delay` later than it would
+  /// alone, and the last one before `all` has passed since the first one began. To be called from `respond`.
+  void take_turn(Time delay, Time all) {
+    longer_ = delay;
+    turns_ = all;
+  }
+  /// Is called when the last bit of a reply was sent, with that time.
+  virtual void replied(Time) {}
   /// Answers the complete request `request`, received at `at`: writes the reply into `reply`, and returns how the
   /// request is answered.
   virtual Answer respond(Bytes request, Time at, ByteBuffer<64>& reply) = 0;
@@ -87,6 +98,7 @@ class Responder : public EncoderOn<std::uint8_t> {
 
  private:
   void receive_byte(std::uint8_t byte, Time at);
+  void check_frame_pause(Time at, Time before);
   void search_again(Time at);
   void receive_while_transmitting(std::uint8_t byte, Time at);
   void begin_reply(Time at);
@@ -106,8 +118,10 @@ class Responder : public EncoderOn<std::uint8_t> {
   ByteBuffer<64> reply_;
   Time reply_at_{};
   Time longer_{};
-  ByteBuffer<64> stored_;                // bytes received during the present transmission, if they are kept
-  unsigned interrupted_ = 0;             // number of requests received during the present transmission
+  Time turns_{};              // duration of the replies of all encoders to the present request; 0: only one answers
+  Time turns_end_{};          // bytes received before are replies of other encoders
+  ByteBuffer<64> stored_;     // bytes received during the present transmission, if they are kept
+  unsigned interrupted_ = 0;  // number of requests received during the present transmission
   unsigned interruptions_in_a_row_ = 0;  // number of consecutive transmissions during which requests were received
   bool reply_pending_ = false;
   bool transmitting_ = false;

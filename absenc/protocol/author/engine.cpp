@@ -95,7 +95,8 @@ void Engine::begin_or_end(ByteStep& step, Time now) {
     size_ = 0;
     step.at = begun_at_ = std::max({now, earliest_, received_at_ + times_.pause});
     step.kind = manner_.pulse != Time{} ? ByteStep::Kind::pulse : ByteStep::Kind::transfer;
-    step.width = manner_.pulse;
+    step.width = manner_.frame != 0 ? manner_.frame_pause : manner_.pulse;
+    step.frame = manner_.frame;
     step.wire = manner_.wire;
     step.out = out_;
     if (manner_.expects_reply) step.expect = expected();

@@ -33,10 +33,12 @@ struct Manner {
   /// Whether any undamaged reply, or none, is accepted, because the document does not define it: the received bytes are
   /// not checked, and silence ends the exchange.
   bool any_reply = false;
-  Time answer_limit{};  ///< longest time until the reply begins; 0: HostTimes::answer_limit
-  Time hold{};          ///< how long the encoder may still be busy with the request after an error
-  Time pulse{};         ///< if not 0, the request is a pulse of this duration on `wire` instead of bytes
-  ExtraWire wire{};     ///< Wire that is pulsed, if `pulse` is not 0.
+  Time answer_limit{};     ///< longest time until the reply begins; 0: HostTimes::answer_limit
+  Time hold{};             ///< how long the encoder may still be busy with the request after an error
+  std::uint8_t frame = 0;  ///< if not 0, the request is sent in frames of this number of bytes
+  Time frame_pause{};      ///< pause between two frames of the request
+  Time pulse{};            ///< if not 0, the request is a pulse of this duration on `wire` instead of bytes
+  ExtraWire wire{};        ///< Wire that is pulsed, if `pulse` is not 0.
 };
 
 /// Conversation on a line of characters; a subclass recognizes a complete reply and handles it. DialogOf makes such a
