@@ -7,7 +7,9 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "absenc/client/change.hpp"
@@ -15,7 +17,7 @@
 
 namespace absenc::client {
 
-/// Place of a byte in the memory of an encoder.
+/// Place of a byte, or of a word in a memory of words, in the memory of an encoder.
 struct MemoryAddress {
   std::uint32_t page = 0;     ///< Number of the page; 0 if the memory has no pages.
   std::uint32_t address = 0;  ///< Address within the page.
@@ -27,14 +29,23 @@ struct MemoryAddress {
   }
 };
 
-/// Bytes of a memory, by their page and address.
-using MemoryImage = std::map<MemoryAddress, std::uint8_t>;
+/// Bytes or words of a memory, by their page and address.
+using MemoryImage = std::map<MemoryAddress, std::uint32_t>;
 
-/// Bytes at consecutive addresses of one page.
+/// Bytes or words at consecutive addresses of one page.
 struct MemoryRun {
-  MemoryAddress first;              ///< Page and address of the first byte.
-  std::vector<std::uint8_t> bytes;  ///< The bytes, from `first` on.
+  MemoryAddress first;               ///< Page and address of the first byte or word.
+  std::vector<std::uint32_t> words;  ///< The bytes or words, from `first` on.
 };
+
+/// Returns the number of bytes at each address of the unit's memory: 1, 2 or 4.
+[[nodiscard]] unsigned word_bytes(const Unit& unit);
+/// Returns what an address of the unit's memory holds: "byte", or "word"; in the plural if `count` is not 1.
+[[nodiscard]] std::string_view word_noun(const Unit& unit, std::size_t count);
+/// Returns bytes or words of the unit's memory in hexadecimal, for people: "00 5A", "005A 1234".
+[[nodiscard]] std::string words_in_hex(const Unit& unit, std::span<const std::uint32_t> words);
+/// Returns bytes or words of the unit's memory in hexadecimal, for programs: "005a", "005a1234".
+[[nodiscard]] std::string words_in_json(const Unit& unit, std::span<const std::uint32_t> words);
 
 /// Returns the bytes of `image` as runs in the order of their addresses, each of at most `longest` bytes.
 [[nodiscard]] std::vector<MemoryRun> runs(const MemoryImage& image, std::size_t longest = SIZE_MAX);
@@ -90,10 +101,10 @@ class Memory {
   [[nodiscard]] MemoryImage read(const MemoryImage& image, const MemoryProgress& progress = {});
 
   /// Writes a byte and reads it back. `before` is the byte that is stored now, if it is known.
-  void write(MemoryAddress at, std::uint8_t value, MemoryAccess access, std::optional<std::uint8_t> before = {});
+  void write(MemoryAddress at, std::uint32_t value, MemoryAccess access, std::optional<std::uint32_t> before = {});
 
  private:
-  [[nodiscard]] std::vector<std::uint8_t> read_run(MemoryAddress at, std::size_t count);
+  [[nodiscard]] std::vector<std::uint32_t> read_run(MemoryAddress at, std::size_t count);
 
   Encoder* encoder_;
 };

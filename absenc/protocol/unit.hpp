@@ -75,11 +75,11 @@ struct Command {
 
 /// A range of bytes in the encoder's memory. The commands memory_read and memory_write access it by their arguments
 /// with the roles address, page, count, value and force; memory_read reports a field with the role data, or value for a
-/// single byte.
+/// single byte. A memory of words has one word at each address, and `data` has the low byte of each word first.
 struct MemoryArea {
   std::uint32_t page;            ///< first page of the area; 0 if the memory has no pages
   std::uint32_t first;           ///< First address of the area on its page.
-  std::uint32_t count;           ///< Number of bytes on each page.
+  std::uint32_t count;           ///< Number of addresses on each page.
   std::string_view meaning;      ///< Content of the area, as a phrase.
   bool writable = true;          ///< Whether hosts may write the bytes.
   bool in_dump = true;           ///< whether a copy of the memory (`absenc memory dump`) includes the area
@@ -89,8 +89,9 @@ struct MemoryArea {
   /// Whether `write_life` counts the writes of all bytes together; false: the document does not state it.
   bool life_in_total = false;
   std::uint32_t pages = 1;  ///< number of pages, from `page` on, with such an area; an encoder may have fewer
+  std::uint8_t word = 1;  ///< bytes of the word at each address: 1, 2 or 4, the same in all areas of a unit
 
-  /// Returns whether the area includes the byte at `address` of the page `on_page`.
+  /// Returns whether the area includes the byte or word at `address` of the page `on_page`.
   [[nodiscard]] constexpr bool has(std::uint32_t on_page, std::uint32_t address) const {
     return on_page - page < pages && address >= first && address - first < count;
   }

@@ -169,11 +169,11 @@ OrderResult read_memory(Encoder& encoder, const MemoryImage& addresses, const Be
   const MemoryImage image = encoder.memory().read(addresses, [&](std::size_t done, std::size_t all) {
     if (done < all) between();
   });
-  const Json parts = Json::list(runs(image), [](const MemoryRun& run) {
+  const Json parts = Json::list(runs(image), [&](const MemoryRun& run) {
     return Json::object()
         .set("page", run.first.page)
         .set("address", run.first.address)
-        .set("data", fmt::format("{:02x}", fmt::join(run.bytes, "")));
+        .set("data", words_in_json(encoder.unit(), run.words));
   });
   return {true, "read", Json::object().set("ok", true).set("bytes", image.size()).set("memory", parts),
           ChangeState::none};

@@ -199,17 +199,25 @@ std::vector<std::string> settings_names(const PyEncoder& encoder) {
   return names;
 }
 
-using MemoryBytes = std::vector<std::tuple<std::uint32_t, std::uint32_t, std::uint8_t>>;
+using MemoryWords = std::vector<std::tuple<std::uint32_t, std::uint32_t, std::uint32_t>>;
 
-MemoryBytes to_list(const client::MemoryImage& image) {
-  MemoryBytes list;
+MemoryWords to_list(const client::MemoryImage& image) {
+  MemoryWords list;
   for (const auto& [at, value] : image) list.emplace_back(at.page, at.address, value);
   return list;
 }
 
-client::MemoryImage image_of(std::uint32_t page, std::uint32_t address, std::string_view bytes) {
+// Words are sequences of bytes, the low byte first.
+client::MemoryImage image_of(const Unit& unit, std::uint32_t page, std::uint32_t address, std::string_view bytes) {
   client::MemoryImage image;
-  for (const std::uint8_t byte : bytes_of(bytes)) image[{page, address++}] = byte;
+  const std::size_t word = client::word_bytes(unit);
+  if (bytes.size() % word != 0) {
+    throw client::UsageError("the bytes to write must be whole words of " + std::to_string(word) + " bytes");
+  }
+  const auto all = bytes_of(bytes);
+  for (std::size_t i = 0; i < bytes.size(); i += word) {
+    image[{page, address++}] = static_cast<std::uint32_t>(load_little_endian(Bytes(all).subspan(i, word)));
+  }
   return image;
 }
 
@@ -225,11 +233,13 @@ py::bytes memory_read(PyEncoder& encoder, std::uint32_t address, std::uint32_t c
   }
   const client::MemoryImage image = encoder.use([&](client::Encoder& one) { return one.memory().read(wanted); });
   std::vector<std::uint8_t> bytes;
-  for (const auto& [at, value] : image) bytes.push_back(value);
+  for (const auto& [at, value] : image) {
+    for (unsigned i = 0; i < client::word_bytes(unit); ++i) bytes.push_back(static_cast<std::uint8_t>(value >> 8 * i));
+  }
   return to_bytes(bytes);
 }
 
-MemoryBytes memory_dump(PyEncoder& encoder) {
+MemoryWords memory_dump(PyEncoder& encoder) {
   return to_list(encoder.use([](client::Encoder& one) {
     client::require_memory(one.unit(), client::MemoryAccess::read);
     client::Memory memory = one.memory();
@@ -240,7 +250,7 @@ MemoryBytes memory_dump(PyEncoder& encoder) {
 
 std::size_t memory_write(PyEncoder& encoder, std::uint32_t address, const py::bytes& data, std::uint32_t page,
                          bool force) {
-  const client::MemoryImage wanted = image_of(page, address, std::string_view(data));
+  const client::MemoryImage wanted = image_of(encoder.unit(), page, address, std::string_view(data));
   return encoder.use([&](client::Encoder& one) {
     const client::MemoryAccess access = force ? client::MemoryAccess::force : client::MemoryAccess::write;
     client::require_memory(one.unit(), access);

@@ -71,7 +71,7 @@ void MemoryChange::verify(const MemoryProgress& progress) {
 void MemoryChange::settle() {
   if (!in_flight_) return;
   const MemoryAddress at = *in_flight_;
-  const std::uint8_t value = left_.at(at);
+  const std::uint32_t value = left_.at(at);
   try {
     os::sleep_until(os::now() + settling);
     const bool there = memory_.read({{at, 0}}).at(at) == value;

@@ -60,7 +60,7 @@ class DumpParser {
       if (lines_.line.starts_with(checksum_name)) {
         read_checksum();
       } else {
-        read_bytes();
+        read_words();
       }
       sum_.add(lines_.line);
     }
@@ -114,7 +114,7 @@ class DumpParser {
     return static_cast<std::uint32_t>(*value);
   }
 
-  void read_bytes() {
+  void read_words() {
     std::string_view rest = lines_.line;
     MemoryAddress at;
     if (rest.starts_with("page ")) {
@@ -129,17 +129,24 @@ class DumpParser {
     at.address = *address;
     std::vector<std::uint8_t> bytes(rest.size());
     const Result<std::size_t> size = parse_hex(rest, bytes);
-    if (!size || *size == 0) refuse("behind the address there should be bytes of two hexadecimal digits");
-    bytes.resize(*size);
-    for (const std::uint8_t byte : bytes) {
-      put(at, byte);
+    const std::size_t word = word_bytes(unit_);
+    if (!size || *size == 0 || *size % word != 0) {
+      refuse(fmt::format("behind the address there should be {} of {} hexadecimal digits", word_noun(unit_, 2),
+                         word == 1   ? "two"
+                         : word == 2 ? "four"
+                                     : "eight"));
+    }
+    for (std::size_t i = 0; i < *size; i += word) {
+      std::uint32_t value = 0;
+      for (std::size_t k = 0; k < word; ++k) value = value << 8 | bytes[i + k];
+      put(at, value);
       ++at.address;
     }
   }
 
-  void put(MemoryAddress at, std::uint8_t byte) {
+  void put(MemoryAddress at, std::uint32_t word) {
     if (const std::string why = closed(unit_, at, access_); !why.empty()) refuse(why);
-    if (!dump_.image.emplace(at, byte).second) {
+    if (!dump_.image.emplace(at, word).second) {
       refuse(fmt::format("{} was already given in line {}", to_text(unit_, at), given_in_[at]));
     }
     given_in_[at] = lines_.number;
@@ -170,8 +177,8 @@ class DumpParser {
 std::string to_dump(const Unit& unit, const Options& options, const MemoryImage& image) {
   std::vector<std::string> lines{std::string(dump_title)};
   for (const std::string& line : header(unit, options)) lines.push_back(line);
-  for (const MemoryRun& run : runs(image, bytes_in_line)) {
-    lines.push_back(fmt::format("{}: {}", to_text(unit, run.first), to_hex(run.bytes)));
+  for (const MemoryRun& run : runs(image, bytes_in_line / word_bytes(unit))) {
+    lines.push_back(fmt::format("{}: {}", to_text(unit, run.first), words_in_hex(unit, run.words)));
   }
   Checksum sum;
   std::string text;

@@ -186,7 +186,7 @@ TEST(MemoryImage, AddressesInWords) {
 TEST(MemoryImage, RunsEndAtGapsPagesAndTheirLength) {
   const MemoryImage image{{{0, 126}, 1}, {{1, 127}, 2}, {{1, 128}, 3}, {{1, 129}, 4}, {{1, 131}, 5}};
   std::vector<std::size_t> sizes;
-  for (const MemoryRun& run : runs(image, 2)) sizes.push_back(run.bytes.size());
+  for (const MemoryRun& run : runs(image, 2)) sizes.push_back(run.words.size());
   EXPECT_EQ(sizes, (std::vector<std::size_t>{1, 2, 1, 1}));
 }
 

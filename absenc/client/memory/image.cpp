@@ -34,11 +34,32 @@ std::vector<MemoryRun> runs(const MemoryImage& image, std::size_t longest) {
   std::vector<MemoryRun> all;
   MemoryAddress next;
   for (const auto& [at, value] : image) {
-    if (all.empty() || at != next || all.back().bytes.size() == longest) all.push_back({at, {}});
-    all.back().bytes.push_back(value);
+    if (all.empty() || at != next || all.back().words.size() == longest) all.push_back({at, {}});
+    all.back().words.push_back(value);
     next = {at.page, at.address + 1};
   }
   return all;
+}
+
+unsigned word_bytes(const Unit& unit) { return unit.memory.empty() ? 1 : unit.memory.front().word; }
+
+std::string_view word_noun(const Unit& unit, std::size_t count) {
+  if (word_bytes(unit) > 1) return count == 1 ? "word" : "words";
+  return count == 1 ? "byte" : "bytes";
+}
+
+std::string words_in_hex(const Unit& unit, std::span<const std::uint32_t> words) {
+  std::string text;
+  for (const std::uint32_t word : words) {
+    text += fmt::format("{}{:0{}X}", text.empty() ? "" : " ", word, 2 * word_bytes(unit));
+  }
+  return text;
+}
+
+std::string words_in_json(const Unit& unit, std::span<const std::uint32_t> words) {
+  std::string text;
+  for (const std::uint32_t word : words) text += fmt::format("{:0{}x}", word, 2 * word_bytes(unit));
+  return text;
 }
 
 MemoryImage dump_addresses(const Unit& unit) {
@@ -67,7 +88,7 @@ std::string addresses_in_words(const Unit& unit, const MemoryImage& image) {
   std::map<std::uint32_t, std::vector<std::string>> ranges;  // address ranges in words, by page
   for (const MemoryRun& run : runs(image)) {
     std::string text = fmt::format("0x{:02X}", run.first.address);
-    if (run.bytes.size() > 1) text += fmt::format(" to 0x{:02X}", run.first.address + run.bytes.size() - 1);
+    if (run.words.size() > 1) text += fmt::format(" to 0x{:02X}", run.first.address + run.words.size() - 1);
     ranges[run.first.page].push_back(text);
   }
   std::vector<std::string> pages;

@@ -8,6 +8,8 @@
 #include "absenc/client/encoder/parts.hpp"
 #include "absenc/client/error.hpp"
 #include "absenc/client/text/unit_text.hpp"
+#include "absenc/core/bits.hpp"
+#include "absenc/core/bytes.hpp"
 
 namespace absenc::client {
 
@@ -17,9 +19,19 @@ namespace {
 struct ReadBytes final : FieldSink {
   void put(const FieldValue& field) override {
     if (field.info->role == Role::data) data.assign(field.bytes.begin(), field.bytes.end());
-    if (field.info->role == Role::value && data.empty()) data = {static_cast<std::uint8_t>(field.number)};
+    if (field.info->role == Role::value) value = static_cast<std::uint32_t>(field.number);
+  }
+  // Returns the words of `size` bytes each; the low byte of each is the first.
+  [[nodiscard]] std::vector<std::uint32_t> words(std::size_t size) const {
+    if (data.empty() && value) return {*value};
+    std::vector<std::uint32_t> all;
+    for (std::size_t i = 0; i + size <= data.size(); i += size) {
+      all.push_back(static_cast<std::uint32_t>(load_little_endian(Bytes(data).subspan(i, size))));
+    }
+    return all;
   }
   std::vector<std::uint8_t> data;
+  std::optional<std::uint32_t> value{};
 };
 
 // Returns how many bytes from `at` on a single request can read.
@@ -48,11 +60,11 @@ MemoryImage Memory::read(const MemoryImage& image, const MemoryProgress& progres
   const Command& command = *find_command(unit(), Verb::memory_read);
   MemoryImage found;
   for (const MemoryRun& run : runs(image)) {
-    for (std::size_t done = 0; done < run.bytes.size();) {
+    for (std::size_t done = 0; done < run.words.size();) {
       const MemoryAddress at{run.first.page, static_cast<std::uint32_t>(run.first.address + done)};
-      const std::size_t count = std::min(run.bytes.size() - done, most_at_once(unit(), command, at));
-      const std::vector<std::uint8_t> bytes = read_run(at, count);
-      for (std::uint32_t i = 0; i < count; ++i) found[{at.page, at.address + i}] = bytes[i];
+      const std::size_t count = std::min(run.words.size() - done, most_at_once(unit(), command, at));
+      const std::vector<std::uint32_t> words = read_run(at, count);
+      for (std::uint32_t i = 0; i < count; ++i) found[{at.page, at.address + i}] = words[i];
       done += count;
       if (progress) progress(found.size(), image.size());
     }
@@ -60,7 +72,7 @@ MemoryImage Memory::read(const MemoryImage& image, const MemoryProgress& progres
   return found;
 }
 
-std::vector<std::uint8_t> Memory::read_run(MemoryAddress at, std::size_t count) {
+std::vector<std::uint32_t> Memory::read_run(MemoryAddress at, std::size_t count) {
   const Command& command = *find_command(unit(), Verb::memory_read);
   ReadBytes bytes;
   run_into(connection_of(*encoder_), command,
@@ -68,12 +80,13 @@ std::vector<std::uint8_t> Memory::read_run(MemoryAddress at, std::size_t count) 
                command,
                {{Role::page, at.page}, {Role::address, at.address}, {Role::count, static_cast<std::int64_t>(count)}}),
            bytes);
-  if (bytes.data.size() == count) return bytes.data;
-  throw Failure(
-      fmt::format("{} bytes were to be read from {}, but {} came", count, to_text(unit(), at), bytes.data.size()));
+  const std::vector<std::uint32_t> words = bytes.words(word_bytes(unit()));
+  if (words.size() == count) return words;
+  throw Failure(fmt::format("{} {} were to be read from {}, but {} came", count, word_noun(unit(), count),
+                            to_text(unit(), at), words.size()));
 }
 
-void Memory::write(MemoryAddress at, std::uint8_t value, MemoryAccess access, std::optional<std::uint8_t> before) {
+void Memory::write(MemoryAddress at, std::uint32_t value, MemoryAccess access, std::optional<std::uint32_t> before) {
   if (before) connection_of(*encoder_).know_before(*before);
   const Command& command = *find_command(unit(), Verb::memory_write);
   ReadBytes ignored;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The verbs `memory read` and `memory write`, for bytes at single addresses.
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <array>
 
@@ -9,6 +8,7 @@
 #include "absenc/client/text/nearest.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
+#include "absenc/core/bits.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/parameters.hpp"
@@ -29,14 +29,17 @@ MemoryAddress first_address(const Invocation& invocation) {
 }
 
 // Returns bytes of memory as lines "0x10  00 5A ...  .Z...".
-std::string hex_dump(const MemoryImage& image) {
+std::string hex_dump(const Unit& unit, const MemoryImage& image) {
   std::vector<std::vector<std::string>> rows;
-  for (const MemoryRun& run : runs(image, 16)) {
+  for (const MemoryRun& run : runs(image, 16 / word_bytes(unit))) {
     std::string characters;
-    for (const std::uint8_t byte : run.bytes) {
-      characters += byte > 0x20 && byte < 0x7F ? static_cast<char>(byte) : '.';
+    for (const std::uint32_t word : run.words) {
+      for (unsigned i = word_bytes(unit); i-- > 0;) {
+        const std::uint32_t byte = word >> 8 * i & 0xFF;
+        characters += byte > 0x20 && byte < 0x7F ? static_cast<char>(byte) : '.';
+      }
     }
-    rows.push_back({fmt::format("0x{:02X}", run.first.address), to_hex(run.bytes), characters});
+    rows.push_back({fmt::format("0x{:02X}", run.first.address), words_in_hex(unit, run.words), characters});
   }
   return table(rows);
 }
@@ -95,15 +98,14 @@ int run_memory_read(const Invocation& invocation) {
   Memory memory = encoder.memory();
   image = read_memory(memory, image);
   if (!invocation.has("--json")) {
-    print_line(hex_dump(image));
+    print_line(hex_dump(*uri.unit, image));
     return exit_good;
   }
-  const std::vector<std::uint8_t> bytes = runs(image).front().bytes;
   print_line(Json::object()
                  .set("ok", true)
                  .set("page", first.page)
                  .set("address", first.address)
-                 .set("data", fmt::format("{:02x}", fmt::join(bytes, "")))
+                 .set("data", words_in_json(*uri.unit, runs(image).front().words))
                  .line());
   return exit_good;
 }
@@ -118,10 +120,12 @@ int run_write(const Invocation& invocation) {
   MemoryImage wanted;
   for (const std::string& written : invocation.texts("values")) {
     const Result<std::int64_t> value = parse_number(written);
-    if (!value || *value < 0 || *value > 255) {
-      throw UsageError(fmt::format("the value \"{}\" is no byte: a number from 0 to 255, or 0x00 to 0xFF", written));
+    const auto most = static_cast<std::int64_t>(low_mask(8 * word_bytes(*uri.unit)));
+    if (!value || *value < 0 || *value > most) {
+      throw UsageError(fmt::format("the value \"{}\" is no {}: a number from 0 to {}, or 0x{:0{}X} to 0x{:X}", written,
+                                   word_noun(*uri.unit, 1), most, 0, 2 * word_bytes(*uri.unit), most));
     }
-    wanted[at] = static_cast<std::uint8_t>(*value);
+    wanted[at] = static_cast<std::uint32_t>(*value);
     ++at.address;
   }
   require_open(*uri.unit, wanted, access);

@@ -23,11 +23,9 @@ namespace absenc::tool {
 
 namespace {
 
-std::string_view noun(std::size_t bytes) { return bytes == 1 ? "byte" : "bytes"; }
-
 Json addresses_json(const MemoryImage& image) {
   return Json::list(runs(image), [](const MemoryRun& run) {
-    return Json::object().set("page", run.first.page).set("address", run.first.address).set("count", run.bytes.size());
+    return Json::object().set("page", run.first.page).set("address", run.first.address).set("count", run.words.size());
   });
 }
 
@@ -45,9 +43,11 @@ std::string write_life(const Unit& unit, const MemoryImage& image) {
 
 // Runs `work` and shows its progress as "DOING n of m bytes". Nothing else may be printed meanwhile.
 template <class Work>
-void with_progress(std::string_view doing, const Work& work) {
+void with_progress(const Unit& unit, std::string_view doing, const Work& work) {
   Progress progress;
-  work([&](std::size_t done, std::size_t all) { progress.show(fmt::format("{} {} of {} bytes", doing, done, all)); });
+  work([&](std::size_t done, std::size_t all) {
+    progress.show(fmt::format("{} {} of {} {}", doing, done, all, word_noun(unit, all)));
+  });
 }
 
 class MemoryWrite {
@@ -57,19 +57,20 @@ class MemoryWrite {
 
   int run() {
     const bool dry = invocation_.has("--dry-run");
-    asks_ = !dry && must_ask(invocation_, uri_, "writing memory", "bytes that differ are overwritten");
+    asks_ = !dry && must_ask(invocation_, uri_, "writing memory",
+                             fmt::format("{} that differ are overwritten", word_noun(*uri_.unit, 2)));
     encoder_ = before_change([&] { return open_encoder(uri_); });
     change_.emplace(encoder_->memory(), wanted_, access_);
     try {
-      with_progress("reading", [&](const MemoryProgress& progress) { change_->look(progress); });
+      with_progress(unit_, "reading", [&](const MemoryProgress& progress) { change_->look(progress); });
       show();
       if (change_->differing().empty() || dry) return finish();
       if (asks_ && !confirmed(uri_, cost())) {
         print_message("nothing was changed");
         return exit_failed;
       }
-      with_progress("writing", [&](const MemoryProgress& progress) { change_->write(progress); });
-      with_progress("reading", [&](const MemoryProgress& progress) { change_->verify(progress); });
+      with_progress(unit_, "writing", [&](const MemoryProgress& progress) { change_->write(progress); });
+      with_progress(unit_, "reading", [&](const MemoryProgress& progress) { change_->verify(progress); });
       return finish();
     } catch (...) {
       return give_account(std::current_exception());
@@ -82,16 +83,17 @@ class MemoryWrite {
   [[nodiscard]] std::string cost() const {
     const std::size_t count = change_->differing().size();
     const std::string life = write_life(unit_, change_->differing());
-    const std::string wear = life.empty() ? "" : fmt::format("; each byte takes one of {}", life);
-    return fmt::format("{} of {} {} differ{}{}", count, wanted_.size(), noun(wanted_.size()), count == 1 ? "s" : "",
-                       wear);
+    const std::string wear = life.empty() ? "" : fmt::format("; each {} takes one of {}", word_noun(unit_, 1), life);
+    return fmt::format("{} of {} {} differ{}{}", count, wanted_.size(), word_noun(unit_, wanted_.size()),
+                       count == 1 ? "s" : "", wear);
   }
 
   void show() const {
     if (json()) return;
     if (change_->differing().empty()) {
-      print_line(wanted_.size() == 1 ? "the byte is so already: nothing to write"
-                                     : fmt::format("all {} bytes are so already: nothing to write", wanted_.size()));
+      print_line(wanted_.size() == 1
+                     ? fmt::format("the {} is so already: nothing to write", word_noun(unit_, 1))
+                     : fmt::format("all {} {} are so already: nothing to write", wanted_.size(), word_noun(unit_, 2)));
       return;
     }
     print_line(difference_table(unit_, "NEW", change_->differing(), change_->found()));
@@ -111,7 +113,7 @@ class MemoryWrite {
                      .set("change", word_of(change_->state()))
                      .line());
     } else if (!written.empty()) {
-      print_line(fmt::format("{} {} written and read back", written.size(), noun(written.size())));
+      print_line(fmt::format("{} {} written and read back", written.size(), word_noun(unit_, written.size())));
     }
     return exit_good;
   }
@@ -174,19 +176,20 @@ int change_memory(const Invocation& invocation, const EncoderAddress& uri, const
 
 MemoryImage read_memory(Memory& memory, const MemoryImage& image) {
   MemoryImage found;
-  with_progress("reading", [&](const MemoryProgress& progress) { found = memory.read(image, progress); });
+  with_progress(memory.unit(), "reading",
+                [&](const MemoryProgress& progress) { found = memory.read(image, progress); });
   return found;
 }
 
 std::string difference_table(const Unit& unit, std::string_view wanted_name, const MemoryImage& differing,
                              const MemoryImage& found) {
-  constexpr std::size_t bytes_in_row = 8;
+  const std::size_t words_in_row = 8 / word_bytes(unit);
   std::vector<std::vector<std::string>> rows{{"WHERE", "ENCODER", std::string(wanted_name)}};
-  for (const MemoryRun& run : runs(differing, bytes_in_row)) {
-    std::vector<std::uint8_t> there;
+  for (const MemoryRun& run : runs(differing, words_in_row)) {
+    std::vector<std::uint32_t> there;
     MemoryAddress at = run.first;
-    for (std::size_t i = 0; i < run.bytes.size(); ++i, ++at.address) there.push_back(found.at(at));
-    rows.push_back({to_text(unit, run.first), to_hex(there), to_hex(run.bytes)});
+    for (std::size_t i = 0; i < run.words.size(); ++i, ++at.address) there.push_back(found.at(at));
+    rows.push_back({to_text(unit, run.first), words_in_hex(unit, there), words_in_hex(unit, run.words)});
   }
   return table(rows);
 }

@@ -37,7 +37,7 @@ int run_dump(const Invocation& invocation) {
     return exit_good;
   }
   os::replace_file(path, text, os::Durable::yes);
-  print_line(fmt::format("{} bytes are in {}", image.size(), path));
+  print_line(fmt::format("{} {} are in {}", image.size(), word_noun(*uri.unit, 2), path));
   return exit_good;
 }
 
@@ -84,8 +84,9 @@ int run_verify(const Invocation& invocation) {
                    .line());
   } else {
     if (!wrong.empty()) print_line(difference_table(*uri.unit, "FILE", wrong, found));
-    print_line(wrong.empty() ? fmt::format("all {} bytes are the same", wanted.size())
-                             : fmt::format("{} of {} bytes differ", wrong.size(), wanted.size()));
+    const std::string_view noun = word_noun(*uri.unit, 2);
+    print_line(wrong.empty() ? fmt::format("all {} {} are the same", wanted.size(), noun)
+                             : fmt::format("{} of {} {} differ", wrong.size(), wanted.size(), noun));
   }
   return wrong.empty() ? exit_good : exit_failed;
 }
