@@ -18,15 +18,15 @@ using ByteList = std::vector<std::uint8_t>;
 constexpr std::size_t enough = 8;  // least number of frames for a statement about their lengths or distances
 
 /// Bytes without a pause between them, and the time at which the first of them arrived.
-struct Piece {
+struct PausedBytes {
   Time at{};
   ByteList bytes{};
 };
 
 // Returns the bytes between pauses of at least `pause`, without the first and the last piece: reading may have begun
 // and ended in the middle of a frame.
-std::vector<Piece> pieces_of(const StreamBytes& stream, Time pause) {
-  std::vector<Piece> pieces;
+std::vector<PausedBytes> pieces_of(const StreamBytes& stream, Time pause) {
+  std::vector<PausedBytes> pieces;
   std::size_t begin = 0;
   Time before{};
   for (const StreamBytes::Mark& mark : stream.marks) {
@@ -45,10 +45,10 @@ std::vector<Piece> pieces_of(const StreamBytes& stream, Time pause) {
 
 // Returns the share of the pieces that have the most frequent length; 0 if there are too few pieces, or if they are
 // single bytes.
-double evenness(const std::vector<Piece>& pieces) {
+double evenness(const std::vector<PausedBytes>& pieces) {
   if (pieces.size() < enough) return 0;
   std::map<std::size_t, std::size_t> lengths;
-  for (const Piece& piece : pieces) ++lengths[piece.bytes.size()];
+  for (const PausedBytes& piece : pieces) ++lengths[piece.bytes.size()];
   const auto usual = std::ranges::max_element(lengths, {}, [](const auto& one) { return one.second; });
   if (usual->first < 2) return 0;
   return static_cast<double>(usual->second) / static_cast<double>(pieces.size());
@@ -56,7 +56,7 @@ double evenness(const std::vector<Piece>& pieces) {
 
 // Tries pauses of all lengths. Of those that make the most even pieces the middle one is taken, because it is far from
 // the pauses within a frame and from those between two frames.
-std::vector<Piece> most_even_pieces(const StreamBytes& stream) {
+std::vector<PausedBytes> most_even_pieces(const StreamBytes& stream) {
   constexpr Time shortest = 100us;
   constexpr Time longest = 200ms;
   constexpr double least = 0.5;
@@ -100,7 +100,7 @@ void StreamBytes::append(const LineExchange<std::uint8_t>& line) {
 
 std::vector<Attempted> frames_between_pauses(const Unit& unit, const Options& options, const StreamBytes& stream) {
   std::vector<Attempted> frames;
-  for (Piece& piece : most_even_pieces(stream)) {
+  for (PausedBytes& piece : most_even_pieces(stream)) {
     Attempted one{.error = unit.check(options, {}, {.bytes = piece.bytes}), .began = piece.at};
     one.heard = one.answered = true;
     one.exchange.reply.bytes = piece.bytes;

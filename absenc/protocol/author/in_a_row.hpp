@@ -14,14 +14,14 @@ namespace absenc::author {
 /// The document's demands on requests that are sent in a row.
 struct InARow {
   /// From where to where hosts keep `interval`.
-  enum class Between : std::uint8_t {
+  enum class IntervalBounds : std::uint8_t {
     reply_and_request,  ///< from the end of a reply to the begin of the next request
     requests,           ///< from the begin of a request to the begin of the next one
   };
 
-  unsigned requests = 0;                         ///< number of equal requests that execute the command, 2 or more
-  Time interval{};                               ///< shortest time before the next request of the row, as hosts keep it
-  Between between = Between::reply_and_request;  ///< the events between which hosts keep `interval`
+  unsigned requests = 0;  ///< number of equal requests that execute the command, 2 or more
+  Time interval{};        ///< shortest time before the next request of the row, as hosts keep it
+  IntervalBounds between = IntervalBounds::reply_and_request;  ///< the events between which hosts keep `interval`
   /// Shortest time from the end of a request, or of its reply (RowCounter::measure_from), to the end of the next
   /// request that a virtual encoder accepts. A request that follows sooner is the first of a new row.
   Time accepted{};
@@ -72,7 +72,7 @@ class RowCounter {
 /// valid.
 template <class P>
 Part<bool> send_in_a_row(DialogOf<P>& dialog, typename P::Request request, const InARow& row) {
-  Time pause = row.between == InARow::Between::reply_and_request ? row.interval : Time{};
+  Time pause = row.between == InARow::IntervalBounds::reply_and_request ? row.interval : Time{};
   for (unsigned sent = 1;; ++sent) {
     const Result<typename P::Reply> reply = co_await dialog.attempt(request).once().changes().after(pause);
     if (sent == row.requests) co_return reply.error() == Error::none;
@@ -81,7 +81,7 @@ Part<bool> send_in_a_row(DialogOf<P>& dialog, typename P::Request request, const
                             "one of the requests in a row was not answered well, so the encoder has most likely done "
                             "nothing: see that with `absenc read` before you try again"});
     }
-    if (row.between == InARow::Between::requests) {
+    if (row.between == InARow::IntervalBounds::requests) {
       pause = dialog.begun_at() + row.interval - dialog.received_at();
     }
   }

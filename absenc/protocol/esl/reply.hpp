@@ -366,7 +366,7 @@ constexpr unsigned unsafe_alarms(const ChannelReply& channel) {
 inline constexpr author::InARow reset_row{
     .requests = reset_requests,
     .interval = reset_interval,
-    .between = author::InARow::Between::requests,
+    .between = author::InARow::IntervalBounds::requests,
     .accepted = 35us,
     .number_rule = "reset not sent eight times in a row",
     .interval_rule = "reset sent too fast: much less than 40 us after the one before",
