@@ -63,7 +63,8 @@ struct BitView {
     }
     return register_at(at, std::make_index_sequence<sizeof(std::size_t)>{}) << (first - 8 * at);
   }
-  // Loads a machine word without a loop, so that the compiler emits a single load where the processor has one.
+  // Loads a big-endian machine word without a loop, so that the compiler emits one load where the processor can load
+  // at any address.
   template <std::size_t... i>
   [[nodiscard]] constexpr std::size_t register_at(std::size_t at, std::index_sequence<i...>) const {
     const std::uint8_t* from = bytes.data() + at;
@@ -83,7 +84,7 @@ struct BitNumber {
   std::uint64_t number;  ///< The bits as a number, the first bit highest.
   unsigned size;         ///< number of bits in `number`, 1 to 64
 
-  /// Returns `count` bits from index `first` as a number; index 0 is the most significant bit of `number`.
+  /// Returns `count` bits from index `first` as a number; index 0 is bit `size` - 1 of `number`.
   [[nodiscard]] constexpr std::uint64_t load(std::size_t first, unsigned count) const {
     return count == 0 ? 0 : number >> (size - first - count) & low_mask(count);
   }

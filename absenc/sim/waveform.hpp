@@ -70,7 +70,7 @@ class Waveform {
 
   /// Returns the wires; extra wires are added when their first pulse is drawn.
   [[nodiscard]] const std::vector<Wire>& wires() const { return wires_; }
-  /// Returns the end of the last drawn item.
+  /// Returns the time behind which nothing is drawn: the latest end of all drawn items and levels.
   [[nodiscard]] Time end() const { return end_; }
 
  private:
