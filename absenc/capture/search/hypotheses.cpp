@@ -56,8 +56,8 @@ class HypothesisSearch {
   HypothesisSearch(const Unit& unit, std::span<const ObservedExchange> exchanges)
       : unit_(unit), exchanges_(exchanges) {}
 
-  /// Adds a hypothesis if `options` explain at least one exchange, and as many as the best hypotheses so far; it replaces
-  /// them if it explains more.
+  /// Adds a hypothesis if `options` explain at least one exchange, and as many as the best hypotheses so far; it
+  /// replaces them if it explains more.
   void add(const Options& options, bool at_least = false) {
     if (contains(best_, options)) return;
     ++tried_;

@@ -62,8 +62,8 @@ struct InterfaceResults {
 };
 
 /// Reads a position with `4`. If the reply is missing or has a wrong length, reads the firmware version: before 1.16
-/// the error is unsupported, otherwise `4` is sent once more. `4` is not repeated if neither command was answered or if
-/// the line is never silent.
+/// the error is unsupported, otherwise `4` is sent once more. `4` is not repeated if it had no reply and the version no
+/// valid one, or if the line is never silent.
 author::Procedure read(Dialog& dialog, InterfaceResults& found);
 /// Reads version, serial number, supply and clock. A missing or invalid reply is an error only if it is that of the
 /// version, or if the line is never silent.
