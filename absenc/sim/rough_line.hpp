@@ -12,8 +12,8 @@
 
 namespace absenc::sim {
 
-/// Probability, 0 to 1, of each kind of damage to data that is sent to the host: `bit` per data bit (CAN: per bit of the
-/// whole frame), all others per frame. Faults of the device itself are FaultRates, applied between device and line.
+/// Probability, 0 to 1, of each kind of damage to data that is sent to the host: `bit` per data bit (CAN: per bit of
+/// the whole frame), all others per frame. Faults of the device itself are FaultRates, applied between device and line.
 struct RoughRates {
   double bit = 0;  ///< probability that a data bit is flipped
   /// 2 to 16 adjacent bits are damaged: the first and last are flipped, each bit between them with probability 1/2.
