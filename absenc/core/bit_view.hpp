@@ -63,8 +63,8 @@ struct BitView {
     }
     return register_at(at, std::make_index_sequence<sizeof(std::size_t)>{}) << (first - 8 * at);
   }
-  // Loads a big-endian machine word without a loop, so that the compiler emits one load where the processor can load
-  // at any address.
+  // Loads a big-endian machine word without a loop, so that the compiler emits one load where the processor can load at
+  // any address.
   template <std::size_t... i>
   [[nodiscard]] constexpr std::size_t register_at(std::size_t at, std::index_sequence<i...>) const {
     const std::uint8_t* from = bytes.data() + at;

@@ -18,8 +18,8 @@ using Wire = std::vector<std::uint8_t>;
 
 constexpr LineSettings settings{.rate = 1'000'000};
 
-/// A device that sends `reply` a time `after` it received the byte `key`, if `key` is the first byte, or the
-/// first after silence or after a reply of its own.
+/// A device that sends `reply` a time `after` it received the byte `key`, if `key` is the first byte, or the first
+/// after silence or after a reply of its own.
 struct Responder final : Machine<std::uint8_t> {
   Responder(std::uint8_t its_key, Wire its_reply, Time its_after = 5us)
       : key(its_key), reply(std::move(its_reply)), after(its_after) {}

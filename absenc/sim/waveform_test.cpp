@@ -166,8 +166,7 @@ TEST(Waveform, DataIsLowForTheTimeoutBehindTheLastEdge) {
   EXPECT_THAT(body(picture), ::testing::EndsWith("#3000\n0!\n#3500\n1!\n0\"\n#23500\n1\"\n#33500\n"));
 
   // After the last bit the device holds the data line low. BiSS: for its fixed timeout (20 us by default) or one and a
-  // half clock periods. SSI: for the monoflop time, from the edge behind the last bit; with
-  // AfterWord::one not at all.
+  // half clock periods. SSI: for the monoflop time, from the edge behind the last bit; with AfterWord::one not at all.
   biss::Format biss{};
   const auto biss_low = [&] {
     biss::testing::Bench bench(biss::line_settings, biss);

@@ -48,8 +48,8 @@ struct ClockedPart {
 };
 
 /// A decoder of clocked bursts, which decodes a capture part by part. A burst whose beginning or end is not in the
-/// capture, and each piece of a burst of more than `most_bits` bits, is marked as cut. A single clock change between two pauses is no burst: the host holds the clock low, or
-/// lets it rise again.
+/// capture, and each piece of a burst of more than `most_bits` bits, is marked as cut. A single clock change between
+/// two pauses is no burst: the host holds the clock low, or lets it rise again.
 class ClockedDecoder {
  public:
   static constexpr std::size_t most_bits = 65536;  // longest burst, in bits; a longer burst is cut into pieces
