@@ -60,7 +60,7 @@ struct ClockedLine {
   std::optional<unsigned> select{};  // index of the channel with chip select, for SPI
   bool rising = false;               // true: the rising edge of the clock samples a bit; false: the falling edge
   bool select_high = false;          // true: chip select is active high
-  Tick pause = 0;   // without chip select: a clock that rests longer ends a word, in ticks; 0: `choose` decides
+  Tick pause = 0;  // without chip select: a clock that rests longer ends a word, in ticks; 0: `choose` decides
   // `settle` and `change_pause` of ClockedFormat; not used if `pause` is 0 and there is no chip select.
   Tick settle = 0;
   Tick change_pause = 0;

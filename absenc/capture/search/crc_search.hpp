@@ -34,9 +34,9 @@ enum class CheckKind : std::uint8_t {
 /// and the position of the checksum are counted from the end of the frame, so that they apply to frames of all lengths.
 struct CheckSolution {
   CheckKind kind = CheckKind::crc;
-  CrcParameters parameters{};      // for kinds other than crc: width is 8 and init is the constant
-  bool low_first = false;          // width above 8 in frames of bytes: the checksum's low byte comes first in the frame
-  bool padded = false;             // the checksum is computed as if a byte 00 followed the covered part
+  CrcParameters parameters{};  // for kinds other than crc: width is 8 and init is the constant
+  bool low_first = false;      // width above 8 in frames of bytes: the checksum's low byte comes first in the frame
+  bool padded = false;         // the checksum is computed as if a byte 00 followed the covered part
   // All frames have one length and no usual init and xorout fit: every value of init fits with an xorout of its own.
   bool init_open = false;
   std::vector<std::size_t> first;  // possible positions of the first covered byte or bit
