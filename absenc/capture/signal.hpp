@@ -60,7 +60,9 @@ struct Burst {
   std::size_t bits = 0;           // number of clocks in the burst
   std::vector<std::uint8_t> in;   // bits sent by the encoder, packed MSB first, the last byte left-aligned
   std::vector<std::uint8_t> out;  // SPI: bits sent by the host, packed like `in`
-  bool cut = false;  // the burst's beginning or end is not in the capture: bits may be missing at that place
+  // The burst's beginning or end is not in the capture, or it is a piece of a burst of more than
+  // ClockedDecoder::most_bits bits: bits may be missing at its beginning or end.
+  bool cut = false;
   // The following members apply to clocked words without chip select.
   bool low_before = false;   // the clock rested at its low level before the burst
   bool low_after = false;    // the clock rests at its low level after the burst

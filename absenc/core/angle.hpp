@@ -50,7 +50,8 @@ struct Reading {
   [[nodiscard]] constexpr bool singleturn_valid() const {
     return singleturn_bits != 0 && singleturn_valid_bits == singleturn_bits;
   }
-  /// Returns whether the single-turn position can be trusted, and if not, whether the encoder reported it as invalid.
+  /// Returns `valid` if all bits of the single-turn position can be trusted; else the reason why not. A position of
+  /// which only some bits are valid is `invalid`.
   [[nodiscard]] constexpr Validity singleturn_validity() const {
     if (singleturn_bits == 0) return Validity::absent;
     if (!singleturn_known) return Validity::unknown;
@@ -61,7 +62,7 @@ struct Reading {
     if (multiturn_signed && multiturn_bits != 0) return with_sign(multiturn, multiturn_bits);
     return static_cast<std::int64_t>(multiturn);
   }
-  /// Returns whether the number of revolutions can be trusted, and if not, whether the encoder reported it as invalid.
+  /// Returns `valid` if the number of revolutions can be trusted; else the reason why not.
   [[nodiscard]] constexpr Validity multiturn_validity() const {
     if (multiturn_bits == 0) return Validity::absent;
     if (!multiturn_known) return Validity::unknown;

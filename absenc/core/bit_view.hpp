@@ -95,7 +95,7 @@ struct BitNumber {
   std::uint64_t number;  ///< The bits as a number, the first bit highest.
   unsigned size;         ///< number of bits in `number`, 1 to 64
 
-  /// Returns `count` bits from index `first` as a number; index 0 is the most significant bit of `number`.
+  /// Returns `count` bits from index `first` as a number; index 0 is bit `size` - 1 of `number`.
   [[nodiscard]] constexpr std::uint64_t load(std::size_t first, unsigned count) const {
     return count == 0 ? 0 : number >> (size - first - count) & low_mask(count);
   }

@@ -62,7 +62,7 @@ class Crc {
   using Word = std::conditional_t<(parameters.width <= 8), std::uint8_t, std::uint16_t>;
 
   constexpr Crc() = default;
-  /// Starts with the register value `init` instead of `parameters.init`, with the same table.
+  /// Starts with the register value `init` instead of `parameters.init`; the table does not depend on either.
   constexpr explicit Crc(std::uint16_t init) : remainder_(initial(init)) {}
 
   /// Adds a byte to the checksum.

@@ -22,8 +22,8 @@ constexpr bool checks(std::uint16_t expected) {
 constexpr CrcParameters modbus{16, 0x8005, 0xFFFF, true, true, 0x0000};
 constexpr CrcParameters biss{6, 0x03, 0x00, false, false, 0x3F};
 
-// The CRCs of the supported encoders give the published check values. The lines with (msb) check ESL's polynomials
-// without reflection, that is, before the bit order on the line is applied.
+// CRCs of supported encoders give the published check values. The lines with (msb) check ESL's polynomials without
+// reflection, that is, before the bit order on the line is applied.
 static_assert(checks<CrcParameters{8, 0x01, 0x00, true, true, 0x00}>(0x31), "T-format");
 static_assert(checks<CrcParameters{8, 0x97, 0x00, false, false, 0xFF}>(0x6B), "RLS EncoLink");
 static_assert(checks<biss>(0x2E), "BiSS-C");
@@ -35,8 +35,8 @@ static_assert(checks<CrcParameters{16, 0x5935, 0x0000, false, false, 0x00}>(0x5D
 static_assert(checks<CrcParameters{16, 0x5935, 0xFFFF, false, false, 0x00}>(0x772B), "ESL channel 2 (msb)");
 static_assert(checks<modbus>(0x4B37), "Modbus RTU");
 
-// Other CRCs from the public catalogue of parametrised CRC algorithms. Among them are widths that are no multiple of 8,
-// an xorout that is not 0, and a refin that differs from refout.
+// CRCs from the public catalogue of parametrised CRC algorithms, not of a supported encoder. Among them are widths that
+// are no multiple of 8, an xorout that is not 0, and a refin that differs from refout.
 static_assert(checks<CrcParameters{3, 0x3, 0x0, false, false, 0x7}>(0x4), "CRC-3/GSM");
 static_assert(checks<CrcParameters{3, 0x3, 0x7, true, true, 0x0}>(0x6), "CRC-3/ROHC");
 static_assert(checks<CrcParameters{5, 0x05, 0x1F, true, true, 0x1F}>(0x19), "CRC-5/USB");

@@ -21,7 +21,7 @@ namespace absenc {
   return -1;
 }
 
-/// Parses pairs of hexadecimal digits into `bytes`; spaces are allowed between bytes. Returns the number of parsed
+/// Parses pairs of hexadecimal digits into `bytes`; spaces are allowed around bytes. Returns the number of parsed
 /// bytes. Errors: invalid_argument (a character that is no digit, or half a byte), buffer_too_small.
 [[nodiscard]] constexpr Result<std::size_t> parse_hex(std::string_view text, MutableBytes bytes) {
   std::size_t count = 0;

@@ -14,8 +14,8 @@ struct Port {
   /// Returns the time on the port's own clock, which also stamps every event and never runs backwards.
   [[nodiscard]] virtual Time now() = 0;
 
-  /// Begins a transfer, pulse or configure step. After a transfer or pulse the next event is `sent`, unless bytes
-  /// arrive before its end (the echo of a half-duplex line, or an unsolicited reply).
+  /// Begins a transfer, pulse or configure step. `sent` is reported at the end of a transfer or pulse; before it may
+  /// come items that arrive earlier (the echo of a half-duplex line, an unsolicited reply), and the timer of a wait.
   virtual void begin(const Step<Item>& step) = 0;
 
   /// Blocks until the next event that a machine waiting with `step` must see, and returns it. Its items stay valid

@@ -22,14 +22,15 @@ class Silence {
     received_ = true;
     reported_ = false;
   }
-  /// Records activity on the line that did not reach this end as an item: the silence starts again.
+  /// Records activity on the line that did not reach this end as an item: the line is silent since `at`. A `silence`
+  /// that was reported already is not reported again.
   void busy(Time at) { since_ = at; }
   /// Records that `silence` was reported.
   void reported() { reported_ = true; }
 
   /// Returns the time since which the line is silent.
   [[nodiscard]] Time since() const { return since_; }
-  /// Returns whether an item was received since the last transfer.
+  /// Returns whether an item was received since the last transfer or pulse.
   [[nodiscard]] bool has_received() const { return received_; }
 
   /// Returns when `silence` is due for a step with these limits (Step::answer and gap); `latency` is the port's delay,
@@ -40,8 +41,8 @@ class Silence {
   }
 
  private:
-  Time since_{};           // end of the last transfer, time of the last activity, or begin of the silence
-  bool received_ = false;  // an item was received since the last transfer
+  Time since_{};           // end of the last transfer or pulse, time of the last activity, or begin of the silence
+  bool received_ = false;  // an item was received since the last transfer or pulse
   bool reported_ = false;
 };
 

@@ -108,8 +108,8 @@ constexpr std::int64_t digits_of(Bytes text) {
   return frame;
 }
 
-/// A reader that splits received bytes into lines. After garbage or a lost CR it resumes behind the next CR, or at the
-/// next letter that begins a frame (t, T, r, R): none of these letters occurs within a frame or a command.
+/// A reader that splits received bytes into lines. After garbage or a lost CR it resumes behind the next CR or BEL, or
+/// at the next letter that begins a frame (t, T, r, R): none of these letters occurs within a frame or a command.
 class LineReader {
  public:
   /// Event that a received byte completes.

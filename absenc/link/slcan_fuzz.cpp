@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Feeds arbitrary bytes as an adapter's output: each line that decodes to a frame must equal the line encoded from that
-// frame, apart from the case of digits and the timestamp.
+// frame, apart from the case of digits and the timestamp. A valid frame behind the bytes must be found.
 #include "absenc/link/slcan.hpp"
 
 #include <cstddef>

@@ -74,7 +74,7 @@ TEST(Slcan, MapsBitRatesToCodes) {
   EXPECT_EQ(rate_of('9'), 0u);
 }
 
-// Returns the lines that a LineReader finds in `stream`; "refused" and "garbage" mark the other events.
+// Returns the lines that a LineReader finds in `stream`, and "refused" or "garbage" for the events of these names.
 std::vector<std::string> found(std::string_view stream) {
   LineReader reader;
   std::vector<std::string> all;

@@ -13,7 +13,7 @@
 
 namespace absenc::sim::testing {
 
-/// A shaft whose position and speed a test can set; the speed is constant from then on.
+/// A shaft whose position and speed a test can set; the speed is constant until it is set again.
 template <unsigned singleturn_bits>
 struct TestShaft final : Shaft {
   [[nodiscard]] ShaftState at(Time time) const override {
@@ -22,7 +22,8 @@ struct TestShaft final : Shaft {
     state.position += static_cast<std::int64_t>(revolutions * 4294967296.0);
     return state;
   }
-  /// Sets the position to `turns` whole turns and `counts` of `singleturn_bits` bits.
+  /// Sets the position at the time of the last `spin` (of a still shaft: at all times) to `turns` whole turns and
+  /// `counts` of `singleturn_bits` bits.
   void put(std::int64_t turns, std::int64_t counts) {
     start.position = (turns << 32) + (counts << (32 - singleturn_bits));
   }

@@ -8,8 +8,8 @@ namespace absenc::sim {
 
 namespace {
 
-// A device's transfer is passed to the port this long before it begins. Passed earlier, it would block the transfers of
-// the other devices.
+// A device's transfer is passed to the port at most this long before it begins. Passed earlier, it would block the
+// transfers of the other devices.
 constexpr Time soon = std::chrono::milliseconds(1);
 
 // Returns the shorter of two limits; 0 means no limit.
@@ -38,8 +38,8 @@ void Bus::feed(const ByteEvent& event) {
   }
 }
 
-// Reports `sent` to the devices whose bytes were sent. The other devices receive the bytes, and `silence` at once,
-// without waiting for their limits: the line is idle behind a transfer.
+// Reports `sent` to the devices whose bytes were sent. The other devices receive the bytes, and those without a pending
+// transfer `silence` at once, without waiting for their limits: the line is idle behind a transfer.
 void Bus::report_sent(const ByteEvent& event) {
   sending_ = false;
   for (Node& node : nodes_) {

@@ -16,7 +16,7 @@ namespace absenc::sim {
 /// reach the line as their AND, as in Line, but aligned to whole bytes.
 class Bus final : public Machine<std::uint8_t> {
  public:
-  /// `devices` must outlive the bus. `character` is the duration of one byte on the line.
+  /// The machines in `devices` must outlive the bus. `character` is the duration of one byte on the line.
   Bus(const std::vector<Machine<std::uint8_t>*>& devices, Time character);
 
   /// Processes an event that the port reports.

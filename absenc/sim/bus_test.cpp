@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compares sim::Bus with sim::Line: the host must receive the same bytes from devices of which each
-// answers one request byte.
+// Tests sim::Bus: the host must receive the same bytes as from devices on a sim::Line, and transfers that overlap are
+// merged.
 #include "absenc/sim/bus.hpp"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,8 @@ using Wire = std::vector<std::uint8_t>;
 
 constexpr LineSettings settings{.rate = 1'000'000};
 
-/// A device that sends `reply` a time `after` it received the byte `key`, if `key` is the first byte after silence.
+/// A device that sends `reply` a time `after` it received the byte `key`, if `key` is the first byte, or the first
+/// after silence or after a reply of its own.
 struct Responder final : Machine<std::uint8_t> {
   Responder(std::uint8_t its_key, Wire its_reply, Time its_after = 5us)
       : key(its_key), reply(std::move(its_reply)), after(its_after) {}

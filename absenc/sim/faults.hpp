@@ -101,7 +101,7 @@ class FaultyDevice final : public Machine<std::uint8_t> {
   // The device receives nothing while a reply that a fault stretched, or a reply to a damaged request, is pending or
   // being sent.
   bool ignores_line_ = false;
-  Time last_ignored_at_ = -std::chrono::hours(1);  // time of the last byte received while `ignores_line_`
+  Time last_ignored_at_ = -std::chrono::hours(1);  // time of the last byte that was ignored
   Time device_gap_{};                              // pause after which the device considers a request complete
   Time silent_until_ = never;                      // time at which a suppressed reply counts as sent
   Time device_timer_ = never;                      // time of the timer that the device requested

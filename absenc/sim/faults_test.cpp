@@ -24,7 +24,8 @@ using StepKind = Step<std::uint8_t>::Kind;
 const ByteVector request{0x32, 0x05};
 const ByteVector reply{0x11, 0x22, 0x33, 0x44};
 
-// A device that answers every two bytes 3 us later, and counts as violations what it receives before its reply ends.
+// A device that answers every two bytes 3 us later, and counts as violations the bytes and silences that are reported
+// to it before its reply ends.
 class Device final : public Machine<std::uint8_t> {
  public:
   void feed(const Event<std::uint8_t>& event) override {

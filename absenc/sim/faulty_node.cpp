@@ -60,7 +60,7 @@ void FaultyNode::damage(const CanFrame& frame) {
   if (strikes(FaultKind::repeat)) out_.push_back(sent);
 }
 
-// Flips 1 to 3 random bits of `frame`; the same bit may be drawn twice.
+// Draws 1 to 3 random bits of `frame` and flips each; a bit that is drawn twice is flipped back.
 void FaultyNode::flip_bits(CanFrame& frame) {
   for (std::uint64_t more = 1 + random_.below(3); more > 0; --more) {
     const std::uint64_t bit = random_.below(std::uint64_t{8} * frame.size);

@@ -9,9 +9,10 @@
 namespace absenc::sim {
 
 /// A machine between a CAN bus and a device that injects faults. The device must outlive it. The faults are those of
-/// FaultRates with a frame in place of a reply: `drop` removes the last byte of a frame, `truncate` one or
-/// more bytes at its end; before the frame, `echo` sends the last received frame and `garbage` a random frame. On a
-/// real bus the CAN checksum would discard frames damaged on the wire: these faults model a node with faulty software.
+/// FaultRates with a frame in place of a reply, but `delay` strikes a whole transfer: `drop` removes the last byte of a
+/// frame, `truncate` one or more bytes at its end; before the frame, `echo` sends the last received frame and `garbage`
+/// a random frame. On a real bus the CAN checksum would discard frames damaged on the wire: these faults model a node
+/// with faulty software.
 class FaultyNode final : public Machine<CanFrame> {
  public:
   /// Injects faults between `device` and its bus. The same seed gives the same faults.

@@ -16,7 +16,7 @@ namespace absenc::sim {
 /// the bus has neither receives nor sends.
 class FrameBus final : public Machine<CanFrame> {
  public:
-  /// `nodes` must outlive the bus. `rate` is the bit rate at which the port and all nodes begin.
+  /// The machines in `nodes` must outlive the bus. `rate` is the bit rate at which the port and all nodes begin.
   FrameBus(const std::vector<Machine<CanFrame>*>& nodes, std::uint32_t rate);
 
   /// Processes an event that the port reports.

@@ -28,7 +28,7 @@ class LatePort final : public Port<Item> {
 
   void begin(const Step<Item>& step) override {
     if (step.kind == Step<Item>::Kind::transfer || step.kind == Step<Item>::Kind::pulse) {
-      // The line's time may be behind this port's time: `rest` advances it, so that the transfer begins now.
+      // `rest` advances the time to `at` and stores the items that arrive until then, so that the transfer begins now.
       rest(std::max(time_, step.at));
       quiet_since_ = time_;
       received_ = silence_reported_ = false;

@@ -25,8 +25,8 @@ enum class NodeRole : std::uint8_t { host, device };
 /// Characters that overlap on one pair reach every receiver as the AND of both (an idle line is high); a character that
 /// begins during another one is received as part of that other one. CAN frames are arbitrated by identifier; the same
 /// identifier with other data is a `line_error` for every node. A node receives its own characters only with
-/// `set_echo`, then before their `sent`. A machine that begins a transfer during another one of its own causes a
-/// std::logic_error.
+/// `set_echo`, then before their `sent`. A machine that begins a transfer or pulse before its last one was sent causes
+/// a std::logic_error, except a transfer of a device on an SPI or clocked link.
 template <class Item>
 class Line {
  public:
@@ -98,9 +98,11 @@ class Line {
   struct ScheduledEvent {
     enum class Kind : std::uint8_t { begin, character, frame, transferred, finished, arbitrate } kind;
     Time at;
-    std::uint64_t order;  // events of the same time are handled in the order in which they were scheduled
+    std::uint64_t order;  // events of the same time are handled in this order, but `arbitrate` last
     Node node;
-    std::uint64_t generation;  // the event is ignored if the node has begun another transfer since
+    // `begin_generation` of the node when the event was scheduled. If the node has another one now, the event does not
+    // concern its present transfer or pulse.
+    std::uint64_t generation;
     bool operator>(const ScheduledEvent& other) const {
       if (at != other.at) return at > other.at;
       // All nodes that begin a CAN frame at this time take part in the arbitration, so it comes last.

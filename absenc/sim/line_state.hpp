@@ -22,11 +22,11 @@ struct Line<Item>::State {
   Machine<Item>* machine = nullptr;  ///< Machine of the node.
   OnEmit on_emit;                    ///< Function that is called at each `emit` step of the machine.
   LineSettings settings{};           ///< Settings of the node's end of the line.
-  bool echo = false;                 ///< Whether the node receives its own characters.
+  bool echo = false;                 ///< Whether the node receives what it sends.
   bool done = false;                 ///< Whether the machine of the node has ended.
 
   Step<Item> waiting{};    ///< last wait step of the machine
-  Time timer_due = never;  ///< time of `timer` in the last wait step, `never` once it was reported
+  Time timer_due = never;  ///< time of the `timer` event that the node waits for; `never`: none
   Silence silence;         ///< Silence timer of the node.
   Time due = never;        ///< time of the next `timer` or `silence` event
 
@@ -39,7 +39,7 @@ struct Line<Item>::State {
   /// Kind of the step that is pending or in progress, transfer or pulse; wait: none.
   typename Step<Item>::Kind active_step = Step<Item>::Kind::wait;
   std::uint64_t begin_generation = 0;  ///< number of transfers, pulses and replaced machines so far
-  bool begun = false;                  ///< false while the transfer's `at` lies in the future
+  bool begun = false;                  ///< whether the transfer or pulse in `active_step` has begun
   std::vector<Item> out;               ///< items of the transfer that the node sends
   std::size_t bits = 0;                ///< spi, clocked: number of bits of the transfer
   std::size_t frame = 0;               ///< number of items of each frame of `out`; 0: one frame
@@ -52,7 +52,7 @@ struct Line<Item>::State {
   ExtraWire pulse_wire{};          ///< wire of the pulse
   Time start{};                    ///< start of the transfer; CAN: start of the frame
   std::size_t index = 0;           ///< index of the item of `out` that is on the wire
-  std::size_t on_wire = 0;         ///< number of items of `out` that have been, are or will be on the wire
+  std::size_t on_wire = 0;         ///< characters: number of items of `out` that have been, are or will be on the wire
   Time each{};                     ///< duration of one byte
 
   /// Returns whether a transfer of this node has begun and has items left to send.

@@ -117,7 +117,7 @@ void Line<Item>::end_character(Node node) {
     if (!receives_from(receiver, sender)) continue;
     if (receiver.framed_sender == node && receiver.framed_from == from) {
       deliver(other, node, item, false);
-    } else {  // the character is part of another sender's character, but the line is not silent either
+    } else {  // the receiver is synchronised to another sender's character, and the line is not silent
       receiver.silence.busy(now_);
       if (!receiver.done) arm(receiver);
     }

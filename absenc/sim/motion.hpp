@@ -72,7 +72,7 @@ class Motion final : public Shaft {
 };
 
 /// Parses `still`, `rpm=R`, `sine=DEGREES,HZ` or `file=CSV` (the file is opened and read here). Throws
-/// std::invalid_argument with a sentence that states the mistake and the allowed values.
+/// std::invalid_argument with a sentence that quotes `text` and states the mistake.
 [[nodiscard]] Motion parse_motion(std::string_view text, std::int64_t start_position);
 
 }  // namespace absenc::sim

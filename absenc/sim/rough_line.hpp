@@ -12,25 +12,26 @@
 
 namespace absenc::sim {
 
-/// Probability, 0 to 1, of each kind of damage to data that is sent to the host: `bit` per data bit, all others per
-/// frame. Faults of the device itself are FaultRates, applied between the device and this line.
+/// Probability, 0 to 1, of each kind of damage to data that is sent to the host: `bit` per data bit (CAN: per bit of
+/// the whole frame), all others per frame. Faults of the device itself are FaultRates, applied between device and line.
 struct RoughRates {
   double bit = 0;  ///< probability that a data bit is flipped
   /// 2 to 16 adjacent bits are damaged: the first and last are flipped, each bit between them with probability 1/2.
   double burst = 0;
   /// One byte or CAN frame arrives twice. On SPI and clocked links one bit arrives twice and the last bit is lost.
   double doubled = 0;
-  /// Another sender sends random bytes during the frame or beyond its end; the host receives the AND of both.
+  /// Another sender sends random bytes during the frame, and perhaps beyond its end (not on SPI and clocked links); the
+  /// host receives the AND of both.
   double talker = 0;
   double late = 0;  ///< the frame is 10 us to 10 s late, each decade equally likely; later frames do not overtake it
 };
 
-/// Counts of the disturbances of a rough line.
+/// Counts of the requests, the replies and the disturbances of a rough line.
 struct RoughCounts {
   std::uint64_t requests = 0;  ///< transfers and pulses of the host
   std::uint64_t replies = 0;   ///< frames sent to the host
   std::uint64_t damaged = 0;   ///< frames damaged by any fault except `late`
-  std::uint64_t late = 0;      ///< Replies that arrived late.
+  std::uint64_t late = 0;      ///< frames that were delayed
 };
 
 /// A line with damage at random. It is simulated faster than Line, which moves single characters; use Line for
@@ -59,7 +60,7 @@ class RoughLine final : public Port<Item> {
   void mark();
   /// Returns the send time of each old frame that was reported to the host since `mark`.
   [[nodiscard]] std::span<const Time> old_frames() const { return old_; }
-  /// Returns the counts of disturbances so far.
+  /// Returns the counts of requests, replies and disturbances so far.
   [[nodiscard]] const RoughCounts& counts() const { return counts_; }
   /// Returns the last request of the host.
   [[nodiscard]] std::span<const Item> request() const { return request_; }

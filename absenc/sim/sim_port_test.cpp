@@ -37,7 +37,7 @@ class Responder final : public Machine<std::uint8_t> {
   bool pending_ = false;
 };
 
-// A host that sends a given number of requests, 100 us apart, and emits every reply.
+// A host that sends a given number of requests, at least 100 us apart, and emits after each reply or silence.
 class Requester final : public Machine<std::uint8_t> {
  public:
   explicit Requester(int times) : left_(times) {}

@@ -24,8 +24,8 @@ namespace absenc::sim {
 /// - additional wires after the first pulse: `trigger`, `clear`, which a pulse pulls to 0
 /// - spi: `cs`, `sck`, `mosi`, `miso`; `miso` is 1 while no device drives it
 /// - clocked: `clock`, idle high, and `data`, which changes at its rising edges. The host samples each bit at the next
-/// falling edge. `idle_clocks` adds as many clocks before the first bit. After the last edge the device may hold
-/// `data` low: the timeout of BiSS, the monoflop of SSI.
+/// falling edge. `idle_clocks` adds as many clocks before the first bit; without them that bit begins with the first
+/// clock edge. After the last edge the device may hold `data` low: the timeout of BiSS, the monoflop of SSI.
 /// - CAN: `can`, recessive is 1; every frame is acknowledged
 class Waveform {
  public:
@@ -71,7 +71,7 @@ class Waveform {
 
   /// Returns the wires; extra wires are added when their first pulse is drawn.
   [[nodiscard]] const std::vector<Wire>& wires() const { return wires_; }
-  /// Returns the end of the last drawn item.
+  /// Returns the time behind which nothing is drawn: the latest end of all drawn items and levels.
   [[nodiscard]] Time end() const { return end_; }
 
  private:

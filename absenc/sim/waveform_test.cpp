@@ -205,7 +205,7 @@ TEST(Waveform, DataIsLowForTheTimeoutBehindTheLastEdge) {
   EXPECT_THAT(body(picture), ::testing::EndsWith("#3000\n0!\n#3500\n1!\n0\"\n#23500\n1\"\n#33500\n"));
 
   // After the last bit the device holds the data line low. BiSS: for its fixed timeout (20 us by default) or one and a
-  // half clock periods. SSI: for the monoflop time, from the edge behind the last bit.
+  // half clock periods. SSI: for the monoflop time, from the edge behind the last bit; with AfterWord::one not at all.
   biss::Format biss{};
   const auto biss_low = [&] {
     biss::testing::Bench bench(biss::line_settings, biss);
@@ -374,7 +374,7 @@ TEST_F(Sigrok, ReadsFramesOfCan) {
     waveform.frame(at, frame);
     at += settings.bits(can_bits(frame).size() + can_intermission_bits);
   };
-  add({.id = 0x000, .size = 8});  // the frame with the most stuff bits
+  add({.id = 0x000, .size = 8});  // a frame with many stuff bits
   add({.id = 0x120, .size = 3, .data = {0x47, 0x26, 0xFF}});
   add({.id = 0x1ABCDE01, .extended = true, .size = 1, .data = {0x5A}});
   add({.id = 0x7E5, .remote = true});

@@ -24,22 +24,22 @@ enum class Carries : std::uint8_t {
   detect,  // unknown which of two channels carries the requests and which the replies; detected from the characters
 };
 
-/// Returns the times of the unit's line in ticks of a capture. `ticks_per_bit` 0: the characters have no lengths, and
-/// characters more than a tick apart belong to different frames. `ticks_per_second` 0: the line has the unit's own
-/// rate.
+/// Returns the times of the unit's line in ticks of a capture. `ticks_per_bit` 0: the bit time is not known, and
+/// characters with a silence of a tick or more between them belong to different frames. `ticks_per_second` 0: the line
+/// has the unit's own rate.
 [[nodiscard]] LineTicks line_ticks(const Unit& unit, double ticks_per_bit, std::uint64_t ticks_per_second);
 
 /// Converts characters to annotated exchanges. Memory does not grow with the length of the capture.
 ///
 /// A pause on the line ends a frame. The first characters of a capture, up to the first pause, may be the end of a
 /// frame or no characters at all: they are reported as cut, unless the line was silent before them. On a line that
-/// never pauses, a frame is accepted only if another good frame follows, because a weak checksum finds frames
-/// everywhere. On a line with both directions a frame is classified as request or reply by the preceding frames, never
-/// by its bytes alone: some replies equal their requests.
+/// never pauses, the first frame is accepted only if more good frames follow it, because a weak checksum finds frames
+/// everywhere. On a line with both directions a frame is classified as request or reply by the frames before and behind
+/// it, never by its bytes alone: some replies equal their requests.
 ///
 /// With arrival times (`by_arrival`) a pause may lie within a frame and be missing between two frames. Frames are then
-/// separated by length and content alone, and pauses only help to judge bytes that are no good frame: see
-/// annotate_arrival.cpp.
+/// separated by length and content, and pauses only help to judge bytes that are no good frame and requests without a
+/// reply: see annotate_arrival.cpp.
 class Annotator {
  public:
   struct Settings {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Feeds any bytes with any pauses as characters of any line: the annotations must contain as many bytes as were fed,
-// and a frame that is annotated as good must pass the unit's checks.
+// Feeds any bytes with any pauses as characters of any line: the annotations must contain as many bytes as were fed, if
+// they are no more than a stored request holds, and a frame that is annotated as good must pass the unit's checks.
 #include <array>
 #include <cstddef>
 #include <cstdint>

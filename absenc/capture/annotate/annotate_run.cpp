@@ -231,7 +231,7 @@ bool Annotator::is_request(std::size_t size) {
 
 std::size_t Annotator::match_unsolicited() {
   const bool streams = judge_.streams();
-  // A request is outstanding and was not matched: the good reply at `at_` belongs to another request.
+  // A request is outstanding and was not matched: a good reply at `at_` belongs to another request.
   if (!streams && request_before(channel_->run.begin(at_))) return 0;
   const std::size_t size = reply_at({}, at_, channel_->last_size);
   if (size == 0) return 0;

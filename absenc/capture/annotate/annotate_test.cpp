@@ -401,7 +401,7 @@ TEST(CompletedReadings, ForgetsAlarmsThatWereCleared) {
   EXPECT_EQ(cleared.alarms_reported & counter_overflow, 0u) << "not reported by any reply since";
 }
 
-// A new request ends the wait for earlier replies, and a bad reply also answers its request.
+// A new request ends the wait for replies to earlier requests. A bad reply is paired with its request.
 TEST(Can, EachReplyBelongsToTheNewestRequest) {
   const Unit& unit = *find_unit("raa38-can");
   Options options;

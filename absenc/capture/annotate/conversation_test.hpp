@@ -100,7 +100,7 @@ class Talker {
     return std::move(record_);
   }
 
-  /// Draws all further traffic to `waveform` too, which must outlive this object.
+  /// Draws all further traffic to `waveform`, which must outlive this object.
   void draw(sim::Waveform& waveform) { waveform_ = &waveform; }
 
   [[nodiscard]] Tick now() const { return static_cast<Tick>(line_.now().count()); }

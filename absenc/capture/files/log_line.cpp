@@ -217,7 +217,7 @@ constexpr std::array<std::array<std::string_view, 4>, 2> arrows = {
 
 int direction_of(std::string_view word) {
   std::string lower = lower_case(word);
-  if (lower.starts_with("tx") || lower.starts_with("rx")) {  // words like "RX1" are directions too
+  if (lower.starts_with("tx") || lower.starts_with("rx")) {  // "RX1" is a direction like "RX"
     while (lower.size() > 2 && is_digit(lower.back())) lower.pop_back();
   }
   for (std::size_t i = 0; i < directions.size(); ++i) {

@@ -241,7 +241,7 @@ class LogicCsv final : public ParsedReader {
   TextLines lines_;
   std::uint64_t rate_;
   std::vector<std::string> names_;
-  std::vector<char> columns_;  // for each column behind the time: 1 logic level, 0 left out
+  std::vector<char> columns_;  // for each column that is not skipped as time: 1 logic level, 0 left out
   RowTime clock_ = RowTime::seconds;
   bool skip_first_ = false;
   bool first_row_ = true;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Files that sigrok-cli writes from raw samples (sessions, VCD, CSV, the text of its UART decoder) must be read as the
-// same levels or bytes.
+// levels or bytes of those samples. Sessions that are cut off must be read up to the cut.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -30,8 +30,8 @@ struct AsyncFormat {
 /// Between parts the decoder stores the changes from the first incomplete character on, and no state within a
 /// character.
 ///
-/// A capture may begin inside a character: of the falling edges within the first character, the one with the fewest
-/// errors in the next twelve characters is the start bit.
+/// A capture may begin inside a character: if the line was not high for a whole character first, then of the first 16
+/// falling edges within one character the one with the fewest errors in the next twelve characters is the start bit.
 class AsyncDecoder {
  public:
   /// Counts of characters and faults. `ticks` and `bits` are sums over all characters without a fault, from the start

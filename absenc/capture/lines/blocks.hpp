@@ -34,7 +34,8 @@ class LevelReader {
   [[nodiscard]] std::string name(unsigned channel) const;
   [[nodiscard]] const Layout& layout() const { return reader_.layout(); }
 
-  /// Claims the next block; only one thread at a time may call this. Returns false at the end of the capture.
+  /// Claims the next block; only one thread at a time may call this. Returns false at the end of the capture, or if the
+  /// rest of the file cannot be read.
   [[nodiscard]] bool claim(Block& block) { return reader_.claim(block); }
   /// Converts a claimed block to level changes. Several threads may call it, each with its own block.
   void expand(Block& block, Levels& levels) const;
@@ -79,8 +80,8 @@ void look_ahead(LevelReader& reader, std::vector<Levels>& parts, Enough&& enough
 /// it begins a character or word at the same time as the guess. From there on both depend only on later changes, so the
 /// guess is correct. If true state and guess never meet, the block is decoded twice, and the result is still correct.
 ///
-/// The calling thread calls `decode` and `join`. Each thread has two blocks in progress. `run` throws exceptions of the
-/// reader and the decoding.
+/// The calling thread calls `decode` and `join`. Up to two blocks per thread are in progress. `run` throws exceptions
+/// of the reader and the decoding.
 template <class Decoding>
 class BlockRun {
  public:

@@ -100,7 +100,7 @@ RC_GTEST_PROP(CanDecoderProperty, PartsMakeNoDifference, (std::uint32_t seed)) {
   for (std::size_t i = 0; i < whole.size(); ++i) RC_ASSERT(frames[i].frame == whole[i].frame);
 }
 
-// A flipped bit gives error frames, but never a good frame that was not sent.
+// A frame with a flipped bit gives nothing but error frames, and the frame behind it is decoded.
 RC_GTEST_PROP(CanDecoderProperty, AFlippedBitIsNoFrame, (std::uint32_t seed)) {
   std::mt19937 random(seed);
   CanBusDrawing bus(10);
@@ -133,7 +133,7 @@ TEST(CanDecoder, ReportsMissingAcknowledge) {
 TEST(CanDecoder, ReportsPlaceOfError) {
   CanBusDrawing bus(10);
   std::vector<bool> bits = sim::can_bits({.id = 0x555, .size = 1, .data = {0x55}});
-  bits[26] = !bits[26];  // changes a bit of the CRC, where bits alternate
+  bits[26] = !bits[26];  // changes a bit of the data byte, where bits alternate
   bus.add(bits);
   bus.pass(20);
   const std::vector<CanRecord> frames = bus.decoded();

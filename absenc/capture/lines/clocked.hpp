@@ -29,8 +29,8 @@ struct ClockedFormat {
 struct ClockRests {
   Tick half_period = 0;
   Tick longest = 0;
-  // Possible limits, in ticks, above which a rest ends a word: three periods, then one value between each two clearly
-  // different lengths of rests, the shortest first.
+  // Possible limits, in ticks, above which a rest ends a word: three periods, then up to 12 values, the shortest first,
+  // each between two clearly different lengths of rests.
   std::vector<Tick> pauses;
 };
 
@@ -48,8 +48,8 @@ struct ClockedPart {
 };
 
 /// A decoder of clocked bursts, which decodes a capture part by part. A burst whose beginning or end is not in the
-/// capture is marked as cut. A single clock change between two pauses is no burst: the host holds the clock low, or
-/// lets it rise again.
+/// capture, and each piece of a burst of more than `most_bits` bits, is marked as cut. A single clock change between
+/// two pauses is no burst: the host holds the clock low, or lets it rise again.
 class ClockedDecoder {
  public:
   static constexpr std::size_t most_bits = 65536;  // longest burst, in bits; a longer burst is cut into pieces

@@ -41,7 +41,7 @@ struct AsyncOutcome {
 
 /// Decodes the characters of several lines, ordered by their start bits; `Character::channel` is the index in `lines`.
 /// A baud rate and an idle level that are not given are detected from the first 16384 changes of a line; a line whose
-/// baud rate cannot be detected uses that of another. Memory does not grow with the file. Throws exceptions of the
+/// baud rate cannot be detected uses that of another line. Memory does not grow with the file. Throws exceptions of the
 /// reader and the sink.
 AsyncOutcome decode_async(Reader& reader, std::span<const AsyncLine> lines, unsigned threads, const PartSink& sink);
 
@@ -60,8 +60,9 @@ struct ClockedLine {
   std::optional<unsigned> select{};  // index of the channel with chip select, for SPI
   bool rising = false;               // true: the rising edge of the clock samples a bit; false: the falling edge
   bool select_high = false;          // true: chip select is active high
-  Tick pause = 0;   // without chip select: a clock that rests longer ends a word, in ticks; 0: `choose` decides
-  Tick settle = 0;  // sampling time of a word's last bit; see ClockedFormat
+  Tick pause = 0;  // without chip select: a clock that rests longer ends a word, in ticks; 0: `choose` decides
+  // `settle` and `change_pause` of ClockedFormat; not used if `pause` is 0 and there is no chip select.
+  Tick settle = 0;
   Tick change_pause = 0;
   /// Returns the index of the reading to use, of all possible ways to split the beginning of the capture. Null: rests
   /// longer than three periods of the clock end a word.

@@ -130,8 +130,8 @@ std::vector<Burst> bursts_until(Tick last, const std::vector<Levels>& parts, con
   return bursts;
 }
 
-// Returns whether the data line changed in each rest between two of the bursts, later than `settle` behind the
-// end of the first.
+// Returns whether the data line changed in each rest between two consecutive bursts, later than `settle` behind the end
+// of the earlier burst; false without a data line, or with fewer than two bursts.
 bool changes_in_rests(const std::vector<Burst>& bursts, const std::vector<Levels>& parts, const WireIndices& wires,
                       Tick settle) {
   if (!wires.in || bursts.size() < 2) return false;
@@ -180,8 +180,8 @@ std::string find_pause(LevelReader& reader, const WireIndices& wires, const Cloc
   // Rests within words and between words may have any length, but a timeout or a monoflop ends only between words.
   if (wires.in) {
     word_formats.push_back(word_formats.back());
-    // An encoder that does not drive the line changes nothing: rests of at least half the longest length end the words
-    // of such a line.
+    // An encoder that does not drive the line changes nothing: rests longer than half the longest one, and than all of
+    // `rests->pauses`, end the words of such a line.
     word_formats.back().pause =
         std::max(rests->longest / 2, *std::max_element(rests->pauses.begin(), rests->pauses.end()));
     word_formats.back().change_pause = 2 * rests->half_period;

@@ -71,8 +71,8 @@ inline std::optional<std::uint32_t> check_of(const CheckedFrame& frame, const Sh
   return value;
 }
 
-/// Calls `take` for each covered bit from `first` on, in the order in which they enter the register. Returns the number
-/// of bits.
+/// Calls `take` for each covered bit from the byte (in frames of bits: the bit) `first` on, in the order in which they
+/// enter the register. Returns the number of bits.
 template <class Take>
 std::size_t covered_bits(const CheckedFrame& frame, const Shape& shape, std::size_t first, const Take& take) {
   const std::size_t end = Frames::size(frame) - shape.trailing - shape.check_size;

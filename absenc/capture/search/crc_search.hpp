@@ -34,10 +34,11 @@ enum class CheckKind : std::uint8_t {
 /// and the position of the checksum are counted from the end of the frame, so that they apply to frames of all lengths.
 struct CheckSolution {
   CheckKind kind = CheckKind::crc;
-  CrcParameters parameters{};      // for kinds other than crc: width is 8 and init is the constant
-  bool low_first = false;          // width above 8 in frames of bytes: the checksum's low byte comes first in the frame
-  bool padded = false;             // the checksum is computed as if a byte 00 followed the covered part
-  bool init_open = false;          // all frames have one length: every value of init fits with an xorout of its own
+  CrcParameters parameters{};  // for kinds other than crc: width is 8 and init is the constant
+  bool low_first = false;      // width above 8 in frames of bytes: the checksum's low byte comes first in the frame
+  bool padded = false;         // the checksum is computed as if a byte 00 followed the covered part
+  // All frames have one length and no usual init and xorout fit: every value of init fits with an xorout of its own.
+  bool init_open = false;
   std::vector<std::size_t> first;  // possible positions of the first covered byte or bit
   std::size_t check_size = 0;      // number of bytes, or bits in frames of bits, of the checksum
   std::size_t trailing = 0;        // number of bytes, or bits in frames of bits, behind the checksum
@@ -50,9 +51,10 @@ struct CheckSearch {
 };
 
 /// Returns checksums of 3 to 16 bits that explain every frame: all that are found with usual init and xorout or
-/// constants, else for each layout and polynomial one with other values. The frames must be all of bytes or all of
-/// bits. Duplicates add no evidence, nor do bits that never change, alone or combined: the evidence is the number of
-/// independent ways in which the covered parts differ. A checksum that never changes is not accepted.
+/// constants, else those with other values (of CRCs one for each layout and polynomial). None if fewer than two frames
+/// differ. The frames must be all of bytes or all of bits. Duplicates add no evidence, nor do bits that never change,
+/// alone or combined: the evidence is the number of independent ways in which the covered parts differ. A checksum that
+/// never changes is not accepted.
 [[nodiscard]] CheckSearch find_checks(std::span<const CheckedFrame> frames);
 
 /// Returns how many more frames with other data would settle whether `solution` is right: its chance would fall below

@@ -149,7 +149,7 @@ TEST(Hypotheses, ListsEqualMeaningsOnce) {
   for (const Hypothesis& one : found) EXPECT_EQ(one.options[2], 0);
 }
 
-// A unit that accepts every word also sees the words of a checked protocol move like a position.
+// A unit that accepts every word decodes the words of a checked protocol as positions that move plausibly.
 TEST(Hypotheses, FramesThatProveThemselvesGoFirst) {
   Hypothesis checked{.evidence = {.tried = 20, .explained = 20, .distinct = 20, .frames = -36}};
   Hypothesis moving{.evidence = {.tried = 20, .explained = 20, .distinct = 20, .frames = 0, .motion = -114}};

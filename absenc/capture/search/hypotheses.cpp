@@ -56,7 +56,8 @@ class HypothesisSearch {
   HypothesisSearch(const Unit& unit, std::span<const ObservedExchange> exchanges)
       : unit_(unit), exchanges_(exchanges) {}
 
-  /// Adds a hypothesis if `options` explain at least as many exchanges as the best hypotheses so far.
+  /// Adds a hypothesis if `options` explain at least one exchange, and as many as the best hypotheses so far; it
+  /// replaces them if it explains more.
   void add(const Options& options, bool at_least = false) {
     if (contains(best_, options)) return;
     ++tried_;
@@ -85,8 +86,8 @@ class HypothesisSearch {
     add(options);
   }
 
-  /// Adds `base` with every change of a single option that has choices, and of each the numbers of bits that fit best,
-  /// because no model explains all exchanges.
+  /// Adds `base` with the numbers of bits that fit best, and `base` with every change of a single option that has
+  /// choices, alone and with the numbers of bits that fit best: no model explains all exchanges.
   void vary(const Options& base) {
     vary_bits(base);
     for (std::size_t i = 0; i < unit_.options.size(); ++i) {

@@ -26,7 +26,7 @@ struct Hypothesis {
   [[nodiscard]] bool is_proven() const;
 };
 
-/// Limit of `Hypothesis::chance`: a result below it is reported as found, a result above it only as possible.
+/// Limit of `Hypothesis::chance`: a result at or below it is reported as found, a result above it only as possible.
 inline constexpr double is_found = -3;
 
 /// Returns whether the hypothesis `one` is ranked before `other`: hypotheses proven by their frames come before those

@@ -15,9 +15,9 @@ namespace absenc::capture {
 /// beginning or the end of the stream are left out.
 [[nodiscard]] std::vector<ObservedExchange> split_stream(const Unit& unit, const Options& options, Bytes bytes);
 
-/// Returns the best hypothesis for a stream; none if no options explain at least three frames. Its options state that
-/// the encoder sends unsolicited frames, and if possible how often, computed from `duration`, the time of the
-/// recording.
+/// Returns the best hypothesis for a stream; none if no options explain at least three frames. If the unit has an
+/// option for it, its options state that the encoder sends unsolicited frames, and if possible how often, computed from
+/// `duration`, the time of the recording.
 [[nodiscard]] std::vector<Hypothesis> find_stream_hypotheses(const Unit& unit, Bytes bytes, Time duration);
 
 }  // namespace absenc::capture

@@ -62,20 +62,20 @@ struct InterfaceResults {
 };
 
 /// Reads a position with `4`. If the reply is missing or has a wrong length, reads the firmware version: before 1.16
-/// the error is unsupported, otherwise `4` is sent once more. `4` is not repeated if neither command was answered or if
-/// the line is never silent.
+/// the error is unsupported, otherwise `4` is sent once more. `4` is not repeated if it had no reply and the version no
+/// valid one, or if the line is never silent.
 author::Procedure read(Dialog& dialog, InterfaceResults& found);
 /// Reads version, serial number, supply and clock. A missing or invalid reply is an error only if it is that of the
 /// version, or if the line is never silent.
 author::Procedure read_info(Dialog& dialog, InterfaceResults& found);
-/// Sets the clock with `M` and reads it back with `m`. Argument: 1 to 8, or kHz. Error also: cross_check_failed
-/// (another clock is set afterwards).
+/// Sets the clock with `M` and reads it back with `m`. Argument: 1 to 8, or kHz. Error besides those of the exchanges:
+/// cross_check_failed (the interface reports another clock afterwards).
 author::Procedure set_clock(Dialog& dialog, InterfaceResults& found, Arguments arguments);
-/// Switches the encoder's supply with `n` or `f`, waits and reads its state with `e`. Error also: cross_check_failed
-/// (the voltage in the reply contradicts the command).
+/// Switches the encoder's supply with `n` or `f`, waits and reads its state with `e`. Error besides those of the
+/// exchanges: cross_check_failed (the voltage in the reply contradicts the command).
 author::Procedure switch_supply(Dialog& dialog, InterfaceResults& found, bool on);
-/// Sets the zero of `?` with `z`. Errors also: not_still (the encoder moves), invalid_argument (the encoder's position
-/// is invalid), cross_check_failed (`?` is not near 0 afterwards).
+/// Sets the zero of `?` with `z`. Errors besides those of the exchanges: not_still (the encoder moves),
+/// invalid_argument (the encoder's position is invalid), cross_check_failed (`?` is not near 0 afterwards).
 author::Procedure set_zero(Dialog& dialog, InterfaceResults& found);
 /// Reads frames at each clock and emits the results after each clock. Restores the old clock at the end, also after an
 /// error and after `abort`.

@@ -221,7 +221,7 @@ TEST(E201Zero, ReadsZeroBack) {
   EXPECT_EQ(bench.run("decimal").fields, (Fields{{"counts", 275086}}));
 }
 
-// 0.02 degrees are 29 counts of 19 bits, and 1 count of 12 bits.
+// The encoder may move by 0.02 degrees, but by one count in any case: 29 counts of 19 bits, 1 count of 12 bits.
 TEST(E201Zero, RefusesMovingEncoder) {
   struct Case {
     std::string bits;
@@ -248,7 +248,7 @@ TEST(E201Zero, RefusesMovingEncoder) {
     };
     const CommandResult zero = bench.run_tampered(tamper, "set-zero");
     EXPECT_EQ(zero.error, one.error) << one.looks.back();
-    const std::array asked{"", "4?", "4??", "4??z?"};  // an old interface does not answer `4`
+    const std::array asked{"", "4?", "4??", "4??z?"};  // `4` shows whether the encoder reports an error
     EXPECT_EQ(bench.answering.asked(), asked[one.looks.size()]);
     if (one.looks.size() < 2) continue;
     const Time pause = bench.answering.log[2].second - bench.answering.log[1].second;

@@ -6,7 +6,7 @@
 
 namespace absenc::e201 {
 
-extern const Unit unit;             ///< The protocol as a unit, for the list of units.
-extern const Clauses unit_clauses;  ///< The demands of its document.
+extern const Unit unit;             ///< Descriptor of the E201-9S.
+extern const Clauses unit_clauses;  ///< Demands of the E201-9S' document on interface and host.
 
 }  // namespace absenc::e201

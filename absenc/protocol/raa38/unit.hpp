@@ -9,8 +9,8 @@ namespace absenc::raa38 {
 extern constinit const Unit serial_unit;   ///< RAA38S6 on RS-485, RS-232 or RS-422.
 extern constinit const Unit modbus_unit;   ///< RAA38S6 with Modbus RTU.
 extern constinit const Unit can_unit;      ///< RAA38S6 on CAN.
-extern const Clauses serial_unit_clauses;  ///< The demands on an RAA38S6 on RS-485.
-extern const Clauses modbus_unit_clauses;  ///< The demands on an RAA38S6 with Modbus RTU.
-extern const Clauses can_unit_clauses;     ///< The demands on an RAA38S6 on CAN.
+extern const Clauses serial_unit_clauses;  ///< Demands on an RAA38S6 on RS-485 and on its host.
+extern const Clauses modbus_unit_clauses;  ///< Demands on an RAA38S6 with Modbus RTU and on its host.
+extern const Clauses can_unit_clauses;     ///< Demands on an RAA38S6 on CAN and on its host.
 
 }  // namespace absenc::raa38

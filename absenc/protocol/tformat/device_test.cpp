@@ -256,7 +256,8 @@ TEST(TformatDevice, RequestDuringTransmissionIsAViolation) {
   Bench longer;
   longer.raw({0x1A, 0xEA, 0x05, 0xEF});
   EXPECT_EQ(longer.violations(), 1u);
-  // Bytes that arrive together, as on a pseudo-terminal, count as two requests, not as four bytes.
+  // If all bytes arrive together, as on a pseudo-terminal, those behind the first request count as two requests, not as
+  // four bytes.
   testing::TestShaft shaft;
   VirtualEncoder encoder({}, shaft);
   encoder.power_on(Time{}, PowerOn::skip);

@@ -114,7 +114,7 @@ inline constexpr std::uint8_t battery_alarm = 0x80;  ///< alarm: the battery is 
 inline constexpr std::uint8_t shown_in_status = over_heat | multiturn_error | battery_error | battery_alarm;
 /// Mask of the alarms that make the turns invalid.
 inline constexpr std::uint8_t turns_lost = over_speed | multiturn_error | battery_error;
-/// Mask of the alarms that stay until a reset; some of them also end with power off (6.5).
+/// Mask of the alarms that stay until a reset; of them, multiturn_error ends with power off as well (6.5).
 inline constexpr std::uint8_t latched = over_speed | counter_overflow | over_heat | multiturn_error | battery_error;
 /// Mask of the alarms that an encoder without a battery always shows, which is no fault (2 (1), 6.5).
 inline constexpr std::uint8_t without_battery = battery_error | battery_alarm;

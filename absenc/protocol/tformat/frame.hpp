@@ -365,7 +365,7 @@ constexpr unsigned reported_status(const Format& format, bool has_alarms) {
   reading.alarms_reported &= ~expected_alarms(format);
   return reading;
 }
-/// Does the same with the data ID that `reply` contains.
+/// Returns the position and turns of a valid reply, with their validity, for the data ID that `reply` contains.
 [[nodiscard]] constexpr Reading to_reading(const Format& format, const Reply& reply,
                                            std::optional<std::uint8_t> known_alarms = std::nullopt) {
   return to_reading(format, reply.id, reply, known_alarms);

@@ -7,6 +7,6 @@
 namespace absenc::tformat {
 
 extern constinit const Unit unit;   ///< Descriptor of the T-format.
-extern const Clauses unit_clauses;  ///< The demands of its document.
+extern const Clauses unit_clauses;  ///< Demands of the T-format's document on encoder and host.
 
 }  // namespace absenc::tformat

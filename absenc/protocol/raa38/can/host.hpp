@@ -90,8 +90,8 @@ using Dialog = author::DialogOf<Protocol>;
 // ---- One node
 
 /// Sets with order 31 the number of positions per second that the node sends, 0 for none, and measures the rate of the
-/// frames that are received. Errors: timeout (neither an answer nor a frame arrives), bad_framing (the same, and frames
-/// are destroyed), cross_check_failed (another rate).
+/// frames that are received. Errors: timeout (of a number above 0: neither an answer nor a frame arrives), bad_framing
+/// (as timeout, and frames are destroyed), cross_check_failed (another rate).
 author::Procedure set_cyclic(Dialog& dialog, Values& found, Arguments arguments);
 
 /// Changes the zero or the direction. Order 20 makes the present position 0, as the document suggests; the position is
@@ -107,7 +107,7 @@ author::Procedure find_node(Dialog& dialog, Values& found);
 
 // ---- All nodes on the bus
 
-/// Counts of the frames that a scan received from one node number.
+/// Counts of the frames that a scan received from one node number, and the position in the last frame.
 struct NodeFrames {
   std::uint16_t unsolicited = 0;  ///< Number of frames that the node sent without a request.
   std::uint16_t per_second = 0;   ///< Number of frames that the node sent without a request in the first second.
@@ -118,15 +118,16 @@ struct NodeFrames {
 
   /// Returns whether a node with this number was found.
   [[nodiscard]] constexpr bool is_there() const { return unsolicited != 0 || answers != 0 || damaged > 1; }
-  /// Returns whether two nodes seem to share the number: two answers to one request, or destroyed frames each time.
+  /// Returns whether two nodes seem to share the number: two answers to one request, or destroyed frames each time, and
+  /// no frame without a request.
   [[nodiscard]] constexpr bool clash() const {
     return (unsolicited == 0 && answers > 1) || (damaged > 1 && answers == 0 && unsolicited == 0);
   }
 };
 
-/// Result of a scan: counts of the frames that were received from each node number.
+/// Result of a scan: what was received from each node number.
 struct Nodes {
-  std::array<NodeFrames, 256> at{};  ///< Counts of each node number, which is the index.
+  std::array<NodeFrames, 256> at{};  ///< Result of each node number, which is the index.
 
   /// Returns how many node numbers were found on the bus.
   [[nodiscard]] unsigned count() const;

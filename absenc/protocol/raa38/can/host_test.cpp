@@ -60,7 +60,7 @@ TEST(Raa38CanRead, IgnoresFramesFromBeforeTheRequest) {
       by_hand.receive(encode_position(0x20, 1));  // a position that is received before the request is sent
       by_hand.sent();
     }
-    // This position waited in a queue: its time of reception is before the request.
+    // This position waited in a queue: it was received before the request, or before the host began to listen.
     by_hand.receive(encode_position(0x20, 2), -1ms);
     EXPECT_EQ(by_hand.next(), Kind::wait);
     by_hand.receive(encode_position(0x20, 3), 1ms);

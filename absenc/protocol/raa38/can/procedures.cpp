@@ -247,7 +247,7 @@ Procedure change(Dialog& dialog, Values& found, Order order, Arguments arguments
 namespace {
 
 constexpr Time between_requests = 2ms;  // time between two requests; one request and one answer take 1 ms at 250 kbit/s
-// A frame this many requests after the request for its node number counts as unsolicited, not as an answer.
+// A frame this many requests or more after the request for its node number counts as unsolicited, not as an answer.
 constexpr unsigned answering = 10;
 constexpr Time last_answers = 100ms;
 constexpr Time entering_time = 20ms;  // time after "enter configuration", which is not answered

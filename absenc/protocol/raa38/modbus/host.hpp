@@ -65,7 +65,8 @@ author::Procedure read_direction(Dialog& dialog, CommandValues& found);
 author::Procedure read_address(Dialog& dialog, CommandValues& found);
 
 /// Finds the baud rate at which the encoder answers: tries the rate of the format first, then the others. Leaves the
-/// line at its old rate. Errors: timeout, or the error of the reply at the rate of the format.
+/// line at its old rate. Errors: timeout, or the error of the reply at the rate of the format, or of a line that is
+/// never silent.
 author::Procedure find_baud(Dialog& dialog, CommandValues& found);
 
 /// Result of a scan of the slaves on a line. The scan sends A0 first, which a single encoder answers; otherwise it

@@ -112,8 +112,8 @@ FrameEnd frame_end(const Options& values, Direction way, Bytes bytes) {
 
 // ---- Evidence of captured frames for options; their address does not matter
 
-/// Content of a valid captured reply, or the error that it has with any options. `reply` is empty if the capture has
-/// none.
+/// Content of a valid capture, or the error that it has with any options. `reply` is empty if the capture has none, or
+/// a refusal.
 struct CaptureContent {
   Request request{};
   std::optional<Reply> reply{};

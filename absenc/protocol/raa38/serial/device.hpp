@@ -40,7 +40,7 @@ class VirtualEncoder final : public author::BusDevice<Protocol, VirtualEncoder, 
   Time frame_at_{};
   std::size_t sent_ = 0;
   bool pending_ = false;
-  std::uint32_t last_characters_ = 0;  // last three characters that were received during the present transmission
+  std::uint32_t last_characters_ = 0;  // last three characters that were received during transmissions
 };
 
 }  // namespace absenc::raa38::serial

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Frames of the RAA38S6 on asynchronous lines, their checks and their times. RS-485, RS-232 and RS-422 carry the same
-// bytes. README.md draws them.
+// bytes. README.md draws the frames.
 #pragma once
 
 #include <algorithm>
@@ -54,12 +54,12 @@ inline constexpr std::size_t frame_capacity = 6;  ///< Length of the longest fra
 inline constexpr Time trigger_width = 10us;  ///< Time T2: shortest pulse on CLK (3.1.3).
 inline constexpr Time clear_width = 1ms;     ///< Width of the pulse on CLR.
 
-// Timeouts of the host, for encoders whose ordered times the options do not state.
+// Times of the host. `answer_limit` and `gap_limit` are for encoders whose ordered times the options do not state.
 /// Timeout of a reply: longest T3, or longest time from a request to its reply.
 inline constexpr Time answer_limit = 100ms;
 inline constexpr Time answer_slack = 5ms;  ///< Time added to a T3 from the options to get the timeout.
 inline constexpr Time gap_limit = 10ms;    ///< Timeout between two characters of a frame; suits 1200 baud.
-inline constexpr Time patience = 1s;  ///< Timeout on a line that is never silent; two frames at 1200 baud take 130 ms.
+inline constexpr Time patience = 1s;  ///< Timeout on a line that is never silent; two frames at 1200 baud take 100 ms.
 inline constexpr Time listen_limit = 1s;  ///< Timeout of a stream without a valid frame.
 /// Time for which the host listens before a scan; longer than the period of most refresh rates.
 inline constexpr Time scan_silence = 200ms;
@@ -152,7 +152,7 @@ inline constexpr int any_unit = -1;
 }
 
 /// Decodes a frame of `unit`, 0 to 15, or of `any_unit`. Errors: wrong_length, bad_checksum, unexpected_reply (another
-/// second byte), out_of_range.
+/// first or second byte), out_of_range.
 [[nodiscard]] constexpr Result<Position> decode_position(const Format& format, Bytes bytes, int unit = any_unit) {
   if (bytes.size() != format.frame_bytes()) return Error::wrong_length;
   if (checksum(bytes.first(bytes.size() - 1)) != bytes.back()) return Error::bad_checksum;
@@ -254,7 +254,7 @@ struct Protocol {
     const RequestBytes request = encode_request({});
     return begin[0] == request[0] && (begin.size() < 2 || begin[1] == request[1]) ? request_bytes : 0;
   }
-  /// Returns the length of the reply to `request`, in bytes; 0 for zero clearing, which has no reply.
+  /// Returns the length of the reply to `request`, in bytes; 0 for the request BC AA Cx, which has no reply.
   static constexpr std::size_t reply_size(const Format& format, const Request& request) {
     return request.kind == Request::Kind::zero_clear ? 0 : format.frame_bytes();
   }
@@ -262,7 +262,7 @@ struct Protocol {
   static constexpr std::size_t expected(const Format& format, const Request&, Bytes) { return format.frame_bytes(); }
   /// Returns false: a reply with an error may be incomplete, so the host awaits more bytes.
   static constexpr bool is_whole(const Format&, Error) { return false; }
-  /// Returns the bytes of the reply with `position`, as they are sent.
+  /// Returns the bytes of the frame that carries `position`.
   static constexpr FrameBytes encode_reply(const Format& format, const Request&, const Position& position) {
     return encode_position(format, position);
   }

@@ -81,7 +81,7 @@ class StreamDecoder {
   template <class OnFrame>
   constexpr bool follow(OnFrame& on_frame) {
     if (size_ < frame_) return false;
-    // After lost bytes the next header may be inside a frame: FF 81 02 (FF 80 lost) FF 81 passes all checks except that
+    // After lost bytes the next header may be inside a frame: FF 81 02 (00 82 lost) FF 81 passes all checks except that
     // no header follows it.
     const bool may_hold_header =
         std::find(window_.begin() + 2, window_.begin() + end(frame_), header) != window_.begin() + end(frame_);
