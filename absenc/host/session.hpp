@@ -23,7 +23,7 @@ namespace absenc::host {
 
 /// Counters of a session: its conversations and their errors.
 struct Counters {
-  std::uint64_t good = 0;       ///< conversations that ended well
+  std::uint64_t good = 0;       ///< conversations that ended well; each result of a stream counts
   std::uint64_t repeated = 0;   ///< repeated attempts, each after an error
   std::uint64_t late = 0;       ///< replies on the line, to any session, that arrived too late and were dropped
   std::uint64_t discarded = 0;  ///< damaged frames of streams, whether an error reported them or not
@@ -86,13 +86,13 @@ class Session {
     return conversation;
   }
   /// Runs `command` to its end and ignores all results but the last. Returns the conversation, or null if the unit
-  /// cannot run the command.
+  /// cannot run the command or `storage` is too small.
   const Conversation<Item>* run(const Command& command, Arguments arguments = {}) {
     return run(command, arguments, [](const Conversation<Item>&) { return true; });
   }
 
-  /// Runs `command` as `run` does, but a conversation that streams continues where it stopped, if `command` was also
-  /// the last command.
+  /// Runs `command` as `run` does, but a conversation that streams continues where it stopped, if the last call was
+  /// `next` or `read` with the same `command`.
   const Conversation<Item>* next(const Command& command, Arguments arguments = {}) {
     if (command_ != &command) streaming_ = false;
     return attempt(command, arguments, [](const Conversation<Item>&) { return true; });
@@ -129,7 +129,8 @@ class Session {
       if (number == most || (known_ && !FirstReading::has_position(*reading))) return conversation;
     }
   }
-  /// Reads the position with `command`. Returns the conversation, or null if the unit cannot run the command.
+  /// Reads the position with `command`. Returns the conversation, or null if the unit cannot run the command or
+  /// `storage` is too small.
   const Conversation<Item>* read(const Command& command, Take take = Take::newest) {
     return read(command, take, [](const Reading&) {});
   }
