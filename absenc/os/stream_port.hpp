@@ -19,8 +19,9 @@ namespace absenc::os {
 
 /// Base class of all byte stream ports. `begin` and `wait` throw Failure, Interrupted (os/signals.hpp) or Ended.
 ///
-/// A transfer begins at `at`, earlier only by the send slack; `begin` blocks until then. `timer` is reported if the
-/// `at` of a wait was later than the last event and the last call of `now`.
+/// A transfer begins at `at`, earlier only by the send slack; `begin` blocks until then. `timer` is reported when the
+/// `at` of a wait is reached, if `at` is later than the last reported event or call of `now`, or if the wait before
+/// requested the same `at` and another event ended it.
 class StreamPort : public Port<std::uint8_t> {
  public:
   StreamPort(const StreamPort&) = delete;
