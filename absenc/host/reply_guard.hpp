@@ -40,10 +40,11 @@ namespace absenc::host {
 /// prolong this, except on CAN. Where no reply was late yet, half of that time is enough, and the guard does not wait
 /// for an encoder that did not answer twice.
 ///
-/// Listening lasts for 5/4 of the lateness that the stored reply would have: if it was late, the reply of the present
-/// request follows within that time. Except on CAN, a shorter time is enough where the expected lateness is at most
-/// half of that: 5/4 of the longest interval between the requests after the stored reply, and at least half a second,
-/// because a line that delays every reply keeps their intervals.
+/// Listening lasts for 5/4 of the lateness that the stored reply would have, but at least four times the longest
+/// timeout and 3/2 of the expected lateness, with the upper limit above: if the stored reply was late, the reply of the
+/// present request follows within that time. Except on CAN, a shorter time is enough where the expected lateness is at
+/// most half of the stored reply's: 5/4 of the longest interval between the requests after the stored reply, and at
+/// least half a second, because a line that delays every reply keeps their intervals.
 ///
 /// The guard knows no protocol: Unit::check decides whether a reply can answer a request. On CAN an unsolicited reply
 /// cannot be told from a late one. Tests compare each reading with the true shaft (tests/late_reply_test.cpp) and

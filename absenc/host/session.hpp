@@ -102,9 +102,10 @@ class Session {
   /// Without a position before (after opening and after silence), if it is too far away, or if the time between was too
   /// long to judge, it is read again until two consecutive positions agree; if none of ten agrees, the last one is
   /// returned and `confirmed` is false. If those two are near the position before, the first one was damaged and counts
-  /// as an error, cross_check_failed, because no checksum detects all damage; if not, the position jumped. A
-  /// conversation that streams continues where it stopped, because finding its frames again costs two of them; `take`
-  /// decides whether frames that were received meanwhile are used. `on_reading` is called with each reading.
+  /// as an error, cross_check_failed, because no checksum detects all damage; if not, the position jumped. A position
+  /// that the encoder reports as invalid is not read again once a position was confirmed. A conversation that streams
+  /// continues where it stopped, because finding its frames again costs two of them; `take` decides whether frames that
+  /// were received meanwhile are used. `on_reading` is called with each reading.
   template <class OnReading>
   const Conversation<Item>* read(const Command& command, Take take, OnReading&& on_reading) {
     if (streaming_ && take == Take::newest && !current_->asks()) catch_up(machine(), *port_);

@@ -31,7 +31,8 @@ constexpr Time first_pause = 500ms;  // first pause between attempts to connect;
 constexpr Time longest_pause = 5s;
 constexpr Time time_to_connect = 10s;
 constexpr Time time_to_finish = 1s;
-constexpr Time stable_time = 10s;  // a connection that lasted this long and acknowledged a message resets the pause
+// A connection that lasted this long, and on which the broker acknowledged a spooled message, resets the pause.
+constexpr Time stable_time = 10s;
 // Minimum time between two events that report a connection; only a connection that has lasted for `stable_time` is
 // reported sooner.
 constexpr Time connection_report_interval = 60s;
