@@ -188,7 +188,7 @@ class Session {
     --counters_.good;
     ++counters_.errors[static_cast<std::size_t>(error)];
   }
-  /// Returns whether another position confirmed the last one.
+  /// Returns whether the position that `read` returned last is confirmed: it agrees with the position before it.
   [[nodiscard]] bool confirmed() const { return confirmed_; }
   /// Returns the counters of this session.
   [[nodiscard]] const Counters& counters() const { return counters_; }
