@@ -14,7 +14,7 @@
 
 namespace absenc::serve {
 
-/// Result of an order: whether it succeeded, a text for people, and the fields of the reply.
+/// Result of an order: whether it succeeded, a text for people, the data, and the state of a change.
 struct OrderResult {
   bool good = false;
   std::string text{};
