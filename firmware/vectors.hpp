@@ -16,7 +16,7 @@ struct ExpectedField {
   std::string_view field;
   std::int64_t number;
   double real;            // expected value as a real number, also if it is whole
-  std::string_view text;  // expected flag names separated by blanks, or bytes in hexadecimal
+  std::string_view text;  // expected flag names separated by blanks, bytes in hexadecimal, or text
 };
 
 struct ReferenceVector {

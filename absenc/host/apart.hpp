@@ -29,7 +29,7 @@ class Apart {
   /// is at least that wait until as much time again has passed.
   [[nodiscard]] constexpr Time since_last(Time latched) const { return has_waited(latched) ? latched - last_ : wait_; }
 
-  /// Adds a reading that was latched at `latched`.
+  /// Adds a reading with the time `latched`.
   constexpr void add(Time latched) {
     if (started_ && has_waited(latched)) {
       wait_ = latched - last_;

@@ -32,7 +32,7 @@ class Carrier {
     machine_ = &machine;
     expected_ = gathered_ = 0;
     sending_ = waiting_ = item_received_ = false;
-    silence_reported_ = true;  // no silence is reported before a transfer is sent or an item is received
+    silence_reported_ = true;  // no silence is reported before a transfer is sent, or an item or line error arrives
     take_steps(now);
   }
   /// Returns whether a conversation runs.
@@ -46,9 +46,9 @@ class Carrier {
     silent_since_ = now;
     deliver({.kind = Event<Item>::Kind::sent, .at = now});
   }
-  /// Reports received items; they are dropped while no conversation runs. Single characters are gathered, as a DMA
-  /// channel does, until as many as the machine expects, at most 16, have arrived, or the line is silent or reports an
-  /// error: gathering one takes little time.
+  /// Reports received items; they are dropped while no conversation runs. If the machine sets a gap limit, single
+  /// characters are gathered, because that takes little time. They are delivered when as many as the machine expects,
+  /// at most 16, have arrived, a silence, timer or line error is reported, or several items arrive in one call.
   void received(std::span<const Item> items, Time now) {
     if (items.size() == 1 && gathered_ + 1u < expected_) return gather(items.front(), now);
     take_input(items, now);
@@ -190,7 +190,7 @@ class Carrier {
   std::uint8_t gathered_ = 0;
   bool waiting_ = false;
   bool sending_ = false;
-  bool item_received_ = false;  // an item arrived since the last transfer
+  bool item_received_ = false;  // an item or line error arrived since the last transfer or pulse
   bool silence_reported_ = true;
   Time silent_since_{};
   std::array<Item, room> items_;  // characters gathered and not yet delivered

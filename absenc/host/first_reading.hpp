@@ -60,7 +60,7 @@ class FirstReading {
     if (!has_step_ || moved / most_excess > reached || distance(step_, place.bits) <= allowed) return false;
     return distance(step - step_, place.bits) <= least(allowed, most_judged(place.bits) / 8);
   }
-  /// Does the same with the time between the latch times of the stored position and of `reading`.
+  /// Returns `is_near(reading, between)` for the time between the latch times of the stored position and of `reading`.
   [[nodiscard]] constexpr bool is_near(const Reading& reading) const {
     return is_near(reading, reading.latched - latched_);
   }

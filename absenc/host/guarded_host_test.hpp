@@ -51,8 +51,8 @@ class GuardedHost {
   bool emitted_ = false;
 };
 
-/// Returns how many of the injected faults were of kinds that can turn wrong bytes into a valid frame. All other faults
-/// leave frames intact, so no wrong reading may follow from these other faults.
+/// Returns how many of the injected faults were of kinds that change bytes, so that a wrong frame can be valid. All
+/// other faults leave frames intact, so no wrong reading may follow from these other faults.
 [[nodiscard]] inline std::uint64_t changed_bytes(const sim::FaultyDevice& faulty) {
   using sim::FaultKind;
   std::uint64_t sum = 0;

@@ -75,7 +75,7 @@ RC_GTEST_PROP(UnwrapProperty, TheLongestGapKeepsWithinThatLimit, ()) {
   RC_ASSERT(counts * static_cast<double>(gap.count() + 2) >= half * 0.9);
 }
 
-// The integer arithmetic of Reach gives the floating-point result, except for rounding up by at most 0.016 %.
+// The integer arithmetic of Reach gives the floating-point result to one count, rounded up by at most 0.02 %.
 RC_GTEST_PROP(ReachProperty, EqualsDistanceAtHighestSpeed, ()) {
   const auto bits = *rc::gen::inRange(1u, 65u);
   const auto speed = *rc::gen::inRange<std::uint32_t>(1, 1'000'001);

@@ -34,15 +34,17 @@ namespace absenc::host {
 ///                                                replies counted      repeated where it may be, else a
 ///                                                                     timeout is reported                   forwarding
 ///
-/// Delaying ends at once for a request that is not outstanding, unless it demands a pause, items still arrive, or the
-/// list of outstanding requests is full. The same request is sent again when the line was silent for four times the
-/// longest timeout and for 3/2 of the expected lateness, with an upper limit of 2.5 to 10 s. Where no reply was late
-/// yet, half of that is enough, and the guard does not wait for an encoder that did not answer twice.
+/// Delaying ends at once for a request that is not outstanding, unless it demands a pause of more than 1 ms, items
+/// still arrive, or the list of outstanding requests is full. An outstanding request is sent again after four times the
+/// longest timeout, but not before 3/2 of the expected lateness, with an upper limit of 2.5 to 10 s; late replies
+/// prolong this, except on CAN. Where no reply was late yet, half of that time is enough, and the guard does not wait
+/// for an encoder that did not answer twice.
 ///
-/// Listening lasts for 5/4 of the lateness that the stored reply would have: if it was late, the reply of the present
-/// request follows within that time. Except on CAN, a shorter time is enough where the expected lateness is at most
-/// half of that: 5/4 of the longest interval between the requests after the stored reply, and at least half a second,
-/// because a line that delays every reply keeps their intervals.
+/// Listening lasts for 5/4 of the lateness that the stored reply would have, but at least four times the longest
+/// timeout and 3/2 of the expected lateness, with the upper limit above: if the stored reply was late, the reply of the
+/// present request follows within that time. Except on CAN, a shorter time is enough where the expected lateness is at
+/// most half of the stored reply's: 5/4 of the longest interval between the requests after the stored reply, and at
+/// least half a second, because a line that delays every reply keeps their intervals.
 ///
 /// The guard knows no protocol: Unit::check decides whether a reply can answer a request. On CAN an unsolicited reply
 /// cannot be told from a late one. Tests compare each reading with the true shaft (tests/late_reply_test.cpp) and
@@ -100,7 +102,7 @@ class ReplyGuard final : public Machine<Item> {
     Time until = never;
     Time first_at{};       // when the first of the stored items was received
     Time received_at{};    // when the last of the stored items was received
-    bool damaged = false;  // a line error was received with the stored items
+    bool damaged = false;  // a line error was received, or the time limit passed while items arrived
     // CAN: a frame that would be the reply if its identifier had 11 bits instead of 29; it explains a timeout.
     Buffer<Item, 1> foreign_frame{};
   };

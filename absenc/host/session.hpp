@@ -23,7 +23,7 @@ namespace absenc::host {
 
 /// Counters of a session: its conversations and their errors.
 struct Counters {
-  std::uint64_t good = 0;       ///< conversations that ended well
+  std::uint64_t good = 0;       ///< conversations that ended well; each result of a stream counts
   std::uint64_t repeated = 0;   ///< repeated attempts, each after an error
   std::uint64_t late = 0;       ///< replies on the line, to any session, that arrived too late and were dropped
   std::uint64_t discarded = 0;  ///< damaged frames of streams, whether an error reported them or not
@@ -86,13 +86,13 @@ class Session {
     return conversation;
   }
   /// Runs `command` to its end and ignores all results but the last. Returns the conversation, or null if the unit
-  /// cannot run the command.
+  /// cannot run the command or `storage` is too small.
   const Conversation<Item>* run(const Command& command, Arguments arguments = {}) {
     return run(command, arguments, [](const Conversation<Item>&) { return true; });
   }
 
-  /// Runs `command` as `run` does, but a conversation that streams continues where it stopped, if `command` was also
-  /// the last command.
+  /// Runs `command` as `run` does, but a conversation that streams continues where it stopped, if the last call was
+  /// `next` or `read` with the same `command`.
   const Conversation<Item>* next(const Command& command, Arguments arguments = {}) {
     if (command_ != &command) streaming_ = false;
     return attempt(command, arguments, [](const Conversation<Item>&) { return true; });
@@ -102,9 +102,10 @@ class Session {
   /// Without a position before (after opening and after silence), if it is too far away, or if the time between was too
   /// long to judge, it is read again until two consecutive positions agree; if none of ten agrees, the last one is
   /// returned and `confirmed` is false. If those two are near the position before, the first one was damaged and counts
-  /// as an error, cross_check_failed, because no checksum detects all damage; if not, the position jumped. A
-  /// conversation that streams continues where it stopped, because finding its frames again costs two of them; `take`
-  /// decides whether frames that were received meanwhile are used. `on_reading` is called with each reading.
+  /// as an error, cross_check_failed, because no checksum detects all damage; if not, the position jumped. A position
+  /// that the encoder reports as invalid is not read again once a position was confirmed. A conversation that streams
+  /// continues where it stopped, because finding its frames again costs two of them; `take` decides whether frames that
+  /// were received meanwhile are used. `on_reading` is called with each reading.
   template <class OnReading>
   const Conversation<Item>* read(const Command& command, Take take, OnReading&& on_reading) {
     if (streaming_ && take == Take::newest && !current_->asks()) catch_up(machine(), *port_);
@@ -129,7 +130,8 @@ class Session {
       if (number == most || (known_ && !FirstReading::has_position(*reading))) return conversation;
     }
   }
-  /// Reads the position with `command`. Returns the conversation, or null if the unit cannot run the command.
+  /// Reads the position with `command`. Returns the conversation, or null if the unit cannot run the command or
+  /// `storage` is too small.
   const Conversation<Item>* read(const Command& command, Take take = Take::newest) {
     return read(command, take, [](const Reading&) {});
   }
@@ -186,7 +188,7 @@ class Session {
     --counters_.good;
     ++counters_.errors[static_cast<std::size_t>(error)];
   }
-  /// Returns whether another position confirmed the last one.
+  /// Returns whether the position that `read` returned last is confirmed: it agrees with the position before it.
   [[nodiscard]] bool confirmed() const { return confirmed_; }
   /// Returns the counters of this session.
   [[nodiscard]] const Counters& counters() const { return counters_; }

@@ -168,7 +168,7 @@ TEST(Session, ShowsTheSecondOfTwoReadingsThatAgree) {
   EXPECT_EQ(bench.device->answer_count(), before + 3);
 }
 
-// The last attempt, too, reports the frame that explains its timeout, although a late reply may arrive.
+// The last attempt reports the frame that explains its timeout, although the reply to an earlier attempt may arrive.
 TEST(Session, ReplyWithWrongKindOfIdentifierExplainsTimeout) {
   struct Extended final : Machine<CanFrame> {
     void feed(const Event<CanFrame>& event) override {
@@ -310,7 +310,8 @@ TEST(SessionGuard, ConfirmsNothingWithoutAgreement) {
   EXPECT_EQ(device->answer_count(), 3u * 11);
 }
 
-// An encoder that was read once needs no second reading for a position that it reports as invalid; it is not confirmed.
+// An encoder that was read once needs no second reading for a position that it reports as invalid. That position is
+// not confirmed.
 TEST(SessionGuard, ReturnsInvalidPositionOfKnownEncoderAtOnce) {
   Bench bench(EchoMode::off);
   bench.read();

@@ -114,8 +114,8 @@ class Rate {
 
   bool seen_ = false;
   Time last_{};
-  double events_ = 0;
-  double nanoseconds_ = 0;  // time in which the counted events arrived; both fade with age
+  double events_ = 0;       // number of events, which fades with their age
+  double nanoseconds_ = 0;  // time in which `events_` arrived, which fades with its age
 };
 
 /// A failed exchange with its bytes, which are cut at the size of the buffers.

@@ -96,7 +96,7 @@ class Unwrapper {
 
   // Returns whether the time between the last reading and `reading` is short enough to know the distance, even if their
   // latch times lie at the outer ends of their intervals. The margin of `longest_gap` for unknown latch times is added
-  // again, because the intervals state them. Always true for arrival times.
+  // again, because the intervals state them. Always true for arrival times, and if `longest_gap` is `never`.
   [[nodiscard]] constexpr bool are_surely_near(const Reading& reading, const LatchTime& at) const {
     const Time gap = longest_gap(resolution_of(reading), limit_);
     return times_ == Times::arrived || gap == never || at.latest - last_at_.earliest < gap / 15 * 16;

@@ -14,12 +14,12 @@ namespace absenc::os {
 /// and what to try.
 class Failure : public std::runtime_error {
  public:
-  /// Kind of a failure of a port.
+  /// Kind of a failure.
   enum class Kind : std::uint8_t {
-    not_found,      ///< no such port, host, listener or folder
+    not_found,      ///< the port, host, listener, file, folder or GPIO line does not exist or cannot be reached
     no_permission,  ///< the port or file exists, but this user may not open it
     in_use,         ///< another program uses the port or file, or a new file would replace another
-    unsupported,    ///< this port cannot do what was requested
+    unsupported,    ///< the port, file or kernel is of a kind that cannot do what was requested
     bad_rate,       ///< this port does not support the requested baud rate
     lost,           ///< the port or file existed and has disappeared
     system,         ///< any other error of the operating system

@@ -13,8 +13,9 @@ class InputLines {
   /// the background, nothing is read and the program is not stopped.
   explicit InputLines(int descriptor = 0);
 
-  /// Returns the complete lines of one read, without their line ends. Never blocks. A line longer than 4096 bytes is
-  /// returned in parts. At the end of the input an incomplete last line is returned too.
+  /// Returns the complete lines of one read, without their line ends. Never blocks. A line of 4096 bytes or more is
+  /// returned in parts of 4096 bytes; the last part may be empty. At the end of the input an incomplete last line is
+  /// returned.
   [[nodiscard]] std::vector<std::string> take();
   /// Returns whether the input has ended.
   [[nodiscard]] bool ended() const { return ended_; }

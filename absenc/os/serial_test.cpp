@@ -48,7 +48,7 @@ static_assert(nearest_rate(2'500'000, 9600, 5'000'000) == 9600, "the driver has 
 
 TEST(SerialPort, SetsAnyRateAndRestoresSettings) {
   const PseudoTerminal terminal;
-  // Returns the settings of the slave, because a master has no settings of its own.
+  // For the master `terminal_state` returns the settings of the slave, because a master has no settings of its own.
   const auto before = terminal_state(terminal.master.get());
   ASSERT_TRUE(before);
   {

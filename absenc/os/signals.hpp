@@ -36,7 +36,8 @@ class CancelCheck {
   CancelCheck(const CancelCheck&) = delete;
   CancelCheck& operator=(const CancelCheck&) = delete;
 
-  /// Returns how long a wait may take before it must call `check`; `never` if no CancelCheck exists in this thread.
+  /// Returns how long a wait may take before it must call `check`; `never` if no CancelCheck exists in this thread, or
+  /// the newest one has an empty function.
   [[nodiscard]] static Time interval();
   /// Calls `over` of the CancelCheck of this thread. Throws Ended if it returns true.
   static void check();

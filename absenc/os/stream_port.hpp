@@ -19,9 +19,9 @@ namespace absenc::os {
 
 /// Base class of all byte stream ports. `begin` and `wait` throw Failure, Interrupted (os/signals.hpp) or Ended.
 ///
-/// A transfer begins at `at`, earlier only by the send slack; `begin` blocks until then. The timer of a wait is set if
-/// its `at` is later than the last event and the last call of `now`; `timer` is reported at that time, or at once if it
-/// has passed meanwhile. A later wait with the same `at` keeps the timer.
+/// A transfer begins at `at`, earlier only by the send slack; `begin` blocks until then. `timer` is reported when the
+/// `at` of a wait is reached, if `at` is later than the last reported event or call of `now`, or if the wait before
+/// requested the same `at` and another event ended it.
 class StreamPort : public Port<std::uint8_t> {
  public:
   StreamPort(const StreamPort&) = delete;

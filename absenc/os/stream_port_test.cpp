@@ -102,7 +102,7 @@ TEST_F(StreamPortTest, ReportsSilenceOnceWhenNoAnswerComes) {
 TEST_F(StreamPortTest, ReportsSilenceOnceAfterAGap) {
   port_.set_latency(2ms);
   put(peer_.get(), {1});
-  // Before the first byte no gap limit applies: only a timer would end the wait.
+  // Before the first byte no gap limit applies, so no silence is reported.
   EXPECT_EQ(port_.wait({.at = never, .gap = 1ns}).kind, Kind::received);
   const ByteEvent silence = port_.wait({.at = never, .answer = 1ns, .gap = 1ms});
   ASSERT_EQ(silence.kind, Kind::silence);

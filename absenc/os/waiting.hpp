@@ -30,8 +30,8 @@ class Waiting {
     return event;
   }
 
-  /// Starts a wait for the events that `step` requests. A timer stays due if another event occurred at the same time
-  /// and the machine requests the timer again.
+  /// Starts a wait for the events that `step` requests. A timer whose time has passed stays due if another event ended
+  /// the wait before and the machine requests the same time again.
   void begin(const Step<Item>& step, Time latency = {}) {
     timer_ = step.at > known_time_ || step.at == timer_ ? step.at : never;
     silence_ = silence.due(step.answer, step.gap, latency);

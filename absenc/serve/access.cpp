@@ -151,8 +151,9 @@ bool Access::is_from_own_page(const Request& request) const {
          (!public_origin_.empty() && equals_ignoring_case(request.origin, public_origin_));
 }
 
-// Returns whether the request needs a token. A proxy does not always add its header. With a configured proxy, even a
-// read request from this computer therefore needs a token, if the server has tokens.
+// Returns whether the request needs a token: never with Right::open, always with Right::change or when the server is
+// not on loopback. Otherwise it needs one only if the server has tokens, and a proxy forwarded the request or is
+// configured: a proxy does not always add its header.
 bool Access::needs_token(const Request& request, Right right) const {
   if (right == Right::open || right == Right::change || !on_loopback_) return right != Right::open;
   return has_tokens() && (request.is_forwarded || !public_origin_.empty());

@@ -44,8 +44,8 @@ class Access {
 
   /// Returns the response that refuses the request; nothing if the request is allowed.
   [[nodiscard]] std::optional<Response> refusal(const Request& request, Right right) const;
-  /// Returns the address of the client. For a request through a proxy on this computer it is the address that the proxy
-  /// reports.
+  /// Returns the address of the client. With a `public_url`, for a request through a proxy on this computer, it is the
+  /// address that the proxy reports.
   [[nodiscard]] std::string client_of(const Request& request) const;
   /// Returns the name of the token in the request; "" without a valid token.
   [[nodiscard]] std::string token_name(const Request& request) const;

@@ -28,7 +28,7 @@ class Connections {
 
   /// Adds a connection. If the address of `peer` exceeds its limit, closes its connection that is idle for longest; if
   /// all together exceed theirs, closes that of the address with the most idle ones. If none is idle, this connection
-  /// belongs to the reserve or is closed.
+  /// belongs to the reserve. If the reserve is then too large, closes its longest idle connection, else this one.
   void add(Id id, int socket, std::string peer, Time now);
   void remove(Id id) { open_.erase(id); }
   /// Records that a whole request was received: the connection is not idle until `await_request`.

@@ -31,7 +31,8 @@ struct Range {
 /// A reader of the history, for use while HistoryWriter writes it. Thread-safe.
 class HistoryReader {
  public:
-  /// Opens no file yet: each query throws Failure if there is no history at `path`.
+  /// Opens no file yet. A query opens the file if it is not open, and throws Failure if there is no history at `path`.
+  /// That an open file was removed is noticed only when the writer calls `refuse`.
   explicit HistoryReader(std::string path);
   ~HistoryReader();
   HistoryReader(const HistoryReader&) = delete;
@@ -41,7 +42,8 @@ class HistoryReader {
   /// seconds, as many as this limit requires: [[at_s, least, mean, greatest, speed least, mean, greatest, readings,
   /// errors],...]
   [[nodiscard]] client::Json seconds(const std::string& encoder, Range range, std::int64_t most);
-  /// Returns the newest `most` events of `encoder`; for "" those of all encoders and of the server.
+  /// Returns at most `most` events of `encoder` in `range`, the newest first; for "" those of all encoders and of the
+  /// server.
   [[nodiscard]] client::Json server_events(const std::string& encoder, Range range, std::int64_t most);
   /// Returns up to `most` rows of the history as CSV, and the time in seconds at which the next rows start; after the
   /// last row this time is later than `range.to_s`.

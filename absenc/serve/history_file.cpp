@@ -16,7 +16,6 @@ namespace {
 
 constexpr std::int64_t version = 1;
 
-// A write-ahead log preserves committed rows when the process is killed, and allows reading at the same time.
 constexpr const char* schema = R"(
 CREATE TABLE IF NOT EXISTS encoder (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE);
 CREATE TABLE IF NOT EXISTS second (
@@ -70,6 +69,7 @@ std::uint32_t big_endian(std::string_view bytes) {
 
 HistoryFile::HistoryFile(const std::string& path) : path_(path), owned_file_(lock(path)) {
   sqlite_.emplace("the history", path, Sqlite::For::writing);
+  // A write-ahead log preserves committed rows when the process is killed, and allows reading at the same time.
   sqlite_->run("PRAGMA auto_vacuum = INCREMENTAL; PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL");
   const std::int64_t found = sqlite_->number("PRAGMA user_version");
   if (found > version) throw Failure(fmt::format("the history {} was written by a newer absenc", path));

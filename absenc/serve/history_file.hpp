@@ -45,7 +45,7 @@ class HistoryFile {
   void close_moved();
   /// Closes a history file in state `damaged` and renames it. Returns the new name. Throws Failure.
   std::string set_aside();
-  /// Renames the history file at `path`. Returns the new name. Throws Failure.
+  /// Renames the history file at `path`, and its log if there is one. Returns the new name of the file. Throws Failure.
   static std::string set_aside(const std::string& path);
 
  private:

@@ -92,7 +92,7 @@ struct Stream::Sending {
   std::deque<Text> queue;
   std::size_t sent_of_first = 0;
   MHD_Connection* suspended = nullptr;
-  int socket = -1;  // socket of the connection that sends this stream; -1 before there is one
+  int socket = -1;  // socket of the connection that sends this stream; -1 while there is none
   Time taken_at = os::now();
   bool ended = false;  // whether no more texts will be added to the queue
   bool over = false;   // whether the connection of the stream has ended

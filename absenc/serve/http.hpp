@@ -50,7 +50,7 @@ class Stream {
   using Text = std::shared_ptr<const std::string>;
 
   /// `most`: greatest number of queued texts, at least 2. `on_empty` is called in the connection thread when the queue
-  /// is empty; it must return quickly.
+  /// is empty and the stream has not ended; it must return quickly.
   explicit Stream(std::string type, std::size_t most = 64, std::function<void()> on_empty = {});
   ~Stream();
   Stream(const Stream&) = delete;

@@ -47,8 +47,8 @@ struct EncoderState {
   Snapshot snapshot;
 };
 
-// Writes every alarm that the replies report, with 1 or 0. If only raised alarms were written, a cleared alarm would
-// look like an unknown one.
+// Writes every alarm that the replies of a live encoder report, with 1 or 0. If only raised alarms were written, a
+// cleared alarm would look like an unknown one.
 void add_alarms(Page& page, const EncoderState& encoder_state) {
   if (encoder_state.snapshot.state != State::live) return;
   for (const Flags& flags : alarms_of(*encoder_state.unit, encoder_state.snapshot.last.reading)) {

@@ -25,8 +25,8 @@ struct MqttHealth {
   bool failing = false;       // whether new readings cannot be spooled, or readings were dropped within the last 30 s
   std::uint64_t waiting = 0;  // number of messages in the spool
   std::int64_t waiting_bytes = 0;
-  std::uint64_t sent = 0;           // messages that the broker has acknowledged since the start
-  std::uint64_t dropped = 0;        // readings lost since the start: spool full or not writable, or disk too slow
+  std::uint64_t sent = 0;           // spooled messages that the broker has accepted since the start
+  std::uint64_t dropped = 0;        // readings lost since the start, for example because the spool was full
   std::uint64_t client_deaths = 0;  // unexpected ends of the MQTT client process since the start
   // By encoder: number of its last reading that is on disk or was sent.
   std::map<std::string, std::uint64_t> taken{};

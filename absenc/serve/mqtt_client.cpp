@@ -123,8 +123,8 @@ void MqttClient::lose(const std::string& why) {
   trouble_ = why;
 }
 
-// Records that the MQTT client process has ended unexpectedly. Only a packet of the broker can make the library end its
-// process: nothing else reaches it from outside.
+// Waits for the end of the MQTT client process. If the connection was not lost before, records that the process ended
+// unexpectedly: only a packet of the broker reaches it from outside and can make its library end it.
 void MqttClient::note_end() {
   const std::string how = process_.end(time_to_end);
   if (state_ == State::lost) return;

@@ -60,8 +60,8 @@ class MqttClient {
   /// Returns whether the MQTT client process ended unexpectedly: its library ends it at some malformed packets.
   [[nodiscard]] bool died() const { return died_; }
 
-  /// Sends a message to the broker. Returns the number that the acknowledgement of this message will have; with QoS 0
-  /// only a refusal is acknowledged.
+  /// Queues a message for the broker, which `work` sends. Returns the number that the acknowledgement of this message
+  /// will have; with QoS 0 only a refusal is acknowledged.
   int publish(const std::string& topic, const std::string& payload, int qos, bool retain);
 
   struct Acknowledgement {

@@ -16,7 +16,7 @@
 
 namespace absenc::serve {
 
-/// Returns a name as one level of a topic: each character other than a letter, digit, - or _ becomes %XX.
+/// Returns a name as one level of a topic: each byte other than an ASCII letter or digit, - or _ becomes %XX.
 [[nodiscard]] std::string topic_level(std::string_view name);
 
 /// Returns the topic PREFIX/ENCODER/KIND; for the server itself, whose `encoder` is "", PREFIX/KIND.

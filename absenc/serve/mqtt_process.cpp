@@ -65,7 +65,8 @@ class MqttProcess {
   }
 
  private:
-  // Waits for the parent or the broker, then exchanges frames with the parent. Returns false when the parent has ended.
+  // Waits for the parent or the broker, at most until the next sign of life is due, then exchanges frames with the
+  // parent. Returns false when the parent has ended.
   bool wait_and_exchange() {
     const int broker = client_ == nullptr || over_ ? -1 : ::mosquitto_socket(client_);
     const bool reads = outgoing_.size() < outgoing_limit;

@@ -23,7 +23,7 @@ class MqttRefusals {
   enum class Verdict : std::uint8_t {
     send,
     wait,  // the message waits until all messages sent so far are acknowledged
-    skip,  // the message is skipped: the broker refuses its topic and the pause is not over
+    skip,  // the message is skipped: its topic is refused, and the pause or a trial message is not over
   };
   /// Returns whether a message of `topic` may be sent now. `on_their_way`: number of sent messages without
   /// acknowledgement.

@@ -27,13 +27,14 @@ constexpr Time state_interval = 200ms;
 constexpr Time many_state_interval = 1s;  // time between two publications of the states, with more than `many` encoders
 constexpr std::size_t many = 50;
 constexpr Time value_interval = 1s;  // time between two publications of values for Home Assistant
-constexpr Time first_pause = 500ms;  // pause before the second attempt to connect; each further pause is twice as long
+constexpr Time first_pause = 500ms;  // first pause between attempts to connect; it doubles up to `longest_pause`
 constexpr Time longest_pause = 5s;
 constexpr Time time_to_connect = 10s;
 constexpr Time time_to_finish = 1s;
-constexpr Time stable_time = 10s;  // a connection that lasted this long and acknowledged a message resets the pause
-// Minimum time between two events about a connection that is often lost; one that lasts for `stable_time` is reported
-// then.
+// A connection that lasted this long, and on which the broker acknowledged a spooled message, resets the pause.
+constexpr Time stable_time = 10s;
+// Minimum time between two events that report a connection; only a connection that has lasted for `stable_time` is
+// reported sooner.
 constexpr Time connection_report_interval = 60s;
 
 }  // namespace
@@ -266,8 +267,7 @@ void MqttSender::send_messages(MqttClient& client) {
   }
 }
 
-// Removes acknowledged messages from the spool. Without an acknowledgement a message leaves the spool only when the
-// spool is full.
+// Handles acknowledgements. A message that the broker accepted leaves the spool; one that it refused stays there.
 void MqttSender::settle(MqttClient& client) {
   std::vector<std::int64_t> arrived;
   for (const MqttClient::Acknowledgement& one : client.take_acknowledgements()) {

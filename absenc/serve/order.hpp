@@ -14,7 +14,7 @@
 
 namespace absenc::serve {
 
-/// Result of an order: whether it succeeded, a text for people, and the fields of the reply.
+/// Result of an order: whether it succeeded, a text for people, the data, and the state of a change.
 struct OrderResult {
   bool good = false;
   std::string text{};
@@ -43,8 +43,8 @@ struct Order {
   [[nodiscard]] bool changes_encoder() const { return kind == Kind::command && command->changes_encoder; }
 };
 
-/// `setting` names the command that reads one setting; "": all settings. Returns an order that reads settings. Throws
-/// UsageError if the unit has no setting, or not this one.
+/// Returns an order that reads settings. `setting` names the command that reads one setting; "": all settings and the
+/// identification. Throws UsageError if the unit has none of these, or not this setting.
 [[nodiscard]] Order settings_order(const Unit& unit, std::string_view setting);
 /// Returns an order that reads memory page `page`; below 0: the addresses that a memory dump contains. Throws
 /// UsageError if the unit has no such memory, or the addresses are too many for one request. For a unit with registers

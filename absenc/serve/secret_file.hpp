@@ -17,7 +17,8 @@ struct Secret {
 /// may write it, a line is invalid, or the file has no line.
 [[nodiscard]] std::vector<Secret> read_secrets(const std::string& title, const std::string& path, std::size_t least);
 
-/// Returns user name and password from the first line of the file at `path`. Throws as `read_secrets` does.
+/// Returns user name and password from the first line of the file at `path` that is neither empty nor begins with #.
+/// Throws as `read_secrets` does.
 [[nodiscard]] Secret read_secret(const std::string& path);
 
 }  // namespace absenc::serve

@@ -65,7 +65,7 @@ class TimeSeries {
   void end_second();
   void add_point(const Point& point);
 
-  Second second_{};  // current second; its `at_s` is 0 before the first reading or error
+  Second second_{};  // current second; its `at_s` is 0 if no second has begun since the last one ended
   std::deque<Second> seconds_;
   std::deque<Second> last_minute_;
   bool traced_ = false;

@@ -17,7 +17,8 @@ namespace {
 
 double microseconds_of(Time time) { return static_cast<double>(time.count()) / 1e3; }
 
-// Adds to an alarm the time since which it is raised, and the user who has acknowledged it.
+// Adds to an alarm the time since which it is raised, and who acknowledged it and when; null for what is not known or
+// did not happen.
 void set_acknowledged(Json& json, const std::vector<RaisedAlarm>& raised, const FieldInfo& field,
                       const FlagInfo& flag) {
   const auto known = std::find_if(raised.begin(), raised.end(), [&](const RaisedAlarm& one) {
@@ -202,7 +203,8 @@ Json condition_json(const Watch& watch, const Snapshot& snapshot) {
 
 namespace {
 
-// Sets the angles of a joint and of the motor. Values that are not configured, invalid or unknown are null.
+// Sets whether a joint and a motor are configured, the position and the speed of the joint, and the electrical angle of
+// the motor. Values that are not configured, invalid or unknown are null.
 void set_angles(Json& json, const Watch& watch, const JointAngles& angles) {
   const auto value = [](const std::optional<double>& one) { return one ? Json(*one) : Json(); };
   const std::optional<Estimate>& speed = angles.joint_speed_mm_s ? angles.joint_speed_mm_s : angles.joint_speed_rpm;

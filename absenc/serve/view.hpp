@@ -16,7 +16,8 @@ namespace absenc::serve {
 [[nodiscard]] inline double seconds_of(Time time) { return std::chrono::duration<double>(time).count(); }
 
 /// Returns the overview of an encoder: state, age_s, position, turns, speed with its uncertainty, alarms in words,
-/// errors of the last minute. Values are null if the encoder is not live or the value is invalid.
+/// errors of the last minute, and more. Values of the position, the speed and the alarms are null if the encoder is not
+/// live or the value is invalid or unknown.
 [[nodiscard]] client::Json overview(const Watch& watch, const Snapshot& snapshot);
 
 /// Returns the part of an encoder's overview that changes rarely: state, why the encoder is not live, alarms in words,

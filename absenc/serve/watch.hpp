@@ -87,7 +87,7 @@ struct Snapshot {
 struct Details {
   std::vector<client::BadExchangeText> bad{};  // bad exchanges of the encoder, newest first
   client::Json fields{};                       // fields of a recent reply, updated at most once a second
-  client::Json reply{};                        // the same reply for people, as in `shown_values`
+  client::Json reply{};                        // the reply of `fields` for people, as in `shown_values`
 };
 
 class Watch {

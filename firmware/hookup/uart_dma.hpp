@@ -64,7 +64,7 @@ class UartDma {
 
  private:
   // Starts receiving `count` bytes, so that the last byte of the reply calls `arrived`; for 0, receiving lasts until
-  // the line is idle.
+  // the line is idle or the buffer is full.
   void arm(std::size_t count) {
     const MutableBytes buffer = buffers_[current_];
     hardware_->receive(count == 0 ? buffer : buffer.first(std::min(count, buffer.size())));

@@ -55,8 +55,8 @@ bool converse(Reader& reader, std::span<const Item> reply, Delivery delivery) {
   return false;
 }
 
-/// Measures a reader, then ends the emulator, with status 0 if a position was read. `by_character`: also measures a
-/// line whose interrupts deliver single characters.
+/// Measures a reader, then ends the emulator, with status 0 if each measurement read a position. `by_character`: also
+/// measures a line whose interrupts deliver single characters.
 template <class Item, class Reader, class... Parameters>
 [[noreturn]] void run(std::span<const Item> reply, bool by_character, const Parameters&... parameters) {
   alignas(Reader) static std::byte memory[sizeof(Reader)];

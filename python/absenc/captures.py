@@ -67,7 +67,7 @@ class Table:
 
 class Capture(Table):
     """The exchanges on a line: `capture["angle_deg"]` is a column, `rows` has all columns as one structured masked
-    array. A value that is missing or invalid is masked (and NaN in floats).
+    array. A value that is missing or invalid is masked (and NaN in floats); texts and bytes are empty instead.
 
     Columns: `time_s`, `end_s`, `kind` ("exchange", "request", "reply", "noise"), `request` and `reply` (bytes; for CAN
     and clocked links text), `turnaround_us`, `angle_deg` (for linear encoders `position_mm`), each field of the unit,
@@ -78,7 +78,7 @@ class Capture(Table):
         self.notes = notes  #: damage of the file, and settings that were detected
 
     def good(self) -> npt.NDArray[np.bool_]:
-        """Returns which rows have no error. Missing and invalid values of such rows are masked in the columns, too."""
+        """Returns which rows have no error. Missing and invalid values in these rows are masked in the columns."""
         return np.asarray(self.rows.data["error"] == "", np.bool_)
 
 

@@ -66,7 +66,8 @@ class Emulation:
         self._emulation.power_on(real)
 
     def raise_alarm(self, name: str) -> None:
-        """Raises one of `protocol.alarms`. Raises UsageError for another name, with the most similar one."""
+        """Raises one of `protocol.alarms`. Raises UsageError for another name, with the most similar one, and for an
+        alarm that no reply reports with the options of this encoder."""
         self._emulation.raise_alarm(name)
 
     def lower_alarm(self, name: str) -> None:
@@ -78,7 +79,8 @@ class Emulation:
         self._emulation.set_condition(name, value)
 
     def set_fault(self, kind: str, rate: float) -> None:
-        """Sets the share of replies, 0 to 1, with a kind of fault: "corrupt", "drop" ... Other faults are unchanged."""
+        """Sets the share of replies, 0 to 1, with a kind of fault: "corrupt", "drop" ... For "request_corrupt" it is
+        the share of received bytes (CAN: frames). Other faults are unchanged."""
         self._emulation.set_fault(kind, rate)
 
     def clear_faults(self) -> None:

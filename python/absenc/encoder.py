@@ -20,7 +20,7 @@ Alarm = Flag
 
 
 class Info(NamedTuple):
-    """Identification of an encoder, and its replies to commands without arguments."""
+    """Identification of an encoder, and its replies to the commands that only read and need no arguments."""
 
     address: str  #: address: "tformat:/dev/ttyUSB0"
     unit: str  #: id of the protocol: "tformat"

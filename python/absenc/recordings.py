@@ -28,7 +28,7 @@ Cells = Mapping[str, Any]
 
 class Recording(Table):
     """Readings and events in order of time: `recording["angle_deg"]` is a column, `rows` has all columns as one
-    structured masked array. A value that is missing or invalid is masked (and NaN in floats).
+    structured masked array. A number that is missing or invalid is masked (and NaN in floats); a missing text is "".
 
     `event` is "" for a reading and "restarted" for one whose `position` starts again; "lost" and "back" concern the
     port; "gap" counts in `missed` the readings that were due but not taken; all others are errors instead of a reading.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Converts a capture to NumPy columns, some thousands of rows at a time.
+// Converts a capture to NumPy columns, a part of the rows at a time.
 #include "absenc/client/decode.hpp"
 
 #include <pybind11/numpy.h>
@@ -78,7 +78,8 @@ struct Values {
     return objects();
   }
 
-  // Returns the values as Python objects, with one object for repeated values, such as most requests and texts.
+  // Returns the values as Python objects. Equal values, such as most requests and texts, are one object; this holds for
+  // the first 256 different values.
   [[nodiscard]] py::object objects() const {
     py::list list(ends.size());
     std::unordered_map<std::string_view, py::object> known;
@@ -130,7 +131,7 @@ class Rows {
   Rows(const std::string& path, const std::string& unit, const client::DecodeChoices& choices)
       : decoded_(path, unit, choices) {}
 
-  /// Returns a tuple (name, unit, dtype, meaning) for each column.
+  /// Returns a list with a tuple (name, unit, dtype, meaning) for each column.
   [[nodiscard]] py::list columns() const {
     py::list list;
     for (const Column& column : decoded_.columns()) {
@@ -140,7 +141,8 @@ class Rows {
     return list;
   }
 
-  /// Returns a tuple (values, missing) for each column, with at most `most` rows; None at the end of the capture.
+  /// Returns a list with a tuple (values, missing) for each column, of at most `most` rows; None at the end of the
+  /// capture.
   py::object take(std::size_t most) {
     std::vector<Values> columns;
     for (const Column& column : decoded_.columns()) columns.emplace_back(column.type);

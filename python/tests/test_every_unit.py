@@ -51,7 +51,8 @@ def test_info_has_no_failures(address):
 
 
 def test_encodes_and_decodes_requests(unit):
-    """An encoded request is decoded as one. With another start, of bytes also with another end, it is refused."""
+    """An encoded request is decoded. A changed one is refused: on CAN with 7 as first character, on links of bytes with
+    0xFF as first byte and a further 0xFF at the end."""
     requests = []
     for command in unit.commands.values():
         if command.arguments:

@@ -44,7 +44,7 @@ function take(event, data) {
     historyTrouble.hidden = trouble === "";
     setText(historyTrouble, trouble === "" ? "" : `The history is not being written: ${trouble}. Rows lost so far: ${data.history.lost}.`);
     view.show(data);
-    if (view.isServed === false) {  // the encoder was removed from absenc.toml, and the server has reloaded it
+    if (view.isServed === false) {  // the server has read absenc.toml again, which no longer has this encoder
       connection.hidden = false;
       setText(connection, `${shown} is no longer served: it was removed from absenc.toml. Nothing on this page is live.`);
     }

@@ -101,7 +101,8 @@ export const SHAPES = {bad: "▲", warn: "◆", good: "●", plain: "○"};
 
 /** Groups of encoders in display order, faulty ones first. */
 export const GROUPS = ["unknown", "lost", "alarm", "errors", "waiting", "live", "good"];
-/** Returns {group, kind, word} for the state and alarms of an encoder; `kind` selects color and shape. */
+/** Returns {group, kind, word} for the state and alarms of an encoder; `kind` selects color and shape. With alarms it
+ *  also has `isSeen`: whether all are acknowledged. */
 export function condition(encoder) {
   const age = encoder.state === "unknown" ? "" : ` ${duration(encoder.age_s)}`;
   if (encoder.state in GONE) return {group: encoder.state === "unknown" ? "unknown" : "lost", kind: "bad", word: GONE[encoder.state] + age};

@@ -26,7 +26,7 @@ struct Snapshot {
     failing,  // the last attempt to read failed
     lost,     // the port was open and was lost
     paused,   // the user has paused the readings
-    ended,    // the encoder cannot be read; `message` has the reason
+    ended,    // the thread has given up reading; `message` has the reason
   };
 
   State state = State::opening;

@@ -26,7 +26,7 @@ class FieldPlaces {
   /// Returns the fields with their bits as "singleturn 16-32, multiturn 48-63"; "" if the unit declares no bits.
   [[nodiscard]] std::string text() const;
   /// Returns the fields with their bits as {"singleturn":[{"first":16,"count":17}]}, the least significant range of a
-  /// field first.
+  /// field first; an inverted range has "inverted":true.
   [[nodiscard]] Json json() const;
   /// Inserts a third column into `rows`, whose first two are name and value: the bits of the field with that name; ""
   /// if not declared.

@@ -32,8 +32,8 @@ std::string speed_text(const Sample& sample) {
   return fmt::format("   {} {}", to_text(*sample.measured_speed()), speed_unit(sample.reading));
 }
 
-/// Prints readings and failures. The advice is printed only for the first of several failures of one kind in a row; the
-/// message that the port is absent only when it changes.
+/// Prints readings and failures. The advice is printed only for the first of several failures of one kind in a row
+/// (as JSON for each); the message that the port is absent only when it changes.
 class Display {
  public:
   /// With `speeds`, the line of a reading contains the speed of a shaft that turns.
