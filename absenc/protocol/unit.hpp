@@ -326,8 +326,8 @@ struct Unit {
   /// Returns where the frame ends that begins with the first of `bytes`.
   FrameEnd (*frame_end)(const Options& options, Direction direction, Bytes bytes);
   /// Constructs the conversation of a command in `storage`, which has `host_storage` bytes. Returns an empty Any if the
-  /// options or arguments contradict the command. A command that the encoder lacks, or an argument outside its range,
-  /// gives a conversation that ends at once with an error.
+  /// options contradict each other, or the command's request cannot be encoded with these arguments. If the encoder
+  /// lacks the command, or an argument is missing or outside its range, the conversation ends at once with an error.
   Any<Conversation> (*host)(const Options& options, const Command& command, Arguments arguments,
                             std::span<std::byte> storage);
   /// Constructs a virtual encoder in `storage`, which has `device_storage` bytes; `shaft` must outlive it. Returns an

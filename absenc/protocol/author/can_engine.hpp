@@ -58,8 +58,8 @@ class CanEngine : public Conversation<CanFrame> {
   void ask(const CanFrame& frame, const CanHostTimes& times, Time pause = {});
   /// Sends `frame` at once and receives frames for exactly `duration`.
   void ask_for(const CanFrame& frame, Time duration);
-  /// Sets whether frames that were received before the request was sent are delivered too: they may answer earlier
-  /// requests.
+  /// Sets whether frames that were received before the request was sent are delivered, not only later ones: they may
+  /// answer earlier requests.
   void overhear(bool yes = true) { receives_early_ = yes; }
   /// Returns whether the delivered frame was received before the request was sent.
   [[nodiscard]] bool came_early() const { return early_; }

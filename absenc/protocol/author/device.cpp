@@ -69,7 +69,8 @@ void Responder::forget() {
   skip_begins_ = damaged_ = false;
 }
 
-// Notes a damaged character: the rest of the request is ignored until the line is silent.
+// Notes a damaged character: the rest of the request is ignored until the line is silent. While the encoder is off or
+// sends, only the begun request is forgotten.
 void Responder::damage(Time at) {
   if (!is_on(at) || transmitting_) return forget();
   received_at_ = at;
@@ -115,7 +116,8 @@ void Responder::receive_byte(std::uint8_t byte, Time at) {
   request_.clear();
 }
 
-// Searches for a request at the later received bytes, because none begins with the first byte.
+// Searches for a request at the later received bytes, because none begins with the first byte; not if the encoder
+// refuses the bytes.
 void Responder::search_again(Time at) {
   refusing_ = is_refused(Flaw::unknown, request_);
   const ByteBuffer<32> heard = request_;
