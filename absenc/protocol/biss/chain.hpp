@@ -33,7 +33,7 @@ struct ChainFormat {
 
   /// Returns the period of MA.
   [[nodiscard]] constexpr Time period() const { return Time((1'000'000 + ma_khz / 2) / ma_khz); }
-  /// Returns the index of the channel that carries the word of `slave`.
+  /// Returns the index of the channel that carries the word of `slave`; 0 if the chain has no such slave.
   [[nodiscard]] constexpr unsigned shown() const { return slave < count ? count - 1u - slave : 0u; }
 };
 

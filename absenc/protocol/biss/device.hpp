@@ -35,8 +35,8 @@ class LineDelay {
   std::uint32_t noise_ = 1;
 };
 
-/// A virtual encoder apart from its port: makes the samples of SLO, with the delay of its line. Also used behind a
-/// virtual adapter.
+/// A virtual encoder apart from its port: makes the samples of SLO, with the delay of its line. VirtualEncoderOf and a
+/// virtual adapter (e201) use it.
 template <class F>
 class EncoderOf {
  public:

@@ -91,7 +91,8 @@ struct Values {
   Maybe<std::uint32_t> address{};  ///< Address of the accessed register.
   Maybe<std::size_t> length{};     ///< Number of bytes of the accessed register.
   Maybe<Bytes> data{};             ///< Bytes of the accessed register, most significant first.
-  Maybe<std::int64_t> value{};  ///< Fewer than 8 bytes as a number; in an answer only if the table lacks the register.
+  /// Fewer than 8 bytes as a number; in an answer only if the table has no register with this address and length.
+  Maybe<std::int64_t> value{};
 };
 
 namespace detail {

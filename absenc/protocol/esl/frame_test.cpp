@@ -228,7 +228,8 @@ TEST(EslFrame, RepliesReportTheFlagsThatTheyCarry) {
   }
 }
 
-// A Lissajous error is a non-safety error (Table 5): the position stays valid for every id.
+// With led_or_lissajous_error, a non-safety error in SF means the Lissajous signals (Table 5), and the position stays
+// valid; a safety error makes it invalid.
 TEST(EslFrame, LedAndLissajousErrorsCountForEveryId) {
   for (const auto& [error, validity] :
        {std::pair{status::safety_error, Validity::invalid}, std::pair{status::non_safety_error, Validity::valid}}) {
