@@ -28,7 +28,7 @@ enum class Demand : std::uint8_t {
   reacts,          ///< the encoder reacts to the request `ask` as `reaction` states
   // Demands about changes of the encoder, which the test undoes
   byte_written,  ///< the byte at `page` and `address` can be written and read back
-  byte_alone,    ///< writing the byte at `page` and `address` leaves the bytes beside it unchanged
+  byte_alone,    ///< writing the byte at `page` and `address` leaves the four bytes below it unchanged
   page_alone,    ///< writing the byte at `page` and `address` leaves the byte at `address` of page `other` unchanged
   /// While the byte at `page` and `address` is written, a request to read it gets a busy reply; later it can be read.
   byte_busy,
@@ -40,12 +40,14 @@ enum class Demand : std::uint8_t {
   zeroed,
   /// One of the values `value` and `other` of the setting `setting`, which cannot be read, mirrors the position.
   mirrored,
-  /// After `command` with the argument `value`, the encoder sends `value` frames per second unsolicited; `stop` ends
-  /// them.
+  /// After `command` with the argument `value` (half of it, if it is the present rate), the encoder sends that many
+  /// frames per second unsolicited; `stop` ends them.
   paced,
   // Demands about values that the test cannot restore
   zero,     ///< the position, which was not 0 before, is 0 after the zero command
-  reset,    ///< the command of `verb` resets the alarms in the mask `value`, or the turns, and nothing else
+  /// The command of `verb` resets the alarms in the mask `value`, or the turns; the position, and turns that it does not
+  /// reset, stay.
+  reset,
   restarts  ///< after `command` the encoder is silent at first; `value` ms later it reports the position from before
 };
 
@@ -73,7 +75,7 @@ struct Ask {
   /// the position.
   std::string_view command{};
   std::span<const std::int64_t> arguments{};  ///< Arguments of `command`; those left out have their defaults.
-  bool wrong_end = false;                     ///< Whether the last byte of the request of `command` has a wrong bit.
+  bool wrong_end = false;                     ///< Whether the last byte has a wrong bit; not used with `wire`.
   /// Writes the request into `request` and returns its length, for requests that depend on the options and that no
   /// command sends. Null: `wire` or the request of `command` is sent.
   Result<std::size_t> (*make)(const Options& options, MutableBytes request) = nullptr;
@@ -109,7 +111,7 @@ struct Clause {
   std::uint32_t page = 0;      ///< Page of the memory byte that the clause is about.
   std::uint32_t address = 0;   ///< Address of the memory byte that the clause is about.
   std::string_view setting{};  ///< name of the setting that `config set` writes and reads
-  std::string_view field{};    ///< field that reports the value of `setting`, which is also the argument that sets it
+  std::string_view field{};    ///< field of the command that reads `setting`, with its value
   std::int64_t other = 0;      ///< Second page, or second value of `setting`, for demands that name `other`.
   Verb verb = Verb::run;       ///< Demand reset: verb of the command that resets.
   std::string_view command{};  ///< Name of the command that demands name `command`.
@@ -119,10 +121,10 @@ struct Clause {
 
 /// Kind of a clause for hosts: the behaviour that the document demands.
 enum class HostDemand : std::uint8_t {
-  asks,           ///< the encoder answers the host's requests
-  after_silence,  ///< the host repeats its request if the encoder sends no reply
-  after_damage,   ///< the host repeats its request after a damaged reply
-  after_refusal,  ///< the host repeats its request after the encoder refused a damaged request
+  asks,           ///< the host sends only requests, from its first one on, and the encoder answers at least one
+  after_silence,  ///< the host sends further requests after the encoder sent no reply
+  after_damage,   ///< the host sends further requests after a damaged reply
+  after_refusal,  ///< the host sends further requests after the encoder refused a damaged one
   rule,           ///< the host never breaks `rule`
   /// The host keeps `rule`, which is about consecutive requests. It is tested only while replies are valid, because a
   /// host may give up after an error.

@@ -46,7 +46,7 @@ enum class ChangeSent : std::uint8_t {
 
 /// Host side of one command: a machine that sends requests and receives replies. When it returns the step `emit` or
 /// `done`, `error`, `detail`, `advice`, `reading`, `report` and `exchange` describe the result, which is valid until
-/// the next call of `feed`.
+/// `feed` or, after `emit`, `next` is called again.
 template <class Item>
 struct Conversation : Machine<Item> {
   /// Returns why there is no result; `Error::none` if there is one. After the step `done` it is the error of the whole

@@ -76,7 +76,7 @@ struct Shown {
   std::optional<std::uint8_t> control_field{};  ///< Control field (CF) of a request: encoder address, data ID, parity.
   std::optional<std::uint8_t> encoder_address{};  ///< Address of the encoder on the line (EAD).
   std::optional<Reply> reply{};                   ///< The reply; its data ID decides which values it has.
-  std::optional<bool> clash{};  ///< Whether the last of three attempts of a scan at this address was damaged.
+  std::optional<bool> clash{};  ///< Whether, in a scan, the last of three replies of the address was damaged.
   std::optional<std::string_view> trouble{};       ///< Sentence about the error of a complete reply in a scan.
   std::optional<std::uint8_t> page{};              ///< Page of a memory access.
   std::optional<std::uint8_t> memory_address{};    ///< Address of a memory access (ADF).

@@ -68,7 +68,7 @@ inline constexpr unsigned most_encoders = 8;  ///< most encoders on a line, beca
 /// Result of `scan`: what was received at each address.
 struct Nodes {
   std::array<std::optional<Reply>, most_encoders> answers{};  ///< valid reply of each address; nothing: there was none
-  std::array<bool, most_encoders> disturbed{};  ///< Whether the last of three attempts at an address was damaged.
+  std::array<bool, most_encoders> disturbed{};  ///< Whether the last of three replies of an address was damaged.
   /// For each address, the check that a complete but invalid reply failed; `passed`: there was no such reply.
   std::array<Check, most_encoders> troubles{};
 };
