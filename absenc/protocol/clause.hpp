@@ -45,7 +45,7 @@ enum class Demand : std::uint8_t {
   paced,
   // Demands about values that the test cannot restore
   zero,     ///< the position, which was not 0 before, is 0 after the zero command
-  /// The command of `verb` resets the alarms in the mask `value`, or the turns; the position, and turns that it does not
+  /// The command of `verb` resets the alarms in the mask `value`, or the turns; the position, and turns that are not
   /// reset, stay.
   reset,
   restarts  ///< after `command` the encoder is silent at first; `value` ms later it reports the position from before

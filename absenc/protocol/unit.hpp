@@ -370,7 +370,7 @@ struct Unit {
   /// Returns how long after the last received item a host must wait before it repeats this valid request. Null: no
   /// time.
   Time (*pause)(const Options& options, Frame request) = nullptr;
-  /// Conditions of the virtual encoder's environment, which can also be set while it runs.
+  /// Conditions of the virtual encoder's environment, which can be set while it runs.
   std::span<const Condition> conditions{};
   /// For clocked links on which the level of the clock line in each pause is a bit from the host (1: low): returns the
   /// index of the bit in this reply that the encoder sends in exchange; nothing if this reply has none. The bits of

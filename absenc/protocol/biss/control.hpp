@@ -178,7 +178,7 @@ struct ControlTarget {
   /// Returns whether the next data byte can begin now: its value is available, or the encoder can accept a new one.
   [[nodiscard]] virtual bool is_ready() const = 0;
   /// Returns whether `slave` takes part in register accesses and acknowledges commands. Command 1 switches this off for
-  /// the slaves that it addresses, and on again if it is sent to all slaves, which slaves that are off receive too.
+  /// the slaves that it addresses. Sent to all slaves, it switches this on again; slaves that are off execute it.
   [[nodiscard]] virtual bool listens(unsigned) const { return true; }
   /// Returns whether `slave` executes the command with number `command`.
   [[nodiscard]] virtual bool obeys(unsigned slave, unsigned command) const = 0;

@@ -99,8 +99,8 @@ author::Procedure read_register(Dialog& dialog, ProcedureState& found, std::size
 /// invalid_argument (the length is unknown).
 author::Procedure read_memory(Dialog& dialog, ProcedureState& found, Arguments arguments);
 
-/// Writes register `index` of the table. This procedure, `write_memory`, `zero` and `preset_multiturn` also have the
-/// error cross_check_failed (reading the register back gave another value).
+/// Writes register `index` of the table. Errors: those of `read_register`, and cross_check_failed (reading the register
+/// back gave another value).
 author::Procedure write_register(Dialog& dialog, ProcedureState& found, std::size_t index, Arguments arguments);
 /// Writes a register. Arguments: address, value, size (0: from the table). Error besides those of `write_register`:
 /// invalid_argument (the size is unknown or above 8, the value does not fit, or the address is that of the command
