@@ -272,7 +272,8 @@ constexpr BitRanges position_bits(const Format& format, const FieldInfo& field) 
 
 }  // namespace detail
 
-/// Returns the bits of a valid reply that hold `field`; empty if no bits do.
+/// Returns the bits of a valid reply that hold `field`, which `decode` must report for this reply; empty if the field
+/// has no bits of its own.
 [[nodiscard]] constexpr BitRanges bits_of(const Format& format, Bytes reply, const FieldInfo& field) {
   if (reply.size() == identity_bytes || reply.size() == padded_identity_bytes) return detail::identity_bits(field);
   const Format known = assumed(format, reply);

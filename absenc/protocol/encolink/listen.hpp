@@ -18,7 +18,7 @@ namespace absenc::encolink {
 class Listen final : public Conversation<std::uint8_t> {
  public:
   /// Creates a conversation that receives an encoder of this format, which must be known, because it sends no
-  /// requests for the identity. Errors: invalid_argument (the format is not known), timeout (nothing is received),
+  /// requests for the identity. Errors: invalid_argument (the format is not known), timeout (nothing more is received),
   /// bad_framing (a damaged character), or wrong_length, bad_checksum or out_of_range (a damaged frame of the stream,
   /// or no two valid frames in a row).
   explicit Listen(const Format& format);
