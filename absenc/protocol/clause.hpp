@@ -100,7 +100,7 @@ struct Clause {
   std::string_view paragraph;  ///< paragraph of the unit's document
   std::string_view words;      ///< Demand of the document, in words.
   Demand demand;               ///< Kind of the clause, which selects its test.
-  /// Options of encoders to which the clause applies: "carries=biss", "crc_width!=0"; empty: all.
+  /// Options of encoders to which the clause applies, separated by blanks: "carries=biss crc_width!=0"; empty: all.
   std::string_view needs{};
   Errors errors = 0;  ///< demand as_drawn: errors of replies that break the clause; 0: form_errors
   Ask ask{};          ///< Request that the test sends, for demands about requests that no host sends.
@@ -110,13 +110,14 @@ struct Clause {
   std::int64_t value = 0;      ///< value of `option`, or the number that the demand names `value`
   std::uint32_t page = 0;      ///< Page of the memory byte that the clause is about.
   std::uint32_t address = 0;   ///< Address of the memory byte that the clause is about.
-  std::string_view setting{};  ///< name of the setting that `config set` writes and reads
+  std::string_view setting{};  ///< setting that the clause is about, or that access to its memory byte changes
   std::string_view field{};    ///< field of the command that reads `setting`, with its value
   std::int64_t other = 0;      ///< Second page, or second value of `setting`, for demands that name `other`.
   Verb verb = Verb::run;       ///< Demand reset: verb of the command that resets.
   std::string_view command{};  ///< Name of the command that demands name `command`.
   std::string_view stop{};     ///< Command that ends the unsolicited frames of `command`; empty: none.
-  std::string_view shown_with{};  ///< options of a virtual encoder that shows the case, if its defaults do not
+  /// Options of a virtual encoder that shows the case, if its defaults do not: "resolution=20&multiturn_bits=0".
+  std::string_view shown_with{};
 };
 
 /// Kind of a clause for hosts: the behaviour that the document demands.
