@@ -44,8 +44,8 @@ class EncoderOf {
   EncoderOf(const F& format, const Shaft& shaft, const Behaviour& behaviour)
       : format_(format), shaft_(&shaft), behaviour_(behaviour) {}
 
-  /// Fills `samples` with SLO for a frame whose first falling edge of MA is at `at`: the whole frame, then zeros up to
-  /// a full byte.
+  /// Fills `samples` with SLO, as the line delays it, for a frame whose first falling edge of MA is at `at`: the whole
+  /// frame, then zeros up to a full byte. SLO is idle if MA is too slow; a frame that is too long has no start bit.
   void sample(Time at, Time period, Samples& samples, bool cds = false) {
     samples.clear();
     // If half a period is as long as the timeout or longer, the frame ends at once and SLO is idle.

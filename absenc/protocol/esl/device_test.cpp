@@ -359,7 +359,7 @@ TEST(EslDevice, ClearsMultiturnErrorOnlyAfterItsTurnReset) {
   EXPECT_EQ(bench.read().one.alarms, alarms::multiturn_error);
   reset(bench, DataId::reset_multiturn);
   bench.pass(10ms);
-  // Multiturn_error is raised already, so raising it again changes nothing.
+  // The alarm multiturn_error is raised already, so raising it again changes nothing.
   bench.encoder.raise_alarms(alarms::multiturn_error);
   reset(bench, DataId::clear_alarms);
   EXPECT_EQ(bench.read().one.alarms, 0);

@@ -47,7 +47,7 @@ inline constexpr std::array<FlagInfo, 8> alarm_flags{{
      "check that no more than 5 V are at the connector; it clears with the voltage, or the encoder is damaged"},
 }};
 
-/// Values of the fields of a frame, or of a procedure's result. A member without a value is not in the frame.
+/// Values of the fields of a frame, or of a procedure's result. A member without a value is not reported.
 struct Shown {
   constexpr Shown() = default;
   /// Constructs the values of a request.

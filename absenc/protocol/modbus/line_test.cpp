@@ -250,7 +250,7 @@ TEST(ModbusLine, ServerChangesRateAfterReply) {
   EXPECT_EQ(bench.server.violation_count(), 0u);
 }
 
-// The client stops when something sends bytes that are no reply without a pause.
+// If bytes that are no reply arrive without a pause, the client stops.
 TEST(ModbusLine, ClientStopsOnEndlessNoise) {
   ToyClient client(request_body);
   Time now{};
