@@ -103,7 +103,7 @@ struct Clause {
   /// Options of encoders to which the clause applies, separated by blanks: "carries=biss crc_width!=0"; empty: all.
   std::string_view needs{};
   Errors errors = 0;  ///< demand as_drawn: errors of replies that break the clause; 0: form_errors
-  Ask ask{};          ///< Request that the test sends, for demands about requests that no host sends.
+  Ask ask{};          ///< Request that the test sends, for demands that name `ask`.
   Reaction reaction = Reaction::silent;  ///< demand reacts: required reaction of the encoder to `ask`
   std::string_view as{};       ///< command whose reply is demanded as reaction to `ask`; "": a reply to `ask` itself
   std::string_view option{};   ///< option that the test sets to `value` before it reads; "": the user's options stay

@@ -112,8 +112,8 @@ struct Device : Machine<Item> {
   virtual void power_on(Time now, PowerOn kind) = 0;
   /// Switches the encoder off at `now`.
   virtual void power_off(Time now) = 0;
-  /// Raises the alarms `bits`, bits of the unit's alarm field. Latched alarms stay until a host clears them, others
-  /// until `lower_alarms`.
+  /// Raises the alarms `bits`, bits of the unit's alarm field. They stay until `lower_alarms`; alarms that the encoder
+  /// latches may stay longer, and a host or power off may clear them.
   virtual void raise_alarms(std::uint32_t bits) = 0;
   /// Ends the cause of the alarms `bits` that `raise_alarms` raised.
   virtual void lower_alarms(std::uint32_t bits) = 0;
