@@ -44,7 +44,7 @@ enum class Demand : std::uint8_t {
   /// frames per second unsolicited; `stop` ends them.
   paced,
   // Demands about values that the test cannot restore
-  zero,     ///< the position, which was not 0 before, is 0 after the zero command
+  zero,  ///< the position, which was not 0 before, is 0 after the zero command
   /// The command of `verb` resets the alarms in the mask `value`, or the turns; the position, and turns that are not
   /// reset, stay.
   reset,
@@ -102,8 +102,8 @@ struct Clause {
   Demand demand;               ///< Kind of the clause, which selects its test.
   /// Options of encoders to which the clause applies, separated by blanks: "carries=biss crc_width!=0"; empty: all.
   std::string_view needs{};
-  Errors errors = 0;  ///< demand as_drawn: errors of replies that break the clause; 0: form_errors
-  Ask ask{};          ///< Request that the test sends, for demands that name `ask`.
+  Errors errors = 0;                     ///< demand as_drawn: errors of replies that break the clause; 0: form_errors
+  Ask ask{};                             ///< Request that the test sends, for demands that name `ask`.
   Reaction reaction = Reaction::silent;  ///< demand reacts: required reaction of the encoder to `ask`
   std::string_view as{};       ///< command whose reply is demanded as reaction to `ask`; "": a reply to `ask` itself
   std::string_view option{};   ///< option that the test sets to `value` before it reads; "": the user's options stay
