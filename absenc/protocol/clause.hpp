@@ -28,7 +28,7 @@ enum class Demand : std::uint8_t {
   reacts,          ///< the encoder reacts to the request `ask` as `reaction` states
   // Demands about changes of the encoder, which the test undoes
   byte_written,  ///< the byte at `page` and `address` can be written and read back
-  byte_alone,    ///< writing the byte at `page` and `address` leaves the bytes beside it unchanged
+  byte_alone,    ///< writing the byte at `page` and `address` leaves the four bytes below it unchanged
   page_alone,    ///< writing the byte at `page` and `address` leaves the byte at `address` of page `other` unchanged
   /// While the byte at `page` and `address` is written, a request to read it gets a busy reply; later it can be read.
   byte_busy,
@@ -40,12 +40,14 @@ enum class Demand : std::uint8_t {
   zeroed,
   /// One of the values `value` and `other` of the setting `setting`, which cannot be read, mirrors the position.
   mirrored,
-  /// After `command` with the argument `value`, the encoder sends `value` frames per second unsolicited; `stop` ends
-  /// them.
+  /// After `command` with the argument `value` (half of it, if it is the present rate), the encoder sends that many
+  /// frames per second unsolicited; `stop` ends them.
   paced,
   // Demands about values that the test cannot restore
-  zero,     ///< the position, which was not 0 before, is 0 after the zero command
-  reset,    ///< the command of `verb` resets the alarms in the mask `value`, or the turns, and nothing else
+  zero,  ///< the position, which was not 0 before, is 0 after the zero command
+  /// The command of `verb` resets the alarms in the mask `value`, or the turns; the position, and turns that are not
+  /// reset, stay.
+  reset,
   restarts  ///< after `command` the encoder is silent at first; `value` ms later it reports the position from before
 };
 
@@ -73,7 +75,7 @@ struct Ask {
   /// the position.
   std::string_view command{};
   std::span<const std::int64_t> arguments{};  ///< Arguments of `command`; those left out have their defaults.
-  bool wrong_end = false;                     ///< Whether the last byte of the request of `command` has a wrong bit.
+  bool wrong_end = false;                     ///< Whether the last byte has a wrong bit; not used with `wire`.
   /// Writes the request into `request` and returns its length, for requests that depend on the options and that no
   /// command sends. Null: `wire` or the request of `command` is sent.
   Result<std::size_t> (*make)(const Options& options, MutableBytes request) = nullptr;
@@ -98,31 +100,32 @@ struct Clause {
   std::string_view paragraph;  ///< paragraph of the unit's document
   std::string_view words;      ///< Demand of the document, in words.
   Demand demand;               ///< Kind of the clause, which selects its test.
-  /// Options of encoders to which the clause applies: "carries=biss", "crc_width!=0"; empty: all.
+  /// Options of encoders to which the clause applies, separated by blanks: "carries=biss crc_width!=0"; empty: all.
   std::string_view needs{};
-  Errors errors = 0;  ///< demand as_drawn: errors of replies that break the clause; 0: form_errors
-  Ask ask{};          ///< Request that the test sends, for demands about requests that no host sends.
+  Errors errors = 0;                     ///< demand as_drawn: errors of replies that break the clause; 0: form_errors
+  Ask ask{};                             ///< Request that the test sends, for demands that name `ask`.
   Reaction reaction = Reaction::silent;  ///< demand reacts: required reaction of the encoder to `ask`
   std::string_view as{};       ///< command whose reply is demanded as reaction to `ask`; "": a reply to `ask` itself
   std::string_view option{};   ///< option that the test sets to `value` before it reads; "": the user's options stay
   std::int64_t value = 0;      ///< value of `option`, or the number that the demand names `value`
   std::uint32_t page = 0;      ///< Page of the memory byte that the clause is about.
   std::uint32_t address = 0;   ///< Address of the memory byte that the clause is about.
-  std::string_view setting{};  ///< name of the setting that `config set` writes and reads
-  std::string_view field{};    ///< field that reports the value of `setting`, which is also the argument that sets it
+  std::string_view setting{};  ///< setting that the clause is about, or that access to its memory byte changes
+  std::string_view field{};    ///< field of the command that reads `setting`, with its value
   std::int64_t other = 0;      ///< Second page, or second value of `setting`, for demands that name `other`.
   Verb verb = Verb::run;       ///< Demand reset: verb of the command that resets.
   std::string_view command{};  ///< Name of the command that demands name `command`.
   std::string_view stop{};     ///< Command that ends the unsolicited frames of `command`; empty: none.
-  std::string_view shown_with{};  ///< options of a virtual encoder that shows the case, if its defaults do not
+  /// Options of a virtual encoder that shows the case, if its defaults do not: "resolution=20&multiturn_bits=0".
+  std::string_view shown_with{};
 };
 
 /// Kind of a clause for hosts: the behaviour that the document demands.
 enum class HostDemand : std::uint8_t {
-  asks,           ///< the encoder answers the host's requests
-  after_silence,  ///< the host repeats its request if the encoder sends no reply
-  after_damage,   ///< the host repeats its request after a damaged reply
-  after_refusal,  ///< the host repeats its request after the encoder refused a damaged request
+  asks,           ///< the host sends only requests, from its first one on, and the encoder answers at least one
+  after_silence,  ///< the host sends further requests after the encoder sent no reply
+  after_damage,   ///< the host sends further requests after a damaged reply
+  after_refusal,  ///< the host sends further requests after the encoder refused a damaged one
   rule,           ///< the host never breaks `rule`
   /// The host keeps `rule`, which is about consecutive requests. It is tested only while replies are valid, because a
   /// host may give up after an error.

@@ -20,8 +20,8 @@ template <class Item>
 struct Exchange {
   std::span<const Item> sent{};      ///< Bytes or CAN frames of the request.
   std::span<const Item> received{};  ///< Bytes or CAN frames that were received after the request, valid or not.
-  Time sent_at{};                    ///< time at which the last bit of the request ended
-  Time received_at{};  ///< time at which the last received bit ended; equal to `sent_at` if nothing was received
+  Time sent_at{};                    ///< time at which the last bit of the request ended, or the request pulse began
+  Time received_at{};  ///< time at which the last received bit ended; if nothing was received, the end of the request
 };
 
 /// Two texts for people that explain an error better than the error's general text. Either may be empty.
@@ -46,7 +46,7 @@ enum class ChangeSent : std::uint8_t {
 
 /// Host side of one command: a machine that sends requests and receives replies. When it returns the step `emit` or
 /// `done`, `error`, `detail`, `advice`, `reading`, `report` and `exchange` describe the result, which is valid until
-/// the next call of `feed`.
+/// `feed` or, after `emit`, `next` is called again.
 template <class Item>
 struct Conversation : Machine<Item> {
   /// Returns why there is no result; `Error::none` if there is one. After the step `done` it is the error of the whole
@@ -112,10 +112,10 @@ struct Device : Machine<Item> {
   virtual void power_on(Time now, PowerOn kind) = 0;
   /// Switches the encoder off at `now`.
   virtual void power_off(Time now) = 0;
-  /// Raises the alarms `bits`, bits of the unit's alarm field. Latched alarms stay until a host clears them, others
-  /// until `lower_alarms`.
+  /// Raises the alarms `bits`, bits of the unit's alarm field; an encoder without alarms ignores the call. They stay
+  /// until `lower_alarms`; a host or power off may clear latched ones earlier.
   virtual void raise_alarms(std::uint32_t bits) = 0;
-  /// Ends the cause of the alarms `bits` that `raise_alarms` raised.
+  /// Ends the alarms `bits` and their cause, even if they are latched.
   virtual void lower_alarms(std::uint32_t bits) = 0;
   /// Sets the condition Unit::conditions[index] to `value`, which is within the condition's range. By default does
   /// nothing.

@@ -22,7 +22,7 @@ enum class Role : std::uint8_t {
   // Roles on a line
   encoder,   ///< option, field: address of the encoder on the line; in a scan this field begins a new record
   identity,  ///< field: identifies the encoder: its type, its serial number
-  clash,     ///< field of a scan: not 0: every answer at this address is damaged
+  clash,     ///< field of a scan: not 0: answers at this address are damaged, and none is valid
   trouble,   ///< field of a scan: what is wrong with an answer that was complete
   rate,      ///< option: bit rate; its choices are bits per second
   // Roles of the options of a checksum at the end of a word, which `crc find` finds

@@ -341,8 +341,8 @@ struct Unit {
   /// Returns where the frame ends that begins with the first of `bytes`.
   FrameEnd (*frame_end)(const Options& options, Direction direction, Bytes bytes);
   /// Constructs the conversation of a command in `storage`, which has `host_storage` bytes. Returns an empty Any if the
-  /// options or arguments contradict the command. A command that the encoder lacks, or an argument outside its range,
-  /// gives a conversation that ends at once with an error.
+  /// options contradict each other, or the command's request cannot be encoded with these arguments. If the encoder
+  /// lacks the command, or an argument is missing or outside its range, the conversation ends at once with an error.
   Any<Conversation> (*host)(const Options& options, const Command& command, Arguments arguments,
                             std::span<std::byte> storage);
   /// Constructs a virtual encoder in `storage`, which has `device_storage` bytes; `shaft` must outlive it. Returns an
@@ -385,7 +385,7 @@ struct Unit {
   /// Returns how long after the last received item a host must wait before it repeats this valid request. Null: no
   /// time.
   Time (*pause)(const Options& options, Frame request) = nullptr;
-  /// Conditions of the virtual encoder's environment, which can also be set while it runs.
+  /// Conditions of the virtual encoder's environment, which can be set while it runs.
   std::span<const Condition> conditions{};
   /// For clocked links on which the level of the clock line in each pause is a bit from the host (1: low): returns the
   /// index of the bit in this reply that the encoder sends in exchange; nothing if this reply has none. The bits of

@@ -150,6 +150,6 @@ struct Protocol {
 };
 
 extern const Unit unit;             ///< The protocol as a unit, for the list of units.
-extern const Clauses unit_clauses;  ///< The demands of its document.
+extern const Clauses unit_clauses;  ///< The demands of the protocol's document.
 
 }  // namespace absenc::amt21

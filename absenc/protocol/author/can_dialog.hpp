@@ -7,6 +7,7 @@
 //     using Format, Request = CanFrame;
 //     static CanHostTimes host_times(const Format&);
 //     static ByteBuffer<N> encode(const Format&, const CanFrame&);   // the text of a frame, as in vectors
+//     static Manner manner(const Format&, const CanFrame&);          // only `pulse` is used, which must be 0
 //   };
 #pragma once
 

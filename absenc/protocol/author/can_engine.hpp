@@ -42,7 +42,7 @@ class CanEngine : public Conversation<CanFrame> {
 
   /// Returns the time at which the last request was sent completely.
   [[nodiscard]] Time sent_at() const { return sent_at_; }
-  /// Returns whether a bus error destroyed frames since the last request, or since the last `listen`.
+  /// Returns whether a bus error destroyed frames since the last request or `listen`, whichever is later.
   [[nodiscard]] bool is_disturbed() const { return disturbed_; }
   /// Returns why no answer was received: timeout, or bad_framing on a bus with errors.
   [[nodiscard]] Error missing() const { return disturbed_ ? Error::bad_framing : Error::timeout; }
@@ -58,8 +58,8 @@ class CanEngine : public Conversation<CanFrame> {
   void ask(const CanFrame& frame, const CanHostTimes& times, Time pause = {});
   /// Sends `frame` at once and receives frames for exactly `duration`.
   void ask_for(const CanFrame& frame, Time duration);
-  /// Sets whether frames that were received before the request was sent are delivered too: they may answer earlier
-  /// requests.
+  /// Sets whether frames that were received before the request was sent are delivered, not only later ones: they may
+  /// answer earlier requests.
   void overhear(bool yes = true) { receives_early_ = yes; }
   /// Returns whether the delivered frame was received before the request was sent.
   [[nodiscard]] bool came_early() const { return early_; }

@@ -18,8 +18,8 @@ struct ClockedHostTimes {
 };
 
 /// Conversation that clocks one transfer after the other; a subclass decides the number of clocks and handles the bits.
-/// The host drives the clock, so the engine has no timeout and repeats nothing. The clock rests before the first
-/// transfer too, because another host may have clocked just before.
+/// The host drives the clock, so the engine has no timeout and repeats nothing. The clock rests before every transfer,
+/// even the first, because another host may have clocked just before.
 class ClockedEngine : public Conversation<std::uint8_t> {
  public:
   /// Not copyable: requests and replies are views into the conversation itself.

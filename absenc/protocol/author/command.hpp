@@ -72,14 +72,14 @@ struct Report {
   void (*put_request)(FieldSink&, const Format&, const Request&) = nullptr;
   /// Puts the fields of a valid reply to the request into the sink.
   void (*put_reply)(FieldSink&, const Format&, const Request&, const Reply&) = nullptr;
-  /// Returns the document's explanation of an invalid or missing reply. Not called if a procedure has an advice of its
-  /// own, or its outcome stands alone (`only`). Null: none.
+  /// Returns the document's explanation of an invalid or missing reply. Conversations do not call it if a procedure has
+  /// an advice of its own, its outcome stands alone (`only`), or the line is never silent. Null: none.
   Explanation (*explain)(const Format&, Error, Items request, Items reply) = nullptr;
   /// Returns the explanation of the error of a conversation that ended, for units in which only the conversation knows
   /// the reason. If set, it replaces `explain` for conversations.
   Explanation (*explain_host)(const Host&) = nullptr;
-  /// Writes the explanation of a failed last exchange of `host` into the sentence, for units that put explanations
-  /// together from parts. If set, it replaces the detail that `explain` gives for conversations.
+  /// Writes the explanation of the error of `host` into the sentence, for units that put explanations together from
+  /// parts. If set, it replaces the details of `explain` and `explain_host` for conversations.
   void (*tell)(Sentence&, const Host& host) = nullptr;
   /// Advice for the error that the line is never silent.
   std::string_view noise_advice = endless_noise.advice;
@@ -255,7 +255,7 @@ struct CommandOf {
     }
   }
   /// Constructs the conversation of the command in `storage`. It is a Refusal if the encoder lacks the command. Returns
-  /// an empty Any if `possible` or `can_ask` returns false, or if the storage is too small.
+  /// an empty Any if `possible` or `can_ask` returns false, or the storage is too small.
   [[nodiscard]] Any<Conversation> run(const Format& format, Arguments arguments, std::span<std::byte> storage) const {
     const std::string_view why = missing != nullptr ? missing(format) : std::string_view{};
     if (!why.empty()) return make_host<Refusal<ItemOf<P>>>(storage, Error::unsupported, why);

@@ -43,7 +43,7 @@ struct Declaration {
   std::span<const ModelText> models{};       ///< models, with their option values as text (option.hpp)
   std::span<const FieldInfo> fields{};       ///< fields of the unit: FieldsOf::infos (field.hpp)
   std::span<const CommandOf<P>> commands{};  ///< commands of the unit (command.hpp)
-  /// Test vectors (text.hpp); one that does not decode as stated does not compile.
+  /// Test vectors (text.hpp); a vector without open bytes that does not decode as stated does not compile.
   std::span<const VectorText> vectors{};
   /// True: frames of vectors are plain texts, not hexadecimal, as always on clocked links (texts of 0 and 1).
   bool frames_are_texts = false;

@@ -70,7 +70,8 @@ void Responder::forget() {
   skip_begins_ = damaged_ = false;
 }
 
-// Notes a damaged character: the rest of the request is ignored until the line is silent.
+// Notes a damaged character: the rest of the request is ignored until the line is silent. While the encoder is off or
+// sends, only the begun request is forgotten.
 void Responder::damage(Time at) {
   if (!is_on(at) || transmitting_) return forget();
   received_at_ = at;

@@ -204,7 +204,7 @@ class DialogOf : public HostOf<P>, public Routine {
     };
     return Rest{*this, pause};
   }
-  /// Delivers the present result to the caller (step `emit`) before the next request.
+  /// Delivers the present result to the caller (step `emit`), before the next pause or request, or before the end.
   void emit() { HostOf<P>::emit(); }
   using HostOf<P>::set_format;
   /// Switches this end of the line to `rate` bits per second before the next request, and uses the time limits `times`
@@ -320,7 +320,7 @@ using ProcedureDialog = typename detail::ProcedureDialog<P>::Type;
 /// A conversation that runs `procedure(dialog, found, bound..., arguments)`; the arguments are passed only if the
 /// procedure takes them. Its result is `Found`, whose member `reading`, if it has one, is the position; otherwise the
 /// `reading` of the dialog is. If `Found` has a member `streams`, each `emit` is a result, and the procedure ends only
-/// with an error. The coroutine frames are in the storage after this object.
+/// with an error.
 template <class P, class Found, auto procedure, auto... bound>
 class Run : public ProcedureDialog<P> {
  public:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Base of virtual encoders on any kind of line: power, alarms raised by tests and users, breaches of rules, and the
-// number of answers. Those of Modbus and of CAN do not need it.
+// Base of virtual encoders on lines of characters and on clocked lines: power, alarms raised by tests and users,
+// breaches of rules, and the number of answers. Virtual encoders on Modbus and CAN do not derive from it.
 #pragma once
 
 #include <cstdint>

@@ -182,8 +182,7 @@ void Engine::conclude() {
     if (disturbed_) return conclude_with(Error::bad_framing);
     return conclude_with(manner_.any_reply ? Error::none : Error::timeout);
   }
-  // After damaged or early characters, or on a line that is never silent, some of the received bytes do not belong to
-  // the reply.
+  // After damaged or early characters, or on a line that is never silent, the received bytes are not just the reply.
   if (disturbed_ || noisy_) return conclude_with(Error::wrong_length);
   conclude_with(manner_.any_reply ? Error::none : check());
 }

@@ -45,8 +45,8 @@ struct Manner {
 /// class from a protocol. CAN and clocked lines have engines of their own, because replies end differently there.
 ///
 /// After an invalid reply the engine waits for silence before it ends or sends again: sending while an encoder sends
-/// can destroy the encoder's driver. A valid reply or a refusal (`is_whole`) ends the exchange at once, unless Manner
-/// demands silence after it.
+/// can destroy the encoder's driver. If the line is not silent within HostTimes::patience, the exchange ends with an
+/// error. A valid reply or a refusal (`is_whole`) ends the exchange at once, unless Manner demands silence after it.
 class Engine : public Conversation<std::uint8_t> {
  public:
   /// Not copyable: requests and replies are views into the conversation itself.
@@ -68,14 +68,16 @@ class Engine : public Conversation<std::uint8_t> {
   [[nodiscard]] Time begun_at() const { return begun_at_; }
   /// Returns the time at which the last bit of the last request was sent; for a pulse, the time at which it began.
   [[nodiscard]] Time sent_at() const { return sent_at_; }
-  /// Returns the time at which the last byte was received, or the last request ended, whichever is later.
+  /// Returns the latest of these times: the first step, the last received byte, the end of the last request, the end
+  /// of the last time of listening.
   [[nodiscard]] Time received_at() const { return received_at_; }
   /// Returns the bytes received after the last request, valid or not.
   [[nodiscard]] Bytes reply() const { return Bytes(storage_).first(size_); }
   /// Returns whether the last exchange was abandoned because the line is never silent. Repeating the request does not
   /// help then.
   [[nodiscard]] bool is_noisy() const { return noisy_; }
-  /// Returns whether, in the last exchange, characters were damaged or received before the request was sent.
+  /// Returns whether a character of the last exchange was damaged, or was received while the bytes of the request were
+  /// still being sent.
   [[nodiscard]] bool is_disturbed() const { return disturbed_; }
 
  protected:

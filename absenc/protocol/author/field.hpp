@@ -76,7 +76,7 @@ template <auto member>
   return one;
 }
 
-/// Table of the fields of a struct `Values`, which has their values as members.
+/// Table of the fields of a struct `Values`, which has their values as members or as results of functions.
 template <class Values, auto... members>
 struct FieldsOf {
   /// Constructs the table from the fields, in the order in which they are put.

@@ -49,7 +49,8 @@ class RowCounter {
   }
   /// Measures the time to the next request from `at`, the end of the reply, instead of from the end of the request.
   void measure_from(Time at) { since_ = at; }
-  /// Ends the row, because the host sent another request. A row that is too short is noted as a broken rule.
+  /// Ends the row, because the host sent a request that is not of the row. A row that is too short is noted as a broken
+  /// rule.
   void end() {
     if (sent_ > 0 && sent_ < row_->requests) rules_->note(false, row_->number_rule);
     forget();
@@ -62,7 +63,7 @@ class RowCounter {
   HostRules* rules_;
   unsigned code_ = 0;
   unsigned sent_ = 0;     // requests of the row
-  unsigned counted_ = 0;  // requests of the row, from the last one that was sent too fast on
+  unsigned counted_ = 0;  // requests since the last execution, from the last one that was sent too fast on
   Time since_{};
 };
 

@@ -25,12 +25,12 @@ struct PagedMemory {
   Time fetch_time{};
   /// Whether page changes and writes exclude each other: only one of the two busy times runs, that of the last change.
   bool exclusive = true;
-  /// Returns whether the byte at `address` of `page` is read and written at once, without busy time or fetching. Null:
-  /// no byte is.
+  /// Returns whether the byte at `address` of `page` is read and written without fetching and without waiting for
+  /// writes; after a page change it is busy like any byte. Null: returns false for every byte.
   bool (*is_immediate)(unsigned page, unsigned address) = nullptr;
   std::string_view page_rule;          ///< Rule for the host: access waits for `page_time`.
   std::string_view write_rule;         ///< Rule for the host: a write follows the write before by `write_time`.
-  std::string_view refused_rule{};     ///< Rule: a read that was refused as busy is repeated; "": no such rule.
+  std::string_view refused_rule{};     ///< Rule: a read that came during a write is repeated; "": no such rule.
   std::string_view fetch_rule{};       ///< Rule: a byte that is being fetched is read again; "": no such rule.
   std::string_view fetch_time_rule{};  ///< Rule: a fetched byte is read only after `fetch_time`; "": no such rule.
 };
@@ -59,8 +59,8 @@ class PagedMemoryDevice : public Responder {
   /// Stores a byte in a writable area of the memory.
   virtual void store(std::uint8_t page, std::uint8_t address, std::uint8_t value) = 0;
 
-  /// Executes a request that was received at `at`, and returns the content of the reply; nothing if `exists` is false
-  /// for it. Busy times are measured from `since`, which may be earlier than `at`.
+  /// Executes a request that was received at `at`, and returns the content of the reply; nothing if the memory is not
+  /// busy and `exists` is false for the request. Busy times are measured from `since`, which may be earlier than `at`.
   std::optional<MemoryAnswer> access(const Access& request, Time at, Time since);
   /// Returns whether the request can be executed: an area has the byte (a writable area, to write it), or has the page
   /// that is to be selected. The selected page can always be read.

@@ -20,8 +20,8 @@ struct Nodes {
 
 /// Sends the request `request_to(i)` to each address i, and stores in `nodes` which addresses answered. An address that
 /// is not silent is requested twice, because one answer may be noise. Errors: timeout (no answer at any address),
-/// wrong_length (eight addresses in a row answered, so the device is no encoder), or that of a line that is never
-/// silent.
+/// wrong_length (eight addresses answered without a silent one among them, so the device is no encoder), or that of a
+/// line that is never silent.
 template <class P, std::size_t addresses, auto request_to>
 Procedure scan(DialogOf<P>& dialog, Nodes<addresses>& nodes) {
   constexpr unsigned most_in_a_row = 8;

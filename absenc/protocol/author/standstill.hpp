@@ -11,7 +11,8 @@
 
 namespace absenc::author {
 
-/// Time between two readings of the position, which show whether the shaft turns at 0.33 rpm or more.
+/// Time between two readings of the position, which show whether the shaft turns faster than 0.33 rpm (or than one
+/// count per reading, with few bits).
 inline constexpr Time between_looks = std::chrono::milliseconds(10);
 /// Greatest difference of two positions of a standing shaft, caused by noise, in 1/1000 degree.
 inline constexpr std::uint32_t standstill_millidegrees = 20;

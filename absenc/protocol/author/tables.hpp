@@ -109,7 +109,7 @@ struct Tables {
     }
     return all;
   }();
-  /// The test vectors, whose members point into `vector_parts`.
+  /// The test vectors, whose frames and expected fields point into `vector_parts`.
   static constexpr auto vectors = [] {
     std::array<Vector, declared.vectors.size()> made{};
     Bytes bytes = vector_parts.bytes;

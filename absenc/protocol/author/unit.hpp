@@ -109,8 +109,8 @@ struct Descriptor {
     return Error::none;
   }
 
-  /// Checks an exchange of bytes and puts the fields and reading of the reply, or without a reply the fields of the
-  /// request, into `sink`. Returns the first error.
+  /// Checks an exchange of bytes. Puts the fields of the reply into `sink`, and its reading if it has a position or
+  /// turns; without a reply, the fields of the request. Returns the first error.
   static constexpr Error decode_bytes(const Format& f, Frame asked, Frame frame, FieldSink& sink) {
     const Result<Request> request = request_of(f, asked.bytes, frame.bytes);
     if (!request) return request.error();
@@ -211,7 +211,8 @@ struct Descriptor {
     }
   }
 
-  /// Constructs the conversation of a command in `storage`; a Refusal if an argument is missing or outside its range.
+  /// Constructs the conversation of a command in `storage`; a Refusal if an argument is missing or outside its range,
+  /// otherwise what CommandOf::run returns.
   static Any<Conversation> host(const Options& values, const Command& command, Arguments arguments,
                                 std::span<std::byte> storage) {
     if (!are_good(command, arguments)) {
@@ -221,7 +222,8 @@ struct Descriptor {
     return find(command).run(declared.format(values), arguments, storage);
   }
 
-  /// Constructs a virtual encoder in `storage`; returns an empty Any if the options contradict each other.
+  /// Constructs a virtual encoder in `storage`. Returns an empty Any if the options contradict each other, or the
+  /// storage is too small.
   static Any<Device> device(const Options& values, const Shaft& shaft, std::span<std::byte> storage) {
     const Format f = declared.format(values);
     if (!is_usable(f)) return {};
@@ -316,7 +318,8 @@ struct Descriptor {
                        [&](const OptionValue& one) { return values.values[one.option] == one.value; });
   }
 
-  /// Returns whether decoding a vector gives the fields or the error that it states, or the vector is not complete.
+  /// Returns whether the options of a vector are valid and, unless the vector has open bytes, decoding it gives the
+  /// fields or the error that it states.
   static constexpr bool holds(const Vector& vector) {
     Options values;
     bool known = resolve(vector.options, {}, values);

@@ -59,7 +59,8 @@ struct RunResult : FieldSink {
   Time took{};
 };
 
-/// Returns the option values that a text such as "name=value name=value" sets.
+/// Returns the option values that resolve_options makes from a text such as "name=value name=value". Throws
+/// std::logic_error if it refuses the text.
 inline Options options_of(const Unit& unit, std::string_view text) {
   std::vector<OptionText> settings;
   for_each_value(text, [&settings](std::string_view name, std::string_view value) {

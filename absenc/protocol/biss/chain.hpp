@@ -33,7 +33,7 @@ struct ChainFormat {
 
   /// Returns the period of MA.
   [[nodiscard]] constexpr Time period() const { return Time((1'000'000 + ma_khz / 2) / ma_khz); }
-  /// Returns the index of the channel that carries the word of `slave`.
+  /// Returns the index of the channel that carries the word of `slave`; 0 if the chain has no such slave.
   [[nodiscard]] constexpr unsigned shown() const { return slave < count ? count - 1u - slave : 0u; }
 };
 
@@ -64,7 +64,7 @@ struct ChainReply {
   unsigned ack_bits = 1;  ///< Number of ACK bits: zeros between the idle samples and the start bit.
   std::array<ChannelData, ChainFormat::most> channels{};  ///< Word, life counter and CRC of each channel.
   unsigned delay_bits = 0;                                ///< Extra idle samples: the delay of the line in clocks.
-  bool cds = false;                                       ///< CDS: the encoder's bit of control communication.
+  bool cds = false;                                       ///< CDS: the encoders' bit of control communication.
 };
 
 /// Decodes a frame of a chain. Errors: those of `decode` for one word, line_stuck also for a word and CRC of zeros

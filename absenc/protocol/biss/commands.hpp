@@ -171,7 +171,7 @@ template <class F>
   }
 }
 
-/// Returns whether an error in sample `bit` counts as detected. At the last idle sample an error only makes the ACK
+/// Returns whether the checks must detect an error in sample `bit`. At the last idle sample an error only makes the ACK
 /// longer. Within the ACK and at the start bit it moves the frame, which a CRC of 6 bits misses once in 64 times.
 [[nodiscard]] inline bool is_behind_ack(Frame reply, std::size_t bit) {
   const BitView samples = author::to_bits(reply);

@@ -84,7 +84,7 @@ struct ControlFrame {
   ByteBuffer<control_most> data;  ///< Values of the registers that were read or written.
   /// For each byte of `data`, the number of frames by which the encoder delayed it.
   Buffer<std::uint16_t, control_most> start_delay;
-  /// Whether the register after the last one may be accessed too (P = 0).
+  /// Whether the encoder permits access to the register after the last one (P = 0).
   bool next_address_accepted = false;
   std::uint8_t acknowledged = 0;  ///< Slaves that acknowledged a command: bit n is slave n.
   bool executed = false;          ///< Whether the host let the slaves execute the command (bit EX).
@@ -173,12 +173,12 @@ struct ControlTarget {
   [[nodiscard]] virtual std::uint8_t read(unsigned slave, unsigned address) = 0;
   /// Writes `value` to the register of `slave` at `address`.
   virtual void write(unsigned slave, unsigned address, std::uint8_t value) = 0;
-  /// Returns the bit P that is sent after a register. `next_allowed`: whether the next register may be accessed too.
+  /// Returns the bit P that is sent after a register. `next_allowed`: whether the register after it may be accessed.
   [[nodiscard]] virtual bool stop_bit(bool next_allowed) const { return !next_allowed; }
   /// Returns whether the next data byte can begin now: its value is available, or the encoder can accept a new one.
   [[nodiscard]] virtual bool is_ready() const = 0;
   /// Returns whether `slave` takes part in register accesses and acknowledges commands. Command 1 switches this off for
-  /// the slaves that it addresses, and on again if it is sent to all slaves, which slaves that are off receive too.
+  /// the slaves that it addresses. Sent to all slaves, it switches this on again; slaves that are off execute it.
   [[nodiscard]] virtual bool listens(unsigned) const { return true; }
   /// Returns whether `slave` executes the command with number `command`.
   [[nodiscard]] virtual bool obeys(unsigned slave, unsigned command) const = 0;

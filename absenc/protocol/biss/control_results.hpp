@@ -74,7 +74,7 @@ struct ControlResults {
   bool has_data = false;                  ///< Whether `bytes` is reported.
   /// For each byte, the number of frames by which the encoder delayed it.
   NumberList start_delay;
-  std::optional<bool> next_address_accepted{};  ///< Whether the next register could be accessed too (P = 0).
+  std::optional<bool> next_address_accepted{};  ///< Whether the register after the last one may be accessed (P = 0).
   std::optional<std::uint8_t> command{};        ///< Number of the command, 0 to 3.
   std::optional<bool> broadcast{};              ///< Whether the command is for all slaves, without acknowledgement.
   NumberList slave_ids;                         ///< IDs of the slaves to which a command is addressed.

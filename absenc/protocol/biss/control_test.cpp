@@ -90,7 +90,7 @@ TEST(BissControl, DecodesWrittenDataFromCdmAlone) {
 }
 
 TEST(BissControl, DetectsEachFlippedBitOfAnAnswer) {
-  // The lock bits of other slaves and the bits after P do not affect decoding.
+  // Flips the bits of CDS from the answer to R to the CRC of the byte; P affects only `next_address_accepted`.
   for (std::size_t i = 14 + 17; i < 14 + 32; ++i) {
     std::string cds(read_44_answer);
     cds[i] = cds[i] == '1' ? '0' : '1';

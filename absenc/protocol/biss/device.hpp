@@ -35,8 +35,8 @@ class LineDelay {
   std::uint32_t noise_ = 1;
 };
 
-/// A virtual encoder apart from its port: makes the samples of SLO, with the delay of its line. Also used behind a
-/// virtual adapter.
+/// A virtual encoder apart from its port: makes the samples of SLO, with the delay of its line. VirtualEncoderOf and a
+/// virtual adapter (e201) use it.
 template <class F>
 class EncoderOf {
  public:
@@ -44,8 +44,8 @@ class EncoderOf {
   EncoderOf(const F& format, const Shaft& shaft, const Behaviour& behaviour)
       : format_(format), shaft_(&shaft), behaviour_(behaviour) {}
 
-  /// Fills `samples` with SLO for a frame whose first falling edge of MA is at `at`: the whole frame, then zeros up to
-  /// a full byte.
+  /// Fills `samples` with SLO, as the line delays it, for a frame whose first falling edge of MA is at `at`: the whole
+  /// frame, then zeros up to a full byte. SLO is idle if MA is too slow; a frame that is too long has no start bit.
   void sample(Time at, Time period, Samples& samples, bool cds = false) {
     samples.clear();
     // If half a period is as long as the timeout or longer, the frame ends at once and SLO is idle.

@@ -36,7 +36,7 @@ TEST(BissDevice, HoldsSloLowAfterCrc) {
   const std::string samples = bench.clock(200, 1ms, 1'000'000);
   EXPECT_EQ(samples.substr(0, 35), "11110010100001100101000111111110011");
   EXPECT_EQ(samples.find('1', 35), std::string::npos);
-  // During the BiSS timeout SLO stays low too.
+  // A frame that is clocked within the BiSS timeout is low from its first sample on.
   EXPECT_EQ(bench.clock(200, 10us, 1'000'000), std::string(200, '0'));
 }
 

@@ -293,7 +293,8 @@ constexpr void append_data(const Format& format, const Data& data, BitBuffer<Cap
   out.append(crc_as_sent(source, out.view(), first, out.size() - first), format.check.width);
 }
 
-// Appends idle bits, ACK, start bit and CDS to `out`. Returns false if `size` more bits do not fit.
+// Appends idle bits, ACK, start bit and CDS to `out`. Returns false, without a change, if these and `size` more bits do
+// not fit.
 template <class ReplyType, std::size_t Capacity>
 constexpr bool append_head(const ReplyType& head, std::size_t size, BitBuffer<Capacity>& out) {
   if (out.capacity() - out.size() < idle_bits + head.delay_bits + head.ack_bits + 2 + size) return false;
@@ -313,8 +314,8 @@ constexpr bool append_head(const ReplyType& head, std::size_t size, BitBuffer<Ca
 }
 
 /// Decodes a frame whose format is known at compile time, as fast as code written for this format by hand. The errors
-/// are those of `decode` with a format as an argument. The word in the result has the member `values` only if the
-/// format has further fields.
+/// are those of `decode` with a format as an argument. The array `values` of the word is empty if the format has no
+/// fields with Meaning::value.
 template <const Format& format>
 [[nodiscard]] constexpr Result<ReplyTo<format>> decode(const BitView& samples, Cds cds = Cds::zero) {
   // A small processor has no use for two ways: its numbers of 64 bits are no faster, and its memory is small.

@@ -112,7 +112,8 @@ template <class F, bool finds>
 class PositionReader : public author::ClockedHostOf<ProtocolOf<F>> {
   using Base = author::ClockedHostOf<ProtocolOf<F>>;
   using P = ProtocolOf<F>;
-  // greatest number of frames that are read after a first late one, until two in a row have the same delay
+  // greatest number of frames that are read after a first late one, until the delays of two in a row differ by at most
+  // one clock
   static constexpr unsigned most_late = 4;
 
  public:

@@ -247,7 +247,7 @@ TEST(BissHost, SendsStartSequenceWhenFirstFrameIsStuck) {
   clocks.clear();
   FindPosition<Format> nobody(format);
   EXPECT_EQ(bench.run(nobody).error(), Error::line_stuck);
-  // The host also clocks for the longest delay of the line, because the delay may be longer than expected.
+  // The last transfer has clocks for the longest delay of the line, because the delay may be longer than expected.
   const std::size_t longest = ProtocolOf<Format>::all_clocks(format);
   EXPECT_EQ(clocks, (std::vector<std::size_t>{frame, start_pulses, frame, longest}));
 }

@@ -72,8 +72,8 @@ Part<Error> run_control_frame(ControlDialog<F>& dialog, ControlMaster& master) {
 }
 
 /// Reads `count` registers, 64 at most, appends their values to `bytes` and returns the error. Late bytes are read
-/// until the same data is received twice. If P refuses the next register, a separate control frame reads it: some
-/// encoders send P = 1 after every register.
+/// again until two control frames in a row bring the same data, or `control_attempts` were made (cross_check_failed).
+/// If P refuses the next register, a separate control frame reads it: some encoders send P = 1 after every register.
 template <class F>
 Part<Error> read_registers(ControlDialog<F>& dialog, ControlMaster& master, ByteBuffer<control_most>& bytes,
                            unsigned first, std::size_t count) {
@@ -104,8 +104,8 @@ Part<Error> read_registers(ControlDialog<F>& dialog, ControlMaster& master, Byte
 }
 
 /// Writes a register and reads it back, even after an error other than a refusal: the value in the register decides,
-/// not the encoder's answer. If the value differs, returns the error of the write, or cross_check_failed if it had
-/// none.
+/// not the encoder's answer. If the value differs or cannot be read, returns the error of the write; if that had none,
+/// cross_check_failed or the error of reading.
 template <class F>
 Part<Error> write_register(ControlDialog<F>& dialog, ControlMaster& master, unsigned address, std::uint8_t value) {
   const std::array<std::uint8_t, 1> bytes{value};
@@ -168,7 +168,7 @@ Procedure read_memory(ControlDialog<F>& dialog, ControlResults& found, Arguments
 }
 
 /// Writes a register unless it has this value already: a register may wear out, and only its maker knows how fast.
-/// Arguments: address, value, bank, 1 to force the write.
+/// Arguments: address, value, bank, force (1: writes it in any case, even a register that its maker defines).
 template <class F>
 Procedure write_memory(ControlDialog<F>& dialog, ControlResults& found, Arguments arguments) {
   const auto address = static_cast<unsigned>(arguments[0]);
@@ -266,8 +266,9 @@ Procedure read_info(ControlDialog<F>& dialog, ControlResults& found) {
   co_return done;
 }
 
-/// Sends a command to the slaves of a mask; 0: to all, without acknowledgement. The last bit of the control frame is
-/// sent after one more position frame. Position frames may lack process data before or after the command.
+/// Sends a command to the slaves of a mask; 0: to all, without acknowledgement. At the end one more position frame is
+/// read, because the slaves take the last CDM bit when it begins. Position frames may lack process data before or after
+/// the command.
 template <class F>
 Procedure send_command(ControlDialog<F>& dialog, ControlResults& found, Arguments arguments) {
   ControlMaster master;

@@ -186,7 +186,7 @@ TEST(BissProcedures, RejectsLifeCounterThatDoesNotAdvanceByOne) {
   EXPECT_EQ(errors({41, 42, 42, 43, 45}), (Errors{none, none, check_life_counter, none, check_life_counter}));
 }
 
-// A lost start bit also makes a frame look late.
+// A frame may look late because its start bit was lost, so only a repeated delay is accepted.
 TEST(BissProcedures, AcceptsLateFrameWhenTheNextIsAsLate) {
   const auto errors = [](std::array<unsigned, 5> ack_bits) {
     std::array<Reply, 5> replies{};

@@ -176,8 +176,8 @@ TEST_P(EncolinkRegister, RestartsAccessAfterDamagedFrame) {
   for (const auto& [frames, error] : std::vector<std::pair<std::vector<unsigned>, Error>>{
            {{9, 60, 130}, Error::none},
            {{9, 10, 40, 70}, Error::none},
-           {{9, 10, 40, 70, 100}, Error::bad_checksum},  // the fifth attempt fails too
-           {{9, 10, 11}, Error::bad_checksum}}) {        // the third damaged frame in a row
+           {{9, 10, 40, 70, 100}, Error::bad_checksum},  // all five attempts fail
+           {{9, 10, 11}, Error::bad_checksum}}) {        // three damaged frames in a row
     Bench bench(testing::single, interface);
     bench.tampered.replies(damaging(frames));
     const RunResult read = bench.run("memory-read", {0x4C});
@@ -242,8 +242,8 @@ TEST_P(EncolinkRegister, RepeatsWriteThatWasNotExecuted) {
   }
 }
 
-// Frames 0 and 1 are for the identity, frame 2 resets the channels; cycles of 7 frames follow. The cycle during which
-// the access ends is idle too.
+// Frames 0 and 1 are for the identity, frame 2 resets the channels; cycles of 7 frames follow. The first idle cycle is
+// that during which the access ends.
 TEST_P(EncolinkRegister, AcceptsAnswerAfterEightIdleCycles) {
   for (const auto& [more, asked] : std::to_array<std::pair<unsigned, unsigned>>({{7, 1}, {8, 2}})) {
     Bench bench(testing::single, interface);

@@ -7,7 +7,7 @@
 namespace absenc::encolink {
 namespace {
 
-/// Requirements of the document that an encoder must fulfil.
+/// Requirements of the document that an encoder on a UART must fulfil.
 constexpr auto clauses = std::array{
     Clause{"answer", "UART, Communication parameters", "a request is answered", Demand::answered},
     Clause{.id = "stream",

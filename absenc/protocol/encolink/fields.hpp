@@ -91,7 +91,8 @@ struct Values {
   Maybe<std::uint32_t> address{};  ///< Address of the accessed register.
   Maybe<std::size_t> length{};     ///< Number of bytes of the accessed register.
   Maybe<Bytes> data{};             ///< Bytes of the accessed register, most significant first.
-  Maybe<std::int64_t> value{};  ///< Fewer than 8 bytes as a number; in an answer only if the table lacks the register.
+  /// Fewer than 8 bytes as a number; in an answer only if the table has no register with this address and length.
+  Maybe<std::int64_t> value{};
 };
 
 namespace detail {
@@ -271,7 +272,8 @@ constexpr BitRanges position_bits(const Format& format, const FieldInfo& field) 
 
 }  // namespace detail
 
-/// Returns the bits of a valid reply that hold `field`; empty if no bits do.
+/// Returns the bits of a valid reply that hold `field`, which `decode` must report for this reply; empty if the field
+/// has no bits of its own.
 [[nodiscard]] constexpr BitRanges bits_of(const Format& format, Bytes reply, const FieldInfo& field) {
   if (reply.size() == identity_bytes || reply.size() == padded_identity_bytes) return detail::identity_bits(field);
   const Format known = assumed(format, reply);

@@ -166,7 +166,7 @@ inline constexpr std::uint16_t signal_lost = 0x0020;          ///< The signal of
 inline constexpr std::uint16_t position_invalid = 0x0200;     ///< The position is invalid.
 inline constexpr std::uint16_t configuration_error = 0x0400;  ///< The stored configuration is damaged.
 inline constexpr std::uint16_t multiturn_mismatch = 0x8000;   ///< The turn counter contradicts the position.
-/// Mask of the bits that are warnings: amplitude high and low, near limits, temperature.
+/// Mask of the bits that are warnings: amplitude low, high and nearly too high, near limits, temperature.
 inline constexpr std::uint16_t warnings = 0x21D0;
 inline constexpr std::uint16_t errors = 0xDE2F;  ///< Mask of the bits that are errors: all bits but the warnings.
 static_assert((warnings ^ errors) == 0xFFFF);

@@ -8,7 +8,7 @@ namespace absenc::encolink {
 // ---- Frames
 
 std::array<std::uint8_t, request_bytes> Frames::encode(const Format&, const Request& request) {
-  Config config = Config::position;  // the request for the frame that carries the identity is a position request too
+  Config config = Config::position;  // Ask::identity has this config: the request before it asked for the identity
   if (request.ask == Ask::reset) config = Config::reset_channels;
   if (request.ask == Ask::identify) config = Config::identify;
   return {static_cast<std::uint8_t>(config), request.ra};

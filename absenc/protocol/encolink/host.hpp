@@ -14,8 +14,8 @@ namespace absenc::encolink {
 /// Purpose of a request. Every request asks for a position frame except `identity`.
 enum class Ask : std::uint8_t {
   position,
-  reset,     ///< Also restarts channels 2 and 3 in the next frame.
-  identify,  ///< Also requests that the next frame is the identity.
+  reset,     ///< Requests a position, and that channels 2 and 3 restart in the next frame.
+  identify,  ///< Requests a position, and that the next frame is the identity.
   identity,
 };
 
@@ -44,8 +44,8 @@ struct Frames {
   static std::array<std::uint8_t, request_bytes> encode(const Format&, const Request& request);
   /// Returns the length of the reply to `request` in bytes; 0 if only silence ends the reply.
   static std::size_t expected(const Format& format, const Request& request, Bytes);
-  /// Decodes a reply. Errors: line_stuck (SPI: all bytes are 00, or all are FF), and those of decode_position or of
-  /// decode_identity.
+  /// Decodes a reply, except that to `identify`, whose content is ignored. Errors: line_stuck (SPI: all bytes are 00,
+  /// or all are FF), and those of decode_position or of decode_identity.
   static Result<Position> decode(const Format& format, const Request& request, Bytes reply);
   /// Returns whether the host awaits no more bytes: on SPI, where a transfer has a fixed length; on a UART more may
   /// follow.
@@ -75,9 +75,10 @@ struct Channels {
   Position first_{};
 };
 
-/// Reads one frame. If the position is invalid, near a limit or all zero (as while the encoder starts), also reads a
-/// cycle of channel 2 and takes the alarms from it. If both channels are zero, the reading is not `ready`. If the cycle
-/// has another error, the alarms stay unknown. If `format` has unknown members, reads the identity first.
+/// Reads one frame. If the position is invalid, near a limit or all zero (as while the encoder starts), and `format`
+/// has channel 2, reads a cycle of channel 2 and takes the alarms from it. If both channels are zero, the reading is
+/// not `ready`. After any other error of the cycle the alarms stay unknown. Reads unknown members from the identity
+/// first.
 class ReadPosition : public author::HostOf<Frames> {
  public:
   /// Creates a conversation that reads an encoder of this format.

@@ -14,11 +14,11 @@ namespace absenc::encolink {
 
 /// Receives the frames of a streaming encoder and sends nothing. Finds frames by their checksums: frame alignment is
 /// accepted after two valid frames in a row. Emits each valid frame from the second of these two on, and each loss of
-/// alignment with its error. Ends when no valid frame arrives for `listen_limit`.
+/// alignment with its error. Ends when nothing was emitted for `listen_limit`.
 class Listen final : public Conversation<std::uint8_t> {
  public:
   /// Creates a conversation that receives an encoder of this format, which must be known, because it sends no
-  /// requests for the identity. Errors: invalid_argument (the format is not known), timeout (nothing is received),
+  /// requests for the identity. Errors: invalid_argument (the format is not known), timeout (nothing more is received),
   /// bad_framing (a damaged character), or wrong_length, bad_checksum or out_of_range (a damaged frame of the stream,
   /// or no two valid frames in a row).
   explicit Listen(const Format& format);

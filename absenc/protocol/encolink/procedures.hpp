@@ -95,31 +95,32 @@ author::Procedure read_info(Dialog& dialog, ProcedureState& found);
 /// unexpected_reply (an invalid byte of channel 3, or an identity that contradicts the options), unsupported (no
 /// channel 2, or the registers of an AksIM-4), or the error of a frame.
 author::Procedure read_register(Dialog& dialog, ProcedureState& found, std::size_t index);
-/// Reads a register. Arguments: address, length (0: from the table). Error also: invalid_argument (the length is
-/// unknown).
+/// Reads a register. Arguments: address, length (0: from the table). Error besides those of `read_register`:
+/// invalid_argument (the length is unknown).
 author::Procedure read_memory(Dialog& dialog, ProcedureState& found, Arguments arguments);
 
-/// Writes register `index` of the table. This procedure, `write_memory`, `zero` and `preset_multiturn` also have the
-/// error cross_check_failed (reading the register back gave another value).
+/// Writes register `index` of the table. Errors: those of `read_register`, and cross_check_failed (reading the register
+/// back gave another value).
 author::Procedure write_register(Dialog& dialog, ProcedureState& found, std::size_t index, Arguments arguments);
-/// Writes a register. Arguments: address, value, size (0: from the table). Error also: invalid_argument (the size is
-/// unknown or above 8, the value does not fit, or it is the command register, which only `send_command` writes).
+/// Writes a register. Arguments: address, value, size (0: from the table). Error besides those of `write_register`:
+/// invalid_argument (the size is unknown or above 8, the value does not fit, or the address is that of the command
+/// register).
 author::Procedure write_memory(Dialog& dialog, ProcedureState& found, Arguments arguments);
 /// Writes `command` to the command register. Only the status in the encoder's answer shows that the encoder executed
 /// the command, so the write is not repeated.
 author::Procedure send_command(Dialog& dialog, ProcedureState& found, std::uint8_t command);
 
 /// Makes the present position the zero of the turn, by the position offset. Argument: 1 to save the offset. Errors
-/// also: invalid_argument (the encoder is starting, or the position is invalid), not_still (the shaft turns),
-/// cross_check_failed (the position is not zero afterwards; the old offset is restored).
+/// besides those of `write_register`: invalid_argument (the encoder is starting, or the position is invalid), not_still
+/// (the shaft turns), cross_check_failed (the position is not zero afterwards; the old offset is restored).
 author::Procedure zero(Dialog& dialog, ProcedureState& found, Arguments arguments);
-/// Sets the turn counter. Arguments: turns, 1 to save them. Errors also: unsupported (the encoder has no turn
-/// counter), invalid_argument (the turn counter has too few bits), cross_check_failed (the turns are others
-/// afterwards).
+/// Sets the turn counter. Arguments: turns, 1 to save them. Errors besides those of `write_register`: unsupported (the
+/// encoder has no turn counter), invalid_argument (the turn counter has too few bits), cross_check_failed (the turns
+/// are not those of the argument afterwards).
 author::Procedure preset_multiturn(Dialog& dialog, ProcedureState& found, Arguments arguments);
 /// Starts the self-calibration and polls its status while the user turns the shaft; emits each status that is not the
-/// result. Errors also: cross_check_failed (the self-calibration failed; the detail states why), timeout (it does not
-/// end).
+/// result. Errors besides those of `read_register`: cross_check_failed (the self-calibration failed; the detail states
+/// why), timeout (the self-calibration does not end).
 author::Procedure self_calibrate(Dialog& dialog, ProcedureState& found);
 
 /// Returns the number of bytes of the register at `address`: `wanted`, or if that is 0 the size in the table; 0 if the

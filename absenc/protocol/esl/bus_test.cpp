@@ -72,7 +72,7 @@ TEST(EslBus, ScanFindsEncodersAndDamagedAnswers) {
         EXPECT_EQ(encoder->violation_count(), 0u);
       }
       EXPECT_EQ(encoder->answer_count(),
-                clashes.empty() || encoder == bus.encoders[0] ? 1u : 3u);  // a scan sends ID 5, never ID 8
+                clashes.empty() || encoder == bus.encoders[0] ? 1u : 3u);  // a damaged reply is requested three times
     }
   }
 }

@@ -226,7 +226,7 @@ TEST(EslDevice, ReadsRegistersAtOnceAndEepromInTwoSteps) {
   ASSERT_EQ(bench.violations(), 1u);
   EXPECT_EQ(bench.encoder.violations()[0].rule, "memory read again less than 200 us after the request before");
   bench.pass(eeprom_read_time);
-  // The reply is busy, because another byte was fetched before.
+  // The reply is busy, because the byte at address 7 was fetched before.
   EXPECT_EQ(bench.raw(memory_read(5)), memory_reply(memory_read(5), true, 0));
 }
 
@@ -359,7 +359,7 @@ TEST(EslDevice, ClearsMultiturnErrorOnlyAfterItsTurnReset) {
   EXPECT_EQ(bench.read().one.alarms, alarms::multiturn_error);
   reset(bench, DataId::reset_multiturn);
   bench.pass(10ms);
-  // Multiturn_error is raised already, so raising it again changes nothing.
+  // The alarm multiturn_error is raised already, so raising it again changes nothing.
   bench.encoder.raise_alarms(alarms::multiturn_error);
   reset(bench, DataId::clear_alarms);
   EXPECT_EQ(bench.read().one.alarms, 0);

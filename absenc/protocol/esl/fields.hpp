@@ -47,7 +47,7 @@ inline constexpr std::array<FlagInfo, 8> alarm_flags{{
      "check that no more than 5 V are at the connector; it clears with the voltage, or the encoder is damaged"},
 }};
 
-/// Values of the fields of a frame, or of a procedure's result. A member without a value is not in the frame.
+/// Values of the fields of a frame, or of a procedure's result. A member without a value is not reported.
 struct Shown {
   constexpr Shown() = default;
   /// Constructs the values of a request.
@@ -76,7 +76,7 @@ struct Shown {
   std::optional<std::uint8_t> control_field{};  ///< Control field (CF) of a request: encoder address, data ID, parity.
   std::optional<std::uint8_t> encoder_address{};  ///< Address of the encoder on the line (EAD).
   std::optional<Reply> reply{};                   ///< The reply; its data ID decides which values it has.
-  std::optional<bool> clash{};  ///< Whether every reply at the address of this record of a scan is damaged.
+  std::optional<bool> clash{};  ///< Whether, in a scan, the last of three replies of the address was damaged.
   std::optional<std::string_view> trouble{};       ///< Sentence about the error of a complete reply in a scan.
   std::optional<std::uint8_t> page{};              ///< Page of a memory access.
   std::optional<std::uint8_t> memory_address{};    ///< Address of a memory access (ADF).

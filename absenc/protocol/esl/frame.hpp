@@ -267,7 +267,7 @@ inline constexpr std::array<Layout, 16> layouts = [] {
 [[nodiscard]] constexpr bool is_safety_position(DataId id) {
   return id == DataId::position || id == DataId::singleturn;
 }
-/// Returns the data ID whose reply has everything that the encoder measures: position, and turns if it counts them.
+/// Returns the data ID whose reply has the position of both channels and, if the encoder counts turns, the turns.
 [[nodiscard]] constexpr DataId position_id(const Profile& profile) {
   return profile.turns ? DataId::position : DataId::singleturn;
 }

@@ -205,7 +205,7 @@ TEST(EslFrame, ValidityOfEachPart) {
   EXPECT_TRUE(to_reading(short_reply).multiturn_valid);
   short_reply.one.status = status::ready | status::non_safety_error;
   EXPECT_TRUE(to_reading(short_reply).singleturn_valid());
-  // The cause of a non-safety error may also be Lissajous or overspeed.
+  // SF does not show whether the turns, Lissajous signals or overspeed cause a non-safety error.
   EXPECT_EQ(to_reading(short_reply).multiturn_validity(), Validity::unknown);
   EXPECT_EQ(to_reading({.id = DataId::temperature}).singleturn_bits, 0u);
 }
@@ -228,7 +228,8 @@ TEST(EslFrame, RepliesReportTheFlagsThatTheyCarry) {
   }
 }
 
-// A Lissajous error is a non-safety error (Table 5): the position stays valid for every id.
+// With led_or_lissajous_error, a non-safety error in SF means the Lissajous signals (Table 5), and the position stays
+// valid; a safety error makes it invalid.
 TEST(EslFrame, LedAndLissajousErrorsCountForEveryId) {
   for (const auto& [error, validity] :
        {std::pair{status::safety_error, Validity::invalid}, std::pair{status::non_safety_error, Validity::valid}}) {

@@ -122,7 +122,7 @@ Procedure reset(Dialog& dialog, ProcedureResult& found, DataId id) {
                                       : author::objection_to_moving(to_reading(first), to_reading(before));
   if (why_not.error != Error::none) co_return why_not;
   co_await author::send_in_a_row(dialog, request_of(dialog, id), reset_row);
-  // ID B writes the zero to the EEPROM; ID D may do so, too.
+  // ID B writes the zero to the EEPROM, and ID D may write to it.
   const Time pause = id == DataId::clear_alarms ? reset_interval : eeprom_write_pause;
   const Reply now = co_await dialog.ask(look).repeated(attempts).after(pause).or_say(
       "all eight requests were sent, but whether the encoder obeyed could not be read");

@@ -35,9 +35,9 @@ struct SafePositionResult : ProcedureResult {
 author::Procedure read_safely(Dialog& dialog, SafePositionResult& found);
 
 /// Resets by the data ID B (single-turn zero here), C (alarms) or D (turns): makes sure that the shaft stands still,
-/// sends eight requests, and verifies the result. Errors: invalid_argument (the encoder is not ready, or its position
-/// is invalid), not_still (the shaft turns), cross_check_failed (the encoder did not execute it; the detail names what
-/// remains), or that of an exchange.
+/// sends eight requests, and verifies the result. Errors: invalid_argument (the encoder is not ready or, for B, its
+/// position is invalid), not_still (the shaft turns), cross_check_failed (the encoder did not execute it, which the
+/// detail describes, or D moved the zero), or that of an exchange.
 author::Procedure reset(Dialog& dialog, ProcedureResult& found, DataId id);
 
 // ---- Memory (Tables 9 to 11, Figures 14 and 15); only with one encoder on the line
@@ -68,7 +68,7 @@ inline constexpr unsigned most_encoders = 8;  ///< most encoders on a line, beca
 /// Result of `scan`: what was received at each address.
 struct Nodes {
   std::array<std::optional<Reply>, most_encoders> answers{};  ///< valid reply of each address; nothing: there was none
-  std::array<bool, most_encoders> disturbed{};                ///< Whether every reply of an address was damaged.
+  std::array<bool, most_encoders> disturbed{};  ///< Whether the last of three replies of an address was damaged.
   /// For each address, the check that a complete but invalid reply failed; `passed`: there was no such reply.
   std::array<Check, most_encoders> troubles{};
 };

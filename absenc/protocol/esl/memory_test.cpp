@@ -183,7 +183,8 @@ TEST(EslMemory, DistinguishesLedAndLissajous) {
   }
 }
 
-// SF shows the cause of led_or_lissajous_error if no other alarm sets the same bit.
+// SF shows the cause of led_or_lissajous_error if only one of its two error bits is set, or no other raised alarm sets
+// the bit.
 TEST(EslMemory, DistinguishesLedAndLissajousOnABusByStatus) {
   constexpr int open = -1;
   struct Row {

@@ -23,7 +23,8 @@ constexpr std::size_t combinations = [] {
   return product;
 }();
 
-// Returns profile number `number` of all combinations of open options; number 0 has all defaults.
+// Returns profile number `number` of all combinations of the open options except sequence_step, which has its value of
+// `base`; number 0 has the defaults of these options.
 Profile nth_profile(const Profile& base, std::size_t number) {
   Profile profile = base;
   for (std::size_t i = 0; i < open_options; ++i) {
@@ -200,7 +201,7 @@ bool parity_is_it(const Profile& profile, const Capture& capture) {
          request_in(with_other_parity(profile), capture).parity_wrong;
 }
 
-// All values of the options that change replies.
+// All values of the options that `find_change` tries alone and in pairs.
 constexpr auto changes = [] {
   Buffer<OptionValue, most_choices * open_options> all;
   for (std::size_t option = 0; option < open_options; ++option) {
@@ -229,7 +230,7 @@ Buffer<OptionValue, 2> find_change(const Profile& profile, Bytes reply) {
     found.push_back({option_parity_scope, profile.parity_scope == ParityScope::all ? 0 : 1});
     return found;
   }
-  if (explain(profile, capture) == Check::passed) return found;  // the reply is valid: no option explains the error
+  if (explain(profile, capture) == Check::passed) return found;  // the reply is valid, so no change is needed
   for (const OptionValue& one : changes.view()) {
     if (explain(changed(profile, one), capture) != Check::passed) continue;
     found.push_back(one);

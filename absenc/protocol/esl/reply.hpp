@@ -387,8 +387,9 @@ struct Protocol {
   static constexpr author::HostTimes host_times(const Profile&) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit, .pause = request_pause};
   }
-  /// Returns how a request is sent: the engine repeats none. After a page change without a valid reply, or while an
-  /// EEPROM byte is being fetched, the encoder is busy, and neither a repetition nor the next request may be sent.
+  /// Returns how a request is sent: once, unless the procedure demands repetitions. After a page change without a valid
+  /// reply, or while an EEPROM byte is being fetched, the encoder is busy, and no repetition or next request may be
+  /// sent.
   static constexpr author::Manner manner(const Profile&, const Request& request) {
     const Time busy = selects_page(request) ? page_time : is_memory_access(request.id) ? eeprom_read_pause : Time{};
     return {.pause = busy, .hold = busy};

@@ -133,7 +133,8 @@ TEST(EslReset, SendsNoZeroAtInvalidPosition) {
   EXPECT_EQ(bench.encoder.memory_version(), 0u);
 }
 
-// Replies 0 and 1 are positions, 2 to 9 answer the reset, 10 is the verification, and 11 and 12 are its repetitions.
+// If no position is repeated, replies 0 and 1 are positions, 2 to 9 answer the reset, 10 is the verification, and 11
+// and 12 are its repetitions.
 TEST(EslReset, LostReplyStopsAResetUnlessItIsTheLast) {
   struct Row {
     unsigned first;

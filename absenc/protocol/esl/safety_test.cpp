@@ -179,7 +179,7 @@ TEST(EslSafetyCampaign, StuckCountersAndPositionsOfOneChannel) {
     unsigned tried = 0;
     unsigned near = 0;
     off = 0;
-    // Each 9-bit position of channel 2 occurs twice.
+    // Each value of the top 9 bits occurs twice.
     for (std::uint32_t stuck = 0; stuck < 0x1000000; stuck += 0x4001, ++tried) {
       const bool is_near = std::abs(wrapped_difference(stuck >> 15, 0x123456 >> 15, 9)) <= 1;
       (is_near ? near : accepted) += accepted_with(of_it(condition::ch1_stuck), stuck, 4, off);

@@ -7,6 +7,6 @@
 namespace absenc::esl {
 
 extern constinit const Unit unit;   ///< Descriptor of ESL.
-extern const Clauses unit_clauses;  ///< The demands of its document.
+extern const Clauses unit_clauses;  ///< The demands of the protocol's document.
 
 }  // namespace absenc::esl

@@ -53,7 +53,7 @@ constexpr void append_crc(ByteBuffer<Capacity>& frame, CrcOrder order = CrcOrder
   frame.push_back(static_cast<std::uint8_t>(low_first ? crc >> 8 : crc));
 }
 
-/// Codes with which the virtual servers refuse a request (A 7).
+/// Codes with which the virtual servers refuse a request (A 7); `none`: the request is not refused.
 enum class Exception : std::uint8_t {
   none = 0,
   illegal_function = 1,

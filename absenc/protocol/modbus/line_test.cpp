@@ -102,7 +102,7 @@ struct Bench {
     sim::testing::RawHost raw_host(std::move(bytes), answer, gap, line.now() + pause);
     return run(raw_host).reply;
   }
-  /// Returns the rule that the client broke; empty unless it broke exactly one.
+  /// Returns the rule that the client broke; empty unless exactly one breach was counted.
   [[nodiscard]] std::string_view broken_rule() const {
     return server.violation_count() == 1 ? server.violations()[0].rule : std::string_view{};
   }
@@ -250,7 +250,7 @@ TEST(ModbusLine, ServerChangesRateAfterReply) {
   EXPECT_EQ(bench.server.violation_count(), 0u);
 }
 
-// The client stops when something sends without a pause, whatever the bytes are.
+// If bytes that are no reply arrive without a pause, the client stops.
 TEST(ModbusLine, ClientStopsOnEndlessNoise) {
   ToyClient client(request_body);
   Time now{};

@@ -45,15 +45,15 @@ struct Format {
   /// Highest speed of the shaft between two words that the host reads to confirm the position; 0: reads one word.
   std::uint32_t confirm_rpm = 0;
   // ---- Values that vary by product (RAA38S6 3.5, note)
-  /// Pause between two words; it must exceed the encoder's monoflop time Tm, or the old word continues.
+  /// Longest pause of the clock after which the old word may still continue (monoflop time Tm of the encoder). The host
+  /// pauses for this time and `pause_margin`.
   Time pause = 50us;
   std::uint32_t clock_khz = 200;  ///< Clock rate in kHz.
   /// Monoflop time Tm of the virtual encoder, at most `pause`; 0: equal to `pause`. Other encoders have 9 to 41 us.
   Time monoflop = 20us;
-  /// Slowest clock that the virtual encoder allows, in kHz. The document's Tcs, more than 4 us, is the period of the
-  /// fastest.
-  std::uint32_t slowest_khz = 100;
-  std::uint32_t fastest_khz = 250;  ///< Fastest clock that the virtual encoder allows, in kHz.
+  std::uint32_t slowest_khz = 100;  ///< Slowest clock that the virtual encoder allows, in kHz.
+  /// Fastest clock that the virtual encoder allows, in kHz. The document's Tcs, more than 4 us, is its period.
+  std::uint32_t fastest_khz = 250;
 };
 
 inline constexpr std::size_t frame_capacity = 2 * WordFormat::maximum_bits;  ///< Greatest number of bits of a frame.
@@ -151,8 +151,8 @@ template <const Format& format>
   return detail::decode_by(Known<format>{}, bits);
 }
 
-/// Appends the encoded `word` to `out`; with `error_parity`, an error inverts the parity bit. Returns false if `out` is
-/// too small.
+/// Appends the encoded `word` to `out`, which must be empty; with `error_parity`, an error inverts the parity bit.
+/// Returns false if the capacity of `out` is too small.
 template <std::size_t Capacity>
 constexpr bool encode_whole(const Format& format, const Word& word, BitBuffer<Capacity>& out) {
   BitBuffer<Capacity> right;

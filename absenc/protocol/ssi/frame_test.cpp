@@ -40,7 +40,7 @@ TEST(SsiFrame, RejectsTooManyClocks) {
 
 TEST(SsiFrame, ReadingTwiceDetectsAnyWrongBit) {
   const Format format{.extra_clocks = 12};
-  // Without extra clocks, the host also accepts the word read twice.
+  // Without extra clocks, `decode` accepts the word read once or twice.
   EXPECT_EQ(decode({}, "000111101111000111101111")->position, 495u);
   std::string text = "000111101111000111101111";
   for (char& c : text) {
@@ -51,7 +51,7 @@ TEST(SsiFrame, ReadingTwiceDetectsAnyWrongBit) {
   EXPECT_EQ(decode(format, text.substr(0, 12)).error(), Error::wrong_length);
 }
 
-// A host that assumes one bit too few or too many detects this by the bits after the word.
+// A host that assumes one bit too few or too many detects this by the bits after the word, unless all bits are alike.
 TEST(SsiFrame, ExtraClocksDetectWrongNumberOfBits) {
   unsigned missed = 0;
   for (std::uint64_t position = 0; position < 4096; ++position) {

@@ -38,8 +38,8 @@ struct Protocol {
   }
 };
 
-/// Returns whether a shaft with at most `confirm_rpm` can have moved from the word `before` to `after`, in either
-/// direction.
+/// Returns whether a shaft with at most `confirm_rpm` can have moved from the word `before` to the word `after` within
+/// the time `between`, in either direction.
 [[nodiscard]] constexpr bool can_follow(const Format& format, const Word& before, const Word& after, Time between) {
   const unsigned bits = format.word.bits_of(Meaning::position);
   const unsigned turns = format.word.bits_of(Meaning::multiturn);

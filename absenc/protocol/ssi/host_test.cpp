@@ -15,7 +15,7 @@
 namespace absenc::ssi {
 namespace {
 
-/// An encoder of 12 bits at position 495, which is the example of the manual.
+/// An encoder, by default of 12 bits, at 495/4096 of a turn, which is the example of the manual.
 struct Bench : biss::testing::ClockedBench<VirtualEncoder> {
   explicit Bench(const Format& format = {}) : ClockedBench(line_settings, format) {
     shaft.state.position = std::int64_t{495} << 20;
@@ -124,7 +124,7 @@ TEST(SsiHost, ExplainsErrors) {
   EXPECT_THAT(detail_of(Error::out_of_range, {{"tree_turns", "12"}, {"tree_steps", "13"}}),
               HasSubstr("fills the word up"));
   EXPECT_THAT(detail_of(Error::out_of_range, {}), HasSubstr("more clocks than the word has bits"));
-  // For errors that the unit does not explain, the host reports no detail.
+  // The unit does not explain these errors.
   for (const Error error : {Error::line_stuck, Error::wrong_length}) EXPECT_EQ(detail_of(error, {}), "");
 }
 

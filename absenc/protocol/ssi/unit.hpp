@@ -7,6 +7,6 @@
 namespace absenc::ssi {
 
 extern const Unit unit;             ///< The protocol as a unit, for the list of units.
-extern const Clauses unit_clauses;  ///< The demands of its document.
+extern const Clauses unit_clauses;  ///< The demands of the protocol's document.
 
 }  // namespace absenc::ssi
