@@ -20,6 +20,7 @@ SOURCE = Path(os.environ.get("ABSENC_SOURCE_DIR", Path(__file__).resolve().paren
 
 # Type names that several types share on purpose, each with the meaning common to all of these types.
 SHARED = {
+    "Bits": "the bits of a BiSS word with its check",
     "Candidate": "a guess that is to be tested further",
     "CheckedFrame": "a whole frame with its check; client's is installed, capture's is not",
     "Choices": "what the caller of the constructor chooses",

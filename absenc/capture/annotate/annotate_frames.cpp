@@ -80,7 +80,7 @@ void BurstAnnotator::finish() {
   sink_.put(annotation);
 }
 
-void ControlFrames::Bits::add(bool bit) {
+void ControlFrames::CollectedBits::add(bool bit) {
   if (size % 8 == 0) bytes.push_back(0);
   if (bit) bytes.back() = static_cast<std::uint8_t>(bytes.back() | 0x80u >> size % 8);
   ++size;

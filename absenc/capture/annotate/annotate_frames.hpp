@@ -37,7 +37,7 @@ class ControlFrames {
   [[nodiscard]] Annotation annotation(Judge& judge) const;
 
  private:
-  struct Bits {
+  struct CollectedBits {
     std::vector<std::uint8_t> bytes;
     std::size_t size = 0;
     void add(bool bit);
@@ -54,8 +54,8 @@ class ControlFrames {
   };
 
   std::optional<Pending> pending_;
-  Bits request_bits_;
-  Bits reply_bits_;
+  CollectedBits request_bits_;
+  CollectedBits reply_bits_;
   Tick begin_ = 0;
   Tick end_ = 0;
   Error error_ = Error::none;

@@ -39,27 +39,27 @@ class CompiledChannel {
   [[nodiscard]] constexpr bool has_crc() const { return width_ != 0; }
 
   /// The bits of a word with its check.
-  struct CheckedBits {
+  struct Bits {
     std::uint64_t covered = 0;  ///< Word and life counter.
     std::uint16_t crc = 0;      ///< CRC as the encoder sent it; 0: there is none.
   };
   /// Returns the bits of the word that begins at index `first` of `samples`, which have `bits()` bits from there on.
-  [[nodiscard, gnu::always_inline]] constexpr CheckedBits load(const BitView& samples, std::size_t first) const {
+  [[nodiscard, gnu::always_inline]] constexpr Bits load(const BitView& samples, std::size_t first) const {
     return {
         samples.load_quickly(first, covered_),
         width_ == 0 ? std::uint16_t{0} : static_cast<std::uint16_t>(samples.load_quickly(first + covered_, width_))};
   }
   /// Returns whether CRC and parity are right.
-  [[nodiscard, gnu::always_inline]] constexpr bool is_right(const CheckedBits& sent) const {
+  [[nodiscard, gnu::always_inline]] constexpr bool is_right(const Bits& sent) const {
     return sent.crc == crc_(sent.covered) && word_.is_parity_right(sent.covered);
   }
   /// Returns the values of the word. `Values`: WordWith.
   template <class Values>
-  [[nodiscard, gnu::always_inline]] constexpr Values values_of(const CheckedBits& sent) const {
+  [[nodiscard, gnu::always_inline]] constexpr Values values_of(const Bits& sent) const {
     return word_.values_of<Values>(sent.covered);
   }
   /// Returns the life counter; 0 if the check has none.
-  [[nodiscard]] constexpr std::uint8_t life_counter_of(const CheckedBits& sent) const {
+  [[nodiscard]] constexpr std::uint8_t life_counter_of(const Bits& sent) const {
     return life_counter_ ? static_cast<std::uint8_t>(sent.covered & low_mask(life_counter_bits)) : std::uint8_t{0};
   }
 

@@ -56,8 +56,8 @@ class CompiledSafetyFormat {
     if (!is_possible_ || !detail::find_data(samples, cpw_.bits() + spw_.bits(), cds, head)) {
       return decode_otherwise(samples, cds);
     }
-    const CheckedBits cpw = cpw_.load(samples, head.first());
-    const CheckedBits spw = spw_.load(samples, head.first() + cpw_.bits());
+    const Bits cpw = cpw_.load(samples, head.first());
+    const Bits spw = spw_.load(samples, head.first() + cpw_.bits());
     if (!is_good(cpw, spw)) return decode_otherwise(samples, cds);
     return Result<SafetyReply>([&] {
       return SafetyReply{.ack_bits = head.ack_bits,
@@ -69,16 +69,16 @@ class CompiledSafetyFormat {
   }
 
  private:
-  using CheckedBits = CompiledChannel<>::CheckedBits;
+  using Bits = CompiledChannel<>::Bits;
 
-  [[nodiscard]] static constexpr ChannelData data_of(const CompiledChannel<>& channel, const CheckedBits& sent) {
+  [[nodiscard]] static constexpr ChannelData data_of(const CompiledChannel<>& channel, const Bits& sent) {
     return {channel.values_of<Word>(sent), channel.life_counter_of(sent), sent.crc};
   }
   // Zeros alone are no word: see take_channel.
-  [[nodiscard]] static constexpr bool is_sent(const CompiledChannel<>& channel, const CheckedBits& bits) {
+  [[nodiscard]] static constexpr bool is_sent(const CompiledChannel<>& channel, const Bits& bits) {
     return !channel.has_crc() || (bits.covered | bits.crc) != 0;
   }
-  [[nodiscard]] constexpr bool is_good(const CheckedBits& cpw, const CheckedBits& spw) const {
+  [[nodiscard]] constexpr bool is_good(const Bits& cpw, const Bits& spw) const {
     return is_sent(cpw_, cpw) && is_sent(spw_, spw) && cpw_.is_right(cpw) && spw_.is_right(spw) &&
            life_counter_follows(format_, spw_.life_counter_of(spw)) &&
            positions_agree(format_, cpw_.values_of<WordWith<0>>(cpw), spw_.values_of<WordWith<0>>(spw));
