@@ -59,6 +59,29 @@ TEST_F(StreamPortTest, SendsNothingBeforeItsTime) {
   EXPECT_GE(port_.wait({}).at, at);
 }
 
+TEST_F(StreamPortTest, SendsFramesOfATransferWithTheirPauses) {
+  constexpr Time pause = 3ms;
+  const Data frames{1, 2, 3, 4, 5};
+  const Time before = now();
+  std::jthread sender(
+      [&] { port_.begin({.kind = ByteStep::Kind::transfer, .frame = 2, .out = frames, .width = pause}); });
+  Data received;
+  while (received.size() < frames.size()) {
+    const Data more = get(peer_.get());
+    ASSERT_FALSE(more.empty());
+    received.insert(received.end(), more.begin(), more.end());
+    if (received.size() > 2) {
+      EXPECT_GE(now(), before + pause);
+    }
+  }
+  EXPECT_GE(now(), before + 2 * pause);
+  EXPECT_EQ(received, frames);
+  sender.join();
+  const ByteEvent sent = port_.wait({.at = never});
+  EXPECT_EQ(sent.kind, Kind::sent);
+  EXPECT_GE(sent.at, before + 2 * pause);
+}
+
 TEST_F(StreamPortTest, SendsAtOnceWithinTheSlack) {
   port_.set_send_slack(1h);
   const Time at = now() + 30min;
