@@ -51,7 +51,8 @@ struct IdentifyChoices {
 [[nodiscard]] Identified identify(std::string_view place, const IdentifyChoices& choices = {});
 
 /// Returns the encoders that explain the frames of the capture in the file `path`. `choices` must contain neither a
-/// model nor options, because these are searched for. Throws UsageError, Failure, os::Interrupted.
+/// model nor options, because these are searched for. Throws UsageError if it does, and os::Interrupted; `notes` says
+/// if the file cannot be read.
 [[nodiscard]] Identified identify_capture(const std::string& path, const DecodeChoices& choices = {});
 
 }  // namespace absenc::client

@@ -192,8 +192,8 @@ bool CheckCode::is_check(std::size_t bit) const {
 
 // Draws errors of all bits but the check bits at random, then sets the check bits so that the checksum is right. The
 // weight of a drawn error is the probability of its errors of check bits. An error of fixed bits may shift the frame;
-// then the check bits are drawn at random too. A shifted frame passes the check in some replies only, so the difference
-// between replies is part of the deviation.
+// then the check bits are drawn at random too, and the weight is 1. A shifted frame passes the check in some replies
+// only, so the difference between replies is part of the deviation.
 Estimated CheckCode::taken(const Unit& unit, const Options& options, std::span<const GoodReply> replies,
                            double bit_errors, unsigned samples) const {
   sim::Random random(2);

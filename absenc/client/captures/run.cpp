@@ -32,8 +32,8 @@ using capture::Content;
 using capture::DecodedPart;
 using capture::Tick;
 
-// Stores an exception of the annotation sink until decoding has ended, because the exception must not pass through a
-// decoder that uses threads.
+// Stores an exception of the annotation sink or of `progress` until decoding has ended, because the exception must not
+// pass through a decoder that uses threads.
 class Guard {
  public:
   template <class Work>

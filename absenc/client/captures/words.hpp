@@ -44,7 +44,7 @@ class TickClock {
 [[nodiscard]] bool has_fields(const capture::Annotation& annotation);
 
 /// Returns the remark of an annotation in words, such as that the frame is cut off; without a remark, its error with
-/// advice; "" if it has neither.
+/// advice; for a good composed frame, that the last exchanges carried it; otherwise "".
 [[nodiscard]] std::string message_of(const Unit& unit, const Options& options, const capture::Annotation& annotation);
 
 }  // namespace absenc::client

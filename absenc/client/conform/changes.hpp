@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the clauses that change an encoder, and restores every changed value however the test ends.
+// Tests the clauses that change an encoder, and restores the changed values however the test ends, except values that
+// `resets` allows it to erase.
 #pragma once
 
 #include <algorithm>

@@ -162,7 +162,8 @@ class Host {
     return trial.judge();
   }
 
-  /// Returns the verdict on our own host with its defects. With `all`, the host finally runs every command once.
+  /// Returns the verdict on our own host with its defects. With `all`, the host finally runs once every command that
+  /// changes no option.
   Conformance judged(bool all = false) {
     constexpr unsigned most_rounds = 40;
     HostTrial trial(unit_, 20);

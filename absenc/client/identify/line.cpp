@@ -24,10 +24,10 @@ namespace {
 constexpr Time short_patience = 700ms;  // time without a reply after which a scan ends
 // time without a reply after which a scan ends, once an encoder has replied beyond doubt
 constexpr Time brief_patience = 150ms;
-constexpr Time long_patience = 5s;     // time without a reply for scans at the end, if nothing was found
+constexpr Time long_patience = 5s;     // time without a reply for scans at the end, unless a find is beyond doubt
 constexpr std::size_t busy_line = 32;  // number of bytes received while listening from which on no requests are sent
 constexpr std::size_t most_introduced = 4;  // number of candidates of one encoder that are asked for their identity
-constexpr double beyond_doubt = -3;         // log10 of a candidate's chance; below it no further rates are tried
+constexpr double beyond_doubt = -3;         // greatest log10 of a candidate's chance that is beyond doubt
 constexpr std::array<std::uint32_t, 10> common_rates{9600,    19'200,  38'400,    57'600,    115'200,
                                                      230'400, 460'800, 1'000'000, 2'500'000, 5'000'000};
 
@@ -136,7 +136,7 @@ class Search {
   }
 
   // Drops candidates whose options the reported identity contradicts, if it agrees with those of another candidate;
-  // otherwise adds a note about the contradiction.
+  // otherwise adds a note if the identity contradicts the likeliest candidate.
   void judge(const std::vector<std::size_t>& alike, const std::vector<Introduction>& said) {
     const bool known = std::any_of(said.begin(), said.end(), [](const Introduction& one) { return one.agrees; });
     for (std::size_t i = 0; i < alike.size(); ++i) {

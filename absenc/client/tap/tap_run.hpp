@@ -45,7 +45,7 @@ class TapRun {
   /// Returns false when receiving has ended. Throws os::Failure of the record file, and the exceptions of the sink and
   /// of Receiver::next.
   bool advance();
-  /// Returns what was received and why receiving ended; call it after `advance` returned false.
+  /// Returns what was received and why receiving ended; call it after `settle` or `advance` returned false.
   [[nodiscard]] TapOutcome outcome() const;
   /// Makes `advance` return false. May be called from any thread after `settle`.
   void cancel();
