@@ -125,8 +125,8 @@ std::unique_ptr<capture::Reader> open_capture(const CaptureChoices& choices) {
   try {
     if (choices.path != "-") return capture::open_capture(choices.path, how);
     auto source = std::make_unique<StdinSource>();
-    // Refuses binary data from standard input: some binary formats are read from the end of the file, which is not
-    // known there.
+    // Refuses raw samples from standard input, and data with a zero byte among the first 64 bytes, which is binary:
+    // some binary formats are read from the end of the file, which is not known there.
     std::array<std::uint8_t, 64> head{};
     const std::size_t size = source->read(0, head);
     if (how.channels != 0 || std::count(head.begin(), head.begin() + static_cast<std::ptrdiff_t>(size), 0) != 0) {

@@ -105,8 +105,9 @@ class Search {
     for (const Unit* unit : std::exchange(cut_, {})) attempt(*unit, search_.settings);
   }
 
-  // Reads the identity of each found encoder, with the options of its likeliest candidate and of equally likely ones,
-  // at most four in all, which the identity may distinguish.
+  // Reads the identity of each found encoder that replies to requests, with the options of its likeliest candidate and
+  // of equally likely ones, at most four in all, which the identity may distinguish. Skips an encoder with a single
+  // such candidate if the unit has no identity. Removes the candidates that `judge` drops.
   void ask_who_they_are() {
     std::vector<Candidate>& all = findings_.candidates;
     std::set<std::pair<const Unit*, std::string>> asked;

@@ -27,7 +27,7 @@ struct RecordHeader {
 };
 
 /// A file of a recording that is being written. Members that write, and `require_there`, throw os::Failure for errors
-/// of the disk, with kind `lost` if the file was removed or replaced.
+/// of the disk, with kind `lost` if the file was removed, moved, replaced or cut.
 class RecordFile {
  public:
   virtual ~RecordFile() = default;

@@ -37,7 +37,8 @@ class TapRun {
   ~TapRun();
 
   /// Waits for enough bytes to identify the protocol and its options. Returns false if no byte arrived or no protocol
-  /// explains the bytes. If the protocol was given, only determines missing options. Must be called before `begin`.
+  /// explains the bytes. If the protocol was given, only determines missing options and returns true. Must be called
+  /// before `begin`.
   bool settle(const std::function<void(const std::string&)>& progress);
   /// Starts decoding: exchanges are passed to `sink`, which must outlive the object. Called once.
   void begin(capture::AnnotationSink& sink);
