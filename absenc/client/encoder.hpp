@@ -193,7 +193,8 @@ class Encoder {
   /// Returns how often the continued position started again, after a jump of the position or after a pause too long to
   /// count the turns.
   [[nodiscard]] std::uint64_t restarts() const;
-  /// Returns the number of good readings per second.
+  /// Returns the number of good readings per second: a mean that forgets with a time constant of one second, 0 before
+  /// the second reading.
   [[nodiscard]] double rate() const;
   /// Returns a warning if the shaft can turn too fast for the intended rate to follow its turns; otherwise "".
   [[nodiscard]] std::string rate_note() const;

@@ -57,8 +57,9 @@ struct UnsolicitedFrames {
   }
 };
 
-/// Access to the line, independent of its link. All functions throw the exceptions of the port. After the caller asked
-/// the test to end they throw os::Interrupted, but only once, so that values can still be restored.
+/// Access to the line, independent of its link. Functions that send or wait throw the exceptions of the port. After the
+/// caller asked the test to end one of them throws os::Interrupted, but only once, so that values can still be
+/// restored.
 struct ChangesLine {
   std::function<CommandResult(const Command&, Arguments)> run;
   // sends a request, encoded by Unit::encode, and returns the exchange

@@ -156,8 +156,8 @@ class Search {
     if (candidate.unit->link == LinkKind::can) return introduce_on<CanFrame>(candidate);
     return introduce_on<std::uint8_t>(candidate);
   }
-  // Opens the port and reads the identity. If the port is lost meanwhile, adds a note; the candidates found so far
-  // remain.
+  // Opens the port and reads the identity. If the port cannot be opened or is lost, adds a note; the candidates found
+  // so far remain.
   template <class Item>
   Introduction introduce_on(const Candidate& candidate) {
     try {
