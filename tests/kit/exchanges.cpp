@@ -332,8 +332,8 @@ class Campaign {
 
   [[nodiscard]] std::vector<std::pair<OwnedFrame, OwnedFrame>> frames_of(const Query& query);
 
-  // Counts the rules that the host violated in a conversation. Before the first fault of the line, any violation is a
-  // finding.
+  // Counts the rules that the host violated in a conversation with the options of a model. Before the first fault of
+  // the line, any such violation is a finding.
   void judge_rules(const Query& query, bool had_faults, std::uint32_t before) {
     const std::uint32_t new_violations = world_.device().violation_count() - before;
     faultless_ = faultless_ && !had_faults;
