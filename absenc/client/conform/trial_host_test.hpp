@@ -45,7 +45,7 @@ struct Flaws {
 
 struct Stopped {};
 
-/// A port that skips the waits of its host, or stops the host after some requests.
+/// A port that skips the waits of its host up to `skipped_wait`, and stops the host after `requests_left` requests.
 template <class Item>
 class HastyPort final : public Port<Item> {
  public:
