@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks that every absenc command named in a text of the sources exists and is written in backquotes. This test covers
-texts of doctor, the page, help and notes; tests/kit/advice.cpp follows the advice for alarms and errors."""
+"""Checks that every command in backquotes in a string of the sources exists and names the tool, and that commands with
+sudo stand in backquotes. tests/kit/advice.cpp follows the advice for alarms and errors."""
 
 import os
 import re
@@ -62,7 +62,7 @@ class NamedCommands(unittest.TestCase):
                 self.assertNotIn(quoted.split(" ")[0], verbs)
 
     def test_shell_commands_stand_in_backquotes(self):
-        """Commands such as `sudo ...`, which users copy, must stand in backquotes too."""
+        """Commands with `sudo`, which users copy, must stand in backquotes, unless they are the whole text."""
         for source in sources():
             for text in literals(source):
                 rest = re.sub(r"`[^`]*(`|$)", "", text)

@@ -103,7 +103,7 @@ class Overriding(ConfigCase):
         self.config('[defaults]\nlatency = 5\nbaud = 9600\necho = "auto"\nmultiturn = 4\nstrict = false\n' + SIM)
         self.assertEqual(self.json("read", "elbow")["multiturn"], 4)
         self.assertEqual(self.json("info", "elbow")["options"]["strict"], False)
-        # A setting of a bus or of an encoder must suit its protocol. A setting in [defaults] need not.
+        # A setting of a bus or of an encoder must suit protocol and port. A setting in [defaults] need not.
         self.config(SIM + "latency = 5\n")
         self.assert_wrong_usage(self.absenc("read", "elbow"), "absenc.toml:4:1: latency cannot be set here", "tcp")
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc decode` with capture files of every format, all built from the same conversation."""
+"""Tests `absenc decode` with captures: texts and logs, waveforms, raw samples and sigrok sessions."""
 import csv
 import functools
 import io

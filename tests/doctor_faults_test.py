@@ -133,8 +133,8 @@ class DoctorFaults(Case):
             return f"{unit:14} {what:24} {first_of(found)} ({proxy.changed} changed)"
 
     def test_another_model(self):
-        """Reads an encoder with the wrong model selected, in both directions. The verdict must be wrong_settings with a
-        model that fits, or good if the replies of both models are equal."""
+        """Reads an encoder with the wrong model selected, in both directions. The verdict must be wrong_settings,
+        or good where the replies of both models are equal; the test accepts either."""
         cases = []
         for unit, about in character_units().items():
             models = [model["name"] for model in about["models"]]

@@ -101,7 +101,7 @@ class Interface(InterfaceCase):
             return self.run_json(path, "run", "decimal")["fields"]["counts"]
         with self.emulator("--singleturn", "1000") as emulator:
             self.assertEqual(counts(emulator.path), 1000)
-            # The zero that this command sets does not affect `read`, so the command is not named `zero`.
+            # The zero of `set-zero` does not affect `read`, so E201 has no command `zero`.
             self.assert_wrong_usage(absenc("zero", f"e201:{emulator.path}", "--yes"), "set-zero")
             self.assertEqual(counts(emulator.path), 1000)
             self.assert_good(absenc("run", f"e201:{emulator.path}", "set-zero", "--yes"))

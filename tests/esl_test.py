@@ -16,7 +16,8 @@ LENGTH = {POSITION: 18, QUICK: 6, TEMPERATURE: 4, READ: 4, WRITE: 4}
 READY, CHANNEL_2 = 0x40, 0x20
 REQUEST = "0875"  # request with ID 1 to address 0
 REPLY = "084000efcdab34125646b3086000abd6cd84"
-# REQUEST and REPLY with the CRC of another profile (crc_bit_order=msb), and REPLY with one wrong bit in channel 2.
+# Request and reply of another profile (crc_bit_order=msb), and a reply with one wrong bit in channel 2. Both replies
+# have another sequence counter than REPLY.
 MSB_REQUEST, MSB_REPLY = "0857", "084000efcdab341255277e086000abd57f67"
 WRONG_CHANNEL_2 = "084000efcdab3412553b5e086000afd5b069"
 
@@ -281,7 +282,7 @@ class Command(EslCase):
 
 
 class DecodeReasons(EslCase):
-    """`decode` must give the same reason for a bad reply as a host, for single frames and for captures."""
+    """`decode` must give the reason for a bad reply, for single frames and for captures."""
     ONE = bytes.fromhex("084000efcdab34125646b3")
     TWO = bytes.fromhex("086000abd6cd84")
 
@@ -607,8 +608,8 @@ class SharedLine(EslCase):
         self.assertEqual([live[name]["singleturn"] for name in ("shoulder", "elbow")], [0, 70000])
 
     def test_memory_is_refused_on_shared_line(self):
-        """An encoder that knows of others on its line refuses memory access. Otherwise the host refuses it, if the
-        configuration file names others."""
+        """An encoder that knows of others on its line does not answer memory requests. The host sends none if the
+        configuration file names several encoders on the line."""
         emulator = self.emulator("--also", "address=3")
         encoder = f"esl:{emulator.path}?latency=20"
         self.assert_failed(absenc("memory", "read", encoder, "0"), "timeout", "others share its line")

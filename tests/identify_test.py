@@ -135,7 +135,7 @@ class UnknownLine(Case):
         self.addCleanup(os.close, self.master)
 
     def serve(self, answer):
-        """A line whose far end answers every request with `answer` until the test ends."""
+        """Lets the line's far end answer every request with `answer(request)` until the test ends."""
         wake, waker = os.pipe()
 
         def run():

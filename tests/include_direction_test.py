@@ -40,8 +40,8 @@ OS_HEADER = re.compile(
     r"^(unistd|fcntl|termios|poll|pty|utmp|pwd|grp|netdb|dirent|gpiod|spawn|sched|pthread|signal)\.h(pp)?$"
 )
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
-# Matches a declaration or definition of a type at namespace scope, which clang-format puts at the beginning of a line.
-# A type inside a class is found as a part of that class, and a `friend` declaration may introduce a name too.
+# DECLARED and DEFINED match types at namespace scope, which clang-format puts at the beginning of a line. They do not
+# match indented types inside a class, except `friend` declarations, which may introduce a name.
 NAMESPACE = re.compile(r"^namespace ([\w:]+) \{", re.MULTILINE)
 DECLARED = re.compile(r"^(?: +friend )?(?:class|struct|union|enum class|enum) (\w+)(?: : [\w:]+)?;", re.MULTILINE)
 DEFINED = re.compile(r"^(?:class|struct|union|enum class|enum) (\w+)[^;{()]*\{", re.MULTILINE)
@@ -127,8 +127,7 @@ def client_circles(root):
 
 
 def names_with_namespace(pattern, text):
-    """Returns the qualified name, such as "absenc::client::Encoder", of each type that the pattern finds in the
-    text."""
+    """Yields the qualified name, such as "absenc::client::Encoder", of each type that the pattern finds in the text."""
     namespaces = [(match.start(), match[1]) for match in NAMESPACE.finditer(text)]
     for match in pattern.finditer(text):
         before = [name for start, name in namespaces if start < match.start()]

@@ -108,8 +108,8 @@ class Info(EncoderCase):
         self.assertEqual({answer["error"] for answer in answers.values()}, {"timeout"})
 
     def test_one_failure_does_not_stop_the_rest(self):
-        # The option encoder_id differs from the encoder's ID. Only replies to memory requests are accepted, because
-        # they have no encoder ID.
+        # The option encoder_id differs from the encoder's ID. Replies to memory requests are accepted nevertheless,
+        # because they have no encoder ID.
         result = absenc("info", self.encoder(more="&encoder_id=23"), "--all")
         self.assert_failed(result, "unexpected_reply", "set model=TS5700N8500")
         self.assertRegex(result.stdout, r"(?m)^encoder-id +FAILED +unexpected_reply: ")

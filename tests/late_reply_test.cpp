@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests that no host takes a late reply for the reply to a newer request. Replies are delayed by various times on every
-// unit whose replies can be late. The shaft turns steadily, so that a position shows the time at which it was sampled.
+// Tests that no host takes a late reply for the reply to a newer request. Replies are delayed by various times on the
+// units that `kinds` lists. The shaft turns steadily, so that a position shows the time at which it was sampled.
 #include <gtest/gtest.h>
 
 #include <algorithm>

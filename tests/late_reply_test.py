@@ -15,7 +15,7 @@ import unittest
 
 from command_support import Emulator, absenc, end
 
-ENCODERS = {  # each entry: address and options of a turning encoder, bytes in a position request and in its reply
+ENCODERS = {  # each entry: unit and options of a turning encoder, bytes in a position request and in its reply
     "tformat": ("tformat", "", 1, 11),
     "esl": ("esl", "", 2, 18),
     "e201": ("e201", "", 1, 17),

@@ -15,16 +15,16 @@ The fine rules:
   drop         leaves out one term of a condition; there is no rule that replaces `||` by `&&`, because any test that
                detects such a change detects this one
   edge         swaps `<` and `<=`, or `>` and `>=`, in a condition
-  true, false  fixes the result of a predicate with one comparison
+  true, false  fixes the result of a predicate that compares with `==` or `!=`
   number       adds one to a constant or to a length that a function returns; doubles it from 256 on; inverts the lowest
-               set bit of a hexadecimal constant
+               set bit of a hexadecimal or binary constant
   bit          clears the lowest set bit of a mask
   shift        shifts by one bit more
   sign         swaps + 1 and - 1
 
 A check is one of these: an `if` that refuses, with an error or with nothing (`return false`, `return std::nullopt`); the
-condition of `expect`; `good ? value : Error::x`; and an error that is returned after all cases. Drop and edge also apply
-to returned and assigned values.
+condition of `expect` or `note`; `good ? value : Error::x`; and an error that is returned after all cases. Drop and edge
+also apply to returned and assigned values.
 """
 
 import hashlib
@@ -93,8 +93,8 @@ def with_switches(text, numbered):
 
 
 def as_functions(text, names):
-    """Returns `text` with the constants `names` of type Time, and constants computed from them, as functions. Returns
-    None if one of the names also has another meaning in the text."""
+    """Returns `text` with the constants `names` of type Time as functions, which are called where the constants were.
+    Returns None if one of the names also has another meaning in the text."""
     source = Source(text)
     inserted = []
     for i, token in enumerate(source.tokens):
@@ -309,8 +309,8 @@ class Finder:
         return any(self.source.partner.get(i, 0) > index for i in range(outer, index) if self.source[i] in OPENING)
 
     def _rule(self, index):
-        """Adds mutants of the condition `kept` in a call `expect(kept, rule, at)`, but not in the declaration of
-        `expect`."""
+        """Adds mutants of the condition `kept` in a call `expect(kept, rule, at)` or `note(kept, ...)`, but not in the
+        declaration of these functions."""
         source = self.source
         first = index + 2
         last = source.right(first, {","})

@@ -218,7 +218,7 @@ class CanBus(Case):
         self.assertRegex(self.node.end()[2], r"faults injected: .*drop.*silence.*repeat")
 
     def test_survives_interrupted_adapter(self):
-        """Garbage, and commands of another program, arrive at the adapter while absenc uses it."""
+        """Garbage and an incomplete command of another program arrive at the adapter before absenc uses it."""
         address = self.bus("--singleturn", "9799")
         with open(self.node.path, "wb", buffering=0) as other:
             other.write(b"garbage\rt22")  # another program sends garbage and an incomplete adapter command

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc read`, `run` and `bench` over a pseudo-terminal, and their error messages."""
+"""Tests `absenc read`, `run` and `bench`, mostly over a pseudo-terminal, and their error messages."""
 import json
 import os
 import pty
@@ -164,7 +164,7 @@ class Simulator(EncoderCase):
             self.assertFalse(one["singleturn_valid"])
 
     def test_speed_limit_confirms_words(self):
-        """Three of ten words are damaged. Of the confirmed words, up to a tenth may be wrong, because damaged words may
+        """Three of ten words are damaged. Of the confirmed words, fewer than 40 may be wrong, because damaged words may
         match by chance."""
         for encoder in ("sim:ssi?fault=corrupt=0.3&max_rpm=1", "sim:amt21?fault=corrupt=0.3&max_rpm=1"):
             result = absenc("read", encoder, "--json", "--count", "400", "--rate", "0")
@@ -392,7 +392,7 @@ class Termination(EncoderCase):
         wait_for_handler(process)
         status, _, err = end(process, signal.SIGINT)
         self.assertEqual(status, 1)
-        # The refused command had only sent read requests.
+        # The interrupted command had only sent read requests.
         self.assert_sentence(err, "interrupted in the middle of zero", "Change: not sent")
 
     def test_interrupted_wait_for_reply(self):

@@ -18,8 +18,8 @@ SOURCE = Path(os.environ["ABSENC_SOURCE_DIR"])
 PAGES = ["README.md", *(f"docs/{name}.md" for name in ("read", "set-up", "record", "serve", "decode", "test-a-drive", "doctor", "cpp",
                                                         "python", "add-an-encoder"))]
 PORT = "/dev/ttyUSB0"
-# Languages of code blocks that this test does not run: commands that change the computer, texts, and programs that
-# other tests run.
+# Languages of code blocks that this test does not run: commands that change the computer, texts, settings of other
+# programs, and programs that other tests run.
 OTHERS = {"sh", "text", "cmake", "cpp", "yaml", "nginx", "caddy"}
 
 

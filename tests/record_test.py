@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests the files that `absenc record` writes when the encoder, the disk or the command fails."""
+"""Tests the files that `absenc record` writes, also when the encoder, the disk or the command fails."""
 import csv
 import datetime
 import glob
@@ -175,7 +175,8 @@ class Files(RecordCase):
 
 
 class Gaps(RecordCase):
-    """Tests of gaps: readings that were due but not taken, because the process was stopped."""
+    """Tests of gaps: readings that were due but not taken, because the process was stopped or the
+    line is too slow."""
 
     def record_and_stop(self, name, stopped, *arguments):
         """Records for 3 s, stops the process for `stopped` seconds during that time, and returns the final message of
@@ -345,7 +346,7 @@ class Failures(RecordCase):
                 self.assertEqual(row["alarms"], "none" if number < lost else "battery_alarm")
 
     def test_full_disk(self):
-        """Uses a file system of 1 MB, mounted as root or in a namespace of its own, as a disk that becomes full."""
+        """Uses a file system of 1 MB, mounted in a namespace of its own, as a disk that becomes full."""
         script = ('mount -t tmpfs -o size=1m absenc-test "$1" && "$0" record sim:tformat --rate 0 --output "$1/log.csv" 2>"$2"; '
                   'echo $? >"$3"; cp "$1/log.csv" "$4"; df --output=avail "$1"; umount "$1"')
         folder, messages, status, copy = (self.output(name) for name in ("disk", "messages", "status", "copy.csv"))

@@ -108,7 +108,7 @@ class BadPackets(BrokerCase):
 
 
 class RefusedMessages(BrokerCase):
-    """Tests of a broker that refuses the readings of one of two encoders, and accepts them later."""
+    """Tests of a broker that refuses the readings or the states of one of two encoders. Readings it accepts later."""
     BAD, GOOD = "/bad/readings", "/good/readings"
 
     def serve(self, answer):

@@ -28,8 +28,8 @@ def seconds_in(path):
 
 
 class DisturbedFile(ServeCase):
-    """Tests of damage to the history file. The server must report it and record again within 5 s. Rows that existed
-    before must not be lost."""
+    """Tests of damage to the history file. The server must report it within 5 s and record again. Rows that are
+    still in the file must not be lost."""
 
     def setUp(self):
         super().setUp()

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks the page of `absenc serve` as Chromium renders it: no text may be broken, cut off or covered, at six widths in
-both themes, and axe-core must find no fault. ABSENC_SCREENSHOTS=FOLDER writes a contact sheet of each scene."""
+"""Checks the page of `absenc serve` as Chromium renders it: no text may be broken, cut off or covered, at up to six
+widths in both themes, and axe-core must find no fault. ABSENC_SCREENSHOTS=FOLDER writes the pictures and contact
+sheets of each scene."""
 import os
 import unittest
 

@@ -175,7 +175,7 @@ class Spool(MqttCase):
         self.assertEqual(self.mqtt(server)["dropped"], 0)
 
     def test_survives_kill(self):
-        port = free_port()  # port of a broker that is not running yet
+        port = free_port()  # a port on which no broker runs
         server = self.sender(f"mqtt://127.0.0.1:{port}", ONE, "--rate", "100")
         wait_until(lambda: self.taken(server) > 150, "they are spooled")
         shown = self.taken(server)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc serve` with other programs: Home Assistant, PlotJuggler, Prometheus, and a dashboard for Grafana."""
+"""Tests what `absenc serve` sends to other programs: Home Assistant, PlotJuggler, Prometheus, and a dashboard for
+Grafana. Of these only Prometheus runs."""
 import json
 import os
 import pathlib

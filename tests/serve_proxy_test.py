@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc serve` behind nginx and Caddy, configured as in docs/serve.md: the page, commands, and access rights
-must work as without a proxy."""
+"""Tests `absenc serve` behind nginx and Caddy, configured as in docs/serve.md: the page and commands must
+work, and access without a token must be refused."""
 import contextlib
 import http.client
 import json

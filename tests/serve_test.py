@@ -561,8 +561,8 @@ class AccessRights(ServeCase):
         self.assertEqual([self.command(server, wrong)[0] for _ in range(13)], [401] * 10 + [429] * 3)
         self.assertEqual(self.command(server, {"Authorization": f"Bearer {TOKEN}"})[0], 200)
         self.assertIn("absenc_wrong_tokens_total{} 13\n", server.ask("/metrics")[1])
-        # A client that sent too many wrong tokens must not learn whether a token is right, so it is refused with a
-        # right one too.
+        # The limit counts the wrong tokens of an address at all paths together, so /api/token refuses this one with
+        # 429.
         self.assertEqual(server.ask("/api/token", headers=wrong)[0], 429)
         self.assertIn("absenc_wrong_tokens_total{} 14\n", server.ask("/metrics")[1])
 
@@ -912,7 +912,7 @@ class History(ServeCase):
         wait_until(lambda: self.rows(server), "it has a second")
         end(server.process)
         with contextlib.closing(sqlite3.connect(path)) as database:
-            # Old rows are deleted only if more than a day was recorded, so 24 hours are added.
+            # Old rows are deleted only if newer rows are in 24 different hours, so a row in each of 24 hours is added.
             hours = [(int(time.time()) - 3600 * i,) for i in range(1, 25)]
             database.executemany("INSERT INTO second SELECT id, ?, 50, 0, 1, 2, 3, NULL, NULL, NULL FROM encoder",
                                  [(1,), *hours])

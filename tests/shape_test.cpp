@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests that the types `Step`, `Event` and `Machine` of link/step.hpp suit every kind of link. Toy machines, one as
-// host and one as device, hold conversations in virtual time with exact times.
+// Tests that the types `Step`, `Event` and `Machine` of link/step.hpp suit every kind of link. Toy machines, as hosts
+// and as devices, hold conversations in virtual time with exact times.
 #include <gtest/gtest.h>
 
 #include <string>

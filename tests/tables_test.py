@@ -45,8 +45,8 @@ def families():
 
 
 def clauses():
-    """Returns the rows of the table of clauses: those that `conform` tests, those of them that only --changes allows,
-    and those for hosts."""
+    """Returns the rows of the table of clauses: the numbers of those that `conform` tests, of those of them that
+    only --changes allows, and of those for hosts."""
     rows = []
     for unit in units():
         reading, both = (
@@ -66,7 +66,8 @@ class Tables(unittest.TestCase):
     maxDiff = None
 
     def check(self, page, name, rows):
-        """Compares the rows between the marks `<!-- name -->` and `<!-- end -->` of a page with what they should be."""
+        """Compares the rows between the marks `<!-- name -->` and `<!-- end -->` of a page with what they should be, or
+        writes them if UPDATE is set."""
         path = SOURCE / page
         text = path.read_text(encoding="utf-8")
         table = re.compile(rf"(<!-- {name} -->\n(?:```\n|\|.*\n\|[-|]+\n))(.*?)((?:```\n)?<!-- end -->)", re.DOTALL)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests that a misspelt member in a unit's declaration does not compile, and that every optional member is tested. Uses
+"""Tests that a misspelt member in a unit's declaration does not compile, and that every member is tested. Uses
 the unit in docs/protocol-template."""
 
 import os

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Fuzz target that feeds arbitrary bytes to every unit: as request and reply to its decoder, as captures to its probe,
-// as received bytes to its conversations, and as requests to its virtual encoder. The first three bytes of an input
-// select the unit, its options and the command.
+// as a frame whose end is sought, as received bytes to its conversations, and as requests to its virtual encoder. The
+// first three bytes of an input select the unit, its options and the command.
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -52,7 +52,7 @@ OwnedFrame as_frame(const Unit& unit, Bytes bytes) {
   return frame;
 }
 
-// Decodes the input, split into request and reply at each of 17 places. With an error no field may be reported; a good
+// Decodes the input, split into request and reply at up to 17 places. With an error no field may be reported; a good
 // frame must report at least one field.
 void decode(const Unit& unit, const Options& options, Bytes input) {
   for (std::size_t split = 0; split <= input.size() && split <= 16; ++split) {

@@ -47,7 +47,7 @@ struct CheckWorth {
   std::size_t frame_bits = 0;  ///< Length of a reply, in bits.
   unsigned distance = 0;  ///< Hamming distance of the code: errors of fewer bits are all detected; 0: more than 8 bits.
   double words = 0;       ///< Number of undetected error patterns of `distance` bits.
-  double unseen = 0;      ///< Rate of replies that are damaged although their checksum is correct.
+  double unseen = 0;      ///< Rate of replies with damage only in covered bits and yet a correct checksum.
   double taken = 0;       ///< Rate of damaged replies that the decoder accepts with a wrong position.
   double taken_deviation = 0;  ///< Standard deviation of `taken`, which is estimated from random samples.
 };
@@ -55,7 +55,8 @@ struct CheckWorth {
 /// Shares of confirmed and of wrong positions, in a campaign with a turning shaft.
 struct Guarded {
   Share confirmed{};  ///< Share of readings whose position a second reading confirmed.
-  /// Share of confirmed readings whose position the shaft did not have when the encoder measured it.
+  /// Share of confirmed readings whose position the shaft did not have when the encoder measured it; excludes readings
+  /// after which the encoder proves to be changed.
   Share wrong{};
   Share alone{};  ///< Share of wrong positions, confirmed or not, among the readings that passed every frame check.
   double let_through = 0;  ///< Computed number of wrong positions that pass both frame checks and confirmation.
@@ -72,7 +73,7 @@ struct CampaignResult {
   Share failed{};               ///< Share of exchanges that ended with an error.
   Share given_up{};             ///< Share of readings that ended with an error after all attempts.
   Share recovered{};            ///< Share of readings that succeeded after a failed attempt.
-  Share wrong{};                ///< Share of exchanges that returned a wrong position; includes `older`.
+  Share wrong{};                ///< Share of exchanges with a wrong position; includes `older`, excludes `changed`.
   /// Share of exchanges (with `rpm`: of readings) after which a damaged request had changed the encoder for good; the
   /// campaign then continues with a fresh encoder.
   Share changed{};

@@ -42,12 +42,12 @@ struct Conformance {
   /// Returns `broken` if any clause is broken or the encoder is left changed; otherwise `kept` if any clause is kept;
   /// otherwise `untested`.
   [[nodiscard]] Verdict verdict() const;
-  /// Returns the results in the Test Anything Protocol, version 13, with "Bail out!" if no clause could be judged.
+  /// Returns the results in the Test Anything Protocol, version 13, with "Bail out!" if the verdict is `untested`.
   [[nodiscard]] std::string tap() const;
-  /// Returns the results as JUnit XML, with an error if no clause could be judged.
+  /// Returns the results as JUnit XML, with an error if the verdict is `untested`.
   [[nodiscard]] std::string junit() const;
   /// Returns the results as text for people: three lines for each clause, the commands that restore an encoder that is
-  /// left changed, and the numbers of verdicts.
+  /// left changed, the numbers of verdicts and, if the verdict is `untested`, a line that says so.
   [[nodiscard]] std::string report() const;
 };
 
@@ -56,7 +56,8 @@ struct ConformChoices {
   std::size_t readings = 100;  ///< Number of readings, at least 1.
   /// Whether clauses that change the encoder are tested too; the test restores the encoder afterwards.
   bool changes = false;
-  /// With `changes`, whether clauses that erase zero, turns or alarms are tested too. Nothing can restore these values.
+  /// With `changes`, whether the test may erase a zero, turns or alarms, which nothing can restore. If not, it tests
+  /// such clauses only on an encoder that has none of them to lose.
   bool resets = false;
   /// Polled during the test; once it returns true, the test ends with Cancelled. Empty: never.
   std::function<bool()> over{};
@@ -67,7 +68,7 @@ struct ConformChoices {
 
 /// Tests the encoder of an address and returns the results. Changes the encoder only with `changes`. `text` and
 /// `settings` are those of `open`. Restores changed values before it throws UsageError, Cancelled or an exception of
-/// the port. If it cannot restore them, it throws a Failure whose text contains the commands that do.
+/// the port. If it cannot restore them, it throws a Failure instead, whose text contains the commands that do.
 [[nodiscard]] Conformance conform(std::string_view text, std::span<const std::string> settings = {},
                                   const ConformChoices& choices = {});
 

@@ -30,17 +30,19 @@ struct RuleCount {
   std::uint64_t broken = 0;  ///< Number of times that the host broke the rule.
 };
 
-/// Counts of requests that the virtual encoder received. CAN frames for other devices are not counted.
+/// Counts of requests, and of what is no request, that the virtual encoder received. CAN frames for other devices are
+/// not counted.
 struct RequestCounts {
   /// Number of requests that comply with the document, including those for other encoders on the line.
   std::uint64_t good = 0;
-  /// Number of byte runs that are no request, and of damaged characters, received after the first good request; while
-  /// there is no good request, of all that were received.
+  /// Number of byte runs or CAN frames that are no request, of requests that do not wait for the reply before, and of
+  /// damaged characters, received after the first good request; while there is no good request, of all that were
+  /// received.
   std::uint64_t bad = 0;
-  /// Number of byte runs that are no request, and of damaged characters, received before the first good request; 0
-  /// until there is one.
+  /// Number of byte runs or CAN frames that are no request, and of damaged characters, received before the first good
+  /// request; 0 until there is one.
   std::uint64_t before = 0;
-  std::string first_bad = {};  ///< First byte run that was counted in `bad`, as text.
+  std::string first_bad = {};  ///< Text of the first item counted in `bad`; "" for a damaged character.
 };
 
 /// A running virtual encoder, served by its own thread until this object is destroyed. Any thread may call the

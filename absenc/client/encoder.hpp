@@ -55,7 +55,8 @@ struct Sample {
   /// Whether a second reading confirmed the position, because the shaft can have moved from one to the other in the
   /// time between them.
   bool confirmed = false;
-  /// Whether the position was valid but no second reading confirmed it. `reading` then marks the position as unknown.
+  /// Whether the encoder was ready and the position valid, but no second reading confirmed it. `reading` then marks the
+  /// position as unknown.
   bool doubtful = false;
   bool position_valid = false;  ///< Whether `position` is valid.
   /// Position in counts, continued past the end of the encoder's counter; see `position_valid`.
@@ -124,8 +125,8 @@ class Encoder {
   /// os::Failure, os::Interrupted, Cancelled. Throws DeadlinePassed if there is no reading at `deadline` (a time of
   /// os::now), up to 20 ms and the duration of one exchange later.
   [[nodiscard]] Reading read(Time deadline = never);
-  /// Returns a reading with the alarms: by the command that reads each alarm by name if the unit has one, otherwise by
-  /// `read`.
+  /// Returns a reading with the alarms: by the command that reads each alarm by name if the unit has one that its
+  /// options allow, otherwise from a reading of the position, confirmed or not.
   [[nodiscard]] Reading read_alarms();
   /// Returns samples for a loop, which continues after a lost port is back. The loop ends after `count` samples, at the
   /// deadline, or with `cancel`.
@@ -192,7 +193,8 @@ class Encoder {
   /// Returns how often the continued position started again, after a jump of the position or after a pause too long to
   /// count the turns.
   [[nodiscard]] std::uint64_t restarts() const;
-  /// Returns the number of good readings per second.
+  /// Returns the number of good readings per second: a mean that forgets with a time constant of one second, 0 before
+  /// the second reading.
   [[nodiscard]] double rate() const;
   /// Returns a warning if the shaft can turn too fast for the intended rate to follow its turns; otherwise "".
   [[nodiscard]] std::string rate_note() const;

@@ -46,8 +46,8 @@ struct CheckFindings {
   std::size_t longest = 0;           ///< Length of the longest frame, in positions.
   /// Whether the frames contain too little information to list all checks that explain them.
   bool is_open = false;
-  /// Number, from 1, of a frame without which a check explains all others; 0: there is none, or a check explains every
-  /// frame, or there are fewer than 5 frames.
+  /// Number, from 1, of a frame without which a check explains all others beyond doubt; 0: there is none, or a check
+  /// explains every frame, or `is_open`, or there are fewer than 5 frames.
   std::size_t odd = 0;
   /// A sentence about open questions, or about the reason why no check was found; "": there is nothing to say.
   std::string advice{};

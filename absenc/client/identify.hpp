@@ -34,7 +34,7 @@ struct FoundEncoder {
 /// Result of `identify`: the encoders that explain what the port or the capture contains.
 struct Identified {
   std::vector<FoundEncoder> found{};  ///< Encoders, the most probable first.
-  std::vector<std::string> notes{};   ///< Sentences about attempts that were impossible and about damaged data.
+  std::vector<std::string> notes{};   ///< Sentences about impossible attempts, damaged data and contradictions.
   bool is_complete = true;            ///< False if the time limit ended the search early.
 };
 
@@ -45,13 +45,14 @@ struct IdentifyChoices {
   std::function<void(const std::string& what)> progress{};
 };
 
-/// Polls the line with every protocol that fits, at its rates and addresses, by reads that change nothing, and returns
-/// the encoders that reply or send unsolicited frames. `place` is a port with its settings: "/dev/ttyUSB0",
+/// Polls the line with every protocol that fits, at its rates and addresses, by requests that change nothing, and
+/// returns the encoders that reply or send unsolicited frames. `place` is a port with its settings: "/dev/ttyUSB0",
 /// "tcp:HOST:PORT?latency=50", "spi:/dev/spidev0.0", "can0". Throws os::Failure, UsageError, os::Interrupted.
 [[nodiscard]] Identified identify(std::string_view place, const IdentifyChoices& choices = {});
 
 /// Returns the encoders that explain the frames of the capture in the file `path`. `choices` must contain neither a
-/// model nor options, because these are searched for. Throws UsageError, Failure, os::Interrupted.
+/// model nor options, because these are searched for. Throws UsageError if it does, and os::Interrupted; `notes` says
+/// if the file cannot be read.
 [[nodiscard]] Identified identify_capture(const std::string& path, const DecodeChoices& choices = {});
 
 }  // namespace absenc::client

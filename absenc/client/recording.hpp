@@ -22,8 +22,8 @@ struct RecordingSettings {
   std::string path;
   std::string encoder;   ///< Name of the encoder, as the header of the file shows it.
   double rate_hz = 100;  ///< Intended number of readings per second; 0: as many as possible.
-  /// Writes only every Nth reading, and also each reading whose alarms differ from those of the reading before. 1:
-  /// writes all.
+  /// Writes only every Nth reading, and also each reading whose alarms, or which of them are reported, differ from
+  /// those of the reading before. 1: writes all.
   std::uint64_t every = 1;
   std::uint64_t count = 0;         ///< Number of written readings after which the recording ends; 0: no limit.
   std::optional<Time> duration{};  ///< Time after which the recording ends; without a value: no limit.
@@ -45,7 +45,7 @@ class Recording {
   /// the disk. Calls `on_written` with each sample: after its row was written, or at once if it gets no row. If the
   /// port is lost, waits until it is open again. Also writes rows for loss and return of the port and for readings that
   /// were due but not taken. Returns whether the last sample was a reading. Throws UsageError, Failure, and os::Failure
-  /// from the disk, with kind `lost` if the file was removed or replaced.
+  /// from the disk, with kind `lost` if the file was removed, moved, replaced or cut.
   bool run(const std::function<void(const Sample&)>& on_written = {});
 
   /// Returns the counts of the rows in all files.

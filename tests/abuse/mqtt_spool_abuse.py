@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Spool files of `absenc serve` that are changed, truncated, overwritten, removed or replaced, while the server has
-them open and between two runs. The server must run and publish readings. The server must count every missing reading,
-or set it aside in a file."""
+them open and between two runs. The server must run, publish readings, empty its spool, and use no id twice."""
 from abuse_support import often
 
 import os

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Attacks `absenc serve` from one address and from several: idle connections, streams that are never read, requests
-sent byte by byte, and mutated requests. Clients of another address must still be served, and the server must not
-end."""
+"""Attacks `absenc serve` from one address: idle connections, streams that are never read, incomplete requests, and
+mutated requests. Clients of another address must still be served, and the server must not end."""
 from abuse_support import often
 
 import contextlib

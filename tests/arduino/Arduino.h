@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Stub of the part of Arduino's core that a sketch with a serial port needs, with the macros of real cores. An encoder
-// on Serial1 sends one reply to every request; in every third reply one bit is flipped.
+// on Serial1 sends one reply to every position request that comes at 2500000 baud with the direction pin high; in every
+// third reply one bit is flipped.
 #pragma once
 
 #include <cstddef>

@@ -101,8 +101,8 @@ class Decoding {
   }
 
  private:
-  // Tries each value of the open bytes of a frame, and reports the frames that are good. Returns whether there is one,
-  // to which `frame` then is set.
+  // Tries each value of the open bytes of a frame and reports the first good frame. Returns whether there is one, to
+  // which `frame` then is set; true if the frame has no open bytes.
   template <class IsGood>
   bool close(std::string_view name, std::vector<std::uint8_t>& frame, OpenBytes open, IsGood is_good) {
     if (open.count == 0) return true;
@@ -200,8 +200,8 @@ class Decoding {
     refused(remote, [] { return std::string("as a remote frame"); });
   }
 
-  // Returns whether the reply of any vector has this identifier: some requests may be answered on one of several
-  // identifiers.
+  // Returns whether the reply of any vector without an error has this identifier: some requests may be answered on one
+  // of several identifiers.
   [[nodiscard]] bool is_of_a_vector(std::uint32_t id) const {
     return std::any_of(unit_.vectors.begin(), unit_.vectors.end(), [&](const Vector& one) {
       const OwnedFrame reply = frame_of(unit_, one.reply);

@@ -104,8 +104,8 @@ class Campaign {
     if (unit.link == LinkKind::spi) rates = {};
     rates[FaultKind::corrupt] = unit.link == LinkKind::can ? 0 : 0.1;  // CAN's own checksum detects damaged frames
     if (test.requests_too) rates[FaultKind::request_corrupt] = 0.02;
-    // With odd seeds, replies are delayed beyond the host's timeout. Encoders with unsolicited frames are excluded,
-    // because a host cannot determine the age of such a frame.
+    // With odd seeds, unless requests are damaged too, replies are delayed beyond the host's timeout. CAN and encoders
+    // with unsolicited frames are excluded, because a host cannot determine the age of such a frame.
     const bool unsolicited = unit.link == LinkKind::can || (unit.streams != nullptr && unit.streams(options));
     if (test.seed % 2 == 1 && !test.requests_too && !unsolicited) rates.delay = unit.timing.turnaround_limit * 3 / 2;
     return rates;
@@ -121,8 +121,8 @@ class Campaign {
     if (!unit_.alarms->flags[bit].name.empty()) world_.device().raise_alarms(1u << bit);
   }
 
-  // Records the results of each command on an undamaged line. The true position is that of the shaft, whatever the
-  // encoder reports.
+  // Records the results of repeatable commands (`is_repeatable`) on an undamaged line. The true position is that of the
+  // shaft, whatever the encoder reports.
   void record_truth() {
     for (std::int64_t& place : places_) place = static_cast<std::int64_t>(random_.next());
     for (const Command& command : unit_.commands) {
@@ -332,8 +332,8 @@ class Campaign {
 
   [[nodiscard]] std::vector<std::pair<OwnedFrame, OwnedFrame>> frames_of(const Query& query);
 
-  // Counts the rules that the host violated in a conversation. Before the first fault of the line, any violation is a
-  // finding.
+  // Counts the rules that the host violated in a conversation with the options of a model. Before the first fault of
+  // the line, any such violation is a finding.
   void judge_rules(const Query& query, bool had_faults, std::uint32_t before) {
     const std::uint32_t new_violations = world_.device().violation_count() - before;
     faultless_ = faultless_ && !had_faults;

@@ -80,8 +80,8 @@ struct Configuration {
   Options options;
   bool is_model = false;
 };
-/// Returns the configurations of a unit, without repetitions: each model; and the first model with each choice of each
-/// option and with the minimum and maximum of each option.
+/// Returns the configurations of a unit, without repetitions: each model, or the defaults if it has none; and the first
+/// of these with each choice of each option and with the minimum and maximum of each option.
 [[nodiscard]] std::vector<Configuration> configurations(const Unit& unit);
 
 using Values = std::vector<std::int64_t>;

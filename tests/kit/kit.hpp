@@ -15,13 +15,13 @@ namespace absenc::kit {
 [[nodiscard]] Findings check_decoding(const Unit& unit);
 
 /// Checks the bit positions that the unit states for the fields of good replies: the bits at these positions must give
-/// the field's value. Uses the vectors, the vectors with flipped bits that are still valid, and replies of the virtual
-/// encoder.
+/// the field's value. Uses the vectors, the vectors with flipped bits that are still valid, and, except on CAN and
+/// clocked links, replies of the virtual encoder.
 [[nodiscard]] Findings check_places(const Unit& unit);
 
 /// Feeds every vector's reply to the commands that send its request: whole, byte by byte, cut after each byte, with
-/// each bit flipped, with garbage before and after it, and twice. A vector with a reading that no command reads is a
-/// finding, and so is a command without a request.
+/// each bit flipped, with garbage before and after it, and twice. It is a finding if no command reads the position of
+/// any vector, or if `encode` refuses a command in every configuration, other than as unsupported.
 [[nodiscard]] Findings check_hosts(const Unit& unit);
 
 /// Checks that every command, a scan too, ends with `timeout` if no encoder answers; a command that expects no reply
@@ -33,7 +33,7 @@ namespace absenc::kit {
 [[nodiscard]] Findings check_requests(const Unit& unit, std::uint64_t seed);
 
 /// Runs each command in the smallest storage that it accepts. This must be no larger than the declared size, no byte
-/// after it may be written, and one byte less must be refused. Checks devices in the same manner.
+/// after it may be written, and one byte less must be refused. A device must need exactly its declared size.
 [[nodiscard]] Findings check_storage(const Unit& unit);
 
 /// Checks that the commands and arguments exist which the descriptor names for memory, registers and settings.
@@ -47,14 +47,15 @@ namespace absenc::kit {
 /// refused.
 [[nodiscard]] Findings check_memory(const Unit& unit);
 
-/// Checks that a host can observe each condition of the virtual encoder at both ends of its range: in some
+/// Checks that a host can observe each condition of the virtual encoder at one end of its range at least: in some
 /// configuration a command must report something else than normally, at once, after a power cycle, with alarms, or
 /// after a reset.
 [[nodiscard]] Findings check_conditions(const Unit& unit);
 
-/// Runs every command with each alarm raised and not raised in the virtual encoder. A reading, live or decoded from the
-/// captured reply, must report the alarm correctly or not at all. Raised bits must be reported, and so must flags that
-/// the reply carries. A part of a position may be valid only if the whole reading says so too.
+/// Runs every command that changes nothing, except scans, with each alarm raised and not raised in the virtual encoder.
+/// A reading, live or decoded from the captured reply, must report the alarm correctly or not at all. Raised bits must
+/// be reported, and so must flags that the reply carries. A part of a position may be valid only if the whole reading
+/// says so too.
 [[nodiscard]] Findings check_states(const Unit& unit);
 
 /// Checks that the zero command is refused with a reason, and leaves the encoder unchanged, while an alarm or a
@@ -71,9 +72,9 @@ namespace absenc::kit {
 /// rule.
 [[nodiscard]] Findings check_commands(const Unit& unit);
 
-/// Settings of `check_exchanges`, which runs a host against a virtual encoder in virtual time over a line with every
-/// kind of fault. Wrong results are findings if no byte of the conversation was damaged. With damaged bytes they may be
-/// no more frequent than the frame's check allows.
+/// Settings of `check_exchanges`, which runs a host against a virtual encoder in virtual time over a line with faults.
+/// Wrong results are findings if no byte of the conversation was damaged. With damaged bytes they may be no more
+/// frequent than the frame's check allows.
 struct ExchangeTest {
   std::uint64_t count = 100'000;
   std::uint64_t seed = 0;

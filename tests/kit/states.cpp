@@ -148,7 +148,8 @@ class States {
     return mask;
   }
 
-  // Checks that the reading of a reply reports each flag that the reply also carries as a field, with the same value.
+  // Checks that the reading of a reply reports each named flag that the reply also carries as a field, with the same
+  // value, except flags that `absent` returns.
   void check_carried_flags(const ReportedFields& seen) {
     if (!seen.reading) return;
     const auto agrees = [&](const Flags& state) {

@@ -20,7 +20,8 @@ struct DamageCount {
 
   /// Returns how many of `trials` further damaged replies may be accepted with a wrong value, if the probability is the
   /// same as in this measurement. The expected number is `wrong` * trials / damaged. A limit of five standard
-  /// deviations and ten more is exceeded by chance in less than one of a million runs of `check_exchanges`.
+  /// deviations and ten more (times trials / damaged if that is above 1) is exceeded by chance in less than one of a
+  /// million runs of `check_exchanges`.
   [[nodiscard]] std::uint64_t allowed(std::uint64_t trials) const {
     const double ratio = static_cast<double>(trials) / static_cast<double>(damaged);
     const double deviation = std::sqrt(static_cast<double>(wrong) * ratio * (1 + ratio));

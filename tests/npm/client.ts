@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A client of `absenc serve` written from openapi.json alone, for a test: requests every route and prints the results.
+// A client of `absenc serve` written from openapi.json alone, for a test: requests every route except /openapi.json and
+// the stream of one encoder, and prints the results.
 import createClient from "openapi-fetch";
 import type {components, paths} from "./api.js";
 

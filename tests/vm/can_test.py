@@ -20,7 +20,7 @@ BUS = "vcan0"
 # reading.
 ENCODER = f"raa38-can:{BUS}?latency=2000&max_rpm=60"
 HASTY = f"raa38-can:{BUS}"
-# A position request to node 20, and its reply with position 9799.
+# A position request to node 0x20, and its reply with position 9799.
 ASKING, ANSWER = "220#8020000000000000", "120#4726000000000000"
 NODE = 0x120
 
@@ -49,7 +49,7 @@ def losses(rows):
 
 
 class AnotherNode(threading.Thread):
-    """A fake node 20 that answers each position request with the given raw frames."""
+    """A fake node 0x20 that answers each position request with the given raw frames."""
 
     def __init__(self, *answers, interface=BUS):
         super().__init__()
@@ -234,7 +234,7 @@ class Library(VirtualBus):
         self.assertEqual(self.line(process), "raa38-can:can8 9799")
         run("ip", "link", "del", "can8")
         process.stdin.write(b"\n")
-        # The emulation can switch the power also while its interface is down.
+        # The emulation can switch the power also while its interface is gone.
         self.assertEqual(self.line(process), "switched")
         self.add("can8")
         wait_until(lambda: receivers("can8") > 0, "the encoder to come back")
@@ -287,8 +287,8 @@ class CanUtils(VirtualBus):
                 self.assertAlmostEqual(moment, seen_moment, delta=0.04)
 
     def test_no_reply_is_lost_on_busy_bus(self):
-        """cangen sends extended frames as fast as possible. They have the number of the node's replies as identifier
-        and contain position 1, so absenc must ignore them."""
+        """cangen sends an extended frame each millisecond. It has the number of the node's replies as identifier and
+        contains position 1, so absenc must ignore it."""
         emulator = self.emulator("--singleturn", "9799")
         cangen = self.popen("cangen", BUS, "-g", "1", "-e", "-I", "120", "-L", "8", "-D", "01".ljust(16, "0"))
         before = self.frames()
@@ -327,7 +327,7 @@ class OtherFrames(VirtualBus):
                 self.failure(answer, words=words)
 
     def test_frames_of_other_nodes_are_ignored(self):
-        """Frames of other nodes are ignored. A frame with this node's identifier that is no reply is an error."""
+        """Frames that are no reply of this node are ignored if its reply follows."""
         with AnotherNode(position(1, NODE | socket.CAN_EFF_FLAG), position(2, 0x121), frame(0x121, b"\3"),
                          frame(0x7FF | socket.CAN_RTR_FLAG, size=8), position(9799)):
             self.assertEqual(self.singleturn(HASTY), 9799)

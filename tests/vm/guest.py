@@ -15,8 +15,8 @@ def kernel_log():
 
 
 class Result(unittest.TestResult):
-    """A result of unittest that collects failures, including those of subtests. A test without a failure is reported as
-    ok."""
+    """A result of unittest that collects failures, including those of subtests, and skipped tests as failures. A test
+    without a failure is reported as ok."""
 
     def startTest(self, test):
         super().startTest(test)

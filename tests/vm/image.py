@@ -17,8 +17,9 @@ TESTS = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 CACHE = os.path.join(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "absenc")
 
 # Why the machine is built this way: the initramfs contains the programs and the Python of this computer, because the
-# tests in it share modules with the other tests (tests/command_support.py). The kernel is Debian's, so that no test depends on the running kernel, to which a
-# container cannot add modules. QEMU emulates the processor (run.py): KVM is not available to every user.
+# tests in it share modules with the other tests (tests/command_support.py). The kernel is Debian's, so that no test
+# depends on the running kernel, to which a container cannot add modules. QEMU emulates the processor (run.py): KVM is
+# not available to every user.
 
 # Kernel modules for the tests. Modules that they depend on are added automatically, except those that the kernel itself
 # loads on demand: the functions of g_serial.
@@ -161,8 +162,8 @@ def libraries(path):
 
 
 def python_files(scripts):
-    """Yields the path of the interpreter, and of every file that these scripts import, compiled if this computer has
-    the file compiled."""
+    """Returns the paths of the interpreter, of every file that these scripts import, and of its compiled form if this
+    computer has one."""
     finder = modulefinder.ModuleFinder(path=[os.path.join(TESTS, "vm"), TESTS, *sys.path[1:]])
     for script in scripts:
         finder.run_script(script)

@@ -200,8 +200,8 @@ class Command(SpidevCase):
                 self.assertRegex(self.summary(process), r"messages in another SPI mode than the encoder's, which is 1: \d+\n")
 
     def test_wrong_mode_of_ssi_is_in_summary(self):
-        """In mode 0 each bit of SSI arrives one clock late, which halves the position. SSI has no check, so only the
-        emulator's summary can report it."""
+        """In mode 0 each bit of SSI arrives one clock late, which shifts a one into the position. SSI has no check, so
+        only the emulator's summary can report it."""
         process = self.serve("ssi", "--singleturn", "2748")
         self.assertEqual(self.reading("ssi:spi:/dev/spidev9.0?spi_mode=0")["singleturn"], (0x1000 | 2748) >> 1)
         self.assertRegex(self.summary(process), r"another SPI mode than the encoder's, which is 3: \d+\n")
@@ -502,7 +502,7 @@ class SpidevInterface(SpidevCase):
         self.assertEqual(self.spi.get(RD_SPEED, "I"), 250_000)
         os.close(self.spi.descriptor)
         self.spi.descriptor = os.open("/dev/spidev9.0", os.O_RDWR)
-        # The speed is the default again, because the descriptor that had set it was closed.
+        # The speed is the default again, because for a moment no descriptor was open.
         self.assertEqual(self.spi.get(RD_SPEED, "I"), 1_000_000)
         self.assertEqual(self.spi.get(RD_MODE, "B"), 1)
 

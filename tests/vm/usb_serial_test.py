@@ -58,7 +58,7 @@ class UsbSerial(EncoderCase):
 
     @contextlib.contextmanager
     def without_gadget(self):
-        """Removes the gadget too, as if the computer that emulates the USB device were switched off."""
+        """Removes the gadget instead of the cable, as if the computer that emulates the USB device were off."""
         subprocess.run(["rmmod", "g_serial"], check=True, timeout=PATIENCE)
         self.assertFalse(os.path.exists(GADGET))
         try:

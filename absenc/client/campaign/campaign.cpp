@@ -116,11 +116,11 @@ class Campaign {
   // recognised.
   void move() {
     shaft_.position = static_cast<std::int64_t>(bench_.random.next());
-    constexpr Time longest = 30s;  // limit of a reply's delay
+    constexpr Time longest = 30s;  // longer than any fault delays a reply
     if (places_.size() > 1 && places_[1].since + longest < line_.now()) places_.pop_front();
     places_.push_back({line_.now(), shaft_.position});
-    // Waits until unsolicited frames with the old position have passed. On SPI also waits as long as chip select must
-    // be released.
+    // If the encoder sends unsolicited frames, waits until those with the old position have passed; on SPI waits as
+    // long as chip select must be released.
     if (bench_.unsolicited) {
       line_.rest(line_.now() + 5ms);
       line_.drop();

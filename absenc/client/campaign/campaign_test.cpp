@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks campaigns on a bad line: the counts match the computed rates, and each fault has its known effect.
+// Checks campaigns: wrong positions are as frequent as computed, each fault makes exchanges fail, a good line does not,
+// and wrong arguments are refused.
 #include "absenc/client/campaign.hpp"
 
 #include <gtest/gtest.h>

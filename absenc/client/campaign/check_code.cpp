@@ -118,7 +118,7 @@ std::optional<std::uint32_t> CheckCode::syndrome_of(AlteredReply& asked, std::si
 }
 
 // Returns whether 1000 random errors, each of a random reply, agree with the syndromes: code words pass the checksum,
-// and other errors do not.
+// other errors do not, and a reply passes all checks once the check bits of the syndrome are flipped.
 bool CheckCode::is_linear(const Unit& unit, const Options& options, std::span<const GoodReply> replies) const {
   sim::Random random(1);
   for (unsigned i = 0; i < 1000; ++i) {
@@ -192,8 +192,8 @@ bool CheckCode::is_check(std::size_t bit) const {
 
 // Draws errors of all bits but the check bits at random, then sets the check bits so that the checksum is right. The
 // weight of a drawn error is the probability of its errors of check bits. An error of fixed bits may shift the frame;
-// then the check bits are drawn at random too. A shifted frame passes the check in some replies only, so the difference
-// between replies is part of the deviation.
+// then the check bits are drawn at random too, and the weight is 1. A shifted frame passes the check in some replies
+// only, so the difference between replies is part of the deviation.
 Estimated CheckCode::taken(const Unit& unit, const Options& options, std::span<const GoodReply> replies,
                            double bit_errors, unsigned samples) const {
   sim::Random random(2);

@@ -40,7 +40,7 @@ class MeasuredShaft final : public Shaft {
   /// Returns whether the reading has a position that the shaft had when the encoder measured it.
   [[nodiscard]] bool was_at(const Reading& reading) const { return find(reading) != nullptr; }
   /// Returns the position of the shaft that belongs to the reading; for a wrong reading, the last position measured
-  /// before the reading was received.
+  /// until the reading was received, or the oldest stored one.
   [[nodiscard]] std::int64_t place_of(const Reading& reading) const {
     const ShaftSample* found = find(reading);
     for (std::size_t i = 0; found == nullptr && i < count(); ++i) {

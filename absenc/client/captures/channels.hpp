@@ -23,8 +23,9 @@ struct WireChannels {
   bool assumed = false;  // full duplex: true if neither --channel nor channel names show which wire is the host's
 };
 
-/// Assigns channels by --channel ("D0", "clock=D0"); without it, by the channels' names or, if no name fits, in order.
-/// Throws UsageError, which lists the channels of the capture or the wires of the link.
+/// Assigns channels by --channel ("D0", "clock=D0"); without it, by the channels' names or, if no name fits, in order
+/// (not on clocked lines and SPI, nor with more channels than wires). Throws UsageError, which lists the channels or
+/// wires, for an unknown name and for a needed wire without a channel.
 [[nodiscard]] WireChannels find_wires(LinkKind link, std::span<const std::string> channels,
                                       std::span<const std::string> wanted);
 

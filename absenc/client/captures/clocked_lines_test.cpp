@@ -67,11 +67,11 @@ struct Master {
   std::int64_t falls = 0;  // time from the last rising edge to the falling edge that sends CDM 1; 0: half a period
   // whether MA rises when the timeout has elapsed; otherwise MA is held low until the next frame
   bool releases = false;
-  int clocks = 0;          // number of clocks beyond the bits of the frame and the idle bit
+  int clocks = 0;          // number of clocks beyond the bits of `biss_frame`; -1: one less
   std::int64_t pause = 0;  // time after the timeout before the next frame; after a release at least `timeout`
 };
 
-constexpr int biss_bits = 32;  // number of bits of a frame, including the idle bit before it
+constexpr int biss_bits = 32;  // number of bits that `biss_frame` returns
 
 // Computes the frame bit by bit: two idle bits, one ACK bit, start, CDS, 19 bits, nError, nWarning and the CRC.
 std::string biss_frame(std::uint32_t position, bool cds) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that captures are decoded to rows, and that the sender of each frame is found.
+// Checks that captures are decoded to rows, and that the protocol of a line and of a capture is identified.
 #include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 

@@ -16,7 +16,8 @@ namespace {
 
 using capture::Tick;
 
-// Counts good frames, unanswered requests, and frames with characters that have framing or parity errors.
+// Counts good frames (not requests alone), unanswered requests, and frames with characters that have framing or parity
+// errors.
 struct FrameCounts final : capture::AnnotationSink {
   void put(const capture::Annotation& annotation) override {
     if (annotation.remark == capture::Remark::damaged) ++damaged;
@@ -30,9 +31,9 @@ struct FrameCounts final : capture::AnnotationSink {
   std::uint64_t damaged = 0;
 };
 
-// Returns whether the unit's own baud rate decodes requests of a host without replies while the other rate decodes few
-// good frames: not more than damaged ones, or than these requests. The few level changes of such requests fit many
-// rates.
+// Returns whether the line carries requests without replies at the unit's own baud rate: that rate gives no damaged
+// frame and more unanswered requests than the other rate, whose good frames exceed neither its damaged frames nor these
+// requests. The few level changes of such requests fit many rates.
 bool reads_silence(const FrameCounts& at_own, const FrameCounts& at_other) {
   return at_own.damaged == 0 && at_own.unanswered > at_other.unanswered &&
          at_other.good <= std::min(at_other.damaged, at_own.unanswered);
@@ -70,10 +71,10 @@ struct Possible final : EvidenceSink {
 
 }  // namespace
 
-// Selects the baud rate with more good frames at the beginning of the capture: the unit's own rate, or the rate that
-// the level changes suggest. Few level changes fit many rates, but only one rate gives right checksums. If characters
-// are damaged or no frame is found, selects the parity with more good frames: a parity bit taken for a stop bit is
-// wrong half of the time.
+// Selects the baud rate with more good frames at the beginning of the capture: the unit's own rate (also if
+// `reads_silence`), or the rate that the level changes suggest. Few level changes fit many rates, but only one rate
+// gives right checksums. If characters are damaged or no frame is found, selects the parity with more good frames: a
+// parity bit taken for a stop bit is wrong half of the time.
 CaptureRun::Speed CaptureRun::likely_speed(const Lines& lines) const {
   constexpr std::size_t enough_characters = 20'000;
   Speed best{choices_.how.baud, choices_.how.parity.value_or(line_.parity)};

@@ -117,7 +117,7 @@ std::vector<Encoder> encoders_of(const Unit& unit) {
   return all;
 }
 
-constexpr std::uintmax_t long_file = 300'000;  // size in bytes from which a capture is long
+constexpr std::uintmax_t long_file = 300'000;  // size in bytes above which a capture is long
 
 /// The commands of one capture: all commands that change nothing, or one that changes the encoder.
 struct Together {

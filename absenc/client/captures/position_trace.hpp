@@ -17,8 +17,8 @@ class PositionTrace {
  public:
   static constexpr std::size_t columns = 64;
 
-  /// Adds a position; a `tick` before that of the first position counts as the first. An invalid position leaves a gap
-  /// in the plot.
+  /// Adds a position; a `tick` before that of the first position counts as the first. A position that is invalid or not
+  /// ready is not added, nor one without turns after a first position with turns; it leaves a gap in the plot.
   void add(std::uint64_t tick, const Reading& reading) {
     if (!reading.singleturn_valid() || !reading.ready) return;
     if (count_ == 0) {

@@ -16,7 +16,7 @@ struct Probed {
   const Unit* unit = nullptr;
   bool explained = false;                  // whether at least one set of options explains all frames
   std::vector<OptionEvidence> evidence{};  // evidence for each value of each open option
-  std::vector<std::string> settled{};  // options that later commands need, as "name=value"; empty: the defaults suffice
+  std::vector<std::string> settled{};      // options that later commands need, as "name=value"; may be empty
 };
 
 /// Judges captured frames. `replies` have the text form that `absenc decode` reads, "" for a missing reply. `requests`

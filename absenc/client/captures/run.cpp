@@ -32,8 +32,8 @@ using capture::Content;
 using capture::DecodedPart;
 using capture::Tick;
 
-// Stores an exception of the annotation sink until decoding has ended, because the exception must not pass through a
-// decoder that uses threads.
+// Stores an exception of the annotation sink or of `progress` until decoding has ended, because the exception must not
+// pass through a decoder that uses threads.
 class Guard {
  public:
   template <class Work>
@@ -125,8 +125,8 @@ std::unique_ptr<capture::Reader> open_capture(const CaptureChoices& choices) {
   try {
     if (choices.path != "-") return capture::open_capture(choices.path, how);
     auto source = std::make_unique<StdinSource>();
-    // Refuses binary data from standard input: some binary formats are read from the end of the file, which is not
-    // known there.
+    // Refuses raw samples from standard input, and data with a zero byte among the first 64 bytes, which is binary:
+    // some binary formats are read from the end of the file, which is not known there.
     std::array<std::uint8_t, 64> head{};
     const std::size_t size = source->read(0, head);
     if (how.channels != 0 || std::count(head.begin(), head.begin() + static_cast<std::ptrdiff_t>(size), 0) != 0) {

@@ -99,7 +99,7 @@ void ChangeTester::test_one(const Clause& clause, ClauseResult& result) {
     conclude(result, false, refused.evidence);
   } catch (const os::Failure& failure) {
     if (failure.kind() != os::Failure::Kind::unsupported) throw;
-    // the port refused a step that it does not support, before the encoder was changed
+    // the port does not support a step of the test, so the clause stays untested
     result.evidence = failure.what();
   }
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the clauses that change an encoder, and restores every changed value however the test ends.
+// Tests the clauses that change an encoder, and restores the changed values however the test ends, except values that
+// `resets` allows it to erase.
 #pragma once
 
 #include <algorithm>
@@ -56,8 +57,9 @@ struct UnsolicitedFrames {
   }
 };
 
-/// Access to the line, independent of its link. All functions throw the exceptions of the port. After the caller asked
-/// the test to end they throw os::Interrupted, but only once, so that values can still be restored.
+/// Access to the line, independent of its link. Functions that send or wait throw the exceptions of the port. After the
+/// caller asked the test to end one of them throws os::Interrupted, but only once, so that values can still be
+/// restored.
 struct ChangesLine {
   std::function<CommandResult(const Command&, Arguments)> run;
   // sends a request, encoded by Unit::encode, and returns the exchange

@@ -93,7 +93,7 @@ class Disobedient final : public Machine<Item> {
   std::vector<Item> reply_;
 };
 
-/// A port that interrupts the test, or loses the line, at step `at`.
+/// A port that calls `end` at its wait number `at`, from 1, and with `lost` loses the line from that wait on.
 template <class Item>
 class EndingPort final : public Port<Item> {
  public:
@@ -327,7 +327,7 @@ void check_ends(const EncoderAddress& address) {
   // If the memory differs even after a complete test, it counts its writes, which cannot be restored; then only the
   // settings are compared.
   const bool counts = whole.memory() != before;
-  // In tests with many steps, each step is tested with only one of the three kinds of end.
+  // In tests with many steps, each tested step has only one of the three kinds of end.
   const unsigned kinds = steps < 1000 ? 3 : 1;
   const unsigned stride = 10 / test_cases(10);
   for (unsigned i = 0; i < steps * kinds; i += stride) {

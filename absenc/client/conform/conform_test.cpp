@@ -106,7 +106,8 @@ TEST_P(Clauses, EachKeptClauseCanBeBroken) {
 INSTANTIATE_TEST_SUITE_P(Units, Clauses, ::testing::ValuesIn(all_units().begin(), all_units().end()),
                          [](const auto& one) { return test_name(*one.param); });
 
-// The echo must not be taken for a reply: with echo the encoder keeps all clauses, and a missing reply breaks one.
+// The echo must not be taken for a reply: with echo the encoder breaks no clause, and missing replies break the clause
+// "answer".
 TEST(Conformance, EchoOfAdapterIsNoReply) {
   for (const char* const text : {"sim:tformat?echo=auto", "sim:tformat?echo=on", "sim:amt21?echo=auto"}) {
     const EncoderAddress address = parse_address(text);

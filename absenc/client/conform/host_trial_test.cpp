@@ -20,8 +20,7 @@ namespace {
 
 Flaws host_that_sends(HostScript script) { return {.sends = {script.begin(), script.end()}}; }
 
-/// Returns defects of SPI controllers, each of which breaks a rule about clock, length, mode, or the time before a
-/// transfer.
+/// Returns defects of SPI controllers in clock, length, mode, or the time before a transfer.
 std::vector<Flaws> flaws_of_controllers() {
   using std::chrono::microseconds;
   using std::chrono::milliseconds;

@@ -126,7 +126,7 @@ std::vector<Item> reply_of(const EncoderAddress& address) {
   return {reply_items.begin(), reply_items.end()};
 }
 
-/// Returns a good reply of an encoder with another address on the same line.
+/// Returns a good reply of an encoder with another address on the same line; empty if the unit has no addresses.
 template <class Item>
 std::vector<Item> reply_of_neighbour(const EncoderAddress& address) {
   EncoderAddress other = address;

@@ -85,14 +85,15 @@ class Mutant final : public Machine<Item> {
   unsigned requests = 0;
   std::vector<Item> reply_items;
   std::vector<Item> good;  // the first request that was received, a good one
-  // index of the only special request, in order of arrival; -1: every request that differs from `good` is special
+  // index of the only special request among those that differ from `good`, in order of arrival; -1: all are special
   int special = -1;
   // further condition that a special request must fulfil; empty: none
   std::function<bool(const std::vector<Item>&)> is_meant{};
   bool is_special = false;  // whether the last request is special
 
  private:
-  // Decides whether the request is special, that is, differs from the first one. A damaged request has no items.
+  // Decides whether the request is special: it differs from the first one and fits `special` and `is_meant`. A damaged
+  // request has no items.
   void note_special(const std::vector<Item>& request) {
     is_special = false;
     if (!request.empty() && request == good) return;

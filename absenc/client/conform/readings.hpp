@@ -25,7 +25,7 @@ struct Readings {
   std::uint64_t good = 0;       // number of requests of good readings, or of good unsolicited frames
   std::uint64_t discarded = 0;  // number of damaged frames in a stream
 
-  /// Returns the first good reading; null if none is good, or if each good word consists of equal bits.
+  /// Returns the first good reading that is no clocked word of equal bits; null if there is none.
   [[nodiscard]] const Attempted* first_good() const;
 };
 
@@ -40,7 +40,8 @@ void judge_streamed(const Readings& readings, ClauseResult& result);
 void judge_time(const Unit& unit, const Options& options, const Readings& readings, Time latency, ClauseResult& result);
 
 /// Stores the verdict on whether no reply has one of `errors`. Concludes `kept` only with evidence that such an error
-/// would be noticed: a change of a good reply causes it, or, for errors of a counter, the counter has moved.
+/// would be noticed: a change of a good reply or a mixture of two causes it, or, for errors of a counter, the counter
+/// has moved.
 void judge_frames(const Unit& unit, const Options& options, const Readings& readings, Errors errors,
                   ClauseResult& result);
 

@@ -92,7 +92,7 @@ class Tester {
  private:
   // time after a failed reading in which a late reply is still received
   static constexpr Time listening = std::chrono::milliseconds(20);
-  static constexpr unsigned times = 3;  // number of times that a request which no host sends is sent
+  static constexpr unsigned times = 3;  // number of times that a test sends its command or request
   static constexpr bool is_can = std::is_same_v<Item, CanFrame>;
 
   // ---- Access to the line
@@ -128,7 +128,8 @@ class Tester {
     AnswerSink sink;
   };
 
-  // Takes one reading with these options; if it fails, listens for a late reply.
+  // Takes one reading with these options; if it fails with an encoder that replies to requests, listens for a late
+  // reply.
   Attempted once(const Options& options, Time listen_for = listening) {
     runner_.set_options(options);
     if (!is_streamed(options)) runner_.start_again();
@@ -268,8 +269,8 @@ class Tester {
 
   // ---- Requests that no host sends
 
-  // Sends requests to several other addresses; a single one might belong to a neighbour on the line. A reply with the
-  // address of our encoder, or replies with its position at every address, are from our encoder.
+  // Sends requests to several other addresses; a single one might belong to a neighbour on the line. A reply that is
+  // valid only for our own address, or at every address an invalid reply or our position, is from our encoder.
   void test_foreign(ClauseResult& result) {
     constexpr std::size_t most_addresses = 8;
     const auto role = std::find_if(unit_.options.begin(), unit_.options.end(),

@@ -45,7 +45,7 @@ struct Flaws {
 
 struct Stopped {};
 
-/// A port that skips the waits of its host, or stops the host after some requests.
+/// A port that skips the waits of its host up to `skipped_wait`, and stops the host after `requests_left` requests.
 template <class Item>
 class HastyPort final : public Port<Item> {
  public:
@@ -162,7 +162,8 @@ class Host {
     return trial.judge();
   }
 
-  /// Returns the verdict on our own host with its defects. With `all`, the host finally runs every command once.
+  /// Returns the verdict on our own host with its defects. With `all`, the host finally runs once every command that
+  /// changes no option.
   Conformance judged(bool all = false) {
     constexpr unsigned most_rounds = 40;
     HostTrial trial(unit_, 20);

@@ -34,7 +34,7 @@ class Attended final : public Machine<Item> {
     if (now >= look_at_) look_at_ = look_(now) ? now + between_looks : never;
     Step<Item> step = machine_.next(now);
     if (step.kind != Step<Item>::Kind::wait) return step;
-    // As on real ports, a timer that is due at the time of another event remains due.
+    // As on real ports, a time that has passed starts no timer, but a timer that is due at another event remains due.
     timer_ = step.at > now || step.at == timer_ ? step.at : never;
     step.at = std::min(look_at_, timer_);
     return step;

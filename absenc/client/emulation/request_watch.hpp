@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counts the requests of a host to a virtual encoder, and all other bytes and frames that the host sends.
+// Counts the requests of a host to a virtual encoder, and bytes and frames from the host that are no request.
 #pragma once
 
 #include <algorithm>

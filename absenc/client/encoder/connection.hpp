@@ -49,8 +49,8 @@ class Connection {
   // exceptions of the port, and UsageError if the unit cannot run the command with these options.
 
   /// Reads the position with all alarms that the unit reports, or runs the command that the address names instead.
-  /// `take` selects which frame is used if the encoder sends positions unsolicited. Also throws UsageError if the unit
-  /// has no command that reads the position.
+  /// `take` selects which frame is used if the encoder sends positions unsolicited. Throws UsageError if the unit has
+  /// no command that reads the position.
   virtual Outcome read(host::Take take = host::Take::newest) = 0;
   /// Runs a command and returns its outcome. Calls `on_emit` for each result but the last; during the call, `report`
   /// passes on the fields of that result. If the command sets a value by which the encoder is reached, the connection

@@ -103,7 +103,7 @@ TEST_P(LifeCounters, OneThatStandsStillIsAnError) {
 TEST_P(LifeCounters, OneThatHasComeRoundIsReadAgain) {
   Counting line(*GetParam());
   for (int i = 0; i < 2; ++i) EXPECT_EQ(line.connection->read().error, Error::none);
-  // these frames arrive as if another host had read 62 frames after the first reading
+  // the frames of the second reading are first as if another host had read 62 frames in between
   line.recorder.play({0, 1, 0, 1, 2, 3, 0, 1});
   for (int i = 0; i < 3; ++i) EXPECT_EQ(line.connection->read().error, Error::none);
   EXPECT_EQ(line.recorder.left(), 0u);

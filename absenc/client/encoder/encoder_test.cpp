@@ -131,8 +131,8 @@ TEST(ClientEncoder, GoesOnAtTheRateThatItWasSetTo) {
   }
 }
 
-// Aborts a change of the rate at different points. Afterwards the port must have a known rate: an encoder at the old
-// rate is read, one at the new rate is not.
+// Aborts a change of the rate at different points. Afterwards the port must have a known rate: the encoder is read
+// exactly if it has the rate of its connection.
 TEST(ClientEncoder, IsReadAtItsRateWhenAChangeOfItsRateWasBrokenOff) {
   unsigned whole = 0;
   unsigned there = 0;

@@ -28,7 +28,7 @@ template <class Item>
 
 /// Bounds for readings that an encoder sends unsolicited, from the spread of their arrivals. A reading was not latched
 /// before the previous reading arrived, unless the previous reading was delayed itself. The delay of a reading is at
-/// most the sum by which pauses of the last seconds exceeded the usual pause.
+/// most the sum by which pauses of this second and the one before exceeded 5/4 of the usual pause.
 class ArrivalSpread {
  public:
   /// Adds the arrival of the next reading. No byte had arrived until `nothing_until`.
@@ -56,7 +56,7 @@ class ArrivalSpread {
   Time arrived_{};
   Time usual_{};  // average pause between two readings
   Time second_ends_{};
-  Time now_{};  // sum by which pauses exceeded the usual pause in the present second
+  Time now_{};  // sum by which pauses exceeded 5/4 of the usual pause in the present second
   Time before_{};
 };
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks latch times for every unit in virtual time. The true instant must be within the measured bounds, however late
-// a request leaves, an encoder replies or the host runs; and no speed may differ from the true one by more than its
-// uncertainty.
+// Checks latch times for every model, and for some modes, in virtual time. The true instant must be within the measured
+// bounds, however late a request leaves, and its end and the reply are noticed; and no speed may differ from the true
+// one by more than its uncertainty.
 #include "absenc/client/encoder/latch_times.hpp"
 
 #include <gtest/gtest.h>

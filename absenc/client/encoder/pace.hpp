@@ -62,11 +62,11 @@ class Pace {
     if (first < end) missed_ += static_cast<std::uint64_t>((end - first - Time{1}) / period_ + 1);
   }
 
-  /// Returns the number of times before the end that were skipped since the last call, because the caller took longer
-  /// than a period or was stopped.
+  /// Returns the number of times before the end that `wait` and `leave_out` skipped since the last call, because the
+  /// caller took longer than a period or was stopped.
   [[nodiscard]] std::uint64_t take_missed() { return std::exchange(missed_, 0); }
 
-  /// Begins a new series of times, the first of which is `start`.
+  /// Begins a new series of times, the first of which is `start`; the next call of `next` or `wait` is for the second.
   void start_at(Time start) { next_ = start; }
 
   [[nodiscard]] Time period() const { return period_; }

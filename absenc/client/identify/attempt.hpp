@@ -27,7 +27,7 @@ using capture::ObservedExchange;
 
 inline constexpr unsigned reads = 6;              // number of readings that are taken of each encoder that replies
 inline constexpr Time listening = 100ms;          // time of listening before the first request at a setting of the line
-inline constexpr std::size_t stream_size = 2048;  // number of bytes of an unsolicited stream that are judged
+inline constexpr std::size_t stream_size = 2048;  // number of unsolicited bytes or frames that are enough
 inline constexpr unsigned most_unanswered = 3;    // number of readings without a reply after which no more are taken
 inline constexpr Time settled = 5ms;              // silence after which no earlier reply is expected
 inline constexpr Time longest_settling = 200ms;   // limit of the wait for silence, on a line that is never silent
@@ -46,7 +46,7 @@ struct ScannedAddresses final : FieldSink {
 /// Reason why a conversation was aborted.
 enum class TryEnd : std::uint8_t {
   silent,   // no valid reply arrived in the allowed time
-  harmful,  // the next request would be a changing command for an encoder of another protocol
+  harmful,  // the next request, or pulse of the wire `clear`, might change an encoder
 };
 
 /// Result of asking an encoder for its identity, and whether it agrees with the assumed options.
@@ -115,8 +115,8 @@ class Attempt {
     return items;
   }
 
-  /// Polls with each set of options that changes the request, except on clocked lines only until an encoder replies,
-  /// and stores the candidates.
+  /// Polls with each set of options that `settings_to_try` returns and stores the candidates. Ends after the first set
+  /// with which an encoder replies, except on clocked lines.
   void ask() {
     const Command* read = find_command(unit_, Verb::read);
     if (read == nullptr || read->changes_encoder) return;
@@ -273,8 +273,8 @@ class Attempt {
     return !same_as(0x00) && !same_as(0xFF);
   }
 
-  // Scans the line; returns, for each encoder that replies, `settings` with its address. Empty if the unit has no scan
-  // or no encoder replies.
+  // Scans the line; returns, for each encoder that replies, `settings` with its address. Empty if the unit has no scan,
+  // or one that changes or disturbs encoders, or if no encoder replies.
   std::vector<SettingTexts> scanned(const SettingTexts& settings, const Options& options) {
     std::vector<SettingTexts> targets;
     const Command* command = find_command(unit_, Verb::scan);

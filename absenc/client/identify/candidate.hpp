@@ -33,8 +33,8 @@ struct Candidate {
 /// chance; it weakens the evidence of each candidate.
 void rank(std::vector<Candidate>& candidates, std::size_t searches);
 
-/// Returns a short list of settings ("name=value") that give these options: with a model unless that takes more
-/// settings, or all options if fewer settings would yield another model.
+/// Returns a short list of settings ("name=value") that give these options, empty for the defaults: with a model unless
+/// that takes more settings, or all options if fewer settings would yield another model.
 [[nodiscard]] std::vector<std::string> settings_for(const Unit& unit, const Options& options);
 
 /// Returns the settings that follow ? in the candidate's address: those of the options and of the port.

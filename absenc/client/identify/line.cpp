@@ -24,10 +24,10 @@ namespace {
 constexpr Time short_patience = 700ms;  // time without a reply after which a scan ends
 // time without a reply after which a scan ends, once an encoder has replied beyond doubt
 constexpr Time brief_patience = 150ms;
-constexpr Time long_patience = 5s;     // time without a reply for scans at the end, if nothing was found
+constexpr Time long_patience = 5s;     // time without a reply for scans at the end, unless a find is beyond doubt
 constexpr std::size_t busy_line = 32;  // number of bytes received while listening from which on no requests are sent
 constexpr std::size_t most_introduced = 4;  // number of candidates of one encoder that are asked for their identity
-constexpr double beyond_doubt = -3;         // log10 of a candidate's chance; below it no further rates are tried
+constexpr double beyond_doubt = -3;         // greatest log10 of a candidate's chance that is beyond doubt
 constexpr std::array<std::uint32_t, 10> common_rates{9600,    19'200,  38'400,    57'600,    115'200,
                                                      230'400, 460'800, 1'000'000, 2'500'000, 5'000'000};
 
@@ -105,8 +105,9 @@ class Search {
     for (const Unit* unit : std::exchange(cut_, {})) attempt(*unit, search_.settings);
   }
 
-  // Reads the identity of each found encoder, with the options of its likeliest candidate and of equally likely ones,
-  // at most four in all, which the identity may distinguish.
+  // Reads the identity of each found encoder that replies to requests, with the options of its likeliest candidate and
+  // of equally likely ones, at most four in all, which the identity may distinguish. Skips an encoder with a single
+  // such candidate if the unit has no identity. Removes the candidates that `judge` drops.
   void ask_who_they_are() {
     std::vector<Candidate>& all = findings_.candidates;
     std::set<std::pair<const Unit*, std::string>> asked;
@@ -136,7 +137,7 @@ class Search {
   }
 
   // Drops candidates whose options the reported identity contradicts, if it agrees with those of another candidate;
-  // otherwise adds a note about the contradiction.
+  // otherwise adds a note if the identity contradicts the likeliest candidate.
   void judge(const std::vector<std::size_t>& alike, const std::vector<Introduction>& said) {
     const bool known = std::any_of(said.begin(), said.end(), [](const Introduction& one) { return one.agrees; });
     for (std::size_t i = 0; i < alike.size(); ++i) {
@@ -155,8 +156,8 @@ class Search {
     if (candidate.unit->link == LinkKind::can) return introduce_on<CanFrame>(candidate);
     return introduce_on<std::uint8_t>(candidate);
   }
-  // Opens the port and reads the identity. If the port is lost meanwhile, adds a note; the candidates found so far
-  // remain.
+  // Opens the port and reads the identity. If the port cannot be opened or is lost, adds a note; the candidates found
+  // so far remain.
   template <class Item>
   Introduction introduce_on(const Candidate& candidate) {
     try {

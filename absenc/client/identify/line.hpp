@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds the encoders on an unknown line: sends read requests, which change nothing, of every protocol that fits.
+// Finds the encoders on an unknown line: sends requests that change nothing (readings, scans and identities) of every
+// protocol that fits.
 #pragma once
 
 #include <cstdint>

@@ -34,9 +34,9 @@ enum class Medium : std::uint8_t { serial, tcp, spi, can };
 /// Returns the request of a command with its default arguments; empty if the command sends none.
 [[nodiscard]] std::vector<std::uint8_t> request_of(const Unit& unit, const Options& options, const Command& command);
 
-/// Returns the sets of settings to try in addition to `settings`, at most 8: no further setting, each model, and single
-/// choices that change the request. On clocked lines the request is the same for all models, which differ in their
-/// number of bits. Settings with which the encoder sends unsolicited are left out.
+/// Returns the sets of settings to try in addition to `settings`, at most 8: no further setting, and models and single
+/// choices that change the request. On clocked lines, where the request is the same for all models, returns no further
+/// setting and each model. Settings with which the encoder sends unsolicited are left out.
 [[nodiscard]] std::vector<SettingTexts> settings_to_try(const Unit& unit, const SettingTexts& settings,
                                                         const Command& read);
 

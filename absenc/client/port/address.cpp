@@ -40,8 +40,8 @@ void set_pulse_wire(os::PulseWire& wire, std::string_view what, const OptionText
   }
 }
 
-// Returns the command, which can be run again and again. Throws UsageError if it changes the encoder or takes
-// arguments.
+// Returns the command, which can be run again and again. Throws UsageError if there is none, or if it changes the
+// encoder or takes arguments.
 const Command& reading_command(const Unit& unit, std::string_view name) {
   const Command& command = require_command(unit, name);
   if (command.changes_encoder || !command.arguments.empty()) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that messages about failed exchanges state each fact only once.
+// Checks that messages about failed exchanges state each fact only once, and ascribe a wrong length to the frame that
+// has it.
 #include "absenc/client/port/diagnosis.hpp"
 
 #include <gtest/gtest.h>

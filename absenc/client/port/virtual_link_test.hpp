@@ -37,7 +37,7 @@ struct VirtualPort {
   std::uint32_t rate = 0;         // rate of the host's end in bits per second; 0: that of the encoder
 };
 
-/// A port that delays each request by a random time.
+/// A port that delays requests by a random time, except on SPI and clocked lines and inside a procedure.
 template <class Item>
 class UnevenPort final : public Port<Item> {
  public:

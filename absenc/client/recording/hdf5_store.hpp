@@ -27,7 +27,7 @@ class Hdf5Store {
   void attach(hid_t access);
 
   /// Writes the collected blocks to the disk. Throws the exceptions of `disk`; then the data committed before remains
-  /// intact, and nothing more can be committed.
+  /// intact.
   void commit();
 
   // Functions for the HDF5 driver:

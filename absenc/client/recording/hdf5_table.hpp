@@ -39,9 +39,9 @@ constexpr std::uint64_t hdf5_not_ended = UINT64_MAX;
 
 class Hdf5Table {
  public:
-  /// Creates the file with a dataset for each column. The file has `attributes`, and `columns` with the column names.
-  /// Each dataset has `unit` and `meaning`, if the column has them, and `missing_value`, the element of a missing value
-  /// (NaN for reals). Throws Failure and the exceptions of `disk`.
+  /// Creates the file with a dataset for each column that is no detail. The file has `attributes`, `rows`, and
+  /// `columns` with the names of these columns. Each dataset has `unit` and `meaning`, if the column has them, and
+  /// `missing_value`, the element of a missing value (NaN for reals). Throws Failure and the exceptions of `disk`.
   Hdf5Table(Hdf5Store::Disk disk, std::span<const Column> columns, const Hdf5Attributes& attributes);
   ~Hdf5Table();
   Hdf5Table(const Hdf5Table&) = delete;

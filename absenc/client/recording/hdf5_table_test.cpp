@@ -82,7 +82,7 @@ std::int64_t whole_rows(const fs::path& path, const char* name, hid_t type, T (*
   return found;
 }
 
-// 32 chunks of 1024 rows fill a B-tree node, so nodes are split and the tree gets another level.
+// The rows fill 96 chunks, too many for one B-tree node, so nodes are split and the tree gets another level.
 TEST(Hdf5Table, EveryBeginningOfACommitIsAWholeFile) {
   Bench bench("prefix");
   Hdf5Table table(bench.disk(), columns, {{"encoder", std::string("elbow")}, {"rate_hz", 100.0}});

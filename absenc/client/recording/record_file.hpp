@@ -26,8 +26,8 @@ struct RecordHeader {
   std::uint64_t part = 1;
 };
 
-/// A file of a recording that is being written. All members throw os::Failure for errors of the disk, with kind `lost`
-/// if the file was removed or replaced.
+/// A file of a recording that is being written. Members that write, and `require_there`, throw os::Failure for errors
+/// of the disk, with kind `lost` if the file was removed, moved, replaced or cut.
 class RecordFile {
  public:
   virtual ~RecordFile() = default;

@@ -171,8 +171,8 @@ RecordHeader Recording::Parts::header() const {
           .part = part_};
 }
 
-// Returns whether the sample is written: every Nth reading, every change of an alarm, and all failures and events
-// except repeated waiting for the port.
+// Returns whether the sample is written: every Nth reading, every reading with other alarms or other reported alarms
+// than the one before, and all failures and events except repeated waiting for the port.
 bool Recording::Parts::wanted(const Sample& sample) {
   if (sample.kind == Sample::Kind::absent) return false;
   if (sample.kind != Sample::Kind::reading) return true;

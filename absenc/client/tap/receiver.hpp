@@ -51,7 +51,7 @@ class Receiver {
   [[nodiscard]] ReceiveEnd end() const;
   /// Returns a sentence about the loss of the port; "" if it was not lost.
   [[nodiscard]] std::string problem() const;
-  /// Returns the number of dropped bytes. Bytes are dropped if the caller does not take them for too long.
+  /// Returns the number of bytes that were dropped because with them more than 64 MiB would have waited for the caller.
   [[nodiscard]] std::uint64_t dropped() const;
 
   /// Returns the port in words, "/dev/ttyUSB0 at 2500000 baud".

@@ -37,7 +37,8 @@ class TapRun {
   ~TapRun();
 
   /// Waits for enough bytes to identify the protocol and its options. Returns false if no byte arrived or no protocol
-  /// explains the bytes. If the protocol was given, only determines missing options. Must be called before `begin`.
+  /// explains the bytes. If the protocol was given, only determines missing options and returns true. Must be called
+  /// before `begin`.
   bool settle(const std::function<void(const std::string&)>& progress);
   /// Starts decoding: exchanges are passed to `sink`, which must outlive the object. Called once.
   void begin(capture::AnnotationSink& sink);
@@ -45,7 +46,7 @@ class TapRun {
   /// Returns false when receiving has ended. Throws os::Failure of the record file, and the exceptions of the sink and
   /// of Receiver::next.
   bool advance();
-  /// Returns what was received and why receiving ended; call it after `advance` returned false.
+  /// Returns what was received and why receiving ended; call it after `settle` or `advance` returned false.
   [[nodiscard]] TapOutcome outcome() const;
   /// Makes `advance` return false. May be called from any thread after `settle`.
   void cancel();

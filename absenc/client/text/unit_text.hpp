@@ -121,8 +121,9 @@ struct RoleArgument {
 /// and fields whose value the reading does not have, are `valid`. All output of fields uses this rule.
 [[nodiscard]] Validity validity_of(const FieldInfo& field, const Reading& reading);
 [[nodiscard]] bool holds(const FieldInfo& field, const Reading& reading);
-/// Returns `value`, the text of a field, marked by its validity: "74565 counts", "INVALID (74565 counts)" or "unknown
-/// (74565 counts)".
+/// Returns `value`, the text of a field, marked by its validity: "74565 counts", "unknown (74565 counts)" or "INVALID
+/// (74565 counts)", which says in the parentheses if the encoder is starting, or if only the top bits of the position
+/// hold.
 [[nodiscard]] std::string marked(const FieldInfo& field, const std::string& value, const Reading& reading);
 
 }  // namespace absenc::client

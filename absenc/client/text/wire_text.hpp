@@ -26,8 +26,9 @@ struct WireFrame {
   [[nodiscard]] Frame frame() const;
 };
 
-/// Parses a frame and returns it. Bytes may be separated by spaces and commas and may begin with 0x. Throws UsageError,
-/// whose text begins with `what` and states the error; for a wrong character also its position (from 1).
+/// Parses a frame and returns it. Bytes may be separated by white space and commas, and each run of bytes may begin
+/// with 0x. Throws UsageError, whose text begins with `what` and states the error; for a wrong character also its
+/// position (from 1).
 [[nodiscard]] WireFrame parse_wire_text(LinkKind link, std::string_view what, std::string_view text);
 
 /// Returns a frame as people read it: "1A 00 2B", "1FF:022B", a remote frame "1FF:R8", a word "0001 1110".
