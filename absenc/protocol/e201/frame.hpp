@@ -271,7 +271,8 @@ struct Protocol {
     if (request.letter != letter::samples) return {};
     return to_reading(format.word, decode_position(format, reply.samples)->word, format.scale);
   }
-  /// Returns when the encoder latched the position that answers a request sent at `sent_at`.
+  /// Returns the time for which a position is reported: the end of the request or pulse at `sent_at`, because the document
+  /// does not say when the encoder latches it.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
 };
 

@@ -420,7 +420,8 @@ struct Protocol {
     // The ID of the request is used, because it may be known at compile time.
     return to_reading(format, request.id, reply);
   }
-  /// Returns when the encoder latched the position of a reply to a request that was sent at `sent_at`.
+  /// Returns the time for which a position is reported: the end of the request, because the document does not say when
+  /// the encoder latches it.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
 
   /// Decodes a request. Returns it, or the error of the first failed check.

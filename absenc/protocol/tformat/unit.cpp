@@ -115,8 +115,8 @@ Outcome failure(const Dialog& dialog, Error error, std::string_view step) {
           Protocol::manner(dialog.format(), dialog.request()).hold};
 }
 
-// Executes a memory request and returns the value in the reply. If the encoder does not execute it, the procedure ends;
-// `step` is the detail of the error.
+// Executes a memory request and returns the value in the reply. Without a valid reply, or if the encoder stays busy too
+// long, the procedure ends; `step` is the detail of every error but busy.
 Part<std::uint8_t> execute(Dialog& dialog, Request request, std::string_view step) {
   const Result<Reply> reply = co_await when_ready(dialog, request);
   if (!reply) co_await dialog.stop(failure(dialog, reply.error(), step));

@@ -303,7 +303,8 @@ struct Protocol {
     if (request.function != function::read) return {};
     return author::position_reading(reply.singleturn, format.bits);
   }
-  /// Returns when the encoder latched the position that answers a request sent at `sent_at`.
+  /// Returns the time for which a position is reported: the end of the request, because the document does not say when
+  /// the encoder latches it.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
   /// Returns whether a second reply must confirm this reply, because its length is in doubt.
   static constexpr bool needs_another(const Format&, const Reply& reply) { return reply.doubtful_size != 0; }
