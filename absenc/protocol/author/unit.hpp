@@ -78,6 +78,7 @@ struct Descriptor {
   template <class F = Format>
   class Decoder final : public FrameDecoder {
    public:
+    /// Compiles the format that the options describe.
     explicit Decoder(const Options& values) : format_(declared.format(values)) {}
     Error decode(Frame request, Frame reply, FieldSink& sink) const override {
       return decode_by(format_, request, reply, sink);

@@ -35,8 +35,8 @@ class NumberList {
   Buffer<char, 96> text_;  // Text of the list; characters that do not fit are dropped.
 };
 
-/// The two characters of a manufacturer as text; a space, a backslash and a byte that is not printable are shown as \x
-/// and two hexadecimal digits.
+/// The two characters of a manufacturer as text; a space, a backslash and a byte that is not printable are shown as a
+/// backslash, x and two hexadecimal digits.
 class MakerName {
  public:
   /// Appends these bytes of the manufacturer registers.

@@ -271,8 +271,8 @@ struct Protocol {
     if (request.letter != letter::samples) return {};
     return to_reading(format.word, decode_position(format, reply.samples)->word, format.scale);
   }
-  /// Returns the time for which a position is reported: `sent_at`, the end of the request, because the document does not
-  /// say when the encoder latches it.
+  /// Returns the time for which a position is reported: `sent_at`, the end of the request. The document does not say
+  /// when the encoder latches it.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
 };
 
