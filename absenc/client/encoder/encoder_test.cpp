@@ -178,6 +178,7 @@ TEST(ClientEncoder, DisconnectedEncoderOpensItsPortForTheNextReading) {
   EXPECT_EQ(encoder.read().singleturn, 7u);
   const std::uint64_t good = encoder.counters().good;
   encoder.disconnect();
+  EXPECT_TRUE(encoder.notes().empty());
   EXPECT_FALSE(encoder.connected());
   EXPECT_EQ(encoder.counters().good, good);
   EXPECT_EQ(encoder.read().singleturn, 7u);
