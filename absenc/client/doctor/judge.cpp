@@ -21,7 +21,7 @@ namespace {
 // delay from which a reply is slow: half of the default latency timer of a USB adapter
 constexpr Time slow = std::chrono::milliseconds(8);
 
-FindingKind ailment_of(const Refusal& refusal) {
+FindingKind kind_of(const Refusal& refusal) {
   using Kind = os::Failure::Kind;
   if (refusal.bus == os::Failure::Bus::off) return FindingKind::can_bus_off;
   if (refusal.bus == os::Failure::Bus::not_acknowledged) return FindingKind::can_not_acknowledged;
@@ -165,7 +165,7 @@ void judge_port(const Case& one, std::vector<Finding>& findings) {
   }
   if (seen.refusal) {
     findings.push_back(
-        finding(ailment_of(*seen.refusal), {seen.refusal->sentence, std::string(action_for(seen.refusal->holder))}));
+        finding(kind_of(*seen.refusal), {seen.refusal->sentence, std::string(action_for(seen.refusal->holder))}));
   }
   if (const auto timer = seen.facts.latency_timer; timer && *timer > 1) {
     const std::string terminal = std::filesystem::path(seen.port).filename();

@@ -131,7 +131,7 @@ Read reading_of(const EncoderAddress& address) {
 }
 
 /// Returns the raised flags that are defects, as bits: all alarms, and status flags with an advice.
-std::uint64_t ailments_of(const Unit& unit, const Reading& reading) {
+std::uint64_t defects_of(const Unit& unit, const Reading& reading) {
   std::uint64_t bits = reading.alarms;
   unsigned at = 0;
   for (const Flags& flags : status_of(unit, reading)) {
@@ -260,7 +260,7 @@ TEST_P(Matrix, WhatTheEncoderReportsIsNeverGood) {
         continue;
       }
       const auto [error, reading, wire] = reading_of(*address);
-      const bool is_reported = error != Error::none || ailments_of(unit(), *reading) != ailments_of(unit(), *usual) ||
+      const bool is_reported = error != Error::none || defects_of(unit(), *reading) != defects_of(unit(), *usual) ||
                                reading->ready != usual->ready ||
                                reading->singleturn_validity() != usual->singleturn_validity() ||
                                reading->multiturn_validity() != usual->multiturn_validity();

@@ -171,7 +171,7 @@ class Attempt {
     using Kind = typename Step<Item>::Kind;
     if (step.kind == Kind::pulse && step.wire == ExtraWire::clear) throw TryEnd::harmful;
     if (talk.patience.is_over(now) && !talk.understood) {
-      talk.understood = is_good(heard_exchange(runner_.last()), talk.options);
+      talk.understood = is_good(observed_exchange(runner_.last()), talk.options);
       if (!talk.understood) throw TryEnd::silent;
     }
     if (step.answer != Time{}) step.answer += allowance_;
@@ -186,7 +186,7 @@ class Attempt {
     });
   }
   void keep_exchange(const LineExchange<Item>& line, Talk& talk) {
-    talk.exchanges.push_back(heard_exchange(line));
+    talk.exchanges.push_back(observed_exchange(line));
     talk.understood = talk.understood || is_good(talk.exchanges.back(), talk.options);
   }
   [[nodiscard]] bool is_good(const ObservedExchange& one, const Options& options) const {

@@ -51,8 +51,8 @@ struct Attempted {
 /// Returns a request and its reply, without echo, as an exchange. `clocks` is the number of clocks of a clocked link.
 /// The last of several received CAN frames is the reply; earlier ones were for other nodes.
 template <class Item>
-[[nodiscard]] capture::ObservedExchange heard_exchange(std::span<const Item> request, std::span<const Item> reply,
-                                                       std::size_t clocks) {
+[[nodiscard]] capture::ObservedExchange observed_exchange(std::span<const Item> request, std::span<const Item> reply,
+                                                          std::size_t clocks) {
   capture::ObservedExchange exchange;
   if constexpr (std::is_same_v<Item, CanFrame>) {
     if (!request.empty()) exchange.request.can = request.front();
@@ -65,8 +65,8 @@ template <class Item>
   return exchange;
 }
 template <class Item>
-[[nodiscard]] capture::ObservedExchange heard_exchange(const LineExchange<Item>& line) {
-  return heard_exchange<Item>(line.request, line.reply(), line.clocks);
+[[nodiscard]] capture::ObservedExchange observed_exchange(const LineExchange<Item>& line) {
+  return observed_exchange<Item>(line.request, line.reply(), line.clocks);
 }
 
 /// Stores the first counter of replies among the fields that a command reports.
@@ -302,7 +302,7 @@ class Runner {
       one.after = line.received_at - line.sent_at;
       one.allowed = line.answer + static_cast<std::int64_t>(received.size()) * character_;
     }
-    one.exchange = heard_exchange<Item>(asked ? line.request : std::span<const Item>{}, reply, line.clocks);
+    one.exchange = observed_exchange<Item>(asked ? line.request : std::span<const Item>{}, reply, line.clocks);
     if constexpr (!is_can) one.raw.assign(received.begin(), received.end());
   }
 
