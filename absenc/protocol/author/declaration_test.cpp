@@ -275,6 +275,12 @@ constexpr Declaration<Toy, Encoder> decoding{
     .decode = [](const Format&, Frame, Frame, FieldSink&) { return Error::line_stuck; },
 };
 
+constexpr Declaration<Toy, Encoder> controlled = [] {
+  Declaration<Toy, Encoder> made = decoding;
+  made.decode_control = [](Frame, Frame, FieldSink&) { return Error::sequence_mismatch; };
+  return made;
+}();
+
 TEST(Declaration, IsKnownByItsMakers) {
   ASSERT_EQ(unit.known_as.size(), 1u);
   EXPECT_EQ(unit.known_as.front(), "maker");
@@ -295,6 +301,13 @@ TEST(Declaration, DecodesByItself) {
   EXPECT_EQ(made.decode(options_with(8), {.bytes = request}, {.bytes = reply}, sink), Error::line_stuck);
   EXPECT_EQ(made.is_answered, nullptr);
   EXPECT_EQ(made.pause, nullptr);
+}
+
+TEST(Declaration, DecodesControlBitsOfFramesWithARequest) {
+  NoFields sink;
+  constexpr Unit made = Descriptor<controlled>::make();
+  EXPECT_EQ(made.decode(options_with(8), {.bytes = request}, {.bytes = reply}, sink), Error::sequence_mismatch);
+  EXPECT_EQ(made.decode(options_with(8), {}, {.bytes = reply}, sink), Error::line_stuck);
 }
 
 }  // namespace
