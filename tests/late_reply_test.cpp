@@ -226,9 +226,9 @@ TEST_P(LateReply, WithRandomDelayNeverAnswersLaterRequest) {
   EXPECT_GT(all.good, all.failed / 10);
 }
 
-/// Reads over a line that stalls for two seconds of every seven. After a stall, all delayed replies arrive, or only the
-/// first if `only_first_arrives`. Returns the outcomes, and in `longest_silence` the longest time between two good
-/// readings.
+/// Reads over a line that stalls for two seconds every seven seconds, first after seven. After a stall, all delayed
+/// replies arrive, or only the first if `only_first_arrives`. Returns the outcomes, and in `longest_silence` the
+/// longest time between two good readings.
 template <class Item>
 Outcomes run_with_stalls(const Kind& kind, bool only_first_arrives, Time& longest_silence) {
   constexpr Time stall = 2s;

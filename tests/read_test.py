@@ -422,7 +422,7 @@ class Termination(EncoderCase):
         result = subprocess.run(["sh", "-c", '"$0" read "tformat:$1?latency=300" >&-', ABSENC, emulator.path],
                                 capture_output=True, text=True, timeout=PATIENCE, check=False)
         self.assert_failed(result, "standard output cannot be written")
-        # The emulator received two position requests of one byte each, and not the text of a reading.
+        # Only the two position requests reached the emulator as requests, and not the text of a reading.
         self.assertIn("absenc: 2 requests answered", emulator.end()[2])
 
 

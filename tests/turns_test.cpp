@@ -104,7 +104,7 @@ class TurningEncoder {
   void pause(Time time) { port_->line().run_until(port_->line().now() + time); }
 
   /// Reads the position once and returns how the unwrapper joined it to the previous one. If it continued, the distance
-  /// must differ from the motion of the shaft by less than half a turn.
+  /// must be that of the motion of the shaft to 0.45 turn, so that no whole turn is lost or added.
   Joined read() {
     const Conversation<Item>* conversation = session_->read(*find_command(*case_.unit, Verb::read), case_.take);
     EXPECT_EQ(text_of(conversation->error()).name, "none") << conversation->detail();

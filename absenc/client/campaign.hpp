@@ -45,7 +45,7 @@ struct CampaignChoices {
 struct CheckWorth {
   unsigned check_bits = 0;     ///< Width of the check in bits; 0: none.
   std::size_t frame_bits = 0;  ///< Length of a reply, in bits.
-  unsigned distance = 0;  ///< Hamming distance of the code: errors of fewer bits are all detected; 0: more than 8 bits.
+  unsigned distance = 0;  ///< Hamming distance of the code: fewer wrong covered bits are all detected; 0: over 8.
   double words = 0;       ///< Number of undetected error patterns of `distance` bits.
   double unseen = 0;      ///< Rate of replies with damage only in covered bits and yet a correct checksum.
   double taken = 0;       ///< Rate of damaged replies that the decoder accepts with a wrong position.
@@ -55,8 +55,8 @@ struct CheckWorth {
 /// Shares of confirmed and of wrong positions, in a campaign with a turning shaft.
 struct Guarded {
   Share confirmed{};  ///< Share of readings whose position a second reading confirmed.
-  /// Share of confirmed readings whose position the shaft did not have when the encoder measured it; excludes readings
-  /// after which the encoder proves to be changed.
+  /// Share of confirmed readings whose position the shaft had at no measurement within 2 ms of their latch time;
+  /// excludes readings after which the encoder proves to be changed.
   Share wrong{};
   Share alone{};  ///< Share of wrong positions, confirmed or not, among the readings that passed every frame check.
   double let_through = 0;  ///< Computed number of wrong positions that pass both frame checks and confirmation.

@@ -31,13 +31,13 @@ struct DecodeChoices {
 };
 
 /// An input range of rows, ordered by the end of their frames. Rows are produced while the file is read, so its size is
-/// unlimited. Other threads decode the file some thousands of rows ahead of the caller.
+/// unlimited. Other threads decode the file up to about 2500 rows ahead of the caller.
 ///
 /// Columns: `time_s` (`tick` in a capture without times), `end_s` (`end_tick`), `kind` ("exchange", "request", "reply",
 /// "noise"), `request` and `reply` (bytes; text for CAN and clocked links, as "1FF:022B" and "0001"), `turnaround_us`,
 /// `angle_deg` (`position_mm` for linear encoders), then each field of the unit under its name, and `error` with
-/// `message`. In a good row `error` is empty, and `message` has only a remark, if any. In a row with an error the
-/// position and the fields are empty.
+/// `message`. In a good row `error` is empty, and `message` has only a remark, if any. The position and the
+/// fields are empty in a row with an error, of noise, or of a frame that is cut off or undocumented.
 ///
 /// If a reply does not carry the alarms, they come from an earlier reply of the same encoder, until a request is
 /// unanswered or clears alarms. Without such a reply, alarms and the position that depends on them are `Unknown`.

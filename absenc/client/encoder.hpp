@@ -50,7 +50,7 @@ struct Sample {
   };
 
   Kind kind = Kind::absent;  ///< Whether this sample holds a reading, a failure or an event.
-  Time at{};                 ///< Time at which the reading was latched, the attempt failed, or the event occurred.
+  Time at{};                 ///< `latched` of the reading, or the time of the failure or of the event.
   Reading reading{};         ///< The reading; default-constructed if `kind` is not `reading`.
   /// Whether a second reading confirmed the position, because the shaft can have moved from one to the other in the
   /// time between them.

@@ -47,7 +47,7 @@ struct MemoryRun {
 /// Returns bytes or words of the unit's memory in hexadecimal, for programs: "005a", "005a1234".
 [[nodiscard]] std::string words_in_json(const Unit& unit, std::span<const std::uint32_t> words);
 
-/// Returns the bytes of `image` as runs in the order of their addresses, each of at most `longest` bytes.
+/// Returns the bytes or words of `image` as runs in the order of their addresses, each of at most `longest` of them.
 [[nodiscard]] std::vector<MemoryRun> runs(const MemoryImage& image, std::size_t longest = SIZE_MAX);
 
 /// Returns all addresses that a dump of the unit's memory contains, each with the value 0.

@@ -42,7 +42,7 @@ class Recording {
   ~Recording();
 
   /// Reads and writes until the settings, Encoder::cancel, end_when or an interrupt end the recording; then flushes to
-  /// the disk. Calls `on_written` with each sample: after its row was written, or at once if it gets no row. If the
+  /// the disk. Calls `on_written` with each sample: after its row was appended, or at once if it gets no row. If the
   /// port is lost, waits until it is open again. Also writes rows for loss and return of the port and for readings that
   /// were due but not taken. Returns whether the last sample was a reading. Throws UsageError, Failure, and os::Failure
   /// from the disk, with kind `lost` if the file was removed, moved, replaced or cut.

@@ -61,8 +61,8 @@ class Settings {
   [[nodiscard]] Answer get(std::string_view name);
   /// Writes the setting `name` without asking the user for confirmation, reads it back, compares all values, and
   /// returns the result. If the setting changes how the encoder is reached, the connection uses the new value from then
-  /// on. Throws Failure if the setting reads back differently, or if the port is lost after a write; its text states
-  /// what is known.
+  /// on. Throws Failure if the setting reads back differently. If the port is lost after a write, throws a Failure
+  /// that lists the values with which the encoder may be left, or the os::Failure if the command reports none.
   SettingChange set(std::string_view name, std::span<const std::int64_t> arguments);
 
  private:

@@ -20,7 +20,7 @@ SEED = int(os.environ.get("ABSENC_ABUSE_SEED", "1"))
 
 
 def harm(random_, path):
-    """Damages the history file and returns a text that names the kind of damage."""
+    """Moves, removes, replaces or damages the history file. Returns a text that names what was done."""
     way = random_.choice(("move", "move all", "remove", "remove all", "replace", "cut off", "overwrite"))
     size = os.path.getsize(path)
     if way.startswith("move"):

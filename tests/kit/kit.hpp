@@ -11,7 +11,8 @@
 namespace absenc::kit {
 
 /// Decodes every vector with `decode` and `frame_end`. A good frame must have the fields of the vector; it must be
-/// refused if cut after any element, with any checked bit flipped, and with a second reply appended.
+/// refused if cut after any element, with any checked bit flipped and, except on CAN and clocked links, with a second
+/// reply appended.
 [[nodiscard]] Findings check_decoding(const Unit& unit);
 
 /// Checks the bit positions that the unit states for the fields of good replies: the bits at these positions must give
@@ -19,9 +20,10 @@ namespace absenc::kit {
 /// clocked links, replies of the virtual encoder.
 [[nodiscard]] Findings check_places(const Unit& unit);
 
-/// Feeds every vector's reply to the commands that send its request: whole, byte by byte, cut after each byte, with
-/// each bit flipped, with garbage before and after it, and twice. It is a finding if no command reads the position of
-/// any vector, or if `encode` refuses a command in every configuration, other than as unsupported.
+/// Feeds every vector's reply to the commands that send its request, as far as the link permits: whole, byte by byte,
+/// cut after each byte, with each checked bit flipped, with garbage before and after it, and twice. It is a finding if
+/// no command reads the position of any vector, or if `encode` refuses a command in every configuration, other than as
+/// unsupported.
 [[nodiscard]] Findings check_hosts(const Unit& unit);
 
 /// Checks that every command, a scan too, ends with `timeout` if no encoder answers; a command that expects no reply

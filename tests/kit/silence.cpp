@@ -34,7 +34,7 @@ void meet_silence(const Unit& unit, const Configuration& configuration, const Co
 
 Findings check_silence(const Unit& unit) {
   Findings findings;
-  // On clocked links the host always reads some level, even without an encoder, so it cannot detect silence.
+  // On clocked and SPI links the host always reads some level, even without an encoder, so it cannot detect silence.
   const bool can_be_silent = unit.link != LinkKind::clocked && unit.link != LinkKind::spi;
   if (!can_be_silent) return findings;
   for (const Configuration& configuration : configurations(unit)) {

@@ -37,7 +37,8 @@ class MeasuredShaft final : public Shaft {
     return {.position = position, .speed_millirpm = seconds > 0 ? static_cast<std::int32_t>(60'000 * speed_) : 0};
   }
 
-  /// Returns whether the reading has a position that the shaft had when the encoder measured it.
+  /// Returns whether the shaft had the reading's position at a stored measurement within 2 ms of the reading's latch
+  /// time.
   [[nodiscard]] bool was_at(const Reading& reading) const { return find(reading) != nullptr; }
   /// Returns the position of the shaft that belongs to the reading; for a wrong reading, the last position measured
   /// until the reading was received, or the oldest stored one.

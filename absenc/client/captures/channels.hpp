@@ -13,7 +13,7 @@
 
 namespace absenc::client {
 
-/// Returns the wires of a link, by the names that --channel accepts.
+/// Returns the names of a link's wires; --channel also accepts other names for them.
 [[nodiscard]] std::span<const std::string_view> wires_of(LinkKind link);
 
 /// The index of the capture's channel for each wire of the link, in the order of `wires_of`; no value for a wire that
@@ -25,7 +25,7 @@ struct WireChannels {
 
 /// Assigns channels by --channel ("D0", "clock=D0"); without it, by the channels' names or, if no name fits, in order
 /// (not on clocked lines and SPI, nor with more channels than wires). Throws UsageError, which lists the channels or
-/// wires, for an unknown name and for a needed wire without a channel.
+/// wires, for an unknown name, for more channels than wires and for a needed wire without a channel.
 [[nodiscard]] WireChannels find_wires(LinkKind link, std::span<const std::string> channels,
                                       std::span<const std::string> wanted);
 

@@ -265,7 +265,7 @@ CaptureOutcome CaptureRun::run_bytes(capture::AnnotationSink& sink, const std::f
   settings.gap = reader_->layout().arrival_gap;
   settings.by_arrival = settings.gap != 0;
   // A log by arrival times may begin inside a frame, because its program may have begun to listen during a frame. Other
-  // captures of bytes begin with a complete frame.
+  // captures of bytes are assumed to begin with a complete frame.
   settings.begins_silent = !settings.by_arrival;
   CaptureOutcome outcome;
   std::unique_ptr<capture::Annotator> annotator;

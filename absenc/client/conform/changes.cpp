@@ -387,7 +387,7 @@ bool ChangeTester::put_back(const Saved& one) {
       interrupted_ = true;
     } catch (const os::Ended&) {
       interrupted_ = true;
-    } catch (const ClauseBroken&) {  // the encoder refused or sent a bad reply: tries again
+    } catch (const ClauseBroken&) {  // a command failed, or a value is not as expected: tries again
     } catch (const std::exception&) {
     }
   }

@@ -25,7 +25,7 @@ struct CommandResult {
   std::uint64_t requests = 0;  // number of requests that the command sent
   bool heard = false;          // whether anything but an echo was received after the last request
   Answer answer{};
-  std::vector<std::uint8_t> data{};  // bytes that the command read from the memory; empty for other commands
+  std::vector<std::uint8_t> data{};  // bytes of the memory that the reply carries; empty if it carries none
   std::optional<Reading> reading{};
 };
 
@@ -57,9 +57,9 @@ struct UnsolicitedFrames {
   }
 };
 
-/// Access to the line, independent of its link. Functions that send or wait throw the exceptions of the port. After the
-/// caller asked the test to end one of them throws os::Interrupted, but only once, so that values can still be
-/// restored.
+/// Access to the line, independent of its link. Functions that send or wait throw the exceptions of the port. When the
+/// caller wants the test to end, the next of these functions throws os::Interrupted, but only once, so that values can
+/// still be restored.
 struct ChangesLine {
   std::function<CommandResult(const Command&, Arguments)> run;
   // sends a request, encoded by Unit::encode, and returns the exchange
@@ -71,7 +71,8 @@ struct ChangesLine {
   std::function<const Options&()> options;  // returns the options with which the encoder is reached now
 };
 
-/// Returns whether the reading has the position `wanted`, in counts, within the noise of a shaft at rest.
+/// Returns whether the reading's position is at most 1/512 turn away from `wanted`, in counts: the noise of a shaft at
+/// rest is assumed to be less.
 [[nodiscard]] bool is_near(const Reading& reading, std::uint64_t wanted);
 
 class ChangeTester {

@@ -33,8 +33,8 @@ inline void conclude(ClauseResult& result, bool kept, std::string evidence) {
 
 /// Returns how many changes of a good exchange the decoder reports as one of `errors`. Changes are a wrong bit, a
 /// missing or additional byte, and the same reply to another request; if none of these is reported, except on clocked
-/// links, a wrong bit with any last byte, of which only the first reported one counts. 0: the unit has no such check
-/// with these options.
+/// links and CAN, a wrong bit with any last byte, of which only the first reported one counts. 0: no change of this
+/// exchange is reported so, as by a unit that has no such check with these options.
 [[nodiscard]] std::size_t detected_changes(const Unit& unit, const Options& options,
                                            const capture::ObservedExchange& good, Errors errors);
 

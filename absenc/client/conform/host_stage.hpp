@@ -26,7 +26,8 @@ class HostStage {
 /// encoder is not polled with these options.
 void require_host(const Unit& unit, const Options& options);
 
-/// Serves the host until the limits of `choices` end the test, and returns the verdicts on the host.
+/// Serves the host until the limits or the function `over` of `choices` end the test, and returns the verdicts on the
+/// host.
 [[nodiscard]] Conformance judge_host(const Unit& unit, HostStage& stage, const ConformHostChoices& choices);
 
 /// Returns `counts` with the counts of the rule about the SPI mode, which only the SPI device can check.

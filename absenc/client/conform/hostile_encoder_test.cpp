@@ -58,7 +58,8 @@ class TapPort final : public Port<Item> {
   Port<Item>& port_;
 };
 
-/// A device that replies to every request, and sends unsolicited frames where an encoder of the unit would.
+/// A device that replies to a request with the items that `next` returns, if any, and sends unsolicited frames where an
+/// encoder of the unit would.
 template <class Item>
 class Stranger final : public Machine<Item> {
  public:

@@ -33,7 +33,7 @@ struct Flaws {
   unsigned stops_at_silence = 0;  // number of missing replies after which the host stops; 0: it never stops
   unsigned stops_at_damage = 0;   // number of damaged replies after which the host stops; 0: it never stops
   unsigned stops_at_refusal = 0;  // number of damaged requests after which the host stops; 0: it never stops
-  Time skipped_wait{};            // longest wait that the host skips; 0: it skips none
+  Time skipped_wait{};            // longest wait in its memory reads that the host skips; 0: none
   std::vector<HostStep> sends{};
   // Defects of an SPI controller:
   Time too_early_by{};     // time by which each transfer begins too early
@@ -156,7 +156,7 @@ class Host {
     for (unsigned i = 0; i < most; ++i) {
       set_fault(trial.look(seen()));
       send(next());
-      listen(std::chrono::milliseconds(25));  // a wait longer than the slowest reply of any encoder
+      listen(std::chrono::milliseconds(25));  // a wait longer than the slowest reply of any virtual encoder
     }
     trial.look(seen());
     return trial.judge();

@@ -43,7 +43,7 @@ class RequestWatch final : public Machine<Item> {
 
  private:
   using Kind = typename Event<Item>::Kind;
-  static constexpr int most_in_reply = 24;  // longest reply of an encoder, in characters
+  static constexpr int most_in_reply = 24;  // limit that no half-duplex reply exceeds, in characters
 
   void look(const Event<Item>& event) {
     if (unit_.link == LinkKind::clocked) {

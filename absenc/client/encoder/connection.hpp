@@ -42,10 +42,10 @@ class Connection {
   virtual void connect() = 0;
   virtual void disconnect() = 0;
   [[nodiscard]] virtual bool connected() const = 0;
-  /// Returns hints on how to improve the port's settings, one sentence each.
+  /// Returns hints on how to improve the port's settings, one sentence each; none while the connection is not open.
   [[nodiscard]] virtual const std::vector<std::string>& notes() const = 0;
 
-  // `notes`, `read`, `run`, `trouble`, `lend` and `now` require an open connection. `read` and `run` throw the
+  // `read`, `run`, `trouble`, `lend` and `now` require an open connection. `read` and `run` throw the
   // exceptions of the port, and UsageError if the unit cannot run the command with these options.
 
   /// Reads the position with all alarms that the unit reports, or runs the command that the address names instead.
@@ -66,7 +66,7 @@ class Connection {
   virtual void report_left(FieldSink& sink) const = 0;
   /// Returns a description of the failure `outcome`, which must be the last outcome.
   [[nodiscard]] virtual Trouble trouble(const Outcome& outcome) const = 0;
-  /// Returns the interval, by the port's clock, in which the encoder latched the last position.
+  /// Returns the computed bounds, by the port's clock, of the time at which the encoder latched the last position.
   [[nodiscard]] virtual host::LatchTime latch_time() const = 0;
   /// Returns whether the last position was compared with another one and the fastest shaft can have moved between them.
   [[nodiscard]] virtual bool confirmed() const = 0;

@@ -274,7 +274,7 @@ TEST(ClientEncoder, APositionThatNoShaftReachesIsReadAgain) {
 }
 
 TEST(ClientEncoder, AZeroThatWasMovedIsAJump) {
-  // Nine turns take minutes of simulated time, whatever the speed of this computer.
+  // At 6 rpm nine turns take 90 s of simulated time, whatever the speed of this computer.
   Encoder encoder = open("sim:tformat?multiturn=9&max_rpm=6");
   EXPECT_EQ(encoder.next().position, 9 << 17);
   static_cast<void>(encoder.run("reset-multiturn"));

@@ -11,9 +11,9 @@
 
 namespace absenc::client {
 
-/// Returns the bounds for a requested reading: the encoder latches between the end of the request and the beginning of
-/// its reply. `character` is the duration of a character on the line; 0 if it is unknown, or if bytes take no time. A
-/// constant delay between request and latching that the document states is ignored.
+/// Returns the bounds for a requested reading. Assumes that the encoder latches between the end of the request, or
+/// `latched` if that is earlier, and the beginning of its reply. `character` is the duration of a character; 0 if it is
+/// unknown, or if bytes take no time. Ignores a constant delay between request and latching that the document states.
 template <class Item>
 [[nodiscard]] host::LatchTime asked_latch_time(const LineExchange<Item>& exchange, Time latched, Time character) {
   // If the host clocks the encoder, or an earlier request triggered it, the encoder latches before the end of the
@@ -26,9 +26,9 @@ template <class Item>
   return {earliest, std::max(earliest, exchange.received_at - reply)};
 }
 
-/// Bounds for readings that an encoder sends unsolicited, from the spread of their arrivals. A reading was not latched
-/// before the previous reading arrived, unless the previous reading was delayed itself. The delay of a reading is at
-/// most the sum by which pauses of this second and the one before exceeded 5/4 of the usual pause.
+/// Estimates bounds for readings that an encoder sends unsolicited, from the spread of their arrivals. Assumes that a
+/// reading is not latched before the previous reading arrived, unless the previous reading was delayed itself, and that
+/// the delay is at most the sum by which pauses of this second and the one before exceeded 5/4 of the usual pause.
 class ArrivalSpread {
  public:
   /// Adds the arrival of the next reading. No byte had arrived until `nothing_until`.

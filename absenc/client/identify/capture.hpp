@@ -13,12 +13,12 @@ namespace absenc::client {
 
 struct CaptureFindings {
   std::vector<Candidate> candidates{};
-  std::vector<std::string> damages{};   // damage in the part of the capture that was read, each kind once
+  std::vector<std::string> damages{};   // damage of the capture, if a protocol read all of it; each once
   std::vector<std::string> refusals{};  // reasons why protocols could not be tried, each once
 };
 
-/// Decodes the capture with each protocol until the evidence suffices, and returns the candidates, and the reasons why
-/// protocols could not be tried. Throws os::Interrupted and the exceptions of `progress`.
+/// Decodes the capture with each protocol until the evidence suffices, and returns the candidates, the damage of the
+/// capture and the reasons why protocols could not be tried. Throws os::Interrupted and the exceptions of `progress`.
 [[nodiscard]] CaptureFindings search_capture(const CaptureChoices& choices,
                                              const std::function<void(const std::string&)>& progress);
 

@@ -234,8 +234,8 @@ class Search {
     if (one.cut() && settings == search_.settings) cut_.push_back(&unit);
   }
 
-  // Listens once for all units with these line settings. Returns whether an encoder sends all the time, so that no
-  // request would be received.
+  // Listens once for all units with these line settings. Returns whether at least `busy_line` bytes were received, so
+  // that no request must be sent; false on CAN.
   template <class Item>
   bool listen(Attempt<Item>& attempt, const Unit& unit) {
     const LineSettings& line = attempt.line();
@@ -290,8 +290,8 @@ class Search {
     }
   }
 
-  // Removes candidates with the same options as a likelier one, and candidates from unsolicited frames if an encoder of
-  // the same unit replies to requests and all its replies are explained.
+  // Removes candidates with the same unit and options as a likelier one, and candidates from unsolicited frames if an
+  // encoder of the same unit replies to requests and all its replies are explained.
   void drop_repeated() {
     std::vector<Candidate> kept;
     for (const Candidate& one : findings_.candidates) {

@@ -17,8 +17,8 @@ class MemoryFile {
   MemoryFile(const std::string& path, std::string_view protocol, std::string_view model);
 
   /// Fills `memory` from the file, or creates the file from `memory` if there is none, and locks the file. Throws
-  /// Failure, and changes neither memory nor file, if the file is of another kind, damaged, of another model or size,
-  /// locked by another emulator, or not writable.
+  /// Failure, and changes neither memory nor file, if the file is of another kind, damaged, of another protocol, model
+  /// or size, locked by another emulator, or not writable.
   void load(MutableBytes memory);
 
   /// Replaces the content of the loaded file atomically. Throws Failure.

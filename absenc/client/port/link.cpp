@@ -118,8 +118,8 @@ Link open_slcan(const EncoderAddress& uri) {
 }
 
 // Returns the CAN log file of a link. After a loss of the port the log continues in the same file. Throws os::Failure
-// if another link uses the file, because a file that exists is not created again. The caller must hold the lock of
-// connect_link.
+// if another link uses the file, because a file that exists is not created again. Takes no
+// lock: connect_link calls this under its own, and other callers of open_link must not run at the same time.
 std::shared_ptr<os::LineFile> log_file(const std::string& path) {
   static std::map<std::string, std::shared_ptr<os::LineFile>> files;
   std::shared_ptr<os::LineFile>& file = files[path];

@@ -25,7 +25,7 @@ struct Link {
 
 /// Opens the port of the address and returns it. Throws os::Failure, UsageError.
 [[nodiscard]] Link open_link(const EncoderAddress& uri);
-/// Opens a serial port or a TCP connection for reading only, and returns it with `bytes` set. Throws os::Failure,
+/// Opens a serial port for receiving only, or a TCP connection, and returns it with `bytes` set. Throws os::Failure,
 /// UsageError.
 [[nodiscard]] Link open_receiving(const EncoderAddress& uri);
 /// A function that replaces open_link, used by tests.

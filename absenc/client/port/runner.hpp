@@ -49,7 +49,7 @@ struct Attempted {
 };
 
 /// Returns a request and its reply, without echo, as an exchange. `clocks` is the number of clocks of a clocked link.
-/// The last of several received CAN frames is the reply; earlier ones were for other nodes.
+/// Takes the last of several received CAN frames for the reply, and the earlier ones for frames of other nodes.
 template <class Item>
 [[nodiscard]] capture::ObservedExchange observed_exchange(std::span<const Item> request, std::span<const Item> reply,
                                                           std::size_t clocks) {
@@ -89,9 +89,9 @@ struct Series {
   std::size_t count = 0;
   Time limit = never;                       // longest duration of the series
   Time patience = std::chrono::seconds(2);  // longest time without a good reply
-  std::size_t most_silent = 8;              // number of runs without any received byte after which the series ends
+  std::size_t most_silent = 8;              // number of runs after which the series ends if none received anything
   Time least{};                             // shortest time before `most_silent` can end the series
-  std::size_t most_bad = 24;                // number of runs without a good reply after which the series ends
+  std::size_t most_bad = 24;                // number of runs after which the series ends if none got a good reply
 };
 
 template <class Item>

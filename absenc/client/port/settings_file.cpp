@@ -132,8 +132,8 @@ class SettingsFileReader {
   std::string path_;
 };
 
-// Returns the index of the last character of the string that begins at `at`; if the string does not end, the length of
-// the text.
+// Returns the index of the last closing quote of the string that begins at `at`, or of the line feed that ends an
+// unclosed string of one line; otherwise the length of the text.
 std::size_t end_of_string(std::string_view text, std::size_t at) {
   const char quote = text[at];
   const bool lines = text.substr(at).starts_with(std::string(3, quote));

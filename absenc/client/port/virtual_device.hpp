@@ -62,7 +62,7 @@ class VirtualDevice {
   /// Sets the object that counts how often rules are checked and broken, which must outlive the device; null: none.
   void watch_rules(RuleWatch* watch);
 
-  /// Sets the rates of all faults, from the next reply on. Requires `faults_may_come`, or faults at the start.
+  /// Sets the rates of all faults from now on. Requires `faults_may_come`, or faults at the start.
   void set_faults(const sim::FaultRates& rates);
   [[nodiscard]] const sim::FaultRates& fault_rates() const { return rates_; }
 

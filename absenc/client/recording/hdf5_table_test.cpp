@@ -60,7 +60,8 @@ Hdf5Rows rows_from(std::int64_t first, std::int64_t count) {
   return rows;
 }
 
-/// Returns the number of rows of a dataset; -1 if the dataset cannot be opened or has other values than those written.
+/// Returns the number of rows of a dataset; -1 if the file or the dataset cannot be opened or read, or if it has other
+/// values than those written.
 template <class T>
 std::int64_t whole_rows(const fs::path& path, const char* name, hid_t type, T (*expected)(std::int64_t)) {
   const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);

@@ -17,7 +17,7 @@ using namespace std::chrono_literals;
 Receiver::Receiver(const EncoderAddress& uri) : link_(open_receiving(uri)), place_(link_.place) {}
 
 Receiver::Receiver() : place_("standard input") {
-  link_.latency = 20ms;  // delay of a pipe between two programs on a busy computer
+  link_.latency = 20ms;  // assumed delay of a pipe between two programs on a busy computer
 }
 
 Receiver::~Receiver() { cancel(); }

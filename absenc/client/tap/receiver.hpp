@@ -57,9 +57,9 @@ class Receiver {
   /// Returns the port in words, "/dev/ttyUSB0 at 2500000 baud".
   [[nodiscard]] const std::string& place() const { return place_; }
   [[nodiscard]] const std::vector<std::string>& notes() const { return link_.notes; }
-  /// Returns the greatest delay of a byte on its way to this program.
+  /// Returns the configured or assumed greatest delay of a byte on its way to this program.
   [[nodiscard]] Time latency() const { return link_.latency; }
-  /// Returns a time of silence that occurs neither inside a frame nor before a reply.
+  /// Returns a time of silence that is assumed to occur neither inside a frame nor before a reply.
   [[nodiscard]] Time quiet() const;
 
  private:

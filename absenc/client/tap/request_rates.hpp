@@ -75,8 +75,8 @@ class RequestRates final : public capture::AnnotationSink {
     bool varies;  // whether the command has arguments, which change its request
   };
 
-  // Returns the command of a request; "" if there is none. Requests of a command with arguments begin with the same
-  // byte and have the same length.
+  // Returns the command of a request; "" if there is none. Assumes that all requests of a command with arguments begin
+  // with the same byte and have the same length.
   [[nodiscard]] std::string_view command_of(Bytes request) const {
     for (const SampleRequest& one : samples_) {
       if (std::equal(one.bytes.begin(), one.bytes.end(), request.begin(), request.end())) return one.command;

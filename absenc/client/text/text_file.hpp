@@ -14,7 +14,7 @@ inline constexpr std::string_view memory_file_title = "absenc memory 1";  // mem
 inline constexpr std::string_view dump_title = "absenc dump 1";           // dump: copy of the memory of an encoder
 
 /// Returns the content of a file. Throws Failure, whose text begins with `what` and the path, if the file cannot be
-/// read or has more than 16 MiB.
+/// read or has more than about 16 MiB.
 [[nodiscard]] std::string read_text_file(std::string_view what, const std::string& path);
 
 /// Returns the path at the end of a chain of symbolic links, even if that file does not exist.
