@@ -120,7 +120,7 @@ class Axis {
 alignas(Axis) std::byte axis_memory[sizeof(Axis)];
 Axis* axis = nullptr;
 
-// Checks each reading against the expected position, and counts the readings.
+// Checks each confirmed reading against the expected position, and counts all readings by their result.
 class ReadingCheck {
  public:
   ReadingCheck(std::uint32_t singleturn, std::uint32_t multiturn) : singleturn_(singleturn), multiturn_(multiturn) {}

@@ -12,7 +12,7 @@ using namespace std::chrono_literals;
 
 // Silence that is required before the same request is sent again, in timeouts.
 constexpr int silent_timeouts = 4;
-// Longest usual lateness of a reply: only lines that delay every reply exceed it.
+// Longest lateness of a reply that is assumed to be usual: only lines that delay every reply are expected to exceed it.
 constexpr Time longest_silence = 2500ms;
 // Least silence after which the replies that a stalled line delayed count as lost.
 constexpr Time stall_silence = 500ms;

@@ -255,7 +255,7 @@ class Session {
       ++counters_.errors[static_cast<std::size_t>(error)];
       if (error == Error::timeout) doubt();  // after a timeout the encoder may have been switched off
       if (number >= attempts || error == Error::invalid_argument || error == Error::not_still) return conversation;
-      // The reply was late, and that of another attempt would be, too.
+      // A reply was late, and that of another attempt would most likely be, too.
       if (error == Error::timeout && late() != late_before) return conversation;
       ++counters_.repeated;
     }

@@ -15,7 +15,8 @@ struct SpeedLimit {
   /// Speed limit of rotary encoders in revolutions per minute. Default: the specified speed of the fastest supported
   /// encoders.
   std::uint32_t rpm = 10'000;
-  std::uint32_t mm_s = 20'000;  ///< speed limit of linear encoders in mm/s; no linear axis is faster than the default
+  /// Speed limit of linear encoders in mm/s. Default: no linear axis is assumed to be faster.
+  std::uint32_t mm_s = 20'000;
 };
 
 /// Multiple of the speed limit up to which a movement is too fast, but no jump.

@@ -167,8 +167,8 @@ std::size_t EmulatorPort::read_some(MutableBytes into, std::span<const int> read
 // Returns how long received bytes may have waited before this thread read them, because this thread could not run. On a
 // busy machine a ready thread may wait for milliseconds. A host that times out and repeats its request meanwhile has
 // broken no rule, although both requests arrive at once. Kernel threads that carry the bytes of pseudo-terminals wait
-// as well, at other times, so the longest delay of the last second is used. The delay is read at most every 0.5 ms,
-// because shorter delays do not matter.
+// as well, at other times, so a delay is used for one second, or until a longer one is read. The delay is read at most
+// every 0.5 ms, because shorter delays do not matter.
 Time EmulatorPort::lateness() {
   const Time now = os::now();
   if (now < delay_read_at_ + 500us) return lateness_;

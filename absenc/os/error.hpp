@@ -42,7 +42,8 @@ class Failure : public std::runtime_error {
   [[nodiscard]] Kind kind() const { return kind_; }
   /// Returns the state of the CAN bus that caused the failure; `unknown` if no such state did.
   [[nodiscard]] Bus bus() const { return bus_; }
-  /// Returns the kind of program that holds the port; `unknown` if the failure is not `in_use`.
+  /// Returns the kind of program that holds the port; `unknown` if the failure is not `in_use` or the program was not
+  /// found.
   [[nodiscard]] Holder holder() const { return holder_; }
 
  private:

@@ -26,8 +26,8 @@ class OutputFile {
  protected:
   enum class Appears : std::uint8_t { at_once, later };
 
-  /// Creates the file at `path`. Throws Failure: `in_use` if a file exists there, `no_permission`, `not_found`,
-  /// `system`.
+  /// Creates the file at `path`; with `later` it gets this name from BlockFile::appear. Throws Failure: `in_use` if a
+  /// file exists there, `no_permission`, `not_found`, `system`.
   OutputFile(const std::string& path, Appears appears);
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;

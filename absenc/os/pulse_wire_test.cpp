@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests requests for RTS, DTR and GPIO lines with a test replacement of the kernel.
+// Tests requests for RTS, DTR and GPIO lines, mostly with a test replacement of the kernel.
 #include "absenc/os/pulse_wire.hpp"
 
 #include <gtest/gtest.h>

@@ -18,7 +18,7 @@ namespace absenc::os {
 /// Selects the component that switches an RS-485 transceiver to sending.
 enum class Rs485 : std::uint8_t {
   // Automatic (half-duplex lines): the kernel switches with RTS if the port supports it and RTS carries no pulses,
-  // otherwise the adapter switches by itself.
+  // otherwise the adapter must switch by itself.
   automatic,
   on,   // the kernel switches; throws `unsupported` if the port cannot do it
   off,  // the kernel never switches; for full-duplex lines
@@ -33,7 +33,8 @@ enum class SerialUse : std::uint8_t {
 /// Returns whether `path` is a pseudo-terminal, where characters take no time and every rate works.
 [[nodiscard]] bool is_pseudo_terminal(const std::string& path);
 
-/// A serial port in raw mode with 8 data bits, locked against other programs. Closing restores the previous settings.
+/// A serial port in raw mode with up to 8 data bits, locked against other programs. Closing restores the previous
+/// settings.
 class SerialPort final : public DescriptorPort {
  public:
   /// Discards bytes received before. Throws Failure; `bad_rate` if the port's nearest rate differs by more than 1 %. A

@@ -37,8 +37,8 @@ std::optional<LineSettings> set_terminal(int descriptor, const LineSettings& set
 }
 
 /// Returns the rate to propose when the driver gave another rate than `requested`: `given`, or the nearest rate that
-/// divides `base` (0: unknown), the input clock of its baud generator. Drivers do not propose it: they fall back to
-/// 9600 instead of the nearest rate.
+/// divides `base` (0: unknown), the input clock of its baud generator. Some drivers do not give it but fall back to
+/// 9600.
 [[nodiscard]] constexpr std::uint32_t nearest_rate(std::uint32_t requested, std::uint32_t given, std::uint32_t base) {
   const auto distance = [requested](std::uint32_t rate) {
     return rate > requested ? rate - requested : requested - rate;

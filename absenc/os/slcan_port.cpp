@@ -33,7 +33,7 @@ void SlcanLine::collect(Time deadline) {
   received_any_ = false;
   deadline = reach(bytes_->now()) ? Time{} : std::min(deadline, due());
   // If the deadline is past, all available bytes are read, in at most `most_reads` reads; otherwise the reads end after
-  // the first event.
+  // the first one that completes a line.
   const bool everything = deadline <= bytes_->now();
   for (unsigned reads = 0; reads < most_reads && (everything || !received_any_); ++reads) {
     const Time now = bytes_->now();

@@ -47,7 +47,7 @@ class Spidev {
   explicit Spidev(SpiDevice& device);
 
   void open() { ++users_; }
-  /// Closes the device; the last close resets the speed.
+  /// Closes the device for one program; the close of the last program resets the controller's speed.
   void close();
 
   /// Handles an ioctl. `in` is the content of the memory ranges `in` that the last SpidevReply requested, empty at

@@ -138,7 +138,7 @@ std::size_t DescriptorPort::read_some(MutableBytes into, std::span<const int>) {
 }
 
 void DescriptorPort::write_all(Bytes bytes) {
-  // Patience for a peer that reads nothing: longer than the slowest line needs to send a full buffer.
+  // Longest time without room for any byte, after which the peer counts as one that reads nothing.
   constexpr Time patience = 3s;
   for (;;) {
     const ssize_t size = write_some(bytes);

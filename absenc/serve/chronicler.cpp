@@ -16,7 +16,7 @@ namespace {
 
 constexpr Time trim_interval = std::chrono::seconds(60);
 
-// Returns a duration as rounded text: "400 days", "1.5 hours".
+// Returns a duration as rounded text: "400 days", "2.5 hours".
 std::string rough_duration(std::int64_t ms) {
   struct Measure {
     double ms;

@@ -24,7 +24,7 @@ constexpr std::size_t most_in_frame = 4096;
 constexpr Time time_to_start = 10s;
 // Longest silence of the MQTT client process, which sends a sign of life each second.
 constexpr Time longest_silence = 10s;
-// Time for the MQTT client process to disconnect from the broker, or to end after a signal.
+// Time for the MQTT client process to disconnect from the broker, or to end after its channel was closed.
 constexpr Time time_to_end = 500ms;
 
 // Replaces characters that are not printable ASCII: the text may come from the broker.

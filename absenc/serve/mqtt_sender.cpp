@@ -21,7 +21,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr std::size_t most_messages_out = 500;  // greatest number of messages without acknowledgement
+constexpr std::size_t most_messages_out = 500;  // greatest number of spooled messages without acknowledgement
 constexpr Time one_wait = 20ms;
 constexpr Time state_interval = 200ms;
 constexpr Time many_state_interval = 1s;  // time between two publications of the states, with more than `many` encoders

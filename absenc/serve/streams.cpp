@@ -20,7 +20,7 @@ Stream::Text event_text(std::string_view event, const client::Json& data) {
 
 std::shared_ptr<Stream> Streams::open(const std::string& trace, const std::string& peer) {
   auto stream = std::make_shared<Stream>("text/event-stream");
-  // This text makes a browser reconnect one second after it lost the stream.
+  // This text makes the EventSource of a browser reconnect one second after it lost the stream.
   stream->push(std::make_shared<const std::string>("retry: 1000\n\n"));
   const std::lock_guard lock(mutex_);
   if (!make_room(peer)) return nullptr;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The base with which the other readers are compared, a program without a reader: start-up, output, and the three C
-// library functions that every compiler calls.
+// The base with which the other readers are compared, a program without a reader: start-up, output, and three C library
+// functions that compilers call by themselves.
 #include <cstring>
 
 #include "firmware/readers/reader.hpp"

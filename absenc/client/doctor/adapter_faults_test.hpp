@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Faults for tests of doctor, each with its expected finding, including those of adapters and of other encoders.
+// Faults for tests of doctor, each with its expected finding: those of adapters and those of other encoders.
 #pragma once
 
 #include <functional>
@@ -10,7 +10,7 @@
 
 namespace absenc::client {
 
-/// An expected finding, and a function that examines an encoder with the fault that causes the finding.
+/// An expected finding, and a function that returns an examination with the fault that causes it.
 struct Fault {
   std::string id;
   std::function<Examination()> examine;

@@ -13,12 +13,11 @@ bool has_characters(const Case& one) {
   return one.unit.link == LinkKind::half_duplex || one.unit.link == LinkKind::full_duplex;
 }
 
-// Returns whether flipping any single bit of the reply makes the reply good.
+// Returns whether the reply becomes good if one of its bits, whichever it is, is flipped.
 bool is_mended(const Case& one, const Frame& request, std::vector<std::uint8_t> bytes, std::size_t bits) {
   const std::size_t count = bits != 0 ? bits : bytes.size() * 8;
   for (std::size_t bit = 0; bit < count; ++bit) {
-    // Numbers bits from the least significant, on clocked links too: the order does not matter, because all bits are
-    // tried.
+    // Numbers the bits of each byte from the most significant one, which is the first of a frame of bits.
     bytes[bit / 8] ^= static_cast<std::uint8_t>(0x80u >> (bit % 8));
     const bool is_good = decodes(one, request, {.bytes = bytes, .bits = bits});
     bytes[bit / 8] ^= static_cast<std::uint8_t>(0x80u >> (bit % 8));
@@ -47,8 +46,8 @@ bool has_good_part(const Case& one, const Attempted& attempt) {
       is_frame(raw.subspan(sent.size()))) {
     return true;
   }
-  // Looks for two good frames, or for a good frame after more than half of another frame, which is then a damaged reply
-  // and not noise.
+  // Looks for two good frames, or for one good frame at the beginning or the end that has at least two thirds of all
+  // bytes. More bytes beside a single good frame are a damaged reply and not noise.
   for (std::size_t size = 2; size < raw.size(); ++size) {
     const bool is_long = size * 3 >= raw.size() * 2;
     if (is_long ? is_frame(raw.first(size)) || is_frame(raw.last(size))

@@ -33,22 +33,22 @@ template <class Is>
 /// characters.
 [[nodiscard]] bool is_cut(const Case& one, const Attempted& attempt);
 
-/// Returns how many of the first 24 damaged replies become good if one bit is flipped. Returns 0 if there are fewer
-/// than five, on CAN, or if random replies of the same length become good about as often, because a short checksum
-/// accepts many by chance.
+/// Returns how many of the first 24 damaged replies become good if one bit is flipped. Returns 0 on CAN, for fewer than
+/// five replies, and if the number is not above an eighth of them plus twice the number of random replies of the same
+/// length that become good, because a short checksum accepts many by chance.
 [[nodiscard]] std::size_t mended_by_one_bit(const Case& one, const All& all);
 
 /// Finds a change of bytes that an adapter, a driver or a device server made to nearly all these damaged replies, or
-/// bytes that it added to the good replies of the examination. Undoing the change makes far more replies good than
-/// chance would. Returns nothing if no change explains the replies. Only for lines of characters.
+/// bytes that it added to, or 8th bits that it removed from, the good replies of the examination. Returns nothing if no
+/// change explains the replies, or if chance may do so. Only for lines of characters.
 [[nodiscard]] std::optional<Finding> damage_by_adapter(const Case& one, const All& all);
 
-/// Finds text of a modem, a console or a GPS receiver in the bytes: a word such as "login:" or "NO CARRIER", or lines
-/// of printable characters, unless the unit's own replies are text. Otherwise returns nothing.
+/// Finds text of a modem, a console or a GPS receiver in the bytes: a word such as "login:" or "NO CARRIER", or, if the
+/// unit's own replies are not text, lines of printable characters. Otherwise returns nothing.
 [[nodiscard]] std::optional<Finding> text_of_others(const Case& one, Bytes bytes);
 
-/// Finds another model or other options of the unit with which nearly all these damaged replies are good. Returns
-/// nothing if there are none, or fewer than four replies.
+/// Finds another model or other options of the unit with which at least 9 of 10 of the first 32 of these replies are
+/// good. Returns nothing if there are none, if chance may be the reason, or if there are fewer than four replies.
 [[nodiscard]] std::optional<Finding> other_settings(const Case& one, const All& all);
 
 /// Returns the settings ("model=23-bit") that change the options `now` into `wanted`; empty if both are equal.
@@ -58,8 +58,8 @@ template <class Is>
 /// Returns options as the settings that give them, "model=23-bit", or "the usual settings".
 [[nodiscard]] std::string said_settings(const Unit& unit, const Options& options);
 
-/// Finds a checksum of another kind than the unit's that is right in all these damaged replies; nothing if there is
-/// none.
+/// Finds a checksum of another kind than the unit's that is right in all these damaged replies. Returns nothing if
+/// there is none, or if less than 80 % of the replies have the error bad_checksum.
 [[nodiscard]] std::optional<Finding> other_checksum(const Case& one, const All& all);
 
 }  // namespace absenc::client

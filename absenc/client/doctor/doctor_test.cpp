@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that doctor names each fault, and that healthy encoders give no finding at any timing.
+// Checks that doctor names each fault, and that healthy encoders give no finding with random pauses between readings.
 #include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 
@@ -252,7 +252,8 @@ std::vector<Fault> other_faults() {
   return faults;
 }
 
-/// Returns faults of replies that are cut, have bytes before them, or refuse the request.
+/// Returns faults of replies that are cut, have bytes before them, contradict their request or refuse it, and faults
+/// that good or late replies show.
 std::vector<Fault> partial_faults() {
   std::vector<Fault> faults;
   faults.push_back({"extra_bytes", [] {
@@ -358,7 +359,8 @@ TEST(Doctor, FindingsSayWhatHelps) {
 
 // ---- Healthy encoders
 
-/// Examines all units with random pauses between readings; every second encoder turns.
+/// Examines all units that have a command `read`, with random pauses between readings; about every second encoder
+/// turns.
 TEST(Doctor, AThousandHealthyEncodersGiveNoFinding) {
   std::mt19937_64 random(16);
   std::size_t runs = 0;
@@ -388,7 +390,7 @@ TEST(Doctor, AFlickeringLastBitIsNoNoise) {
   EXPECT_THAT(ids(judged(positions([](std::size_t i) { return i * i / 3 + i; }))), IsEmpty());
 }
 
-/// Ends the examination early: while it listens, while it reads, and while it tries other rates.
+/// Ends the examination after 0, 1, 3, 10 or 60 polls of `over`, with an encoder that replies and on a silent line.
 TEST(Doctor, EndsAsSoonAsItIsToldTo) {
   for (const bool answers : {true, false}) {
     const auto open = [&](const EncoderAddress&) {

@@ -31,7 +31,8 @@ TEST(Doctor, FailuresThatComeAndGoAreToldWithTheirPeriod) {
   EXPECT_THAT(ids(any), Not(Contains("comes_and_goes")));
 }
 
-/// The user turns the shaft by hand; the number of turns changes where the position passes zero.
+/// The user turns the shaft by hand: by several turns, which change where the position passes zero, and by less than
+/// one.
 TEST(Doctor, AShaftThatFollowsTheHandGivesNoFinding) {
   const auto place = [](std::size_t i) { return i * hand_counts; };
   EXPECT_THAT(ids(judged(turned_by_hand(
@@ -39,11 +40,11 @@ TEST(Doctor, AShaftThatFollowsTheHandGivesNoFinding) {
               IsEmpty());
   const auto less_than_a_turn = [](std::size_t i) {
     return i * 600;
-  };  // 200 readings cover 120 000 of the 131 072 counts of a turn
+  };  // 200 readings cover 119 400 of the 131 072 counts of a turn
   EXPECT_THAT(ids(judged(turned_by_hand(less_than_a_turn, [](std::size_t) { return 3; }))), IsEmpty());
 }
 
-/// A reply that is late by no more than this computer's own wake-up delay is no evidence against the encoder.
+/// Single replies that are late by no more than this computer's own wake-up delay are no evidence against the encoder.
 TEST(Doctor, ALatenessOfThisComputerIsNotTheEncoders) {
   Observations seen = positions([](std::size_t) { return 5; });
   for (Attempted& one : seen.readings) one.limit = 3ms;
@@ -63,7 +64,8 @@ TEST(Doctor, ALatenessOfThisComputerIsNotTheEncoders) {
   EXPECT_THAT(ids(judged(seen)), Contains("reply_late"));
 }
 
-/// On a busy computer, late replies in less than 0.1 % of the readings are no finding; on an idle one they are.
+/// On a busy computer, late or missing replies in less than 0.1 % of the readings are no finding; on an idle one they
+/// are.
 TEST(Doctor, FewOfThousandsMayBeABusyComputer) {
   Observations seen = positions([](std::size_t) { return 5; });
   const std::vector<Attempted> some = seen.readings;
@@ -88,8 +90,8 @@ TEST(Doctor, FewOfThousandsMayBeABusyComputer) {
   }
 }
 
-/// On a busy computer one failure among 200 readings is no finding. On an idle one, or among three readings, it is a
-/// finding.
+/// On a busy computer one missing reply, or one late reply before the next, among 200 readings is no finding. On an
+/// idle one, or among three readings, it is a finding.
 TEST(Doctor, OneOfManyMayBeABusyComputer) {
   const auto with_one = [](std::size_t count, const Attempted& failed) {
     Observations seen = positions([](std::size_t) { return 5; });
@@ -122,7 +124,7 @@ TEST(Doctor, OneOfManyMayBeABusyComputer) {
   EXPECT_THAT(ids(judged(busy)), Contains("extra_bytes"));
 }
 
-/// Examines two failures among 300 readings with a timeout of 300 ms: a computer that stood still for 300 ms explains
+/// Judges two failures among 300 readings with a timeout of 300 ms: a computer that stood still for 300 ms explains
 /// them, a third failure it does not.
 TEST(Doctor, AComputerThatStoodStillExplainsSilence) {
   Observations seen = positions([](std::size_t) { return 5; });
@@ -145,7 +147,7 @@ TEST(Doctor, AComputerThatStoodStillExplainsSilence) {
 TEST(Doctor, APositionThatThisComputerTookLateIsNoJump) {
   Observations seen = positions([](std::size_t i) { return i * 20; });
   for (std::size_t i = 100; i < 150; ++i)
-    seen.readings[i].reading->latched += 49ms;  // frames 100 to 149 arrive together with the frame 150
+    seen.readings[i].reading->latched += 49ms;  // frames 100 to 149 arrive together, 149 ms after frame 0
   for (std::size_t i = 101; i < 150; ++i) {
     seen.readings[i].reading->latched = seen.readings[100].reading->latched + static_cast<std::int64_t>(i) * 1us;
   }

@@ -30,7 +30,7 @@ constexpr std::size_t first_readings =
 constexpr std::size_t trial_readings = 5;  // number of readings with each setting per turn of the comparison
 constexpr unsigned trial_turns = 2;
 constexpr Time trial_limit = std::chrono::milliseconds(500);
-constexpr Time models_limit = std::chrono::seconds(3);  // time limit for trying all models
+constexpr Time models_limit = std::chrono::seconds(3);  // time limit of first readings with other models and options
 constexpr Time addresses_limit = std::chrono::seconds(4);
 constexpr Time identify_limit = std::chrono::seconds(10);
 
@@ -99,7 +99,6 @@ class Doctor {
       seen_.port = address_.path;
       seen_.facts = surroundings_.facts(address_.path);
     }
-    // Skips a setting that the controller does not support, because other settings may help.
     if (address_.unit->link == LinkKind::can) {
       look_over<CanFrame>();
     } else {
@@ -154,7 +153,7 @@ class Doctor {
     }
   }
 
-  // Returns whether fewer than one in 20 readings is good: a short checksum accepts some damaged replies.
+  // Returns whether at most one in 20 readings is good: a short checksum accepts some damaged replies.
   [[nodiscard]] bool none_good() const { return count_good(seen_.readings) * 20 < seen_.readings.size() + 1; }
   [[nodiscard]] bool any_good() const {
     return std::any_of(seen_.readings.begin(), seen_.readings.end(),
@@ -202,7 +201,7 @@ class Doctor {
   }
 
   // Tries settings until one of them helps, or until the encoder replies with the user's own settings. Returns true
-  // then, so that the search ends; false if nothing helped.
+  // then, so that the search ends; false if nothing helped within `limit`.
   template <class Item>
   bool try_each(const std::vector<Other>& others, Time limit) {
     Time spent{};
@@ -248,7 +247,7 @@ class Doctor {
     if (count_good(attempts) == first_readings) read_again<std::uint8_t>();
   }
 
-  // Takes readings once more, after the silent ones, because the encoder replies now.
+  // Takes readings once more, after the failed ones, because the encoder replies now.
   template <class Item>
   void read_again() {
     tell("reading");
@@ -257,7 +256,8 @@ class Doctor {
     examiner.conclude(seen_);
   }
 
-  // Takes `count` readings with these settings and returns their duration. A port that does not open adds no attempts.
+  // Takes `count` readings with these settings and returns their duration, 0 if the port fails. A port that does not
+  // open adds no attempts.
   template <class Item>
   Time ask(const EncoderAddress& address, std::size_t count, std::vector<Attempted>& attempts) {
     const Command* read = find_command(*address.unit, Verb::read);
@@ -267,13 +267,14 @@ class Doctor {
       const Time begin = examiner.now();
       examiner.read(*read, count, trial_limit, attempts);
       return examiner.now() - begin;
-    } catch (const os::Failure&) {  // the port does not support this rate
+    } catch (const os::Failure&) {  // the port does not support this setting, or failed
     } catch (const UsageError&) {   // the options need a wire that is not connected
     }
     return {};
   }
 
-  // Returns whether the received bytes have no explanation yet, so that another protocol may be one.
+  // Returns whether no reading is good and no finding explains it with certainty, so that another protocol may be the
+  // reason.
   [[nodiscard]] bool is_unexplained() const {
     if (any_good() || seen_.never_silent || seen_.lateness != Time{}) return false;
     const Examination so_far = judge(*address_.unit, address_.options, seen_);

@@ -140,8 +140,8 @@ class Examiner {
     return one;
   }
 
-  // Adds the exchange to `failed` if its request was not answered or its reply is damaged. Lines of characters only: on
-  // SPI a reply may answer the request before.
+  // Adds the exchange to `failed` if its request was to be answered but was not, or if its reply has an error. Lines of
+  // characters only: on SPI a reply may answer the request before.
   void record_failure(const LineExchange<Item>& line, std::vector<Attempted>& failed) const {
     Attempted one;
     runner_.keep_exchange(one);

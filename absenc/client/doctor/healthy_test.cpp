@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that no healthy encoder gets a finding: each unit and model in each mode, examined repeatedly at random
-// positions, speeds and pauses between readings.
+// Checks that no healthy encoder gets a warning or a fault: each unit in each mode of `modes_of`, examined repeatedly
+// at random positions, speeds and pauses between readings.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -21,7 +21,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr unsigned examinations = 200;  // number of examinations of each model and mode
+constexpr unsigned examinations = 200;  // number of examinations of each mode
 constexpr std::size_t readings = 40;
 
 class HealthyEncoder : public ::testing::TestWithParam<const Unit*> {};

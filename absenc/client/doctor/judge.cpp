@@ -18,7 +18,7 @@ namespace absenc::client {
 
 namespace {
 
-// delay from which a reply is slow: half of the default latency timer of a USB adapter
+// delay beyond the allowed time above which a reply is slow: half of the default latency timer of a USB adapter
 constexpr Time slow = std::chrono::milliseconds(8);
 
 FindingKind kind_of(const Refusal& refusal) {
@@ -97,7 +97,7 @@ std::string inversion(const Case& one) {
   return {};
 }
 
-// Finds the reason for missing replies if nothing was received, on any kind of line.
+// Finds the reason for missing replies if no reading received anything, on any kind of line.
 void judge_silence(const Case& one, std::vector<Finding>& findings) {
   const Observations& seen = one.seen;
   if (seen.readings.empty() || count(seen.readings, was_heard) != 0 || seen.never_silent) return;
@@ -129,7 +129,7 @@ void judge_lateness(const Case& one, std::vector<Finding>& findings) {
   for (const Attempted& attempt : seen.readings) limit = std::max(limit, attempt.limit);
   const bool is_ours = seen.woken_late > Time{} && seen.lateness - limit <= seen.woken_late;
   const bool is_one_of_few = seen.late < 2 && !nothing_else;
-  if ((!often || is_one_of_few) && is_ours) return;  // the replies are no later than this computer's own wake-up delay
+  if ((!often || is_one_of_few) && is_ours) return;  // late by no more than this computer's own wake-up delay
   const auto allowance = std::chrono::ceil<std::chrono::milliseconds>(seen.lateness * 3 / 2).count();
   findings.push_back(finding(often ? FindingKind::reply_late : FindingKind::sometimes_late,
                              {fmt::format("{}", std::min<std::size_t>(seen.late, tried)), fmt::format("{}", tried),
@@ -209,7 +209,7 @@ void judge_line(const Case& one, std::vector<Finding>& findings) {
 
 namespace {
 
-// Finds a counter that is in every reply and never changes.
+// Finds a counter that has the same value in all good replies that contain it, if these are at least 8.
 void judge_counter(const Case& one, std::vector<Finding>& findings) {
   constexpr std::size_t enough = 8;
   std::set<std::int64_t> values;
@@ -290,7 +290,8 @@ Examination judge(const Unit& unit, const Options& options, const Observations& 
   const Case one{unit, options, seen, result.good};
   judge_port(one, result.findings);
   judge_line(one, result.findings);
-  // A fault of the line explains bad frames, so these give no finding of their own.
+  // A fault of the port or the line, except destroyed CAN frames, explains bad frames, so these give no finding of
+  // their own.
   const bool explained = std::any_of(result.findings.begin(), result.findings.end(), [](const Finding& found) {
     return found.severity == Severity::fault && found.finding_kind != FindingKind::can_errors;
   });

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds changes of bytes by adapters, drivers and device servers. A change is found if undoing it makes the replies
-// good.
+// Finds changes of bytes by adapters, drivers and device servers. Most changes are found because undoing them makes
+// damaged replies good, some by their traces in good replies.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -50,8 +50,8 @@ class Mender {
     return sent.size() == size && raw_.size() >= size && std::equal(sent.begin(), sent.end(), raw_.begin());
   }
 
-  /// Returns whether the reply is good without the bytes at these indexes, which ascend. With `random`, leaves out as
-  /// many other bytes.
+  /// Returns whether the reply is good without the bytes at these indexes; false for no index or all. With `random`,
+  /// leaves out as many other bytes; returns false if there are not so many.
   [[nodiscard]] bool without(const std::vector<std::size_t>& places) const {
     if (places.empty() || places.size() >= raw_.size()) return false;
     std::vector<bool> removed(raw_.size(), false);
@@ -75,7 +75,7 @@ class Mender {
   }
 
   /// Returns whether the reply is good with up to `most` of these values inserted anywhere, and stores their number in
-  /// `put`. With `random`, inserts other values.
+  /// `put`. Gives up after 5000 decodings. With `random`, inserts other values.
   [[nodiscard]] bool with(Bytes values, std::size_t most, std::size_t& put) const {
     ByteList used(values.begin(), values.end());
     if (random_ != nullptr) {
@@ -92,8 +92,8 @@ class Mender {
     return false;
   }
 
-  /// Returns whether the reply is good with the 8th bit of some bytes set, and stores their number. With `random`, also
-  /// changes two other bits.
+  /// Returns whether the reply is good with the 8th bit of some bytes set, and stores their number; a reply of more
+  /// than 12 bytes need only be complete. With `random`, also flips two random other bits.
   [[nodiscard]] bool with_eighth_bits(std::size_t& set) const {
     ByteList bytes = raw_;
     if (random_ != nullptr && bytes.size() > 2) {
@@ -121,7 +121,8 @@ class Mender {
  private:
   static constexpr std::size_t most_tries = 5000;  // limit of the decodings of one reply
 
-  // Inserts `count` of the values at all indexes from `from` on, and returns whether any result is good.
+  // Tries to insert `count` of the values at indexes from `from` on, in all ways until one result is good or `tries` is
+  // 0. Returns whether a result is good.
   [[nodiscard]] bool insert(ByteList& bytes, const ByteList& values, std::size_t from, std::size_t count,
                             std::size_t& tries) const {
     if (count == 0) {
@@ -237,7 +238,8 @@ bool undo_seven_bits(const Mender& mender, std::size_t& count) { return mender.w
 constexpr std::size_t cheap = 24;  // number of replies to try
 constexpr std::size_t dear = 10;   // number of replies to try if each is decoded thousands of times
 
-// Changes at any index precede changes at one end, because they are more specific.
+// Bytes added at any index precede bytes added at one end, because they are more specific. Changes that need many
+// decodings come last.
 constexpr auto suspicions = std::to_array<Suspicion>({
     {FindingKind::telnet_doubled, fits_telnet, undo_telnet, cheap},
     {FindingKind::newline_translated, fits_newline, undo_newline, cheap},
@@ -265,8 +267,8 @@ std::size_t variety(const All& all) {
   return sum;
 }
 
-// Returns the finding of this change if undoing it makes nearly all damaged replies good, far more than chance would;
-// otherwise nothing.
+// Returns the finding of this change if undoing it makes at least 8 of 10 of the tried damaged replies good, far more
+// than chance would; otherwise nothing. Lost 8th bits need no comparison with chance if the replies vary enough.
 std::optional<Finding> suspected(const Case& one, const All& all, const Suspicion& suspicion) {
   constexpr std::size_t enough = 4;
   const bool of_nearly_all = all.size() * 10 >= one.seen.readings.size() * 8;
@@ -296,7 +298,7 @@ std::optional<Finding> suspected(const Case& one, const All& all, const Suspicio
       example = attempt;
     }
     by_chance += suspicion.undo(Mender(one, *attempt, &random), ignored) ? 1 : 0;
-    // A change that explains none of the first replies cannot explain nearly all of them.
+    // A change that explains none of the first four replies is taken for the wrong one.
     if (tried >= enough && mended == 0) return {};
   }
   tried = std::min(tried, suspicion.most_tried);
@@ -310,7 +312,7 @@ std::optional<Finding> suspected(const Case& one, const All& all, const Suspicio
 }
 
 // Finds 8th bits that are lost although replies are good: an XOR checksum can be right without them. Then a byte of the
-// position goes from 7F to 00 again and again.
+// position jumps between values from 60 to 7F and values below 20, at least twice.
 std::optional<Finding> seven_bits_of_good(const Case& one) {
   constexpr std::size_t enough = 40;
   constexpr std::size_t least_wraps = 2;
@@ -338,7 +340,8 @@ std::optional<Finding> seven_bits_of_good(const Case& one) {
                   to_hex(Bytes(before->raw).first(std::min<std::size_t>(before->raw.size(), 24)))});
 }
 
-// Finds a byte before each reply to a request of one byte, which the port took for the echo of the request.
+// Finds bytes before at least 8 of 10 good replies, as many as the request has but with other values, which the port
+// took for the echo of the request.
 std::optional<Finding> false_echo(const Case& one) {
   std::size_t good = 0;
   std::size_t wrong = 0;
@@ -362,7 +365,7 @@ std::optional<Finding> false_echo(const Case& one) {
                   to_hex(Bytes(example->raw).first(std::min<std::size_t>(example->raw.size(), 24)))});
 }
 
-// Finds one or two bytes after most good replies, too few for a second reply.
+// Finds one or two bytes after at least 8 of 10 good replies, too few for a second reply.
 std::optional<Finding> byte_behind_good(const Case& one) {
   const Observations& seen = one.seen;
   if (seen.overfull * 10 < one.good * 8 || one.good < 4 || seen.most_behind == 0 || seen.most_behind > 2) return {};

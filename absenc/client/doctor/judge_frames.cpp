@@ -182,8 +182,9 @@ std::optional<Finding> refusal(const Case&, const All& all) {
                                         last.advice.empty() ? std::string(text.advice) : last.advice});
 }
 
-// Finds a sender that is several times slower than the receiver. Its bytes have long runs of equal bits, with at most
-// one level change each, unlike the bytes of a frame with a checksum.
+// Finds a sender at another rate, by characters without a stop bit that the UART counted, or by the bytes of a sender
+// that is several times slower than the receiver: these have long runs of equal bits, with at most one level change
+// each, unlike the bytes of a frame with a checksum.
 std::optional<Finding> stretched(const Case& one, const All& all) {
   if (one.unit.link != LinkKind::half_duplex && one.unit.link != LinkKind::full_duplex) return {};
   if (const auto& damage = one.seen.damage; damage && damage->framing > 0) {
@@ -227,7 +228,8 @@ std::optional<Damage> compare(const ByteList& reply, const ByteList& good) {
   return damage;
 }
 
-// Returns the reply that at least 9 of 10 good replies equal; empty if the shaft moves, or if frames have a counter.
+// Returns the reply that at least 9 of 10 good replies equal; empty if there is none, as while the shaft moves or if
+// frames have a counter, or if fewer than 8 replies are good.
 ByteList usual_reply(const std::vector<Attempted>& readings) {
   std::map<ByteList, std::size_t> counts;
   std::size_t good = 0;
@@ -262,8 +264,8 @@ All heard(const std::vector<Attempted>& attempts) {
 bool is_silent(const Attempted& one) { return one.error != Error::none && !one.heard; }
 
 // Returns the damaged replies to requests that were repeated, without good replies beside other bytes, and without
-// replies in which the encoder refuses a request. Returns none if more requests were not answered: a late reply may
-// collide with the reply to the next request.
+// replies in which the encoder refuses a request. Returns none if as many or more requests were not answered: a late
+// reply may collide with the reply to the next request.
 All damaged_requests(const Case& one) {
   All all = damaged(one.seen.repeated);
   std::erase_if(all, [&](const Attempted* attempt) { return is_refusal(*attempt) || has_good_part(one, *attempt); });
@@ -408,7 +410,8 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
                                {fmt::format("{}", one.seen.overfull), fmt::format("{}", one.seen.readings.size()),
                                 to_hex(example.first(std::min(example.size(), most_shown)))}));
   } else if (std::optional<Finding> extra = extra_bytes(one, all)) {
-    // A late reply stands before the reply to the next request, whose own request seems not to be answered.
+    // A late reply stands before the reply to the next request, and the request of the late reply seems not to be
+    // answered.
     const bool are_late =
         std::ranges::all_of(all, [&](const Attempted* one_of) { return begins_with_reply(one, *one_of); });
     const auto silent = static_cast<std::size_t>(std::ranges::count_if(one.seen.readings, is_silent) +

@@ -50,7 +50,7 @@ bool speaks_text(const Unit& unit) {
   return all != 0 && text * 10 >= all * 9;
 }
 
-// Returns the bytes from `at` on as quoted text, up to the end of the line: "$GPGGA,120000".
+// Returns the bytes from `at` on as quoted text, up to the end of the line and at most 32: "$GPGGA,120000".
 std::string quoted(Bytes bytes, std::size_t at) {
   constexpr std::size_t most = 32;
   std::string text = "\"";
@@ -75,7 +75,8 @@ bool is_same_kind(const FoundCheck& one, const FoundCheck& other) {
                                                           one.parameters.poly == other.parameters.poly));
 }
 
-// Returns whether the unit's own frames have this kind of checksum, perhaps with another initial value.
+// Returns whether the unit's own frames have this kind of checksum, perhaps with other parameters than width and
+// polynomial.
 bool is_of_unit(const FoundCheck& check, const Unit& unit) {
   std::vector<CheckedFrame> frames;
   for (const Vector& vector : unit.vectors) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Judges whether positions are those of a shaft: steady at rest, not too fast, without missing codes.
+// Judges whether positions are those of a shaft: steady at rest, moving when turned by hand, not too fast, without
+// missing codes.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -120,8 +121,8 @@ void judge_jumps(const Walk& walk, const host::SpeedLimit& limit, Time woken_lat
   findings.push_back(finding(FindingKind::position_jumps, {fmt::format("{}", jumps), fmt::format("{}", furthest)}));
 }
 
-// Judges a shaft that is turned by hand: its position must move, and its number of turns must change within each whole
-// turn.
+// Judges a shaft that is turned by hand: its position must move, and its number of turns must change if the position
+// covers a whole turn.
 void judge_turning(const Walk& walk, std::vector<Finding>& findings) {
   constexpr std::size_t enough = 20;
   if (walk.steps.size() < enough) return;
@@ -137,8 +138,8 @@ void judge_turning(const Walk& walk, std::vector<Finding>& findings) {
   }
 }
 
-// Finds bits that never change although the position moved in uneven steps by several times their value. With even
-// steps a bit may always have the same value.
+// Finds bits that never change although the position moved in uneven steps by at least eight times their value. With
+// even steps a bit may always have the same value.
 void judge_bits(const Walk& walk, std::vector<Finding>& findings) {
   constexpr std::size_t enough = 64;
   constexpr std::size_t uneven = 8;

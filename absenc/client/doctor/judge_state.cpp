@@ -64,8 +64,8 @@ std::string share(std::size_t some, std::size_t all) {
   return some == all ? fmt::format("all {}", all) : fmt::format("{} of {}", some, all);
 }
 
-// Reports positions and turns that are invalid although no alarm explains it. `is_damage` returns whether so few
-// invalid readings may be damage that the checksum missed.
+// Reports that positions, or else numbers of turns, are invalid; called if no flag explains that. `is_damage` returns
+// whether so few invalid readings may be damage that the checksum missed.
 template <class IsDamage>
 void judge_validity(const std::vector<const Reading*>& readings, const IsDamage& is_damage,
                     std::vector<Finding>& findings) {
@@ -111,7 +111,7 @@ void judge_state(const Case& one, std::vector<Finding>& findings) {
     count_flags(status_of(one.unit, *reading), false, *reading, alarms, flags);
   }
   std::stable_sort(flags.begin(), flags.end(), [](const RaisedFlag& before, const RaisedFlag& after) {
-    return (before.invalid > 0) > (after.invalid > 0);  // flags that make the position invalid come first
+    return (before.invalid > 0) > (after.invalid > 0);  // flags with an invalid position or turns come first
   });
   // Removes flags of so few readings that they may be damage: a checksum of 6 bits misses one of 64 damaged replies, by
   // chance a few more.

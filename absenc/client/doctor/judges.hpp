@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The judges of doctor: each adds its findings about one aspect of the observations.
+// The judges of doctor: each adds or returns its findings about one aspect of the observations.
 #pragma once
 
 #include <algorithm>
@@ -36,12 +36,14 @@ void judge_port(const Case& one, std::vector<Finding>& findings);
 void judge_line(const Case& one, std::vector<Finding>& findings);
 /// Adds the finding about damaged replies for an examination in which less than one reading in 20 is good.
 void judge_bad_frames(const Case& one, std::vector<Finding>& findings);
-/// Returns the finding about bursts of failures with good readings between them; nothing if there are no bursts.
+/// Returns the finding about bursts of failures with good readings between them; nothing if there are fewer than three
+/// bursts, or if they hold less than 70 % of the failures.
 [[nodiscard]] std::optional<Finding> coming_and_going(const Case& one);
 /// Adds the findings about failed readings for an examination in which at least one reading in 20 is good.
 void judge_mixed_frames(const Case& one, std::vector<Finding>& findings);
-/// Returns the finding for an encoder that was powered on during the examination: at least four readings without any
-/// byte, then only good ones, at least 20. Otherwise returns nothing.
+/// Returns the finding for an encoder that seems to have been powered on during the examination: two or more failed
+/// readings, at least half of them without any byte, then only good ones. Returns nothing otherwise, and if chance or a
+/// busy computer may be the reason.
 [[nodiscard]] std::optional<Finding> judge_start(const Case& one);
 /// Returns the finding that `silent` of `all` requests were not answered, or that as many frames of a stream did not
 /// come.
@@ -50,7 +52,7 @@ void judge_state(const Case& one, std::vector<Finding>& findings);
 void judge_position(const Case& one, const std::vector<Attempted>& readings, bool by_hand,
                     std::vector<Finding>& findings);
 
-/// Returns the first 16 received bytes of the attempt as "1A 20 45", or the received CAN frame as text.
+/// Returns the first 16 bytes of the attempt's reply as "1A 20 45", or the received CAN frame as text.
 [[nodiscard]] std::string shown(const Attempted& one);
 
 }  // namespace absenc::client

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks doctor in virtual time with every unit in every mode, each alarm, each condition at both ends of its range,
-// and each fault at 1, 10 and 100 %. Doctor must not call an encoder good that reports a defect or whose frames are
-// damaged, and no finding may name another cause. docs/doctor.md has the tables of first findings; `./dev tables`
-// updates them.
+// Checks doctor in virtual time with every unit: in every readable mode healthy, with each alarm and with each
+// condition at the ends of its range, and in a polled and an unsolicited mode with each fault at 1, 10 and 100 %.
+// Doctor must not call an encoder good that reports a defect or whose frames are damaged, and no finding may name
+// another cause. docs/doctor.md has the tables of first findings; `./dev tables` updates them.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <gmock/gmock-more-matchers.h>
@@ -31,7 +31,7 @@ using Ids = std::set<std::string_view>;
 
 constexpr std::size_t readings = 200;
 
-/// Setting of a position without a byte 0: with zeros, the rest of a truncated frame could be a good frame.
+/// Setting of a position other than 0: with zeros only, the rest of a truncated frame could be a good frame.
 constexpr std::string_view at_no_zero = "singleturn=1383&";
 
 /// The result of an examination, and the virtual encoder that was examined, whose faults can be read afterwards.
@@ -147,7 +147,7 @@ std::uint64_t defects_of(const Unit& unit, const Reading& reading) {
 /// Ids of the findings that may result from a state that the encoder reports.
 const Ids of_state{"starting", "alarm", "status", "position_invalid", "contradictory", "counter_stands", "refused"};
 
-/// Returns the findings that may result from each kind of fault; damage appears differently in each frame format.
+/// Returns the findings that may result from this kind of fault; damage appears differently in each frame format.
 const Ids& causes_of(const Unit& unit, sim::FaultKind kind) {
   using enum sim::FaultKind;
   static const Ids damage{"damaged_bits",   "damaged_bursts", "sometimes_damaged", "always_damaged", "bytes_missing",
@@ -232,7 +232,8 @@ TEST_P(Matrix, AHealthyEncoderIsGoodAndItsVerdictSaysWhatWasLookedAt) {
   }
 }
 
-/// Returns each alarm, and each condition at both ends of its range, as settings of a virtual encoder.
+/// Returns each alarm that replies can report, and each condition at both ends of its range except its normal value, as
+/// settings of a virtual encoder.
 std::vector<std::string> states_of(const Unit& unit) {
   std::vector<std::string> states;
   const Options options = parse_address("sim:" + std::string(unit.id)).options;
@@ -326,7 +327,7 @@ std::string first_of(const Examination& examination) {
 }
 
 /// Returns the table with a row for each unit and a column for each fault. A cell has the first findings at 1, 10 and
-/// 100 %, or a single one if they are equal.
+/// 100 %, without one that equals the finding before it.
 std::string fault_table() {
   std::string table = "| protocol |";
   for (const std::string_view name : sim::fault_names) table += fmt::format(" {} |", name);

@@ -27,7 +27,7 @@ struct Trial {
   // Number of good readings with the user's setting, which take turns with those of the other.
   std::size_t good_as_said = 0;
   std::size_t tried_as_said = 0;
-  std::string command{};  // only for the finding other_protocol: the command that reads the encoder
+  std::string command{};  // address that reads the encoder, if `identify` found it; "": it did not
 };
 
 /// The reason why the port could not be opened, or was lost.
@@ -47,7 +47,7 @@ struct Observations {
   std::optional<Refusal> refusal{};
   std::vector<std::uint8_t> unsolicited{};  // bytes received before the first request
   Time listened{};
-  bool never_silent = false;  // whether the line was never silent while doctor listened
+  bool never_silent = false;  // whether bytes came in 4 or all of 5 periods of listening
   std::vector<Attempted> readings{};
   // Failed requests that readings repeated, in the order of time: a reading may be good although its first request was
   // not answered. The last request of a reading is not here, but in `readings`.
@@ -66,7 +66,7 @@ struct Observations {
   host::EchoMode echo_said{};     // echo mode that the user set
   host::EchoMode echo{};          // echo mode that was detected
   std::optional<Time> latency{};  // latency that the user set
-  Time woken_late{};              // greatest wake-up delay of this computer during the examination
+  Time woken_late{};              // greatest wake-up delay of this computer during the readings
   host::SpeedLimit limit{};       // speed limit of the encoder's shaft
   std::string clash{};            // address that two encoders share, "address 3"; "": none
   bool complete = true;
@@ -75,8 +75,8 @@ struct Observations {
 /// Derives the findings from the observations, in the order of their kinds, and returns the result of the examination.
 [[nodiscard]] Examination judge(const Unit& unit, const Options& options, const Observations& seen);
 
-/// Returns the most likely finding for a single failed reading, whose evidence may be incomplete. `usually_good`: other
-/// readings mostly succeed; `late`: replies arrived after their timeout.
+/// Returns the most likely finding for a single failed reading; the evidence of the finding may be incomplete.
+/// `usually_good`: other readings mostly succeed; `late`: replies arrived after their timeout.
 [[nodiscard]] Finding finding_of(const Unit& unit, const Options& options, PortKind place, const Attempted& last,
                                  bool usually_good, bool late);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Each fault of an adapter, of the line or of another device at the other end, with its expected finding, for tests of
-// doctor.
+// Each fault of an adapter, of the line or of another device at the other end, and each state of an encoder, with the
+// expected findings, for tests of doctor.
 #pragma once
 
 #include <set>
@@ -66,8 +66,9 @@ inline bool has_weak_check(const Pair& pair) {
   return capture::acceptance(*asked.unit, asked.options, one.exchange, 1u << 10) > 0.05;
 }
 
-/// Returns a fault that changes these byte values in replies. The shaft swings a little about a position at which most
-/// replies contain them. Units without such a position, or with a weak checksum, cannot have the fault.
+/// Returns a fault that changes these byte values in replies. The shaft swings a little about a position at which the
+/// change affects at least half of the replies. Units without such a position, or with a weak checksum, cannot have the
+/// fault.
 inline PathFault of_bytes(const std::string& name, const std::vector<std::uint64_t>& values, const Change& change,
                           Ids causes = {}) {
   causes.insert(name);
@@ -262,7 +263,7 @@ inline std::vector<PathFault> faults_of_state() {
                         if (condition.name != "battery") continue;
                         const Pair pair = pair_of(unit, mode, rate, {"condition=battery=0"});
                         Outcome outcome{examined(pair.asked, pair.far), {"alarm", "status", "position_invalid"}};
-                        // Skips units whose replies do not report the battery.
+                        // Skips units without alarms, whose replies cannot report the battery.
                         if (unit.alarms == nullptr) return none;
                         return std::optional(outcome);
                       }

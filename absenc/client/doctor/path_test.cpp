@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks, for every unit and rate, that each fault of an adapter and each other device at the other end is the first
-// finding of doctor.
+// Checks, for every unit of a line of characters at each of its rates, that the first finding of doctor is an expected
+// one for each fault of `all_path_faults` that the unit can have.
 #include <gtest/gtest.h>
 
 #include "absenc/client/doctor/path_faults_test.hpp"

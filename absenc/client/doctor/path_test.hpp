@@ -111,7 +111,8 @@ struct Far {
   std::function<std::unique_ptr<Talker>()> other{};
 };
 
-/// Opens links to the devices that `Far` describes. Each call of `open` makes new devices, unless `goes_on` is set.
+/// Opens links to the devices that `Far` describes. Each call of `open` makes new devices; with `goes_on` only the
+/// first one does.
 class Opener {
  public:
   explicit Opener(Far far) : far_(std::move(far)) {}
@@ -237,7 +238,7 @@ inline std::vector<const Unit*> character_units() {
 }
 
 /// Returns the setting with which the unit replies to requests: "" if the default options do, otherwise the first
-/// choice of an option that does.
+/// choice of an option that does, or "" if there is none.
 inline std::string asked_mode(const Unit& unit) {
   const auto streams = [&](const std::string& mode) {
     const auto address = parse_address(fmt::format("sim:{}{}{}", unit.id, mode.empty() ? "" : "?", mode));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a stream shows beside its good frames: the bytes of an encoder that sends frames without requests, cut at the
+// Evidence of a stream beside its good frames: the bytes of an encoder that sends frames without requests, cut at the
 // pauses between them, and the frames that did not come.
 #pragma once
 
@@ -24,18 +24,20 @@ struct StreamBytes {
   void append(const LineExchange<std::uint8_t>& line);
 };
 
-/// Returns the stream's bytes between two pauses, good or damaged, as replies without a request. The shortest pause
-/// that ends a frame is found from the bytes: it makes most pieces equally long. Returns nothing if no pause does.
+/// Returns the stream's bytes between two pauses, good or damaged, as replies without a request. The least pause that
+/// ends a frame is estimated from the bytes: it is one with which most pieces are equally long. Returns nothing if
+/// there is none.
 [[nodiscard]] std::vector<Attempted> frames_between_pauses(const Unit& unit, const Options& options,
                                                            const StreamBytes& stream);
 
-/// Inserts a failed reading (Error::timeout) for each frame that did not come, if the frames come at a regular rate.
-/// `arrivals` are the times at which the frames of `readings` arrived. Frames that were received but damaged
-/// (Attempted::discarded) are not missing, nor is a late one.
+/// Inserts a failed reading (Error::timeout) for each frame that did not come, if the frames come at a regular rate, at
+/// least two did not come, and neither of the last two readings follows the gap. `arrivals` are the times at which the
+/// frames of `readings` arrived. Frames that were received but damaged (Attempted::discarded) are not missing, nor is a
+/// late one.
 void insert_missing_frames(std::vector<Attempted>& readings, const std::vector<Time>& arrivals);
 
-/// Returns the number of good frames that arrived twice, directly one after the other, although the position changes;
-/// 0 if hardly any other frame did.
+/// Returns the number of good frames that arrived twice, directly one after the other, although the position changes; 0
+/// if they are fewer than 8, or fewer than 40 % of the readings.
 [[nodiscard]] std::size_t count_doubled(const std::vector<Attempted>& readings, const std::vector<Time>& arrivals);
 
 }  // namespace absenc::client

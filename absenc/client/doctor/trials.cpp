@@ -28,7 +28,7 @@ bool carries_characters(const Unit& unit) {
 
 // ---- Trials of other rates
 
-// Returns the trial of a rate; nothing if the unit cannot have this rate.
+// Returns the address with another rate; nothing if the unit cannot have this rate.
 std::optional<EncoderAddress> with_rate(const EncoderAddress& address, std::uint32_t rate) {
   EncoderAddress other = address;
   const Option* option = find_role(address.unit->options, Role::rate);
@@ -128,7 +128,7 @@ class Safety {
   bool said_ = false;
 };
 
-// Returns the address with another setting on the same port, at the user's rate.
+// Returns the address with other options on the same port, at the user's rate unless the options have another one.
 EncoderAddress with_options(const EncoderAddress& address, const Options& options) {
   EncoderAddress other = address;
   other.options = options;
@@ -138,7 +138,7 @@ EncoderAddress with_options(const EncoderAddress& address, const Options& option
   return other;
 }
 
-// Adds the choice of an option if the unit accepts the resulting options.
+// Returns whether the unit accepts these options.
 bool is_possible(const Unit& unit, const Options& options) {
   std::vector<std::string> texts = option_texts(unit, options);
   std::vector<OptionText> settings;

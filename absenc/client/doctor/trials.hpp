@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lists the settings to try if no reading is good: rates, SPI modes, echo, models, addresses.
+// Lists the settings to try if hardly any reading is good: rates, SPI clocks, SPI modes, echo, models, addresses.
 #pragma once
 
 #include <cstddef>

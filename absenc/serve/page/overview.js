@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Overview page: a card for each encoder, faulty ones first, with filter and counts in the bar.
+// Overview page: a card for each encoder, by default faulty ones first, with filter and counts in the bar.
 import {breakable, dial, element, rich, scale, setClass, setHidden, setText, spark, toggleClass} from "./dom.js";
 import {request} from "./server.js";
 import {GROUPS, GROUP_WORDS, MORE_WORDS, SHAPES, belowFigure, condition, figure, numberText, faultLines} from "./words.js";

@@ -126,7 +126,7 @@ export const GROUP_WORDS = {
 /** Text after the number, on wide screens only. */
 export const MORE_WORDS = {live: ", alarms not reported"};
 
-/** Returns [kind, bold text, text] for each line that describes a fault. */
+/** Returns [kind, bold text, text] for each line about a fault, or about alarms that are not reported. */
 export function faultLines(encoder) {
   const list = [];
   for (const alarm of encoder.alarms ?? []) {

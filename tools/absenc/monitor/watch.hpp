@@ -43,8 +43,8 @@ struct Snapshot {
   Time median{};               // median of the latencies from request to reply
   Time percentile_99{};
   Time longest{};
-  // Last readings, failures, losses of the port and results of commands as text, the newest last; empty unless details
-  // were asked for.
+  // Last readings, failures, losses and returns of the port, restarts of the position, and results of commands as text,
+  // the newest last; empty unless details were asked for.
   std::vector<std::string> trace{};
   std::vector<BadExchangeText> bad{};  // last bad exchanges, the newest first; empty unless details were asked for
   // "name value" of each field of the last reply that the line of the reading lacks; empty unless details were asked

@@ -70,7 +70,7 @@ int identify_frames(const Invocation& invocation) {
         candidates.push_back({unit, std::move(one), {}, false, line_of(*unit)});
       }
     } catch (const UsageError& error) {
-      // A request that is written for another kind of link is no request of this unit.
+      // A frame that is written for another kind of link is no frame of this unit.
       if (!unreadable) unreadable = error;
     }
   }
@@ -146,8 +146,8 @@ bool is_capture(std::string_view where) {
   return std::filesystem::is_regular_file(where, error) || std::filesystem::is_directory(where, error);
 }
 
-// Throws Failure for the name of a missing file, which would otherwise be taken for a port. CAN interfaces have names
-// like can0, ports of this computer are below /dev.
+// Throws Failure for the name of a missing file that has an extension; it would otherwise be taken for a port. CAN
+// interfaces have names like can0, ports of this computer are below /dev.
 void refuse_missing_file(std::string_view where) {
   const std::filesystem::path path(where);
   std::error_code error;
