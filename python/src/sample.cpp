@@ -90,10 +90,12 @@ void bind_sample(py::module_& module) {
                              "Whether the revolutions are valid; None: not reported, or the encoder has none.")
       .def_property_readonly(
           "alarms", &PyReading::alarms,
-          "Names of the raised alarms; []: all are reported clear; None: none is raised, but not all are "
+          "Names of the raised alarms; []: all are reported clear; None: none is raised, and not all "
           "reported.")
-      .def_property_readonly("status", &PyReading::status,
-                             "Names of the status flags that are set; None: not reported.")
+      .def_property_readonly(
+          "status", &PyReading::status,
+          "Names of the status flags that are set; []: all are reported clear; None: none is set, and "
+          "not all are reported.")
       .def_property_readonly(
           "time_s", [](const PyReading& one) { return seconds(one.reading.latched); },
           "Time at which the position was latched, in seconds of time.monotonic().")
