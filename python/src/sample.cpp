@@ -90,7 +90,7 @@ void bind_sample(py::module_& module) {
                              "Whether the revolutions are valid; None: not reported, or the encoder has none.")
       .def_property_readonly(
           "alarms", &PyReading::alarms,
-          "Names of the raised alarms; []: all are reported clear; None: none is raised, and not all "
+          "Names of the raised alarms; []: all are reported clear; None: none is raised, and not all are "
           "reported.")
       .def_property_readonly(
           "status", &PyReading::status,
