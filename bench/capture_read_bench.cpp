@@ -33,8 +33,8 @@ struct Files {
   Files()
       : folder(std::filesystem::temp_directory_path() / ("absenc-bench-" + std::to_string(std::random_device()()))) {
     std::filesystem::create_directory(folder);
-    // Samples of eight lines that change about every 32 samples, like a line that is sampled at 10 or more times its
-    // bit rate.
+    // Samples of eight lines: about every 32 samples one of them changes, like a line that is sampled at 10 or more
+    // times its bit rate.
     std::mt19937 random(1);
     std::vector<char> samples(samples_size);
     unsigned levels = 0xFF;

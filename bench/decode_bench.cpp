@@ -57,7 +57,8 @@ void tformat_everything_reference(benchmark::State& state) {
 BENCHMARK(tformat_everything_reference);
 
 // ---- BiSS: formats of 19, 32 and 57 bits. Each is decoded as a format known at compile time, compiled when it is
-// chosen, and by the motor controller's decoder, which is the reference of both.
+// chosen, with its fields looked up for each frame, and by the motor controller's decoder, which is the reference of
+// all three.
 
 template <unsigned bits>
 constexpr biss::Format format_of{.word = biss::word_with_status({.position = bits})};

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Measures streams of 10 000 frames per second each, on 1, 4 and 16 pseudo-terminals at once, read in one process with
-// a thread, a serial port and a session for each. A lost frame ends the benchmark. The cost per frame should not rise
-// with the number of ports. The sender is a process that writes ten frames to each port every millisecond, in bursts
-// like those of a USB adapter.
+// a thread, a serial port and a session for each. A lost or bad frame ends the benchmark. The cost per frame should not
+// rise with the number of ports. The sender is a process that writes ten frames to each port every millisecond, in
+// bursts like those of a USB adapter.
 #include <fcntl.h>
 #include <stdlib.h>
 #include <termios.h>

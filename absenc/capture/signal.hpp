@@ -19,7 +19,7 @@ using Tick = std::uint64_t;
 enum class Content : std::uint8_t {
   samples,  // levels of all channels at a fixed rate
   changes,  // times at which each channel changed its level
-  bytes,    // characters that the line decoder of another program found
+  bytes,    // characters that another program decoded or received, or that were typed
   frames,   // CAN frames with their times
 };
 

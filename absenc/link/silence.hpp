@@ -6,8 +6,8 @@
 
 namespace absenc {
 
-/// A silence timer at one end of a line. `silence` is reported at most once after each transfer and once after each
-/// received item, when the line was quiet for the limit in the machine's last step.
+/// A silence timer at one end of a line. `silence` is reported at most once after each transfer or pulse and once
+/// after each received item, when the line was quiet for the limit in the machine's last step.
 class Silence {
  public:
   Silence() = default;

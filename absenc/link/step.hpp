@@ -74,7 +74,8 @@ struct Event {
     /// Device side: chip select or first clock edge. The next step should be the reply that the device drives.
     selected,
     triggered,   ///< device side: a pulse on `wire` has begun
-    line_error,  ///< a damaged character (stop bit, parity, other rate) or CAN frame was received
+    /// A damaged character (stop bit, parity, other rate) or CAN frame was received, or a CAN frame could not be sent.
+    line_error,
   };
 
   Kind kind = Kind::timer;        ///< kind of the event

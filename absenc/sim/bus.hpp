@@ -12,8 +12,8 @@ namespace absenc::sim {
 
 /// Several devices on one half-duplex line, without bit timing. Not a Line, which is exact to the nanosecond.
 ///
-/// Every device receives the host's bytes and those of the other devices. Characters that are sent at the same time
-/// reach the line as their AND, as in Line, but aligned to whole bytes.
+/// Every device receives the host's bytes and those of the other devices, except those that are sent together with its
+/// own. Characters that are sent at the same time reach the line as their AND, as in Line, but aligned to whole bytes.
 class Bus final : public Machine<std::uint8_t> {
  public:
   /// The machines in `devices` must outlive the bus. `character` is the duration of one byte on the line.

@@ -94,7 +94,7 @@ class FaultyDevice final : public Machine<std::uint8_t> {
   FaultCounts counts_{};
   std::uint64_t damaged_replies_ = 0;
 
-  std::vector<std::uint8_t> request_;  // bytes received since the last reply
+  std::vector<std::uint8_t> request_;  // bytes received since the last reply, the first 256
   std::vector<std::uint8_t> reply_;
   std::vector<std::uint8_t> received_;  // bytes of the last received event as passed on to the device
   bool request_damaged_ = false;        // the request was damaged, so the device may answer while the host still sends

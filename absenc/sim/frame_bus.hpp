@@ -11,8 +11,8 @@
 namespace absenc::sim {
 
 /// Several nodes on one CAN bus, without bit timing. Every node receives the host's frames and those of the other
-/// nodes. Arbitration and collisions are not simulated: frames that are due at the same time are sent one after
-/// the other, the lowest identifier first. A node whose `configure` step requests another bit rate than
+/// nodes. Arbitration and collisions are not simulated: of the next frames of all nodes, those due at the same time are
+/// sent one after the other, the lowest identifier first. A node whose `configure` step requests another bit rate than
 /// the bus has neither receives nor sends.
 class FrameBus final : public Machine<CanFrame> {
  public:

@@ -34,7 +34,7 @@ class Line {
   using Node = std::size_t;
   /// Called at an `emit` step of a machine. Returns whether the machine continues; false: it is treated as done.
   using OnEmit = std::function<bool()>;
-  /// Called at the end of every character or CAN frame on the wire.
+  /// Called at the end of every byte of a character, and of every CAN frame, on the wire.
   using Observer = std::function<void(Node sender, Time start, Time end, const Item& item)>;
   /// One transfer of SPI bytes or of `bits` clocks: the items that the host sent and received, the last byte
   /// left-aligned. `lead` is the time from `start`, when the chip was selected, to the first clock.
@@ -68,7 +68,7 @@ class Line {
   void wake(Node node);
   /// Sets whether a node receives what it sends.
   void set_echo(Node node, bool echo);
-  /// Makes the line call `observer` for each character or CAN frame on it.
+  /// Makes the line call `observer` for each byte of a character, or CAN frame, on it.
   void observe(Observer observer);
   /// Makes the line call `observer` for each transfer of SPI bytes or clocked bits.
   void observe_transfers(TransferObserver observer);

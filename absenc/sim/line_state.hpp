@@ -52,7 +52,7 @@ struct Line<Item>::State {
   ExtraWire pulse_wire{};          ///< wire of the pulse
   Time start{};                    ///< start of the transfer; CAN: start of the frame
   std::size_t index = 0;           ///< index of the item of `out` that is on the wire
-  std::size_t on_wire = 0;         ///< characters: number of items of `out` that have been, are or will be on the wire
+  std::size_t on_wire = 0;         ///< characters: number of items of the frame of `out` that is on the wire; 0: none
   Time each{};                     ///< duration of one byte
 
   /// Returns whether a transfer of this node has begun and has items left to send.

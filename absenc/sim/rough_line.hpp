@@ -36,8 +36,8 @@ struct RoughCounts {
 
 /// A line with damage at random. It is simulated faster than Line, which moves single characters; use Line for
 /// collisions or single characters. A frame arrives in one piece at its end; if the ends have different rates it
-/// arrives as a `line_error`. On CAN the controllers check: a damaged frame is a `line_error`. Clocked and SPI links
-/// have no late frames and only one rate.
+/// arrives as a `line_error`. On CAN the controllers check: a frame with flipped bits or another sender is a
+/// `line_error`. Clocked and SPI links have no late frames and only one rate.
 template <class Item>
 class RoughLine final : public Port<Item> {
  public:

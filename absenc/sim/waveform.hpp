@@ -34,7 +34,8 @@ class Waveform {
     std::string_view name;  ///< name of the wire
     bool idle;              ///< level of the wire before its first change
   };
-  /// Receives level changes and comments in the order of time, as soon as their order is known.
+  /// Receives level changes in the order of time, as soon as their order is known, and comments likewise. A comment
+  /// may come after changes of a later time.
   struct Sink {
     /// Receives a level change of the wire with this index in `wires()`.
     virtual void change(Time at, std::size_t wire) = 0;

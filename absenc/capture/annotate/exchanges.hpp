@@ -19,7 +19,7 @@ struct LineTicks {
 
   Tick pause = 1;       // a silence of this length ends a frame
   Tick character = 1;   // duration of a character; a silence within a character is shorter
-  Tick turnaround = 0;  // longest turnaround time in the unit's document; 0: not known
+  Tick turnaround = 0;  // turnaround time that the unit's document states; 0: not known
   Tick limit = never;   // longest time from request to reply, after which no host expects the reply
 };
 

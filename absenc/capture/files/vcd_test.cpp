@@ -46,7 +46,7 @@ TEST(Vcd, LevelsAndTimes) {
   EXPECT_TRUE(reader->damages().empty());
 }
 
-// A source for a file too large for memory: one text repeated many times, then another text.
+// A source for a large file that is not kept in memory: one text repeated many times, then another text.
 class Repeated final : public Source {
  public:
   Repeated(std::string part, std::uint64_t count, std::string last)

@@ -37,8 +37,8 @@ inline constexpr double is_found = -3;
 }
 
 /// Returns the hypotheses that explain the most exchanges, the likeliest first; none if no exchange is explained.
-/// Models are tried before single options. `settings` apply to all hypotheses, for example the address of the polled
-/// encoder.
+/// Models are tried before single options. The search starts from options with `settings` applied, for example
+/// the address of the polled encoder; it may change options that have choices or numbers of bits.
 [[nodiscard]] std::vector<Hypothesis> find_hypotheses(const Unit& unit, std::span<const OptionText> settings,
                                                       std::span<const ObservedExchange> exchanges);
 

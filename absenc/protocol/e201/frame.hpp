@@ -67,7 +67,7 @@ inline constexpr Time answer_limit = 50ms;  ///< Timeout of a reply; the 64 cloc
 inline constexpr Time gap_limit = 20ms;     ///< Timeout between two characters of a reply.
 inline constexpr Time reply_limit = 100ms;  ///< Longest duration of a reply, even if characters still arrive.
 inline constexpr Time silent_limit = 10ms;  ///< Timeout of a command that may have no reply.
-/// Time after `n` until the encoder is ready, and after `f` until the supply is down.
+/// Time that is assumed after `n` until the encoder is ready, and after `f` until the supply is down.
 inline constexpr Time supply_time = 200ms;
 
 /// Returns the period of MA at clock number 1 to 8.
@@ -171,8 +171,8 @@ inline constexpr unsigned widest = 64;  ///< Greatest width of a position in bit
   return samples;
 }
 
-/// Decodes a reply that is a line of text. Errors: wrong_length (no complete line, more than one, or one that is too
-/// long for `Text`), bad_framing (the text is no reply to the command `asked`).
+/// Decodes a reply that is a line of text. Errors: wrong_length (no complete line, a blank one, more than one, or one
+/// that is too long for `Text`), bad_framing (the text is no reply to the command `asked`).
 [[nodiscard]] constexpr Result<Reply> decode_line(std::uint8_t asked, Bytes bytes) {
   const std::size_t end = end_of_first_line(bytes);
   const Bytes text = trimmed(bytes.first(end));
@@ -254,7 +254,7 @@ struct Protocol {
     if (request.letter == letter::samples) return samples_length;
     return letter::is_in(letter::answered_by_a_line, request.letter) ? end_of_first_line(reply) : 0;
   }
-  /// Returns whether the host awaits no more bytes: a reply with a CR at its end is complete, even if it is invalid.
+  /// Returns whether the host awaits no more bytes after a reply with this error: true unless its length is wrong.
   static constexpr bool is_whole(const Format&, Error error) { return error != Error::wrong_length; }
   /// Decodes a reply. Errors: those of decode_samples and decode_position, those of decode_line, or unsupported (no
   /// document describes the reply to this command).

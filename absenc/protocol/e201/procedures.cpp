@@ -43,7 +43,7 @@ Procedure read(Dialog& dialog, InterfaceResults& found) {
   if (!reply) co_return {reply.error()};
   found.samples = reply->samples;
   found.reading = Protocol::reading(dialog.format(), {letter::samples}, *reply);
-  found.reading.latched = dialog.sent_at();  // the interface starts to clock when it has received the command
+  found.reading.latched = dialog.sent_at();  // assumed: no document states when the encoder latches the position
   found.reading.received = dialog.received_at();
   co_return done;
 }
@@ -238,7 +238,7 @@ constexpr auto of_lines = std::to_array<ErrorExplanation>({
     {Error::bad_framing, {"this is no answer to that command", check_model}},
 });
 
-// Explains bad_framing of a position by the check of decode_position that failed.
+// Explains bad_framing of a position by the check of decode_samples or decode_position that failed.
 Explanation explain_framing(const Format& format, Bytes reply) {
   const Result<std::uint64_t> samples = decode_samples(reply);
   if (!samples) return {"the interface answers with hexadecimal digits", check_model};

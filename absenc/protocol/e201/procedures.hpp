@@ -26,7 +26,7 @@ struct InterfaceResults {
   std::optional<Text> supply{};          ///< State of the encoder's supply, as text.
   std::optional<std::int64_t> clock{};   ///< Number of the MA clock that is set, 1 to 8.
   std::optional<std::int64_t> width{};   ///< Width of the position that `?` returns, in bits.
-  std::optional<std::int64_t> counts{};  ///< Position from `?`, in counts from the interface's zero.
+  std::optional<std::int64_t> counts{};  ///< Position from `?` or `>`, in counts from the interface's zero.
   /// Recommendation of other clocks, if the set clock does not suit the encoder.
   std::optional<std::string_view> advice{};
 
@@ -36,7 +36,7 @@ struct InterfaceResults {
   std::array<unsigned, clocks_khz.size()> valid{};
   unsigned measured = 0;  ///< Number of clocks whose frames have all been read.
   unsigned previous = 0;  ///< Number of the clock before the sweep; 0: unknown.
-  unsigned left = 0;      ///< Number of the clock that the sweep set last; 0: none.
+  unsigned left = 0;      ///< Number of the clock that the sweep last set, or tried to set; 0: none.
   bool restored = false;  ///< Whether the sweep has restored the clock `previous`.
   bool aborted = false;   ///< Whether the user aborted the sweep.
 
@@ -85,7 +85,8 @@ author::Procedure sweep_clocks(Dialog& dialog, InterfaceResults& found, Argument
 inline constexpr std::string_view check_stream =
     "check that it is an E201-9S and does not stream (`absenc run ... stream-off` ends it)";
 
-/// Returns cause and advice for `error` of `reply` to `request`; an empty reply is a timeout.
+/// Returns cause and advice for `error` of `reply` to `request`, empty if there are none for it. An empty request
+/// counts as `4`.
 [[nodiscard]] Explanation explain(const Format& format, Error error, Bytes request, Bytes reply);
 
 }  // namespace absenc::e201

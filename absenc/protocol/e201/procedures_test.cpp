@@ -105,7 +105,7 @@ TEST(E201Read, ExplainsEachError) {
   EXPECT_EQ(bench.run_tampered(once, "position").error, "none");
 }
 
-// No document gives reply times: a slower reply counts as missing, and the host waits no longer.
+// No document gives reply times: a reply that is slower than the host's timeouts counts as missing.
 TEST(E201Read, UsesReplyTimeouts) {
   Bench bench("singleturn_bits=19");
   const std::string good = "c0014328ff300000\r";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of clock-sweep: its counts of valid frames, its errors, and that it restores the clock in every case.
+// Tests of clock-sweep: its counts of valid frames, its errors, and that it restores the clock.
 #include <gtest/gtest.h>
 
 #include "absenc/protocol/e201/bench_test.hpp"

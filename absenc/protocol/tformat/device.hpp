@@ -146,9 +146,9 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     reply.append(encode_reply(*made).view());
     return Answer::sent;
   }
-  // Returns whether a flawed request gets a refusal when the line is silent. A byte without the sync code gets none:
-  // the encoder searches for a request at the next byte (8.1). The length of a refused frame is unknown, so a missing
-  // start bit ends the frame (8.2, 9.2).
+  // Returns whether a flawed request gets a refusal when the line is silent. An undamaged byte without the sync code
+  // gets none: the encoder searches for a request at the next byte (8.1). The length of a refused frame is unknown, so
+  // a missing start bit ends the frame (8.2, 9.2).
   bool is_refused(Flaw flaw, Bytes heard) override {
     if (flaw == Flaw::unknown && !has_sync_code(heard[0])) return false;
     if (flaw == Flaw::unknown && heard[0] != control_field(heard[0] >> 3)) refused_status_ |= status::parity_error;
@@ -270,8 +270,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   void watch_battery() { battery_lost_ = battery_lost_ || !has_battery(); }
 
   void started(Time at) override { full_absolute_ = magnitude(shaft_->at(at).speed_millirpm) >= full_absolute_speed; }
-  // Counts the turns while only the battery supplies the counter (5.4.2): checks the motion every 10 ms, but at no more
-  // than 10 000 points of a long pause.
+  // Counts the turns while only the battery supplies the counter (5.4.2): checks the motion every 10 ms, and less often
+  // in a pause of more than 100 s, at about 10 000 points.
   void count_on_battery(Time from, Time now) {
     if (!counts_turns()) return;
     const Time step = std::max(Time(10ms), (now - from) / 10'000);

@@ -125,7 +125,7 @@ inline constexpr std::uint8_t without_battery = battery_error | battery_alarm;
 struct Format {
   unsigned singleturn_bits = 17;  ///< bits of the position within the turn, 1 to 24
   unsigned multiturn_bits = 16;   ///< bits of the turns, 0 to 24; 0: single-turn encoder
-  int encoder_id = -1;            ///< ENID that every reply must carry, 0 to 255; -1: any
+  int encoder_id = -1;            ///< ENID that a reply with an ENID must carry, 0 to 255; -1: any
   /// Whether replies must also pass the checks that an encoder that deviates from the specification fails.
   bool strict = true;
   bool battery = true;  ///< whether a battery is connected; without one the turns are invalid (2 (1))

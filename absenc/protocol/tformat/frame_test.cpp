@@ -47,7 +47,7 @@ TEST(TformatFrame, EveryControlFieldIsJudged) {
 }
 
 // Counts the two-bit errors of an 11-byte reply that pass: those that X^8 + 1 does not detect, then those that also
-// pass the fixed bits, then those that also pass the comparison of SF and ALMC.
+// pass the fixed bits, ENID and the ranges, then those that also pass the comparison of SF and ALMC.
 TEST(TformatFrame, TwoBitErrorsThatPassEachLevelOfChecks) {
   const Format format{.encoder_id = 0x11};
   const ReplyBytes good = encode_reply({.singleturn = 0x12345, .multiturn = 0x1234, .encoder_id = 0x11});
@@ -147,8 +147,8 @@ TEST(TformatFrame, PartialRepliesLeaveValidityUnknown) {
   EXPECT_EQ(to_reading({}, alarmed, 0).multiturn_validity(), Validity::unknown);
 }
 
-// SF reports only that one of four alarms is raised; if a reply to ID 3 has reported one of the four, that alarm
-// explains it.
+// SF reports only that one or more of four alarms are raised; if a reply to ID 3 has reported one of the four, that
+// alarm explains it.
 TEST(TformatFrame, KnownAlarmExplainsStatus) {
   const Reply turns{.id = DataId::multiturn, .status = status::alarm, .multiturn = 5};
   for (const std::uint8_t harmless : {alarms::over_heat, alarms::battery_alarm}) {

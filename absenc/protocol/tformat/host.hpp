@@ -12,8 +12,8 @@ namespace absenc::tformat {
 
 /// Conversation that reads with one of the data IDs 0 to 3. A reply to ID 3 carries everything. SF in other replies
 /// hides over_speed, full_absolute_status and counter_overflow. So without `known_alarms` (the ALMC of a reply to ID 3
-/// since power on) a request with ID 3 precedes IDs 0 and 1; and an alarm that newly appears in SF is followed by a
-/// request with ID 3, whose reply is the result. Nothing is repeated.
+/// since power on) a request with ID 3 precedes IDs 0 and 1; and an alarm that newly appears in the SF of their
+/// replies is followed by a request with ID 3, whose reply is the result. Nothing is repeated.
 class ReadPosition : public author::HostOf<Protocol> {
  public:
   /// Reads from an encoder of this format with a request of data ID `id`.
@@ -45,7 +45,7 @@ class ReadPosition : public author::HostOf<Protocol> {
       if (unknown != 0) return ask_for(DataId::everything);
     }
     new (&reading_) Reading(to_reading(format(), reply(), known_alarms_));  // constructed in place, not copied
-    // The document does not state when the position is latched; the end of the request is the latest possible time.
+    // The document does not state when the position is latched: the end of the request is assumed.
     reading_.latched = sent_at();
     reading_.received = received_at();
     finish(Error::none);

@@ -101,7 +101,8 @@ TEST(TformatHost, TimeoutIsNotRepeated) {
 
 // ---- Refusals (6.3.2)
 
-// The explanation of a refusal names ca0 and ca1, other reasons for such an answer, and what to try.
+// The explanation of a refusal names ca0 and ca1, if they are raised, and what to try; otherwise other reasons for such
+// an answer.
 TEST(TformatHost, ExplainsRefusals) {
   struct Row {
     std::uint8_t alarm;

@@ -129,7 +129,7 @@ inline CommandResult with(Scripted node, std::string_view command, std::vector<s
   return raa38::testing::result_of<CanFrame>(*talk);
 }
 
-/// Returns the answer that a correct node at position `counts` gives to a frame.
+/// Returns the answer that a correct node at position `counts` gives to a frame; none to an order for all nodes.
 [[nodiscard]] inline Frames correct_answer(const CanFrame& received_frames, std::uint64_t counts) {
   const OrderInfo& info = *order_of(received_frames);
   if (info.answer == Answer::position) return {encode_position(0x20, counts)};

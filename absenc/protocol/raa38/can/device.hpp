@@ -31,7 +31,7 @@ class VirtualNode final : public Device<CanFrame> {
   [[nodiscard]] MutableBytes memory() override { return settings_.memory(); }
   [[nodiscard]] std::uint32_t memory_version() const override { return settings_.version(); }
   [[nodiscard]] std::span<const Violation> violations() const override { return rules_.violations(); }
-  /// Returns how often the host broke a rule of the document.
+  /// Returns how often the host broke a rule that the node checks.
   [[nodiscard]] std::uint32_t violation_count() const override { return rules_.violation_count(); }
   void watch_rules(RuleWatch* watch) override { rules_.watch(watch); }
   [[nodiscard]] std::uint64_t answer_count() const override { return answer_count_; }

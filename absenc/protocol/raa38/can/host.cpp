@@ -20,8 +20,8 @@ void Read::heard(const CanFrame& frame, Time at) {
   if (!is_from(frame, format_.node)) return;
   keep(frame, at);
   const Result<std::uint32_t> counts = decode_position(format_, frame);
-  // The document does not state when the node takes the position. A requested position is taken after the request was
-  // sent; a cyclic position, before its frame was received.
+  // The document does not state when the node takes the position. Assumed: a requested position at the end of the
+  // request; a cyclic position when its frame was received.
   if (counts) {
     reading_ = {.singleturn = *counts,
                 .singleturn_bits = format_.bits,

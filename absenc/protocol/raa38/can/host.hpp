@@ -13,7 +13,7 @@ namespace absenc::raa38::can {
 
 using namespace std::chrono_literals;
 
-// The document gives no reply times; the timeouts below are far longer than any controller needs.
+// The document gives no reply times; the timeouts below are assumed to be longer than any node needs.
 inline constexpr Time answer_limit = 50ms;  ///< Timeout of a reply on a bus without other frames.
 inline constexpr Time busy_limit = 250ms;   ///< Timeout of a reply on a bus that other nodes keep busy.
 /// Time for which the host listens for unsolicited frames before it sends requests.
@@ -118,8 +118,8 @@ struct NodeFrames {
 
   /// Returns whether a node with this number was found.
   [[nodiscard]] constexpr bool is_there() const { return unsolicited != 0 || answers != 0 || damaged > 1; }
-  /// Returns whether two nodes seem to share the number: two answers to one request, or destroyed frames each time, and
-  /// no frame without a request.
+  /// Returns whether two nodes seem to share the number: more than one answer, or destroyed frames each time and no
+  /// answer; and in both cases no frame without a request.
   [[nodiscard]] constexpr bool clash() const {
     return (unsolicited == 0 && answers > 1) || (damaged > 1 && answers == 0 && unsolicited == 0);
   }

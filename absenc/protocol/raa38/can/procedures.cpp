@@ -49,7 +49,7 @@ struct SendRate {
 // ---- Receiving until a time is over
 
 // Measures the send rate of the node until the listening time is over; with `until_enough`, ends as soon as enough
-// frames were received.
+// frames were received in enough time.
 Part<SendRate> count_frames(Dialog& dialog, bool until_enough = false) {
   SendRate cadence;
   for (;;) {
@@ -247,12 +247,14 @@ Procedure change(Dialog& dialog, Values& found, Order order, Arguments arguments
 namespace {
 
 constexpr Time between_requests = 2ms;  // time between two requests; one request and one answer take 1 ms at 250 kbit/s
-// A frame this many requests or more after the request for its node number counts as unsolicited, not as an answer.
+// A frame this many requests or more after the request for its node number counts as unsolicited, not as an answer;
+// after the last request every frame counts as an answer.
 constexpr unsigned answering = 10;
 constexpr Time last_answers = 100ms;
 constexpr Time entering_time = 20ms;  // time after "enter configuration", which is not answered
 constexpr Time answer_window = 100ms;
-constexpr Time switching_time = 50ms;  // time that a controller needs to rejoin the bus after a change of its bit rate
+// Assumed time that a controller needs to rejoin the bus after a change of its bit rate.
+constexpr Time switching_time = 50ms;
 constexpr int rate_attempts = 3;
 constexpr auto most_clashes = 16;  // more numbers with destroyed frames indicate a bad line
 

@@ -262,7 +262,7 @@ constexpr bool is_answer(const Request& request, Bytes reply) {
 
 // ---- Protocol of the host
 
-/// Timeout of a reply. The document gives no time; slaves of this kind need a few milliseconds.
+/// Timeout of a reply. The document gives no time; slaves of this kind are assumed to need a few milliseconds.
 inline constexpr Time answer_limit = std::chrono::milliseconds(50);
 
 /// Types and functions of the protocol that the classes in absenc/protocol/author use: frames, lengths and times.

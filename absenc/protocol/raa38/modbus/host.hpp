@@ -72,7 +72,7 @@ author::Procedure find_baud(Dialog& dialog, CommandValues& found);
 /// Result of a scan of the slaves on a line. The scan sends A0 first, which a single encoder answers; otherwise it
 /// requests every address from the first argument to the second. If all replies of an address are damaged, two encoders
 /// share it or the line is bad. Errors: timeout if no slave answers, invalid_argument if the last address is before the
-/// first.
+/// first, or the error of a line that is never silent.
 struct Slaves {
   /// Result of polling one address: no answer, a valid answer, only damaged answers, or a refusal.
   enum class Kind : std::uint8_t { none, answers, clash, refuses };

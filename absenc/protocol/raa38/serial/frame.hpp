@@ -276,8 +276,8 @@ struct Protocol {
   static constexpr Reading reading(const Format& format, const Request&, const Position& position) {
     return author::position_reading(position.singleturn, format.bits);
   }
-  /// Returns the time for which a position is reported: `sent_at`, the end of the request. The document does not say
-  /// when the encoder latches it.
+  /// Returns the time for which a position is reported: `sent_at`, the end of the request or the beginning of the
+  /// pulse, because the document does not say when the encoder latches it.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
   /// Returns the times of the virtual encoder: the time until a reply, and the silence after which it drops an
   /// incomplete request.

@@ -126,7 +126,8 @@ void Listen::take(const StreamFrame& found) {
   ++valid_count_;
 }
 
-// Returns when the position was taken. Frames that were received together were sent one after the other.
+// Returns the time that is assumed for the position: the reception of its frame. Of frames that were received together,
+// each earlier one is assumed a period earlier; without a period, they share the time since the reception before.
 Time Listen::latched_time(const StreamFrame& found) const {
   if (found.at != received_at_) return found.at;
   const auto behind = static_cast<std::int64_t>(waiting_.size() - taken_);

@@ -89,7 +89,7 @@ author::Procedure set_zero(Dialog& dialog, Values& found);
 /// Result of a scan of the units on a bus; the index is the unit number. The scan listens for encoders that transmit
 /// without a request, then requests every number, whatever the option mode is. If all replies of a number are damaged,
 /// two encoders share it or the line is bad. Errors: timeout if no unit answers, unexpected_reply if an encoder
-/// transmits without a request.
+/// transmits without a request, or the error of a line that is never silent.
 using Units = std::array<Values, unit_count>;
 /// Scans the bus for units.
 author::Procedure scan(Dialog& dialog, Units& found);

@@ -114,8 +114,8 @@ class StreamDecoder {
     return true;
   }
 
-  // Returns whether the second of two frames in a row follows the first after less than half a period, so that the
-  // bytes are no frames.
+  // Returns whether the second of two frames in a row follows the first after less than half a period, but not at the
+  // same time (both were received at once), so that the bytes are no frames.
   [[nodiscard]] constexpr bool is_too_early() const {
     const Time between = times_[2 * frame_ - 1] - times_[frame_ - 1];
     return between > Time{} && between < format_.period() / 2;

@@ -222,7 +222,7 @@ bool disturb(Wire& wire, std::size_t size, sim::Random& random) {
 // Compares sent and received positions in order. A received position is wrong if none of the next 12 sent ones equals
 // it; a sent position that was not received is lost, unless a disturbance hit its frame.
 void judge_option(Tally& tally, const std::vector<Sent>& sent, const std::vector<std::uint32_t>& results) {
-  constexpr std::size_t most_missing = 12;  // greatest number of frames in a row that may be lost
+  constexpr std::size_t most_missing = 12;  // number of sent frames in which a received one is searched
   std::size_t next = 0;
   for (const std::uint32_t position : results) {
     const std::size_t end = std::min(sent.size(), next + most_missing);
