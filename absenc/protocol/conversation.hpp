@@ -131,7 +131,7 @@ struct Device : Machine<Item> {
   [[nodiscard]] virtual std::uint32_t violation_count() const = 0;
   /// Sets the observer of rule checks, which must outlive the encoder; null: none. By default does nothing.
   virtual void watch_rules(RuleWatch* /*watch*/) {}
-  /// Returns how many answers the encoder has given. Unsolicited frames, and requests executed without a reply, may
+  /// Returns how many answers the encoder has given. Unsolicited frames, and requests that get no reply, may
   /// count too.
   [[nodiscard]] virtual std::uint64_t answer_count() const = 0;
 

@@ -53,8 +53,8 @@ class CanEngine : public Conversation<CanFrame> {
   CanEngine() = default;
   ~CanEngine() = default;
 
-  /// Sends `frame`, not before `pause` after the last answer or request, and receives until the bus is silent for
-  /// `times.answer_limit`, or until `times.busy_limit` has passed.
+  /// Sends `frame`, not before `pause` after the last request, or its answer if `keep` stored one. Receives until the
+  /// bus is silent for `times.answer_limit`, or until `times.busy_limit` has passed.
   void ask(const CanFrame& frame, const CanHostTimes& times, Time pause = {});
   /// Sends `frame` at once and receives frames for exactly `duration`.
   void ask_for(const CanFrame& frame, Time duration);

@@ -38,8 +38,8 @@ class EncoderOn : public Device<Item> {
   [[nodiscard]] std::uint32_t violation_count() const final { return rules_.violation_count(); }
   /// Sets the observer of rule checks; null: none.
   void watch_rules(RuleWatch* watch) final { rules_.watch(watch); }
-  /// Returns how many answers the encoder has given: replies, unsolicited transmissions, and requests executed without
-  /// a reply.
+  /// Returns how many answers the encoder has given: replies, unsolicited transmissions, and those requests
+  /// without a reply for which the subclass calls `count_answer` or returns Answer::none, executed or not.
   [[nodiscard]] std::uint64_t answer_count() const final { return answer_count_; }
 
  protected:
