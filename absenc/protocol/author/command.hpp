@@ -208,8 +208,8 @@ struct CommandOf {
 
   Command info;  ///< Description of the command.
   /// Returns the request that does the work of the command, although a procedure may send more. It returns an error, or
-  /// a request that P::encode refuses, if the arguments allow none. Null: there is none (clocked lines), or the requests
-  /// are not known beforehand.
+  /// a request that P::encode refuses, if the arguments allow none. Null: there is none (clocked lines), or the
+  /// requests are not known beforehand.
   Result<Request> (*request)(const Format&, Arguments);
   /// Constructs the conversation of the command at the start of the storage, which has at least `size` bytes; the rest
   /// holds coroutine frames.

@@ -43,7 +43,7 @@ inline constexpr Time busy_limit = 2s;   ///< Longest time for which the host wa
 inline constexpr Time calibration_time = 1s;     ///< Duration of the virtual encoder's self-calibration.
 inline constexpr Time calibration_limit = 15s;   ///< Timeout of a self-calibration; the vendor allows the shaft 10 s.
 inline constexpr Time calibration_poll = 100ms;  ///< Time between two polls of a running self-calibration.
-/// Longest time without a valid frame while the host receives a stream.
+/// Longest time without a valid frame or a loss of alignment while the host receives a stream.
 inline constexpr Time listen_limit = 500ms;
 
 // ---- Frames

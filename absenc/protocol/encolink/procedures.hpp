@@ -74,7 +74,7 @@ struct ProcedureState : Channels {
 
 /// Reads `size` bytes at `address` by a register access, in up to five attempts, while positions continue. Returns how
 /// the last attempt ended. Stops the procedure if the encoder has no registers, or those of an AksIM-4, or sends no
-/// valid identity.
+/// valid identity that agrees with the options.
 author::Part<AccessOutcome> attempt_read(Dialog& dialog, ProcedureState& found, std::uint32_t address,
                                          std::uint16_t size);
 /// Writes `value` as `size` bytes to `address` like `attempt_read`, but repeats no write that the encoder may have
