@@ -315,9 +315,8 @@ constexpr Error decode_access_answer(Bytes request, Bytes reply, FieldSink& sink
 }
 
 /// Decodes a reply, or without one the request, into `sink` and returns the first error. If the request is a register
-/// access (all its `ra` bytes),
-/// the reply is the answer to it. Otherwise the length of the reply decides: position frame, channel 2 cycle or
-/// identity.
+/// access (all its `ra` bytes), the reply is the answer to it. Otherwise the length of the reply decides: position
+/// frame, channel 2 cycle or identity.
 constexpr Error decode(const Format& format, Bytes request, Bytes reply, FieldSink& sink) {
   if (reply.empty()) return decode_request(request, sink);
   if (is_access(request)) return decode_access_answer(request, reply, sink);
