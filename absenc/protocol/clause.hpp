@@ -92,9 +92,9 @@ enum class Reaction : std::uint8_t {
   refusal_or_silent,  ///< the document permits a refusal and silence
 };
 
-/// A demand of the document on an encoder. Its test passes only if the case occurred: the requests were sent, valid
-/// replies were received, a wrong bit in them would have been detected, and a value that must change was different
-/// before. The engine (client/conform) derives these conditions from `demand` alone.
+/// A demand of the document on an encoder. Its test passes only if the case occurred. Depending on the demand, this
+/// means: the requests were sent, valid replies were received, a wrong bit in them would have been detected, a value
+/// that must change was different before. The engine (client/conform) derives these conditions from `demand` alone.
 struct Clause {
   std::string_view id;         ///< identifier, unique in its unit: "crc"
   std::string_view paragraph;  ///< paragraph of the unit's document

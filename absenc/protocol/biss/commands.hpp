@@ -190,7 +190,8 @@ template <class F>
 // ---- Parts of the declaration that all BiSS units share
 
 /// Writes the CDM bits of the command's control frame to `out` as '0' and '1' and returns their number; 0 for the
-/// commands `position` and `info`. If a command sends several control frames, writes the one that reads or changes the register.
+/// commands `position` and `info`. If a command sends several control frames, writes the one that reads or changes the
+/// register.
 template <class F>
 Result<std::size_t> encode_control(const F& format, const Command& command, Arguments arguments, MutableBytes out) {
   ControlMaster master;
