@@ -151,7 +151,7 @@ struct Vector {
   std::string_view source;             ///< Document and paragraph of the frame.
   std::string_view options;            ///< Options of the encoder, as `name=value` separated by blanks.
   Bytes request;                       ///< Bytes of the request; empty: none.
-  Bytes reply;                         ///< Bytes of the reply.
+  Bytes reply;                         ///< Bytes of the reply; empty: none.
   std::span<const Expected> fields{};  ///< Expected values of all fields; empty if `error` is set.
   Error error = Error::none;           ///< Expected error; `Error::none`: the frame is valid.
   OpenBytes open_request{};            ///< Bytes of the request that the tests are to compute.

@@ -42,7 +42,8 @@ class CanEngine : public Conversation<CanFrame> {
 
   /// Returns the time at which the last request was sent completely.
   [[nodiscard]] Time sent_at() const { return sent_at_; }
-  /// Returns whether a bus error destroyed frames since the last request or `listen`, whichever is later.
+  /// Returns whether a bus error, which may have destroyed frames, was reported since the last request or `listen`,
+  /// whichever is later.
   [[nodiscard]] bool is_disturbed() const { return disturbed_; }
   /// Returns why no answer was received: timeout, or bad_framing on a bus with errors.
   [[nodiscard]] Error missing() const { return disturbed_ ? Error::bad_framing : Error::timeout; }

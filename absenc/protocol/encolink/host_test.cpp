@@ -366,7 +366,7 @@ TEST(EncolinkListen, LatchedIsTimeOfPosition) {
   EXPECT_EQ(compared, 9u);
 }
 
-// README, listen: with `stream_rate` set, `position` sends nothing, and commands other than it and `listen` are refused.
+// README, listen: with `stream_rate` set, `position` sends nothing; commands other than it and `listen` are refused.
 TEST(EncolinkListen, SendsNothingToStreamingEncoder) {
   Bench bench(streaming);
   std::size_t sent = 0;
