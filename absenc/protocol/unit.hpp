@@ -368,10 +368,10 @@ struct Unit {
   LineSettings (*settings)(const Options& options) = nullptr;
   /// The unit of the same encoder behind an SPI controller, if that is another unit; null: there is no such unit.
   const Unit* over_spi = nullptr;
-  /// Puts the evidence about every value of the probeable options into `sink`. Returns whether some combination of
-  /// values explains all captures, which are in the order of time. If so, the probeable options in `options` get these
-  /// values, and defaults where the captures leave them open; all other values in `options` must be set before. Null:
-  /// frames do not show option values.
+  /// Puts the evidence about the values of those options that frames can show into `sink`. Returns whether some
+  /// combination of values explains all captures, which are in the order of time. If so, stores these values in
+  /// `options`; where the captures leave a value open, a default is stored, or the given value stays. All other values
+  /// in `options` must be set before. Null: frames do not show option values.
   bool (*probe)(Options& options, std::span<const Capture> captures, EvidenceSink& sink) = nullptr;
   /// Returns the wires beside the data line that an encoder with these options needs. It is called before a port is
   /// opened, because the user must name the wire, and a pseudo-terminal has none. Null: none.

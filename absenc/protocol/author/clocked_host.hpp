@@ -13,7 +13,7 @@
 
 namespace absenc::author {
 
-/// The members that a protocol of clocked bits must have:
+/// The members that a protocol of clocked bits must have, `Request` only if it is that of a unit:
 ///
 ///   struct Protocol {
 ///     using Format, Reply;

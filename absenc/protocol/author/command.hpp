@@ -54,7 +54,7 @@ template <class P>
 using ItemOf = typename detail::ItemOf<P>::Item;
 
 /// Functions that turn requests and replies of a unit into fields, and errors into texts for people. Firmware that
-/// uses no Unit does not link them. All conversations of the unit derive from `Host`.
+/// uses no Unit does not link them. All conversations that Reported extends by them derive from `Host`.
 template <class P, class Host = Conversation<ItemOf<P>>>
 struct Report {
   /// Class with the functions of the protocol.

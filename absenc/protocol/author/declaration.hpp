@@ -18,8 +18,7 @@ namespace absenc::author {
 
 /// The properties of a unit of the protocol `P`, from which Descriptor (unit.hpp) makes the Unit. `P` has the members
 /// that dialog.hpp and device.hpp, clocked_host.hpp or can_dialog.hpp list. `VirtualEncoder`, a Device such as
-/// BusDevice or ClockedDevice, is constructed from (format, shaft). All conversations of the unit derive from `Host`,
-/// as in Report.
+/// BusDevice or ClockedDevice, is constructed from (format, shaft). `Host`: as in Report.
 template <class P, class VirtualEncoder, class Host = Conversation<ItemOf<P>>>
 struct Declaration {
   /// Class with the functions of the protocol.

@@ -17,7 +17,8 @@
 
 namespace absenc::author {
 
-/// The functions that a protocol must have. None is optional, so a misspelt name does not compile.
+/// The functions that a protocol must have; `reading` and `latched` only if `last_reading` is used. A misspelt name
+/// does not compile.
 ///
 ///   struct Protocol {
 ///     using Format, Request, Reply;                                  // Format: made from the options
@@ -313,7 +314,8 @@ struct ProcedureDialog<P> {
 }  // namespace detail
 
 /// Type of the dialog of a protocol's procedures: `P::Dialog` if the protocol declares it, because its requests do not
-/// have one reply each; otherwise DialogOf. `P::Dialog` is an Engine and Routine constructed from (format, arena).
+/// have one reply each; otherwise DialogOf. `P::Dialog` is a Routine and an engine of its kind of line, constructed
+/// from (format, arena).
 template <class P>
 using ProcedureDialog = typename detail::ProcedureDialog<P>::Type;
 

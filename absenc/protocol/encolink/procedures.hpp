@@ -39,7 +39,7 @@ struct ProcedureState : Channels {
   std::optional<bool> running{};  ///< Whether a self-calibration is running; no value in other procedures.
   bool reports_status = false;    ///< Whether the detailed status is reported.
 
-  bool emits = false;                 ///< Whether the procedure emits each position.
+  bool emits = false;                 ///< Whether each position is emitted before the next request.
   bool is_new = false;                ///< Whether the latest position was not emitted yet.
   std::uint8_t protocol_version = 0;  ///< Protocol version in the identity; 0: the identity was not read yet.
   unsigned lost = 0;                  ///< Number of frames in a row that were lost or damaged.
