@@ -122,7 +122,7 @@ struct Device : Machine<Item> {
   virtual void set_condition(std::size_t /*index*/, std::int64_t /*value*/, Time /*now*/) {}
   /// Returns the bytes of the encoder that survive power off. The caller may write them only while the encoder is off.
   [[nodiscard]] virtual MutableBytes memory() = 0;
-  /// Returns a number that every change of `memory` increments.
+  /// Returns a number that the encoder increments with every change that it makes to `memory`.
   [[nodiscard]] virtual std::uint32_t memory_version() const = 0;
   /// Returns the first rule breaches of the host, in order of time. `violation_count` also counts those for which there
   /// is no room.

@@ -30,7 +30,7 @@ class EncoderOn : public Device<Item> {
   void raise_alarms(std::uint32_t bits) override { raised_ |= bits; }
   /// Ends the cause of the alarms `bits`. An encoder with latched alarms overrides this function.
   void lower_alarms(std::uint32_t bits) override { raised_ &= ~bits; }
-  /// Returns a number that every change of the memory increments.
+  /// Returns a number that the encoder increments with every change that it makes to the memory.
   [[nodiscard]] std::uint32_t memory_version() const final { return memory_version_; }
   /// Returns the first rule breaches of the host, in order of time.
   [[nodiscard]] std::span<const Violation> violations() const final { return rules_.violations(); }

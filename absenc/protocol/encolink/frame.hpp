@@ -72,7 +72,7 @@ inline constexpr std::size_t request_bytes = 2;    ///< Number of bytes of a req
 inline constexpr std::size_t identity_bytes = 19;  ///< Number of bytes of an identity, checksum included.
 /// Number of bytes of an identity as the vendor's library reads it: one more than the identity has.
 inline constexpr std::size_t padded_identity_bytes = 20;
-inline constexpr std::size_t reply_capacity = 20;       ///< Number of bytes of the longest reply.
+inline constexpr std::size_t reply_capacity = 20;       ///< Bytes of the longest reply, a padded identity.
 inline constexpr unsigned maximum_resolution = 22;      ///< Greatest number of bits of the position.
 inline constexpr unsigned maximum_multiturn_bits = 16;  ///< Greatest number of bits of the turns.
 /// Bytes of one reply.

@@ -107,7 +107,7 @@ author::Procedure write_register(Dialog& dialog, ProcedureState& found, std::siz
 /// register).
 author::Procedure write_memory(Dialog& dialog, ProcedureState& found, Arguments arguments);
 /// Writes `command` to the command register. Only the status in the encoder's answer shows that the encoder executed
-/// the command, so the write is not repeated.
+/// the command, so a write that it may have executed is not repeated.
 author::Procedure send_command(Dialog& dialog, ProcedureState& found, std::uint8_t command);
 
 /// Makes the present position the zero of the turn, by the position offset. Argument: 1 to save the offset. Errors
