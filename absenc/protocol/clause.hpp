@@ -154,8 +154,8 @@ struct HostClause {
   /// untested until this rule has been checked.
   std::string_view rule{};
   // Test hosts for this clause, if the hosts that all tests use do not break it: those stop after missing or damaged
-  // replies, send two commands in a row, leave pauses out, or clock too fast, too slowly, too early, with too few clocks
-  // or in another mode.
+  // replies, send two commands in a row, leave pauses out, or clock too fast, too slowly, too early, too few bits or in
+  // another mode.
   std::array<HostScript, 2> breaks{};  ///< scripted hosts that break this clause and no other; empty: none
   HostScript keeps{};                  ///< a host that does what `breaks` do and keeps this clause; empty: none
   /// Options of the virtual encoder for the hosts `breaks` and `keeps`: "acquisition_us=20000".
