@@ -115,7 +115,7 @@ struct Device : Machine<Item> {
   /// Raises the alarms `bits`, bits of the unit's alarm field; an encoder without alarms ignores the call. They stay
   /// until `lower_alarms`; a host or power off may clear latched ones earlier.
   virtual void raise_alarms(std::uint32_t bits) = 0;
-  /// Ends the alarms `bits` and their cause, even if they are latched.
+  /// Ends the alarms `bits` that were raised, even if they are latched. An alarm that a condition causes may stay.
   virtual void lower_alarms(std::uint32_t bits) = 0;
   /// Sets the condition Unit::conditions[index] to `value`, which is within the condition's range. By default does
   /// nothing.

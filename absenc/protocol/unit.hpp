@@ -89,7 +89,7 @@ struct MemoryArea {
   /// Whether `write_life` counts the writes of all bytes together; false: the document does not state it.
   bool life_in_total = false;
   std::uint32_t pages = 1;  ///< number of pages, from `page` on, with such an area; an encoder may have fewer
-  std::uint8_t word = 1;  ///< bytes of the word at each address: 1, 2 or 4, the same in all areas of a unit
+  std::uint8_t word = 1;    ///< bytes of the word at each address: 1, 2 or 4, the same in all areas of a unit
 
   /// Returns whether the area includes the byte or word at `address` of the page `on_page`.
   [[nodiscard]] constexpr bool has(std::uint32_t on_page, std::uint32_t address) const {

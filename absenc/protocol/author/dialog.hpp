@@ -31,7 +31,7 @@ namespace absenc::author {
 ///     static bool is_whole(const Format&, Error);                    // see Engine
 ///     static Reading reading(const Format&, const Request&, const Reply&);
 ///     static Time latched(const Format&, Time sent_at);              // when the encoder latches the position; if the
-///   };                                                               // document does not say: `sent_at`, the latest
+///   };                                                               // document does not say: `sent_at` is assumed
 ///
 /// A conversation with encoded requests and decoded replies; a subclass sends the requests and handles the replies.
 template <class P>
