@@ -34,7 +34,7 @@ enum class Verb : std::uint8_t {
   config_get,
   config_set,
   scan,  ///< finds the encoders on the line: reports a record for each, which begins with the encoder's address
-  run,   ///< a procedure that only this unit has; `absenc run` starts it by name
+  run,   ///< a procedure with none of the purposes above; `absenc run` starts it by name
 };
 
 /// Description of an argument of a command.
@@ -58,8 +58,9 @@ struct Command {
   std::uint8_t id;                        ///< number of the command within its unit: index into Unit::commands
   std::string_view meaning;               ///< Purpose of the command, as a phrase.
   std::span<const Argument> arguments{};  ///< Arguments of the command, in their order.
-  bool changes_encoder = false;           ///< Whether the command changes anything in the encoder.
-  bool repeatable = true;                 ///< Whether the same command may be sent again after an error.
+  /// Whether the command changes the encoder; the page or bank that it selects for reading does not count.
+  bool changes_encoder = false;
+  bool repeatable = true;  ///< Whether the same command may be sent again after an error.
   /// For verb config_set: name of the config_get command that reads the setting. "": no command reads it; then the
   /// setting has the name of this command, which checks the effect itself.
   std::string_view reads_back{};
