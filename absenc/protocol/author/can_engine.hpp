@@ -18,7 +18,8 @@ struct CanHostTimes {
 };
 
 /// Conversation that sends one frame at a time and receives frames; a subclass decides which frame is sent next. Frames
-/// that were complete before the request was sent are not delivered to the subclass, unless it calls `overhear`.
+/// that were complete before the request was sent, or before `listen` began, are not delivered to the subclass, unless
+/// it calls `overhear`.
 class CanEngine : public Conversation<CanFrame> {
  public:
   /// Not copyable: requests and replies are views into the conversation itself.

@@ -18,7 +18,7 @@
 
 namespace absenc::author {
 
-/// Times of a virtual encoder, as its document states them.
+/// Times of a virtual encoder: those of its document, or assumed where it states none.
 struct DeviceTimes {
   Time character{};        ///< duration of a character on the line; of a byte, if two bytes share a character
   Time answer_time{};      ///< time from the end of a request to the begin of its reply

@@ -14,7 +14,7 @@
 
 namespace absenc::author {
 
-/// Time limits and pauses of a host, as the protocol's document states them.
+/// Time limits and pauses of a host: those of the protocol's document, or chosen where it states none.
 struct HostTimes {
   Time answer_limit{};          ///< longest time from the end of a request to the first character of its reply
   Time gap_limit{};             ///< longest time between two characters of a reply
