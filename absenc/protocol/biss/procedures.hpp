@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Procedures that access the registers of a BiSS encoder, one bit per frame, while positions are read.
+// Procedures that access the registers of a BiSS encoder or send it commands, one bit per frame, while positions are
+// read.
 #pragma once
 
 #include <algorithm>
