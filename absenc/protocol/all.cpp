@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The only file that names every unit. A new protocol needs its folder and one line here.
+// The only C++ file that names every unit. In the code, a new protocol needs its folder and one line here.
 #include "absenc/protocol/all.hpp"
 
 #include <array>

@@ -92,9 +92,9 @@ enum class Reaction : std::uint8_t {
   refusal_or_silent,  ///< the document permits a refusal and silence
 };
 
-/// A demand of the document on an encoder. Its test passes only if the case occurred: the requests were sent, valid
-/// replies were received, a wrong bit in them would have been detected, and a value that must change was different
-/// before. The engine (client/conform) derives these conditions from `demand` alone.
+/// A demand of the document on an encoder. Its test passes only if the case occurred. Depending on the demand, this
+/// means: the requests were sent, valid replies were received, a wrong bit in them would have been detected, a value
+/// that must change was different before. The engine (client/conform) derives these conditions from `demand` alone.
 struct Clause {
   std::string_view id;         ///< identifier, unique in its unit: "crc"
   std::string_view paragraph;  ///< paragraph of the unit's document
@@ -153,10 +153,11 @@ struct HostClause {
   /// Name of the rule that the virtual encoder checks, or the test's controller for `spi_mode_rule`; the clause is
   /// untested until this rule has been checked.
   std::string_view rule{};
-  // Test hosts for this clause, if the hosts that all tests use do not break it: those send two commands in a row,
-  // leave pauses out, or clock too fast, too early or in another mode.
-  std::array<HostScript, 2> breaks{};  ///< two scripted hosts that break this clause and no other
-  HostScript keeps{};                  ///< a host that does the same as `breaks` and keeps this clause
+  // Test hosts for this clause, if the hosts that all tests use do not break it: those stop after missing or damaged
+  // replies, send two commands in a row, leave pauses out, or clock too fast, too slowly, too early, too few bits or in
+  // another mode.
+  std::array<HostScript, 2> breaks{};  ///< scripted hosts that break this clause and no other; empty: none
+  HostScript keeps{};                  ///< a host that does what `breaks` do and keeps this clause; empty: none
   /// Options of the virtual encoder for the hosts `breaks` and `keeps`: "acquisition_us=20000".
   std::string_view options{};
 };

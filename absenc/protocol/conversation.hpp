@@ -105,7 +105,7 @@ template <class Item>
 struct Device : Machine<Item> {
   /// How long the encoder takes to be ready after it is switched on.
   enum class PowerOn : std::uint8_t {
-    real,  ///< the encoder takes the start-up time of its document
+    real,  ///< the encoder takes its start-up time, of its document or assumed
     skip,  ///< the encoder is ready at once
   };
   /// Switches the encoder on at `now`.
@@ -115,14 +115,14 @@ struct Device : Machine<Item> {
   /// Raises the alarms `bits`, bits of the unit's alarm field; an encoder without alarms ignores the call. They stay
   /// until `lower_alarms`; a host or power off may clear latched ones earlier.
   virtual void raise_alarms(std::uint32_t bits) = 0;
-  /// Ends the alarms `bits` and their cause, even if they are latched.
+  /// Ends the alarms `bits` that were raised, even if they are latched. An alarm that a condition causes may stay.
   virtual void lower_alarms(std::uint32_t bits) = 0;
   /// Sets the condition Unit::conditions[index] to `value`, which is within the condition's range. By default does
   /// nothing.
   virtual void set_condition(std::size_t /*index*/, std::int64_t /*value*/, Time /*now*/) {}
   /// Returns the bytes of the encoder that survive power off. The caller may write them only while the encoder is off.
   [[nodiscard]] virtual MutableBytes memory() = 0;
-  /// Returns a number that every change of `memory` increments.
+  /// Returns a number that the encoder increments with every change that it makes to `memory`.
   [[nodiscard]] virtual std::uint32_t memory_version() const = 0;
   /// Returns the first rule breaches of the host, in order of time. `violation_count` also counts those for which there
   /// is no room.
@@ -131,7 +131,7 @@ struct Device : Machine<Item> {
   [[nodiscard]] virtual std::uint32_t violation_count() const = 0;
   /// Sets the observer of rule checks, which must outlive the encoder; null: none. By default does nothing.
   virtual void watch_rules(RuleWatch* /*watch*/) {}
-  /// Returns how many answers the encoder has given. Unsolicited frames, and requests executed without a reply, may
+  /// Returns how many answers the encoder has given. Unsolicited frames, and requests that get no reply, may
   /// count too.
   [[nodiscard]] virtual std::uint64_t answer_count() const = 0;
 

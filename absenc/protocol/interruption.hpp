@@ -19,7 +19,7 @@ class Interruption {
     due_ = 0;
   }
   /// Returns whether the byte received at `at` begins a request. `length`: length of a request that begins with this
-  /// byte; 0 if no request does, because a collision on a half-duplex line garbles bytes. `character`: time of one
+  /// byte; 0 if none does, as when a collision on a half-duplex line garbled it. `character`: time of one
   /// character. The first byte, and one that ends more than two characters after the byte before, always begins one.
   bool begins_request(std::size_t length, Time at, Time character) {
     const bool begins_run = !received_at_ || at - *received_at_ > 2 * character;

@@ -12,7 +12,7 @@
 namespace absenc {
 
 /// Returns a format with a position, and any others of the possible fields, in any order. Most have at most 64 bits,
-/// some up to 128.
+/// some up to 115.
 inline WordFormat random_word(sim::Random& random) {
   std::vector<Meaning> meanings{Meaning::position};
   for (const Meaning one : {Meaning::multiturn, Meaning::error, Meaning::warning, Meaning::parity}) {

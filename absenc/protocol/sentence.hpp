@@ -44,7 +44,7 @@ class Sentence {
   [[nodiscard]] std::string_view view() const { return {text_.data(), size_}; }
 
  private:
-  std::array<char, 400> text_;  // not initialized: each conversation has a sentence, and few use it
+  std::array<char, 400> text_;  // not initialized: each Reported conversation has a sentence, and few use it
   std::size_t size_ = 0;
 };
 

@@ -34,7 +34,7 @@ enum class Verb : std::uint8_t {
   config_get,
   config_set,
   scan,  ///< finds the encoders on the line: reports a record for each, which begins with the encoder's address
-  run,   ///< a procedure that only this unit has; `absenc run` starts it by name
+  run,   ///< a procedure with none of the purposes above; `absenc run` starts it by name
 };
 
 /// Description of an argument of a command.
@@ -58,8 +58,9 @@ struct Command {
   std::uint8_t id;                        ///< number of the command within its unit: index into Unit::commands
   std::string_view meaning;               ///< Purpose of the command, as a phrase.
   std::span<const Argument> arguments{};  ///< Arguments of the command, in their order.
-  bool changes_encoder = false;           ///< Whether the command changes anything in the encoder.
-  bool repeatable = true;                 ///< Whether the same command may be sent again after an error.
+  /// Whether the command changes the encoder; the page or bank that it selects for reading does not count.
+  bool changes_encoder = false;
+  bool repeatable = true;  ///< Whether the same command may be sent again after an error.
   /// For verb config_set: name of the config_get command that reads the setting. "": no command reads it; then the
   /// setting has the name of this command, which checks the effect itself.
   std::string_view reads_back{};
@@ -89,7 +90,7 @@ struct MemoryArea {
   /// Whether `write_life` counts the writes of all bytes together; false: the document does not state it.
   bool life_in_total = false;
   std::uint32_t pages = 1;  ///< number of pages, from `page` on, with such an area; an encoder may have fewer
-  std::uint8_t word = 1;  ///< bytes of the word at each address: 1, 2 or 4, the same in all areas of a unit
+  std::uint8_t word = 1;    ///< bytes of the word at each address: 1, 2 or 4, the same in all areas of a unit
 
   /// Returns whether the area includes the byte or word at `address` of the page `on_page`.
   [[nodiscard]] constexpr bool has(std::uint32_t on_page, std::uint32_t address) const {
@@ -151,7 +152,7 @@ struct Vector {
   std::string_view source;             ///< Document and paragraph of the frame.
   std::string_view options;            ///< Options of the encoder, as `name=value` separated by blanks.
   Bytes request;                       ///< Bytes of the request; empty: none.
-  Bytes reply;                         ///< Bytes of the reply.
+  Bytes reply;                         ///< Bytes of the reply; empty: none.
   std::span<const Expected> fields{};  ///< Expected values of all fields; empty if `error` is set.
   Error error = Error::none;           ///< Expected error; `Error::none`: the frame is valid.
   OpenBytes open_request{};            ///< Bytes of the request that the tests are to compute.
@@ -368,10 +369,10 @@ struct Unit {
   LineSettings (*settings)(const Options& options) = nullptr;
   /// The unit of the same encoder behind an SPI controller, if that is another unit; null: there is no such unit.
   const Unit* over_spi = nullptr;
-  /// Puts the evidence about every value of the probeable options into `sink`. Returns whether some combination of
-  /// values explains all captures, which are in the order of time. If so, the probeable options in `options` get these
-  /// values, and defaults where the captures leave them open; all other values in `options` must be set before. Null:
-  /// frames do not show option values.
+  /// Puts the evidence about the values of those options that frames can show into `sink`. Returns whether some
+  /// combination of values explains all captures, which are in the order of time. If so, stores these values in
+  /// `options`; where the captures leave a value open, a default is stored, or the given value stays. All other values
+  /// in `options` must be set before. Null: frames do not show option values.
   bool (*probe)(Options& options, std::span<const Capture> captures, EvidenceSink& sink) = nullptr;
   /// Returns the wires beside the data line that an encoder with these options needs. It is called before a port is
   /// opened, because the user must name the wire, and a pseudo-terminal has none. Null: none.

@@ -141,7 +141,7 @@ struct Protocol {
     if (request.ask == Ask::turns) return author::turns_reading(reply.value, {0, turns_bits, 0, true});
     return author::position_reading(static_cast<std::uint64_t>(reply.value), format.singleturn_bits);
   }
-  /// Returns when the encoder latched the position that answers a request sent at `sent_at`: at the end of the request.
+  /// Returns the time taken as the latch of the position in the reply to a request: its end at `sent_at`.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
   /// Returns the times of the virtual encoder: duration of a character, time until a reply, time to start.
   static constexpr author::DeviceTimes device_times(const Format& format) {

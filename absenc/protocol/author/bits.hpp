@@ -17,8 +17,8 @@ namespace absenc::author {
   return ranges;
 }
 
-/// Returns the ranges of `count` bits, from bit `first` on, of a big-endian number: it occupies `size` bytes from byte
-/// number `byte` on, the most significant byte first.
+/// Returns the ranges of `count` bits, from bit `first` (0: the lowest) on, of a big-endian number: it occupies `size`
+/// bytes from byte number `byte` on, the most significant byte first.
 [[nodiscard]] constexpr BitRanges big_endian_bits(std::size_t byte, std::size_t size, std::size_t count,
                                                   std::size_t first = 0) {
   BitRanges ranges;

@@ -32,8 +32,8 @@ class DialogOf<P> : public CanEngine, public Routine {
   /// Returns the format of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
 
-  /// Sends a frame not before `pause` after the last answer or request. `ask`, `ask_for`, `listen` or `configure` must
-  /// be called before the first await of a received frame.
+  /// Sends a frame not before `pause` after the last request, or its answer if `keep` stored one. `ask`, `ask_for`,
+  /// `listen` or `configure` must be called before the first await of a received frame.
   void ask(const CanFrame& frame, Time pause = {}) { CanEngine::ask(frame, P::host_times(format_), pause); }
   using CanEngine::ask_for;
   using CanEngine::configure;

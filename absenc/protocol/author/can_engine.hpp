@@ -18,7 +18,8 @@ struct CanHostTimes {
 };
 
 /// Conversation that sends one frame at a time and receives frames; a subclass decides which frame is sent next. Frames
-/// that were complete before the request was sent are not delivered to the subclass, unless it calls `overhear`.
+/// that were complete before the request was sent, or before `listen` began, are not delivered to the subclass, unless
+/// it calls `overhear`.
 class CanEngine : public Conversation<CanFrame> {
  public:
   /// Not copyable: requests and replies are views into the conversation itself.
@@ -42,7 +43,8 @@ class CanEngine : public Conversation<CanFrame> {
 
   /// Returns the time at which the last request was sent completely.
   [[nodiscard]] Time sent_at() const { return sent_at_; }
-  /// Returns whether a bus error destroyed frames since the last request or `listen`, whichever is later.
+  /// Returns whether a bus error, which may have destroyed frames, was reported since the last request or `listen`,
+  /// whichever is later.
   [[nodiscard]] bool is_disturbed() const { return disturbed_; }
   /// Returns why no answer was received: timeout, or bad_framing on a bus with errors.
   [[nodiscard]] Error missing() const { return disturbed_ ? Error::bad_framing : Error::timeout; }
@@ -53,8 +55,8 @@ class CanEngine : public Conversation<CanFrame> {
   CanEngine() = default;
   ~CanEngine() = default;
 
-  /// Sends `frame`, not before `pause` after the last answer or request, and receives until the bus is silent for
-  /// `times.answer_limit`, or until `times.busy_limit` has passed.
+  /// Sends `frame`, not before `pause` after the last request, or its answer if `keep` stored one. Receives until the
+  /// bus is silent for `times.answer_limit`, or until `times.busy_limit` has passed.
   void ask(const CanFrame& frame, const CanHostTimes& times, Time pause = {});
   /// Sends `frame` at once and receives frames for exactly `duration`.
   void ask_for(const CanFrame& frame, Time duration);

@@ -39,8 +39,8 @@ class ClockedDevice : public EncoderOn<std::uint8_t> {
   /// Makes the encoder drive the data line low for `time` after the last edge of the clock. To be called from
   /// `selected`.
   void hold_low(Time time) { low_after_ = time; }
-  /// Sets how many of the driven bits hosts read; only these bits can be damaged by simulated faults of the line. To be
-  /// called from `selected`.
+  /// Sets how many of the driven bits hosts read: simulated faults of the line flip bits only in the bytes that have
+  /// these bits. To be called from `selected`.
   void hosts_take(std::size_t bits) { taken_ = bits; }
 
  private:

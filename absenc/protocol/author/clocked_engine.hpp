@@ -11,7 +11,7 @@
 
 namespace absenc::author {
 
-/// Rate and pause of the clock, as the encoder's document states them.
+/// Rate and pause of the clock, which the options of the encoder select.
 struct ClockedHostTimes {
   std::uint32_t rate = 0;  ///< rate of the clock in Hz, set before the first transfer; 0: the line keeps its rate
   Time rest{};  ///< shortest pause of the clock before each transfer, after which the encoder latches a new position

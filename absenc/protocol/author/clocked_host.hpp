@@ -13,7 +13,7 @@
 
 namespace absenc::author {
 
-/// The members that a protocol of clocked bits must have:
+/// The members that a protocol of clocked bits must have, `Request` only if it is that of a unit:
 ///
 ///   struct Protocol {
 ///     using Format, Reply;
@@ -72,7 +72,7 @@ class ClockedHostOf : public ClockedEngine {
     if (reply) last_ = *reply;
     return reply.error();
   }
-  /// Stores a valid reply and its position, which was latched at the first edge of the clock.
+  /// Stores a valid reply and its position, with `begun_at` as the time of its latch.
   void keep(const Reply& reply) {
     last_ = reply;
     keep();

@@ -54,7 +54,7 @@ template <class P>
 using ItemOf = typename detail::ItemOf<P>::Item;
 
 /// Functions that turn requests and replies of a unit into fields, and errors into texts for people. Firmware that
-/// uses no Unit does not link them. All conversations of the unit derive from `Host`.
+/// uses no Unit does not link them. All conversations that Reported extends by them derive from `Host`.
 template <class P, class Host = Conversation<ItemOf<P>>>
 struct Report {
   /// Class with the functions of the protocol.
@@ -208,7 +208,8 @@ struct CommandOf {
 
   Command info;  ///< Description of the command.
   /// Returns the request that does the work of the command, although a procedure may send more. It returns an error, or
-  /// a request that P::encode refuses, if the arguments allow none. Null: the requests are not known beforehand.
+  /// a request that P::encode refuses, if the arguments allow none. Null: there is none (clocked lines), or the
+  /// requests are not known beforehand.
   Result<Request> (*request)(const Format&, Arguments);
   /// Constructs the conversation of the command at the start of the storage, which has at least `size` bytes; the rest
   /// holds coroutine frames.

@@ -18,8 +18,7 @@ namespace absenc::author {
 
 /// The properties of a unit of the protocol `P`, from which Descriptor (unit.hpp) makes the Unit. `P` has the members
 /// that dialog.hpp and device.hpp, clocked_host.hpp or can_dialog.hpp list. `VirtualEncoder`, a Device such as
-/// BusDevice or ClockedDevice, is constructed from (format, shaft). All conversations of the unit derive from `Host`,
-/// as in Report.
+/// BusDevice or ClockedDevice, is constructed from (format, shaft). `Host`: as in Report.
 template <class P, class VirtualEncoder, class Host = Conversation<ItemOf<P>>>
 struct Declaration {
   /// Class with the functions of the protocol.
@@ -66,7 +65,7 @@ struct Declaration {
   /// length P::longest_reply.
   std::size_t (*reply_size)(const Format&, Bytes begin) = nullptr;
   /// Returns the error to report for the reply to an invalid request: for example, that the encoder rejected it.
-  /// `error`: error of the request. Null: `error` is reported.
+  /// `error`: error of the request; `reply` is empty if only the request is decoded. Null: `error` is reported.
   Error (*answer_to_bad)(const Format&, Bytes request, Error error, Bytes reply) = nullptr;
   /// Checks a frame and puts its fields into the sink. Null: functions of the protocol and the report do.
   Error (*decode)(const Format&, Frame request, Frame reply, FieldSink&) = nullptr;
@@ -80,9 +79,11 @@ struct Declaration {
 
   // ---- As in Unit (protocol/unit.hpp)
 
-  /// Returns where a frame ends. Null: the lengths of requests and replies decide.
+  /// Returns where a frame ends. Null: the lengths of requests and replies decide; on clocked links all bytes are one
+  /// frame.
   FrameEnd (*frame_end)(const Options&, Direction, Bytes) = nullptr;
-  /// Returns whether a request is answered. Null: Protocol::manner decides.
+  /// Returns whether a request is answered. Null: Protocol::manner decides; on clocked links and with `decode`, every
+  /// request is answered.
   bool (*is_answered)(const Options&, Frame request) = nullptr;
   /// Returns whether the checks must detect that this bit of a valid reply was flipped; null: every bit.
   bool (*is_checked)(const Options&, Frame request, Frame reply, std::size_t bit) = nullptr;

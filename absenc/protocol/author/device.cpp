@@ -137,7 +137,7 @@ void Responder::search_again(Time at) {
 
 // Handles a byte received while the encoder sends. A request breaks a rule then. It is excused, in at most
 // `most_excuses` consecutive replies, if this program was delayed so long that the host may have repeated the request
-// after its timeout: longer than the host waits for each request.
+// after its timeout: longer than the assumed timeout of the host times the number of requests in this transmission.
 void Responder::receive_while_transmitting(std::uint8_t byte, Time at) {
   if (!interruption_.begins_request(request_size({&byte, 1}), at, times_.character)) return;
   ++interrupted_;

@@ -18,7 +18,7 @@
 
 namespace absenc::author {
 
-/// Times of a virtual encoder, as its document states them.
+/// Times of a virtual encoder: those of its document, or assumed where it states none.
 struct DeviceTimes {
   Time character{};        ///< duration of a character on the line; of a byte, if two bytes share a character
   Time answer_time{};      ///< time from the end of a request to the begin of its reply
@@ -79,7 +79,7 @@ class Responder : public EncoderOn<std::uint8_t> {
     longer_ = delay;
     turns_ = all;
   }
-  /// Is called when the last bit of a reply was sent, with that time.
+  /// Is called when the last bit of a reply, or of bytes given to `transmit`, was sent, with that time.
   virtual void replied(Time) {}
   /// Answers the complete request `request`, received at `at`: writes the reply into `reply`, and returns how the
   /// request is answered.
@@ -122,7 +122,7 @@ class Responder : public EncoderOn<std::uint8_t> {
   Time turns_end_{};          // bytes received before are replies of other encoders
   ByteBuffer<64> stored_;     // bytes received during the present transmission, if they are kept
   unsigned interrupted_ = 0;  // number of requests received during the present transmission
-  unsigned interruptions_in_a_row_ = 0;  // number of consecutive transmissions during which requests were received
+  unsigned interruptions_in_a_row_ = 0;  // consecutive transmissions before the present one with a request
   bool reply_pending_ = false;
   bool transmitting_ = false;
   Interruption interruption_;
@@ -168,7 +168,8 @@ class BusDevice : public Responder {
     const auto zero = static_cast<std::int64_t>(load_little_endian(Bytes(memory_).subspan(zero_address, 4)));
     return (shaft(at).position - zero) >> (32 - bits);
   }
-  /// Stores the position of the shaft at `at` as the zero, in four bytes of the memory at `zero_address`.
+  /// Stores the position of the shaft within its turn at `at` as the zero, in four bytes of the memory at
+  /// `zero_address`.
   void store_zero(Time at, std::size_t zero_address) {
     const auto here = static_cast<std::uint64_t>(shaft(at).position) & low_mask(32);
     store_little_endian(MutableBytes(memory_).subspan(zero_address, 4), here);

@@ -17,7 +17,8 @@
 
 namespace absenc::author {
 
-/// The functions that a protocol must have. None is optional, so a misspelt name does not compile.
+/// The functions that a protocol must have; `reading` and `latched` only if `last_reading` is used. A misspelt name
+/// does not compile.
 ///
 ///   struct Protocol {
 ///     using Format, Request, Reply;                                  // Format: made from the options
@@ -30,7 +31,7 @@ namespace absenc::author {
 ///     static bool is_whole(const Format&, Error);                    // see Engine
 ///     static Reading reading(const Format&, const Request&, const Reply&);
 ///     static Time latched(const Format&, Time sent_at);              // when the encoder latches the position; if the
-///   };                                                               // document does not say: `sent_at`, the latest
+///   };                                                               // document does not say: `sent_at` is assumed
 ///
 /// A conversation with encoded requests and decoded replies; a subclass sends the requests and handles the replies.
 template <class P>
@@ -313,7 +314,8 @@ struct ProcedureDialog<P> {
 }  // namespace detail
 
 /// Type of the dialog of a protocol's procedures: `P::Dialog` if the protocol declares it, because its requests do not
-/// have one reply each; otherwise DialogOf. `P::Dialog` is an Engine and Routine constructed from (format, arena).
+/// have one reply each; otherwise DialogOf. `P::Dialog` is a Routine and an engine of its kind of line, constructed
+/// from (format, arena).
 template <class P>
 using ProcedureDialog = typename detail::ProcedureDialog<P>::Type;
 

@@ -30,7 +30,7 @@ class EncoderOn : public Device<Item> {
   void raise_alarms(std::uint32_t bits) override { raised_ |= bits; }
   /// Ends the cause of the alarms `bits`. An encoder with latched alarms overrides this function.
   void lower_alarms(std::uint32_t bits) override { raised_ &= ~bits; }
-  /// Returns a number that every change of the memory increments.
+  /// Returns a number that the encoder increments with every change that it makes to the memory.
   [[nodiscard]] std::uint32_t memory_version() const final { return memory_version_; }
   /// Returns the first rule breaches of the host, in order of time.
   [[nodiscard]] std::span<const Violation> violations() const final { return rules_.violations(); }
@@ -38,8 +38,8 @@ class EncoderOn : public Device<Item> {
   [[nodiscard]] std::uint32_t violation_count() const final { return rules_.violation_count(); }
   /// Sets the observer of rule checks; null: none.
   void watch_rules(RuleWatch* watch) final { rules_.watch(watch); }
-  /// Returns how many answers the encoder has given: replies, unsolicited transmissions, and requests executed without
-  /// a reply.
+  /// Returns how many answers the encoder has given: replies, unsolicited transmissions, and those requests
+  /// without a reply for which the subclass calls `count_answer` or returns Answer::none, executed or not.
   [[nodiscard]] std::uint64_t answer_count() const final { return answer_count_; }
 
  protected:

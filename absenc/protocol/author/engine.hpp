@@ -14,7 +14,7 @@
 
 namespace absenc::author {
 
-/// Time limits and pauses of a host, as the protocol's document states them.
+/// Time limits and pauses of a host: those of the protocol's document, or chosen where it states none.
 struct HostTimes {
   Time answer_limit{};          ///< longest time from the end of a request to the first character of its reply
   Time gap_limit{};             ///< longest time between two characters of a reply
@@ -61,23 +61,24 @@ class Engine : public Conversation<std::uint8_t> {
   /// Puts nothing, so that names and texts of fields are only linked where they are used. Reported (command.hpp) puts
   /// them, and explains the error that the line is never silent.
   void report(FieldSink&) const override {}
-  /// Returns the last request and the bytes received after it.
+  /// Returns the last request, none after `listen`, and the bytes of `reply`.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const final { return {out_, reply(), sent_at_, received_at_}; }
 
-  /// Returns the time at which the last request began; an SPI device answers with its state at that time.
+  /// Returns the time at which the last request was due to begin. An SPI device is taken to answer with its state at
+  /// that time.
   [[nodiscard]] Time begun_at() const { return begun_at_; }
   /// Returns the time at which the last bit of the last request was sent; for a pulse, the time at which it began.
   [[nodiscard]] Time sent_at() const { return sent_at_; }
   /// Returns the latest of these times: the first step, the last received byte, the end of the last request, the end
   /// of the last time of listening.
   [[nodiscard]] Time received_at() const { return received_at_; }
-  /// Returns the bytes received after the last request, valid or not.
+  /// Returns the bytes received since the last request, or listening, began, valid or not, as far as there is room.
   [[nodiscard]] Bytes reply() const { return Bytes(storage_).first(size_); }
   /// Returns whether the last exchange was abandoned because the line is never silent. Repeating the request does not
   /// help then.
   [[nodiscard]] bool is_noisy() const { return noisy_; }
-  /// Returns whether a character of the last exchange was damaged, or was received while the bytes of the request were
-  /// still being sent.
+  /// Returns whether, since the last request began, a character was damaged, or was received while no reply was
+  /// awaited; without characters received while listening, or during a pulse unless damaged.
   [[nodiscard]] bool is_disturbed() const { return disturbed_; }
 
  protected:
@@ -97,7 +98,7 @@ class Engine : public Conversation<std::uint8_t> {
   /// Sends nothing until `time`, then calls `woken`.
   void sleep(Time time);
   /// Listens without sending for `duration`, from the next step on: calls `heard` for all received bytes and `woken` at
-  /// the end. The end is also checked when bytes arrive, because a port delivers bytes before timers.
+  /// the end. The end is checked at every step, so also after bytes, which a port delivers before timers.
   void listen(Time duration);
   /// Continues to listen until the end of the time. To be called after `heard`.
   void listen_on() { state_ = State::listening; }
@@ -160,7 +161,7 @@ class Engine : public Conversation<std::uint8_t> {
   State state_ = State::over;
   bool disturbed_ = false;
   bool item_received_ = false;  // a byte, or a damaged character, was received in this exchange
-  bool noisy_ = false;          // bytes are still received after `noise_end_`
+  bool noisy_ = false;          // bytes are still received at `noise_end_` or later
   bool started_ = false;
   bool emitting_ = false;
   Error error_ = Error::none;
@@ -168,7 +169,7 @@ class Engine : public Conversation<std::uint8_t> {
   std::size_t due_ = 0;  // bytes of the reply still to be received
   MutableBytes storage_;
   HostTimes times_;
-  // A byte received after this time shows that the line is never silent; without such a byte silence is reported.
+  // A byte received at this time or later shows that the line is never silent; without such a byte silence is reported.
   Time noise_end_{};
   Time received_at_{};
   Manner manner_{};

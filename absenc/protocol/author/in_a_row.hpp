@@ -11,7 +11,7 @@
 
 namespace absenc::author {
 
-/// The document's demands on requests that are sent in a row.
+/// The document's demands on requests that are sent in a row, and what a virtual encoder accepts.
 struct InARow {
   /// From where to where hosts keep `interval`.
   enum class IntervalBounds : std::uint8_t {

@@ -38,7 +38,7 @@ struct Known {
   [[gnu::flatten]] static constexpr Reading reading(const Format&, const Request&, const Reply& reply) {
     return P::reading(format, request, reply);
   }
-  /// Returns when the encoder latched the position of a reply to a request that was sent at `sent_at`.
+  /// Returns the latch time that P states or assumes for the reply to a request that was sent at `sent_at`.
   static constexpr Time latched(const Format&, Time sent_at) { return P::latched(format, sent_at); }
 };
 

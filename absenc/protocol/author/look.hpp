@@ -26,8 +26,8 @@ namespace absenc::author {
   return reading;
 }
 
-/// Result of `look`: the exchange that read a position. The `Found` of a procedure that reports a position is this
-/// struct, or derives from it.
+/// Result of `look`: the exchange that read a position. The `Found` of a procedure that calls `look` is this struct,
+/// or derives from it.
 template <class P>
 struct Looked {
   typename P::Request request{};  ///< The request that was sent.

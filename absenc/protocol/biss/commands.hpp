@@ -103,12 +103,12 @@ template <auto member>
 inline constexpr auto start_sequence_option = author::option<member>(
     "start_sequence", "virtual encoder: after power on it shows nothing before the start sequence");
 
-/// Puts the results of a register command into `sink`.
+/// Puts the results of a command that sends control frames into `sink`.
 template <class F>
 constexpr void put_registers(FieldSink& sink, const F&, const ControlResults& found) {
   register_fields.put(sink, found);
 }
-/// Describes how the results of register commands are reported.
+/// Describes how the results of commands that send control frames are reported.
 template <class F>
 inline constexpr author::Finding<F, ControlResults> control_results{.put = put_registers<F>};
 
@@ -189,8 +189,9 @@ template <class F>
 
 // ---- Parts of the declaration that all BiSS units share
 
-/// Writes the CDM bits of the command's control frame to `out` as '0' and '1' and returns their number, 0 for a command
-/// without one. If a command sends several control frames, writes the one that reads or changes the register.
+/// Writes the CDM bits of the command's control frame to `out` as '0' and '1' and returns their number; 0 for the
+/// commands `position` and `info`. If a command sends several control frames, writes the one that reads or changes the
+/// register.
 template <class F>
 Result<std::size_t> encode_control(const F& format, const Command& command, Arguments arguments, MutableBytes out) {
   ControlMaster master;

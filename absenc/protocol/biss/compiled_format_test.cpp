@@ -69,7 +69,8 @@ void expect_equal_data(const Data& data, const Data& expected) {
   EXPECT_EQ(data.crc, expected.crc);
 }
 
-// ACK and delay as on real lines, and some so long that the start bit is not in the first machine word.
+// Returns a number of ACK bits as on real lines, or at times so many that the start bit is not in the first machine
+// word.
 unsigned random_ack(sim::Random& random) {
   return static_cast<unsigned>(1 + random.below(random.below(4) == 0 ? 90 : 20));
 }

@@ -59,7 +59,8 @@ class MakerName {
   Buffer<char, 8> text_;
 };
 
-/// Results of a captured control frame, or of a register procedure. Only members with a value are reported.
+/// Results of a captured control frame, or of a procedure that sends control frames. Only members with a value are
+/// reported.
 struct ControlResults {
   // ---- Results of a control frame
   std::optional<std::uint8_t> slaves{};         ///< Number of slaves with an ID.

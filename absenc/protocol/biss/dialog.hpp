@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Connects a procedure that accesses BiSS registers with the line, frame by frame. Each frame carries a position, which
-// is decoded and checked, and the encoder's bit (CDS). The host's bit (CDM) is the level of MA between two frames.
+// Connects a procedure that sends BiSS control frames with the line, frame by frame. Each frame carries a position,
+// which is decoded and checked, and the encoder's bit (CDS). The host's bit (CDM) is the level of MA between two
+// frames.
 #pragma once
 
 #include "absenc/protocol/author/dialog.hpp"

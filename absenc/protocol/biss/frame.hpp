@@ -236,7 +236,7 @@ struct Head {
 };
 
 // Finds the data, `size` bits, of a frame whose start bit and CDS are in the first machine word, as they nearly always
-// are. Returns false for any other frame, and for one with an error.
+// are. Returns false for any other frame, and for one that is cut or has a CDS that is not accepted.
 [[nodiscard, gnu::always_inline]] constexpr bool find_data(const BitView& samples, std::size_t size, Cds cds,
                                                            Head& head) {
   if (samples.bytes.size() < sizeof(std::size_t)) return false;
@@ -375,7 +375,7 @@ template <const Format& format>
   return to_reading(contents, reply.word, format.scale);
 }
 
-/// Returns whether only zeros follow the CDS bit, because process data are switched off. Stores ACK, delay and CDS in
+/// Returns whether only zeros follow the CDS bit, as when process data are switched off. Stores ACK, delay and CDS in
 /// `head`.
 template <class ReplyType>
 [[nodiscard]] constexpr bool is_empty_frame(BitView samples, ReplyType& head) {
@@ -384,7 +384,7 @@ template <class ReplyType>
   return first < samples.size && !samples[first] && samples.end_of_run(first) == samples.size;
 }
 
-/// Returns whether the samples ended before the frame did, because encoder or line needed longer than expected.
+/// Returns whether the samples ended before the frame did, as when encoder or line need longer than expected.
 [[nodiscard]] constexpr bool ended_early(Error error, BitView samples) {
   if (error == Error::truncated) return true;
   return error == Error::bad_framing && samples.end_of_run(samples.end_of_run(0)) == samples.size;

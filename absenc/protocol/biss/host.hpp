@@ -11,7 +11,8 @@
 
 namespace absenc::biss {
 
-/// Longest extra delay of encoder and line, beyond the expected delay, with which a host still finds the frame.
+/// Longest extra delay of encoder and line, beyond the expected delay, with which a host still finds the frame, if
+/// ProtocolOf::most_clocks suffice.
 inline constexpr Time longest_delay = 80us;
 
 /// A conversation that reads positions and meanwhile carries control frames; dialog.hpp defines it.

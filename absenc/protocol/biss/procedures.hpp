@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Procedures that access the registers of a BiSS encoder, one bit per frame, while positions are read.
+// Procedures that access the registers of a BiSS encoder or send it commands, one bit per frame, while positions are
+// read.
 #pragma once
 
 #include <algorithm>
@@ -72,7 +73,8 @@ Part<Error> run_control_frame(ControlDialog<F>& dialog, ControlMaster& master) {
 }
 
 /// Reads `count` registers, 64 at most, appends their values to `bytes` and returns the error. Late bytes are read
-/// again until two control frames in a row bring the same data, or `control_attempts` were made (cross_check_failed).
+/// again until a control frame is not late or brings the data of the late one before it; after `control_attempts`:
+/// cross_check_failed.
 /// If P refuses the next register, a separate control frame reads it: some encoders send P = 1 after every register.
 template <class F>
 Part<Error> read_registers(ControlDialog<F>& dialog, ControlMaster& master, ByteBuffer<control_most>& bytes,
@@ -119,7 +121,8 @@ Part<Error> write_register(ControlDialog<F>& dialog, ControlMaster& master, unsi
   co_return error != Error::none ? error : Error::cross_check_failed;
 }
 
-/// Writes a register that the user's command is meant to change, and records that the encoder was changed.
+/// Writes a register that the user's command is meant to change, and records that the encoder may have changed, or that
+/// it refused the write.
 template <class F>
 Part<Error> change_register(ControlDialog<F>& dialog, ControlMaster& master, unsigned address, std::uint8_t value) {
   dialog.changes();
@@ -128,7 +131,7 @@ Part<Error> change_register(ControlDialog<F>& dialog, ControlMaster& master, uns
   co_return error;
 }
 
-/// Selects `bank` and returns the error; does nothing if `address` belongs to no bank or `bank` is selected already.
+/// Selects `bank` and returns the error; writes nothing if `address` belongs to no bank or `bank` is selected already.
 template <class F>
 Part<Error> select_bank(ControlDialog<F>& dialog, ControlMaster& master, unsigned bank, unsigned address) {
   if (address >= registers::bank_size) co_return Error::none;
@@ -168,7 +171,7 @@ Procedure read_memory(ControlDialog<F>& dialog, ControlResults& found, Arguments
 }
 
 /// Writes a register unless it has this value already: a register may wear out, and only its maker knows how fast.
-/// Arguments: address, value, bank, force (1: writes it in any case, even a register that its maker defines).
+/// Arguments: address, value, bank, force (1: also writes an equal value, and a register that its maker defines).
 template <class F>
 Procedure write_memory(ControlDialog<F>& dialog, ControlResults& found, Arguments arguments) {
   const auto address = static_cast<unsigned>(arguments[0]);

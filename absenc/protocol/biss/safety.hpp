@@ -99,7 +99,8 @@ constexpr std::uint64_t compared_bits(const Channel& channel, const WordWith<siz
          format.compare_bits <= format.spw.word.bits_of(Meaning::position);
 }
 
-/// Returns whether both words have the same position, within one count of the compared bits.
+/// Returns whether both words have the same position, and the same turns if both have turns, within one count of the
+/// compared bits.
 template <std::size_t size>
 [[nodiscard]] constexpr bool positions_agree(const SafetyFormat& format, const WordWith<size>& cpw,
                                              const WordWith<size>& spw) {

@@ -233,7 +233,7 @@ constexpr void put_register(FieldSink& sink, std::uint32_t address, Bytes data,
 }
 
 /// Returns `format` with values for its unknown members, to decode a reply of an encoder whose identity is unknown: 22
-/// bits, and turns if the length of the reply includes them.
+/// bits, and 16 bits of turns if the length of the reply, and in a position frame the checksum, shows turns.
 [[nodiscard]] constexpr Format assumed(const Format& format, Bytes reply) {
   Format known = format;
   if (known.resolution == 0) known.resolution = maximum_resolution;
@@ -314,9 +314,9 @@ constexpr Error decode_access_answer(Bytes request, Bytes reply, FieldSink& sink
   return Error::none;
 }
 
-/// Decodes a reply into `sink` and returns the first error. If the request is a register access (all its `ra` bytes),
-/// the reply is the answer to it. Otherwise the length of the reply decides: position frame, channel 2 cycle or
-/// identity.
+/// Decodes a reply, or without one the request, into `sink` and returns the first error. If the request is a register
+/// access (all its `ra` bytes), the reply is the answer to it. Otherwise the length of the reply decides: position
+/// frame, channel 2 cycle or identity.
 constexpr Error decode(const Format& format, Bytes request, Bytes reply, FieldSink& sink) {
   if (reply.empty()) return decode_request(request, sink);
   if (is_access(request)) return decode_access_answer(request, reply, sink);

@@ -43,7 +43,7 @@ inline constexpr Time busy_limit = 2s;   ///< Longest time for which the host wa
 inline constexpr Time calibration_time = 1s;     ///< Duration of the virtual encoder's self-calibration.
 inline constexpr Time calibration_limit = 15s;   ///< Timeout of a self-calibration; the vendor allows the shaft 10 s.
 inline constexpr Time calibration_poll = 100ms;  ///< Time between two polls of a running self-calibration.
-/// Longest time without a valid frame while the host receives a stream.
+/// Longest time without a valid frame or a loss of alignment while the host receives a stream.
 inline constexpr Time listen_limit = 500ms;
 
 // ---- Frames
@@ -72,7 +72,7 @@ inline constexpr std::size_t request_bytes = 2;    ///< Number of bytes of a req
 inline constexpr std::size_t identity_bytes = 19;  ///< Number of bytes of an identity, checksum included.
 /// Number of bytes of an identity as the vendor's library reads it: one more than the identity has.
 inline constexpr std::size_t padded_identity_bytes = 20;
-inline constexpr std::size_t reply_capacity = 20;       ///< Number of bytes of the longest reply.
+inline constexpr std::size_t reply_capacity = 20;       ///< Bytes of the longest reply, a padded identity.
 inline constexpr unsigned maximum_resolution = 22;      ///< Greatest number of bits of the position.
 inline constexpr unsigned maximum_multiturn_bits = 16;  ///< Greatest number of bits of the turns.
 /// Bytes of one reply.

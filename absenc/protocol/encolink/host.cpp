@@ -58,8 +58,8 @@ void Channels::take(const author::HostOf<Frames>& host) {
     }
   }
   reading = to_reading(format, position, status);
-  // On SPI the encoder takes the position when NCS falls. For a UART the document does not state when: at the latest
-  // at the end of the request.
+  // On SPI the encoder takes the position when NCS falls. For a UART the document does not state when: the end of the
+  // request is assumed.
   reading.latched = format.interface == Interface::spi ? host.begun_at() : host.sent_at();
   reading.received = host.received_at();
 }

@@ -63,7 +63,7 @@ struct Channels {
   std::optional<Error> ended{};
   std::uint8_t channel3 = 0;  ///< Channel 3 byte of the last valid cycle.
   bool in_step = false;       ///< Whether the channel 2 bytes are aligned to a cycle.
-  /// Whether all bytes of the last cycle were 0, because the encoder is starting.
+  /// Whether all bytes of the last cycle were 0, as while the encoder starts.
   bool silent = false;
 
   /// Processes the valid frame that `host` has received. A cycle whose position differs from that of its first frame

@@ -366,7 +366,7 @@ TEST(EncolinkListen, LatchedIsTimeOfPosition) {
   EXPECT_EQ(compared, 9u);
 }
 
-// Document, on an encoder that transmits without requests: "Nothing is sent then."
+// README, listen: with `stream_rate` set, `position` sends nothing; commands other than it and `listen` are refused.
 TEST(EncolinkListen, SendsNothingToStreamingEncoder) {
   Bench bench(streaming);
   std::size_t sent = 0;

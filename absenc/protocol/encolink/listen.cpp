@@ -103,7 +103,7 @@ void Listen::take(Bytes frame, const Position& position) {
   frame_.clear();
   frame_.append(frame);
   reading_ = to_reading(format_, position_);
-  // The document does not state when the encoder takes the position: at the latest when the frame begins. That time is
+  // The document does not state when the encoder takes the position: the begin of the frame is assumed. That time is
   // counted back from `received_at_`, when the last received byte ended.
   reading_.latched = received_at_ - uart_settings.character() * static_cast<std::int64_t>(waiting().size());
   reading_.received = received_at_;

@@ -209,8 +209,8 @@ void note_refusal(Dialog& dialog, const ProcedureState& found, AccessOutcome acc
     dialog.refused();
 }
 
-// Writes a register and reads it back, even if the answer to the write is lost. Repeats the write only if reading back
-// shows another value.
+// Writes a register and reads it back, even if the answer to the write is lost. A write that the encoder may have
+// executed is repeated only if reading back shows another value.
 Part<bool> write(Dialog& dialog, ProcedureState& found, std::uint32_t address, std::uint16_t size,
                  std::uint64_t value) {
   constexpr std::string_view in_the_middle =

@@ -39,7 +39,7 @@ struct ProcedureState : Channels {
   std::optional<bool> running{};  ///< Whether a self-calibration is running; no value in other procedures.
   bool reports_status = false;    ///< Whether the detailed status is reported.
 
-  bool emits = false;                 ///< Whether the procedure emits each position.
+  bool emits = false;                 ///< Whether each position is emitted before the next request.
   bool is_new = false;                ///< Whether the latest position was not emitted yet.
   std::uint8_t protocol_version = 0;  ///< Protocol version in the identity; 0: the identity was not read yet.
   unsigned lost = 0;                  ///< Number of frames in a row that were lost or damaged.
@@ -74,7 +74,7 @@ struct ProcedureState : Channels {
 
 /// Reads `size` bytes at `address` by a register access, in up to five attempts, while positions continue. Returns how
 /// the last attempt ended. Stops the procedure if the encoder has no registers, or those of an AksIM-4, or sends no
-/// valid identity.
+/// valid identity that agrees with the options.
 author::Part<AccessOutcome> attempt_read(Dialog& dialog, ProcedureState& found, std::uint32_t address,
                                          std::uint16_t size);
 /// Writes `value` as `size` bytes to `address` like `attempt_read`, but repeats no write that the encoder may have
@@ -107,7 +107,7 @@ author::Procedure write_register(Dialog& dialog, ProcedureState& found, std::siz
 /// register).
 author::Procedure write_memory(Dialog& dialog, ProcedureState& found, Arguments arguments);
 /// Writes `command` to the command register. Only the status in the encoder's answer shows that the encoder executed
-/// the command, so the write is not repeated.
+/// the command, so a write that it may have executed is not repeated.
 author::Procedure send_command(Dialog& dialog, ProcedureState& found, std::uint8_t command);
 
 /// Makes the present position the zero of the turn, by the position offset. Argument: 1 to save the offset. Errors

@@ -125,7 +125,7 @@ Result<Request> memory_writing(const Format&, Arguments arguments) {
 constexpr MakeRequest not_encodable =
     nullptr;  // null where the value depends on the position, or where nothing is sent
 
-// ---- End of a frame: found by its checksum alone
+// ---- End of a frame: the shortest of the possible lengths with a right checksum decides
 
 constexpr std::size_t reply_size(const Format& format, Bytes begin) {
   for (std::size_t size = 1; size <= identity_bytes; ++size) {

@@ -100,7 +100,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     latches_ |= static_cast<std::uint8_t>(bits & ~unsigned{alarms::voltage});
     forced_ |= static_cast<std::uint8_t>(bits & alarms::voltage);
   }
-  /// Ends the alarms `bits` and their cause, including latched alarms.
+  /// Ends the alarms `bits` that were raised or latched. Alarms that a condition causes stay while it lasts.
   void lower_alarms(std::uint32_t bits) override {
     latches_ &= static_cast<std::uint8_t>(~bits);
     forced_ &= static_cast<std::uint8_t>(~bits);
@@ -371,7 +371,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
 
   author::RowCounter resets_{reset_row, rules()};
   unsigned encoder_ids_ = 0;        // number of consecutive requests with ID 8
-  std::uint8_t refused_field_ = 0;  // CF of the last damaged request that is refused
+  std::uint8_t refused_field_ = 0;  // CF of the last damaged request for this encoder
   std::uint8_t others_field_ = 0;   // CF of the last request; the reply of another encoder begins with the same byte
 };
 

@@ -87,7 +87,7 @@ struct Shown {
   std::optional<bool> led_error{};                 ///< Whether the LED current is out of range.
   std::optional<bool> lissajous_error{};           ///< Whether the signals of the disc are out of range.
   std::optional<std::uint32_t> safe_singleturn{};  ///< Safe position within the turn, in counts.
-  /// Page that a procedure leaves selected because it could not select the page from before again.
+  /// Page that a procedure leaves selected: the page from before is unknown, or was not seen to be selected again.
   std::optional<std::uint8_t> page_left{};
   bool has_turns = true;  ///< false: the turns (ABM) of the reply are not shown
 };

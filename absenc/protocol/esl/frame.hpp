@@ -319,7 +319,7 @@ struct ChannelReply {
   std::uint8_t encoder_id = 0;  ///< Encoder id (ENID).
 };
 
-/// A decoded reply; members that its data ID does not carry are 0, and `two.status` is then status::channel_2.
+/// A decoded reply; members that its data ID does not carry are 0. Without channel 2 `two.status` is status::channel_2.
 struct Reply {
   DataId id = DataId::position;                   ///< Data ID of the reply.
   std::uint8_t encoder_address = 0;               ///< Address of the encoder on the line (EAD), 0 to 7.

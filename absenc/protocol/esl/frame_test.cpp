@@ -151,7 +151,7 @@ TEST(EslFrame, ReadsKnownProfileLikeAnyProfile) {
   author::testing::expect_known_as_any<Protocol, known_default, known_calibration>(frame({}, DataId::calibration));
 }
 
-// The Hamming distance of both CRCs is 5.
+// The 16-bit CRCs of both channels have a Hamming distance of 5.
 TEST(EslFrame, DetectsUpToFourWrongBits) {
   sim::Random random(5);
   for (const Profile& profile : all_profiles()) {

@@ -159,7 +159,7 @@ author::Outcome failure(Error error, std::string_view words, Time hold) {
 }
 
 // Selects a page, waits until it is ready, and returns it. Otherwise the procedure ends; `words` is the detail of the
-// error.
+// error, unless the memory stays busy, which has a detail of its own.
 author::Part<std::uint8_t> turn_to(Dialog& dialog, std::uint8_t page, std::string_view words) {
   const Request request{DataId::write_memory, dialog.format().address, page_select_address, page};
   const Result<Reply> reply = co_await when_ready(dialog, request);

@@ -57,8 +57,8 @@ author::Procedure write_memory(Dialog& dialog, ProcedureResult& found, Arguments
 author::Procedure select_page(Dialog& dialog, ProcedureResult& found, Arguments arguments);
 
 /// Finds whether the LED or the Lissajous signals raise led_or_lissajous_error: reads address 0x1A of page 8, then
-/// selects the page from before again. With several encoders on the line it reads SF instead (Table 5). Errors:
-/// unsupported (other alarms raise the same bits of SF), busy, or that of an exchange.
+/// selects the page from before again, if it is known. With several encoders on the line it reads SF instead (Table 5).
+/// Errors: unsupported (other alarms raise the same bits of SF), busy, or that of an exchange.
 author::Procedure read_error_info(Dialog& dialog, ProcedureResult& found);
 
 // ---- Several encoders on one line

@@ -144,7 +144,7 @@ TEST(EslMemory, WriteErrors) {
     reply = wire({.id = DataId::read_memory, .memory_address = 10, .value = 0x32});
   };
   for (const Row& row : {Row{0, Error::none, "", 1, cut}, Row{2, Error::none, "", 1, cut},
-                         // A lost reply to the write: reading back decides, and the write is never repeated.
+                         // A cut reply to the write: reading back decides, and the write is not repeated.
                          Row{3, Error::none, "", 1, cut},
                          Row{5, Error::cross_check_failed, "reading back gave another value", 1, other}}) {
     Bench bench({}, [&row](unsigned index, Wire& reply) {

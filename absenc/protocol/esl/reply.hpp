@@ -422,7 +422,7 @@ struct Protocol {
   }
   /// Returns false: after any error of a reply more bytes may follow.
   static constexpr bool is_whole(const Profile&, Error) { return false; }
-  static constexpr auto latched = latch_time;  ///< returns when the encoder latches the position of a reply
+  static constexpr auto latched = latch_time;  ///< returns the typical time of the latch
 };
 
 /// Conversation that reads a position with a profile and a request that are constants: `static constexpr Profile

@@ -20,7 +20,7 @@ class SafePosition {
   [[nodiscard]] constexpr std::uint32_t singleturn() const { return singleturn_; }
   /// Returns the address of the encoder on its line, 0 to 7.
   [[nodiscard]] constexpr std::uint8_t encoder_address() const { return encoder_address_; }
-  /// Returns the time at which the encoder latched the position.
+  /// Returns the time taken as the latch of the position: see `latch_time`.
   [[nodiscard]] constexpr Time latched() const { return latched_; }
 
  private:

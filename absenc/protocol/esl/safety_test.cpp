@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Campaign of faults against safe positions: each single fault of one channel, each small error of the wire, replays
-// and delays. The number of wrong but accepted positions is printed for each kind; README.md states which the checks
-// cannot detect, and why.
+// Campaign of faults against safe positions: stuck values and bits of one channel, one or two wrong bits, swapped or
+// missing bytes, replays, delays and noise. The number of accepted positions is printed for each kind; README.md states
+// which faults the checks cannot detect, and why.
 #include "absenc/protocol/esl/safety.hpp"
 
 #include <gtest/gtest.h>

@@ -40,8 +40,8 @@ inline constexpr Time gap_limit = 3 * line_settings.character();
 /// set, so one bit would be enough.
 inline constexpr Time request_pause = line_settings.bits(2);
 
-/// Returns when the encoder latches the position of a reply to a request that ended at `sent_at`: 4.3 us after the end
-/// of CF, after which the request may have one CRC byte.
+/// Returns the time taken as the latch of the position in a reply to a request that ended at `sent_at`: the typical
+/// 4.3 us (`position_time`) after the end of CF, which one CRC byte follows if requests have a CRC.
 [[nodiscard]] constexpr Time latch_time(const Profile& profile, Time sent_at) {
   return sent_at - (profile.request_crc ? line_settings.character() : Time{}) + position_time;
 }

@@ -34,7 +34,7 @@ class Echoing final : public Server {
   }
 };
 
-// Feeds the input to a server. Bytes 0xF0 to 0xFF after an odd byte are pauses.
+// Feeds the input to a server. Bytes 0xF0 to 0xFF after an odd byte, and the end of the input, are pauses.
 void ask_server(Bytes input) {
   Echoing server;
   server.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);

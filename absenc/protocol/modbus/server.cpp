@@ -70,7 +70,7 @@ void Server::feed(const ByteEvent& event) {
 
 void Server::receive(const ByteEvent& event) {
   if (transmitting_) {
-    // A request during a transmission breaks the rule once, not once for each byte of the request.
+    // Whatever is received during one transmission breaks the rule once, not once for each byte.
     if (!expects_collision_ && !interrupted_ && !ended_late_) expect(false, turn_rule, event.at);
     interrupted_ = true;
     return;

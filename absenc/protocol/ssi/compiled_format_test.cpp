@@ -8,7 +8,7 @@
 namespace absenc::ssi {
 namespace {
 
-// A word whose last bit is the parity bit that an error inverts.
+// Returns `word` with a parity bit: if it has none, one is added at the end.
 WordFormat with_error_parity(WordFormat word) {
   if (word.find(Meaning::parity) == nullptr) word.add({"parity", Meaning::parity, 1});
   return word;

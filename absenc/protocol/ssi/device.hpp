@@ -27,7 +27,7 @@ class VirtualEncoder final : public author::ClockedDevice {
   Format format_;
   const Shaft* shaft_;
   Word latched_{};
-  std::size_t shifted_ = 0;  // number of clocks since `latched_` was stored, modulo the length of two words
+  std::size_t shifted_ = 0;  // clocks since `latched_` was stored; modulo two words if clocked again too soon
   Time free_at_{};           // end of the monoflop time after the last clock
 };
 
