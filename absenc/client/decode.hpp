@@ -30,8 +30,9 @@ struct DecodeChoices {
   std::vector<std::string> options{};  ///< Options of the unit, as "name=value".
 };
 
-/// An input range of rows, ordered by the end of their frames. Rows are produced while the file is read, so its size is
-/// unlimited. Other threads decode the file up to about 2500 rows ahead of the caller.
+/// An input range of rows, ordered by the end of their frames; an unanswered request may follow later rows. Rows are
+/// produced while the file is read, so its size is unlimited. Other threads decode the file up to about 2500 rows ahead
+/// of the caller.
 ///
 /// Columns: `time_s` (`tick` in a capture without times), `end_s` (`end_tick`), `kind` ("exchange", "request", "reply",
 /// "noise"), `request` and `reply` (bytes; text for CAN and clocked links, as "1FF:022B" and "0001"), `turnaround_us`,
@@ -40,7 +41,8 @@ struct DecodeChoices {
 /// fields are empty in a row with an error, of noise, or of a frame that is cut off or undocumented.
 ///
 /// If a reply does not carry the alarms, they come from an earlier reply of the same encoder, until a request is
-/// unanswered or clears alarms. Without such a reply, alarms and the position that depends on them are `Unknown`.
+/// unanswered or clears alarms. Without such a reply, the fields of the alarms and of the position that depends on them
+/// are `Unknown`, and `angle_deg` is empty.
 class Decoded {
  public:
   /// Type of the values in the range.

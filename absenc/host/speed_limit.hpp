@@ -51,8 +51,8 @@ inline constexpr unsigned most_excess = 4;
   return nanoseconds < 9.2e18 ? Time(static_cast<std::int64_t>(nanoseconds)) : never;
 }
 
-/// The distance that a shaft or carriage can move in a given time at its speed limit. Uses integers, because a small
-/// processor has no floating point.
+/// The distance that a shaft or carriage can move in a given time at its speed limit. Computes distances with integers,
+/// because a small processor has no floating point; only of_carriage() uses floating point.
 class Reach {
  public:
   /// Returns the reach of a shaft of at most `rpm` revolutions per minute; `rpm` is limited to about 1 830 000.

@@ -71,8 +71,8 @@ inline constexpr Errors form_errors = any_of(Error::bad_framing, Error::unexpect
 struct Ask {
   /// The whole request on the wire: bytes in hexadecimal, "ea 00 ea", or a CAN frame, "1ff:022b".
   std::string_view wire{};
-  /// Name of the command whose one request is sent, with its checksum, if `wire` is empty; "": the command that reads
-  /// the position.
+  /// Name of the command whose one request is sent, with its checksum, if `wire` is empty and `make` is null; "":
+  /// the command that reads the position.
   std::string_view command{};
   std::span<const std::int64_t> arguments{};  ///< Arguments of `command`; those left out have their defaults.
   bool wrong_end = false;                     ///< Whether the last byte has a wrong bit; not used with `wire`.

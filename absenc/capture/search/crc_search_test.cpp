@@ -241,7 +241,8 @@ RC_GTEST_PROP(CrcSearchProperty, FindsEveryCheckOf3To16Bits, (std::uint32_t seed
   RC_ASSERT(found(find_checks(frames_of(made, 3 + 16 / width, random)), made));
 }
 
-// Compares the list of divisors with a trial of every polynomial of the degree.
+// Compares the list of divisors of a polynomial with the constant term 1 with a trial of every polynomial of the degree
+// that has this term, too: others do not divide it.
 RC_GTEST_PROP(PolynomialProperty, ListsAllDivisorsOnce, (std::uint64_t value)) {
   const unsigned degree = *rc::gen::inRange<unsigned>(1, 11);
   value |= 1;

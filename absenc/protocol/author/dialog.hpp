@@ -140,12 +140,12 @@ class DialogOf : public HostOf<P>, public Routine {
       dialog_.earliest_ = dialog_.received_at() + pause;
       return *this;
     }
-    /// Sends the request once: an invalid or missing reply is not followed by a repetition.
+    /// Sets that the request is sent once: an invalid or missing reply is not followed by a repetition.
     Question& once() {
       dialog_.asking_.repeats = 0;
       return *this;
     }
-    /// Sends the request up to `attempts` times (1 or more) until its reply is valid.
+    /// Sets that the request is sent up to `attempts` times (1 or more) until its reply is valid.
     Question& repeated(unsigned attempts) {
       dialog_.asking_.repeats = attempts - 1;
       return *this;
@@ -166,7 +166,7 @@ class DialogOf : public HostOf<P>, public Routine {
       return *this;
     }
 
-    /// Returns false: a reply always takes time.
+    /// Returns false, so that co_await always suspends the procedure: a reply takes time.
     [[nodiscard]] bool await_ready() const { return false; }
     /// Sends the request and suspends the procedure until the exchange has ended.
     void await_suspend(std::coroutine_handle<>) { dialog_.ask_it(must); }

@@ -65,7 +65,7 @@ export class EncoderPage {
     this.below = element("p", {class: "below"});
     this.ranges = element("div");
     this.units = element("div");
-    this.scale.node.hidden = true;  // the scale is hidden until the encoder is known to be linear
+    this.scale.node.hidden = true;  // the scale is hidden until the encoder is known to be linear, with its length
     this.plot = element("div", {class: "plot", hidden: true, role: "img", "aria-label": "trace"});
     this.noTrace = element("p", {class: "faint"});
     this.wrong = element("div");
