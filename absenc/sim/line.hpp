@@ -63,8 +63,8 @@ class Line {
   Node attach(NodeRole role, Machine<Item>& machine, const OnEmit& on_emit = {});
   /// Replaces the machine of `node`, from now on. A transfer of the old machine is cut off.
   void replace(Node node, Machine<Item>& machine);
-  /// Takes the steps of the node's machine until it waits. Needed after something other than an event has changed the
-  /// machine.
+  /// Takes the steps of the node's machine until it waits or is done. Needed after something other than an event has
+  /// changed the machine.
   void wake(Node node);
   /// Sets whether a node receives what it sends.
   void set_echo(Node node, bool echo);
