@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Captures thousands of random exchanges, with faults or without, of every unit that does not use CAN. The annotator,
 // which knows neither the sender nor the frame boundaries of characters, must find each good exchange with its exact
-// times, and an error at the place of each bad one.
+// times, and an error at the place of each bad one. Units of characters with a weak check are tested without faults.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -365,7 +365,8 @@ TEST_P(Characters, FindsEveryErrorAtItsPlace) {
   EXPECT_GT(errors[Error::none], 2000);
 }
 
-// Annotates a recording of the encoder's side only, for example of one of two pairs of wires.
+// Checks that a recording of the encoder's pair of wires only (full duplex) gives at least as many positions as that of
+// both pairs.
 TEST_P(Characters, FindsRepliesWithoutRequests) {
   talk({}, 500, 3);
   if (unit.link != LinkKind::full_duplex) return;
