@@ -88,7 +88,7 @@ TEST(TformatFrame, RefusalDiffersFromWrongLength) {
   EXPECT_EQ(decode_reply({}, {DataId::singleturn}, damaged).error(), Error::bad_checksum);
 }
 
-// Replies to memory requests (Table 5, 9.1).
+// Checks replies to a write request: address, value, and value of a busy encoder (Table 5, 9.1).
 TEST(TformatFrame, MemoryReplyMatchesItsRequest) {
   const Request write{DataId::write_memory, 5, 7};
   const auto answered = [&write](std::uint8_t address, bool busy, std::uint8_t value, bool strict = true) {
