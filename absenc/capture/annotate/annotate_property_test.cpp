@@ -382,7 +382,7 @@ TEST_P(Characters, FindsRepliesWithoutRequests) {
   EXPECT_GE(positions, expected);
 }
 
-// A wrong stop bit makes its exchange bad and affects no other.
+// Checks that a wrong stop bit in a reply makes its exchange bad and affects no other.
 TEST_P(Characters, DamagedCharacters) {
   if (has_weak_check(unit, options)) GTEST_SKIP() << "its check is too weak";
   talk({}, 1000, 4);
@@ -405,8 +405,8 @@ TEST_P(Characters, DamagedCharacters) {
   expect_same(annotate(settings_of(unit)), expected);
 }
 
-// Begins the capture at some of the first 200 characters: no error and no false exchange may be found, and at most two
-// annotations may be missing.
+// Checks captures that begin at some of the first 200 characters: no error and no false exchange may be found, and at
+// most two annotations may be missing.
 TEST_P(Characters, BeginsAnywhere) {
   talk({}, 300, 5);
   const std::vector<Character> all = characters;

@@ -195,7 +195,7 @@ TEST(CrcSearch, FindsExclusiveOrCrcInBothBitOrders) {
   }
 }
 
-// Four frames, of which two equal the other two, count as two frames.
+// Checks that four frames, of which two equal the other two, are as much evidence as two frames.
 TEST(CrcSearch, FramesThatDifferInOneWayOnlyCountOnce) {
   std::mt19937 random(9);
   const GeneratedCheck made{.parameters = esl_8};
