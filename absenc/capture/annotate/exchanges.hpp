@@ -69,7 +69,8 @@ class Exchanges {
   /// Reports bytes that belong to no outstanding request.
   void report_unpaired(Annotation::Kind kind, const Piece& piece, Error error, Remark remark,
                        const Contents& contents = {});
-  /// Ends the capture at `end`. Reports outstanding requests, as cut if their reply may follow after the capture.
+  /// Ends the capture at `end`. Reports the outstanding requests like `report_unanswered`, but as cut those whose reply
+  /// may follow after the capture.
   void finish(Tick end);
 
  private:

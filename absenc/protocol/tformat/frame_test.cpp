@@ -182,8 +182,8 @@ TEST(TformatFrame, StatusReportsPartOfTheAlarms) {
   EXPECT_EQ(to_reading({}, {.id = DataId::read_memory}).status_reported, 0u);
 }
 
-// Checks that without a battery the bit `alarm` of SF, which is always set then (2 (1)), reports none of its four alarms
-// in a reply without ALMC.
+// Checks that in a reply without ALMC the bit `alarm` of SF reports none of its four alarms if there is no battery: the
+// bit is always set then (2 (1)).
 TEST(TformatFrame, WithoutBatteryStatusLeavesFourAlarmsUnknown) {
   constexpr Format format{.battery = false};
   const auto whole = [&](std::uint8_t more) {
