@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Commands of the RLS E201-9S USB interface, a letter each, some with a number, and its ASCII replies. README.md lists
-// the commands with their sources. Replies that no document describes are decoded as leniently as possible: text.hpp.
+// Commands of the RLS E201-9S USB interface, one character each, some with a number, and its ASCII replies. README.md
+// lists the commands with their sources. text.hpp decodes replies that no document describes, as leniently as possible.
 #pragma once
 
 #include <array>

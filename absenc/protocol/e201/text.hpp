@@ -78,7 +78,7 @@ struct Version {
   return std::nullopt;
 }
 
-/// Returns the first whole number in a text. Error: bad_framing (the text has no digit).
+/// Returns the first whole number in a text, at most its first nine digits. Error: bad_framing (the text has no digit).
 [[nodiscard]] constexpr Result<std::int64_t> find_number(Bytes text) {
   std::size_t at = 0;
   if (!detail::skip_to_digit(text, at)) return Error::bad_framing;

@@ -110,8 +110,8 @@ TEST(TformatProcedures, WritesMemoryOnlyIfItDiffersAndReadsItBack) {
   EXPECT_EQ(bench.violations(), 0u);
 }
 
-// Checks that 0x80 is refused as threshold, and other bytes are not: bit 7 enables the threshold, from 1 degC on, and
-// every byte with bit 7 clear is "off" (7.2.4, 7.4).
+// Checks that 0x80 is refused as threshold, but 0x81, 0xFF, 0x00 and 0x7F are not: bit 7 enables the threshold, from
+// 1 degC on, and every byte with bit 7 clear is "off" (7.2.4, 7.4).
 TEST(TformatProcedures, RefusesOverHeatThresholdOfZeroDegrees) {
   Bench bench;
   const auto zero = bench.run("memory-write", {overheat_address, 0x80, service_page});
