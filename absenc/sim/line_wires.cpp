@@ -220,9 +220,9 @@ void Line<Item>::end_frame(Node node) {
     State& sender = *nodes_[node];
     const CanFrame frame = sender.out[sender.index];
     if (observer_) observer_(node, sender.start, now_, frame);
-    // Nodes whose frames have the same arbitration field sent at the same time. If the rest of the frames is equal too,
-    // none of the nodes notices; otherwise all frames are lost. No node repeats its frame, because the clash would
-    // never end.
+    // Nodes whose frames were pending when this one began, with the same arbitration field, sent them at the same time.
+    // If the rest of the frames is equal too, none of the nodes notices; otherwise all these frames are lost. No node
+    // repeats its frame, because the clash would never end.
     std::vector<Node> senders;
     bool clash = false;
     for (Node other = 0; other < nodes_.size(); ++other) {
