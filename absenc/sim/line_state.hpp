@@ -12,7 +12,7 @@ namespace absenc::sim {
 
 /// Returns the character on a line that two senders drive at once: 0 bits win.
 [[nodiscard]] inline std::uint8_t combine(std::uint8_t a, std::uint8_t b) { return a & b; }
-/// Returns `a`: arbitration leaves only one sender of a CAN frame, so frames are never combined.
+/// Returns `a`. Only makes `combine` exist for CAN frames, which are never combined: they are arbitrated.
 [[nodiscard]] inline CanFrame combine(const CanFrame& a, const CanFrame&) { return a; }
 
 /// State of one node of a line.
