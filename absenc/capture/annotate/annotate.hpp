@@ -79,7 +79,7 @@ class Annotator {
     Run run;
     bool synchronised = false;    // frames are searched for: a pause was found, or a run was filled without one
     bool at_frame_start = false;  // a frame is known to begin at the next character to parse
-    std::size_t last_size = 0;    // size of the last good unsolicited frame in this run; 0: none, or a reply followed it
+    std::size_t last_size = 0;    // size of the last good unsolicited frame in this run; 0: none, or a reply followed
     std::size_t stream_size = 0;  // size of the last good unsolicited frame in any run
   };
 
