@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Measures the processor time per reading when `absenc monitor` watches 1, 8 and 64 virtual encoders at 100 readings
-// per second each: medians of three interleaved rounds. Each virtual encoder is a separate process.
+// per second each: medians of three interleaved rounds, of one in the short run. Each virtual encoder is a separate
+// process.
 #include <stdlib.h>
 #include <sys/resource.h>
 #include <sys/wait.h>

@@ -37,8 +37,8 @@ struct BitView {
     return value << count | window(first) >> (register_bits - count);
   }
 
-  /// Returns the same as `load` for 1 to 64 bits. Where a machine word has 64 bits it needs no loop, so that decoders
-  /// of formats with few fields are fast; the code is repeated where it is called.
+  /// Returns the same as `load` for 1 to 64 bits. Where a machine word has 64 bits it needs no loop for views of 8
+  /// bytes or more, so that decoders of formats with few fields are fast; the code is repeated where it is called.
   [[nodiscard, gnu::always_inline]] constexpr std::uint64_t load_quickly(std::size_t first, unsigned count) const {
     if constexpr (register_bits < 64) return load(first, count);
     const std::uint64_t begin = window(first);

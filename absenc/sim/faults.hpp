@@ -102,7 +102,7 @@ class FaultyDevice final : public Machine<std::uint8_t> {
   // being sent.
   bool ignores_line_ = false;
   Time last_ignored_at_ = -std::chrono::hours(1);  // time of the last byte that was ignored
-  Time device_gap_{};                              // pause after which the device considers a request complete
+  Time device_gap_{};                              // longest `gap` that the device has requested so far
   Time silent_until_ = never;                      // time at which a suppressed reply counts as sent
   Time device_timer_ = never;                      // time of the timer that the device requested
 };

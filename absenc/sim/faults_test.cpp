@@ -200,8 +200,8 @@ TEST_F(Faults, RequestCorruptReachesTheDeviceOnly) {
   EXPECT_EQ(faulty->count(FaultKind::request_corrupt), 2u);
 }
 
-// The host's next request, 70 us or 150 us after the first, may arrive before the delayed or repeated reply has ended.
-// The device must not count that as a violation by the host.
+// Checks that the device counts no violation by the host when the next request, 70 us or 150 us after the first, may
+// arrive before the delayed or repeated reply has ended.
 TEST_F(Faults, StretchedReplyCausesNoViolation) {
   damage(FaultKind::delay);
   for (const FaultKind kind : {FaultKind::delay, FaultKind::repeat}) {
@@ -221,7 +221,8 @@ TEST_F(Faults, StretchedReplyCausesNoViolation) {
   EXPECT_EQ(device.violations, 0);
 }
 
-// The device takes the first half of a damaged request for a whole request and answers while the host still sends.
+// Checks that the device receives no more bytes, and counts no violation, when it has taken the first half of a damaged
+// request for a whole request and answers while the host still sends.
 TEST_F(Faults, DamagedRequestCausesNoViolation) {
   damage(FaultKind::request_corrupt);
   host.request_bytes = {1, 2, 3, 4};
@@ -231,7 +232,8 @@ TEST_F(Faults, DamagedRequestCausesNoViolation) {
   EXPECT_FALSE(device.sending);
 }
 
-// The repeated reply ends at 103 us, during the second byte of a request that begins at 90 us.
+// Checks that a request that begins at 90 us is ignored as a whole: the repeated reply ends at 103 us, during the
+// second byte of this request.
 TEST_F(Faults, RequestWithIgnoredBeginningIsIgnored) {
   damage(FaultKind::repeat);
   device.gap = microseconds(15);

@@ -177,7 +177,7 @@ void Line<Item>::feed(Node node, const Event<Item>& event) {
   serve(node);
 }
 
-// Takes steps from the node's machine until it waits.
+// Takes steps from the node's machine until it waits or is done.
 template <class Item>
 void Line<Item>::serve(Node node) {
   using Kind = typename Step<Item>::Kind;
@@ -208,7 +208,8 @@ void Line<Item>::serve(Node node) {
   state.due = never;  // the machine is done: no later event wakes it
 }
 
-// Accepts a transfer or pulse of a node. It begins at its time `at`, or now if that time has passed.
+// Accepts a transfer or pulse of a node. Unless it is a selected device's transfer, it begins at its time `at`, or now
+// if that time has passed.
 template <class Item>
 void Line<Item>::accept_step(Node node, const Step<Item>& step) {
   State& state = *nodes_[node];

@@ -23,10 +23,10 @@ enum class NodeRole : std::uint8_t { host, device };
 /// character's time.
 ///
 /// Characters that overlap on one pair reach every receiver as the AND of both (an idle line is high); a character that
-/// begins during another one is received as part of that other one. CAN frames are arbitrated by identifier; the same
-/// identifier with other data is a `line_error` for every node. A node receives its own characters only with
-/// `set_echo`, then before their `sent`. A machine that begins a transfer or pulse before its last one was sent causes
-/// a std::logic_error, except a transfer of a device on an SPI or clocked link.
+/// begins during another one is received as part of that other one. CAN frames are arbitrated by identifier; frames
+/// that begin together with the same identifier but other data are a `line_error` for every node. A node receives its
+/// own characters only with `set_echo`, then before their `sent`. A machine that begins a transfer or pulse before its
+/// last one was sent causes a std::logic_error, except a transfer of a device on an SPI or clocked link.
 template <class Item>
 class Line {
  public:
@@ -63,8 +63,8 @@ class Line {
   Node attach(NodeRole role, Machine<Item>& machine, const OnEmit& on_emit = {});
   /// Replaces the machine of `node`, from now on. A transfer of the old machine is cut off.
   void replace(Node node, Machine<Item>& machine);
-  /// Takes the steps of the node's machine until it waits. Needed after something other than an event has changed the
-  /// machine.
+  /// Takes the steps of the node's machine until it waits or is done. Needed after something other than an event has
+  /// changed the machine.
   void wake(Node node);
   /// Sets whether a node receives what it sends.
   void set_echo(Node node, bool echo);

@@ -12,7 +12,7 @@ namespace absenc::sim {
 
 /// Returns the character on a line that two senders drive at once: 0 bits win.
 [[nodiscard]] inline std::uint8_t combine(std::uint8_t a, std::uint8_t b) { return a & b; }
-/// Returns `a`: arbitration leaves only one sender of a CAN frame, so frames are never combined.
+/// Returns `a`. Only makes `combine` exist for CAN frames, which are never combined: they are arbitrated.
 [[nodiscard]] inline CanFrame combine(const CanFrame& a, const CanFrame&) { return a; }
 
 /// State of one node of a line.
@@ -39,18 +39,18 @@ struct Line<Item>::State {
   /// Kind of the step that is pending or in progress, transfer or pulse; wait: none.
   typename Step<Item>::Kind active_step = Step<Item>::Kind::wait;
   std::uint64_t begin_generation = 0;  ///< number of transfers, pulses and replaced machines so far
-  bool begun = false;                  ///< whether the transfer or pulse in `active_step` has begun
+  bool begun = false;                  ///< whether `active_step` has begun, if sent in frames: its present frame
   std::vector<Item> out;               ///< items of the transfer that the node sends
   std::size_t bits = 0;                ///< spi, clocked: number of bits of the transfer
   std::size_t frame = 0;               ///< number of items of each frame of `out`; 0: one frame
   std::size_t expect = 0;              ///< number of items that the node expects
-  Time width{};  ///< `width` of the step: duration of the pulse, or time for which a device drives low
+  Time width{};  ///< `width` of the step (link/step.hpp): duration, pause, or time of driving low
   std::uint8_t behind_out = 0xFF;  ///< spi, clocked: byte that the host samples after `out` has ended
   bool hold_low = false;           ///< clocked: the host holds the clock line low before the transfer
   Time accepted_at{};              ///< time at which the machine requested the transfer
   Time lead{};                     ///< spi: time from chip select to the first clock
   ExtraWire pulse_wire{};          ///< wire of the pulse
-  Time start{};                    ///< start of the transfer; CAN: start of the frame
+  Time start{};                    ///< start of the transfer, or of its present frame
   std::size_t index = 0;           ///< index of the item of `out` that is on the wire
   std::size_t on_wire = 0;         ///< characters: number of items of the frame of `out` that is on the wire; 0: none
   Time each{};                     ///< duration of one byte

@@ -57,7 +57,8 @@ TEST_F(LineTest, WakeTakesAStepWithoutAnEvent) {
   EXPECT_EQ(device.log, "17000 received 27000 received ");
 }
 
-// A request in frames: the receiver gets each byte at its time, the sender `sent` once, and the pause is silence.
+// Checks a request in frames: the receiver gets each byte at its time, the sender gets `sent` once, and the pause is
+// silence.
 TEST_F(LineTest, SendsFramesWithPausesBetweenThem) {
   const std::vector<Byte> five{1, 2, 3, 4, 5};
   device.idle.gap = microseconds(7);

@@ -12,8 +12,8 @@ namespace absenc::sim {
 
 namespace {
 
-// Returns whether two UART settings are compatible. A UART samples the stop bit in its middle, so two clocks may differ
-// by at most 5 %.
+// Returns whether two UART settings are compatible: parity and data bits are equal, and the rates differ by at most
+// 5 %, because a UART samples the stop bit in its middle.
 bool compatible(const LineSettings& a, const LineSettings& b) {
   const std::uint64_t larger = std::max(a.rate, b.rate);
   const std::uint64_t difference = larger - std::min(a.rate, b.rate);
@@ -117,7 +117,7 @@ void Line<Item>::end_character(Node node) {
     if (!receives_from(receiver, sender)) continue;
     if (receiver.framed_sender == node && receiver.framed_from == from) {
       deliver(other, node, item, false);
-    } else {  // the receiver is synchronised to another sender's character, and the line is not silent
+    } else {  // the receiver is synchronised to another character, and the line is not silent
       receiver.silence.busy(now_);
       if (!receiver.done) arm(receiver);
     }
@@ -220,9 +220,9 @@ void Line<Item>::end_frame(Node node) {
     State& sender = *nodes_[node];
     const CanFrame frame = sender.out[sender.index];
     if (observer_) observer_(node, sender.start, now_, frame);
-    // Nodes whose frames have the same arbitration field sent at the same time. If the rest of the frames is equal too,
-    // none of the nodes notices; otherwise all frames are lost. No node repeats its frame, because the clash would
-    // never end.
+    // Nodes whose frames were pending when this one began, with the same arbitration field, sent them at the same time.
+    // If the rest of the frames is equal too, none of the nodes notices; otherwise all these frames are lost. No node
+    // repeats its frame, because the clash would never end.
     std::vector<Node> senders;
     bool clash = false;
     for (Node other = 0; other < nodes_.size(); ++other) {

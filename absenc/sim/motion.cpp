@@ -63,7 +63,8 @@ std::int32_t saturated(double value) {
   return static_cast<std::int32_t>(std::lround(std::clamp(value, -limit, limit)));
 }
 
-// Returns the number that the whole of `text` is, blanks around it allowed; nothing for other text.
+// Returns the finite number that the whole of `text` is, blanks, tabs and CRs around it allowed; nothing for other
+// text.
 std::optional<double> number(std::string_view text) {
   const auto first = text.find_first_not_of(" \t\r");
   if (first == std::string_view::npos) return {};

@@ -27,8 +27,8 @@ class Motion final : public Shaft {
   /// Returns a motion at -1 000 000 to 1 000 000 revolutions per minute, rounded to 1e-6 rpm. Throws
   /// std::invalid_argument outside this range.
   [[nodiscard]] static Motion constant_speed(std::int64_t start, double rpm);
-  /// Returns the motion start + amplitude * sin(2 pi frequency t): up to 36 000 000 degrees and 10 000 Hz, rounded to
-  /// 1e-6 Hz. Throws std::invalid_argument outside this range.
+  /// Returns the motion start + amplitude * sin(2 pi frequency t): 0 to 36 000 000 degrees, and 0 to 10 000 Hz rounded
+  /// to 1e-6 Hz. Throws std::invalid_argument outside this range.
   [[nodiscard]] static Motion sine(std::int64_t start, double amplitude_degrees, double frequency_hz);
   /// Returns a motion in straight lines between points `seconds,degrees` (degrees relative to `start`), one point per
   /// line, seconds rising. The shaft stands still before the first and after the last point. A heading and lines that

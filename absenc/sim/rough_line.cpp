@@ -220,7 +220,7 @@ void RoughLine<Item>::feed(const Event<Item>& event) {
   serve_device();
 }
 
-// Carries out the device's steps until it waits.
+// Carries out the device's steps until it waits or is done.
 template <class Item>
 void RoughLine<Item>::serve_device() {
   while (carry_out(device_.next(time_))) {
@@ -272,7 +272,7 @@ void RoughLine<Item>::enqueue(Time start, Time first, Time end, std::span<const 
   damage(arrived.items);
   if (host_rate_ != device_rate_) arrived.items.clear();
   const Time late = host_is_clock() ? Time{} : lateness();
-  // A frame arrives after the frames sent before it, because a line keeps their order.
+  // A frame does not arrive before the frames sent before it, because a line keeps their order.
   const Time before = back_ != front_ ? in_transit_[back_ - 1].at : Time{};
   arrived.sent = start;
   arrived.at = std::max(end + late, before);

@@ -20,8 +20,8 @@ struct RoughRates {
   double burst = 0;
   /// One byte or CAN frame arrives twice. On SPI and clocked links one bit arrives twice and the last bit is lost.
   double doubled = 0;
-  /// Another sender sends random bytes during the frame, and perhaps beyond its end (not on SPI and clocked links); the
-  /// host receives the AND of both.
+  /// Another sender sends random bytes during the frame and, except on SPI and clocked links, perhaps beyond its end;
+  /// the host receives the AND of both.
   double talker = 0;
   double late = 0;  ///< the frame is 10 us to 10 s late, each decade equally likely; later frames do not overtake it
 };

@@ -88,8 +88,8 @@ void SimPort<Item>::advance(const Step<Item>& step) {
 template <class Item>
 template <class Done>
 void SimPort<Item>::run_until(const Done& done) {
-  // Sleep while the line has no scheduled event; it is short, so that `sleep_until` is called often and can end the
-  // wait by an exception.
+  // Duration of one sleep while the line has no scheduled event; short, so that `sleep_until` is called often and can
+  // end the wait by an exception.
   constexpr Time idle = std::chrono::milliseconds(100);
   while (!done()) {
     const Time due = line_.next_event();

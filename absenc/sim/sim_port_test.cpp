@@ -183,7 +183,8 @@ TEST(SimPort, LimitsRunOnlyDuringWaits) {
   EXPECT_EQ(port.wait(impatient).kind, Kind::silence);
 }
 
-// A configure step advances the line to the present, past the timer's time; `wait` then still reports the timer.
+// Checks that `wait` still reports a timer after a configure step has advanced the line to the present, past the time
+// of the timer.
 TEST(SimPort, ReportsTimerThatPassedMeanwhile) {
   SlowWorld world;
   Mute mute;

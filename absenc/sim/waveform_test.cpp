@@ -83,7 +83,7 @@ TEST(Waveform, DrawsCharactersOfFiveToSixteenDataBits) {
   }
 }
 
-// Two bytes of a line share a character; a byte without a second one is drawn with ones.
+// Checks that two bytes of a line share a character, and that a byte without a second one is drawn with ones.
 TEST(Waveform, DrawsTwoBytesAsOneCharacterOfSixteenBits) {
   LineSettings settings = slow;
   settings.data_bits = 16;
@@ -243,7 +243,8 @@ TEST(Waveform, PulsesHaveWiresOfTheirOwn) {
   EXPECT_EQ(body(waveform), "#0\n1!\n1\"\n1#\n1$\n#1000\n0#\n#3000\n1#\n#5000\n0$\n#6000\n1$\n#16000\n");
 }
 
-// The waveform must pass changes to its sink while the line runs: stored until the end, they would fill the memory.
+// Checks that the waveform passes changes to its sink while the line runs: stored until the end, they would fill the
+// memory.
 TEST(Waveform, PassesSettledChangesToSink) {
   struct Counter final : Waveform::Sink {
     void change(Time at, std::size_t) override {

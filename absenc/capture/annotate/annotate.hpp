@@ -77,9 +77,9 @@ class Annotator {
   struct Channel {
     Carries carries = Carries::both;
     Run run;
-    bool synchronised = false;    // a pause was found on this channel, so the beginnings of its frames are known
-    bool at_frame_start = false;  // a frame is known to begin at the first character of the run
-    std::size_t last_size = 0;    // size of the last good unsolicited frame in this run; 0: none
+    bool synchronised = false;    // frames are searched for: a pause was found, or a run was filled without one
+    bool at_frame_start = false;  // a frame is known to begin at the next character to parse
+    std::size_t last_size = 0;    // size of the last good unsolicited frame in this run; 0: none, or a reply followed
     std::size_t stream_size = 0;  // size of the last good unsolicited frame in any run
   };
 
@@ -128,7 +128,7 @@ class Annotator {
   std::array<std::size_t, 256> reply_sizes_{};  // size of the last good reply, by the first byte of its request
   std::vector<Character> undecided_;            // characters stored until the channels' directions are known
 
-  bool is_first_ = true;  // no frame was parsed yet: the beginning of the first frame may lie before the capture
+  bool is_first_ = true;  // the next frame is the first, and its beginning may lie before the capture
 
   // State while a run is parsed.
   Channel* channel_ = nullptr;

@@ -198,7 +198,8 @@ TEST_P(Arrival, CaptureBeginsWithinAnExchange) {
   }
 }
 
-// Tests one channel with both directions, as a tap on one pair of wires receives it.
+// Checks that replies with a flipped bit cost no other exchange, on one channel with both directions, as a tap on one
+// pair of wires receives it.
 TEST_P(Arrival, ADamagedReplyCostsNoOtherExchange) {
   if (unit.link != LinkKind::half_duplex) return;
   const std::vector<Exchange> exchanges = talk(400, 5);

@@ -64,7 +64,7 @@ class ControlFrames {
 };
 
 /// Annotates SPI exchanges, each a reply and, if the host's data line was captured, its request; and clocked words,
-/// which have no request.
+/// which have no request, with the control frames that they carry.
 class BurstAnnotator {
  public:
   /// `unit` and `sink` must outlive the annotator.

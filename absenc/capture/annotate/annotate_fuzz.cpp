@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Feeds any bytes with any pauses as characters of any line: the annotations must contain as many bytes as were fed, if
-// they are no more than a stored request holds, and a frame that is annotated as good must pass the unit's checks.
+// Feeds any bytes, with pauses or without, as characters of each half-duplex or full-duplex unit's line: the
+// annotations must contain as many bytes as were fed, if these are no more than a stored request holds, and a frame
+// that is annotated as good must pass the unit's checks.
 #include <array>
 #include <cstddef>
 #include <cstdint>

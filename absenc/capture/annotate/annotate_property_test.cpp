@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Captures thousands of random exchanges, with faults or without, of every unit that does not use CAN. The annotator,
 // which knows neither the sender nor the frame boundaries of characters, must find each good exchange with its exact
-// times, and an error at the place of each bad one.
+// times, and an error at the place of each bad one. Units of characters with a weak check are tested without faults.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -365,7 +365,8 @@ TEST_P(Characters, FindsEveryErrorAtItsPlace) {
   EXPECT_GT(errors[Error::none], 2000);
 }
 
-// Annotates a recording of the encoder's side only, for example of one of two pairs of wires.
+// Checks that a recording of the encoder's pair of wires only (full duplex) gives at least as many positions as that of
+// both pairs.
 TEST_P(Characters, FindsRepliesWithoutRequests) {
   talk({}, 500, 3);
   if (unit.link != LinkKind::full_duplex) return;
@@ -381,7 +382,7 @@ TEST_P(Characters, FindsRepliesWithoutRequests) {
   EXPECT_GE(positions, expected);
 }
 
-// A wrong stop bit makes its exchange bad and affects no other.
+// Checks that a wrong stop bit in a reply makes its exchange bad and affects no other.
 TEST_P(Characters, DamagedCharacters) {
   if (has_weak_check(unit, options)) GTEST_SKIP() << "its check is too weak";
   talk({}, 1000, 4);
@@ -404,8 +405,8 @@ TEST_P(Characters, DamagedCharacters) {
   expect_same(annotate(settings_of(unit)), expected);
 }
 
-// Begins the capture at some of the first 200 characters: no error and no false exchange may be found, and at most two
-// annotations may be missing.
+// Checks captures that begin at some of the first 200 characters: no error and no false exchange may be found, and at
+// most two annotations may be missing.
 TEST_P(Characters, BeginsAnywhere) {
   talk({}, 300, 5);
   const std::vector<Character> all = characters;

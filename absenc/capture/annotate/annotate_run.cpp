@@ -139,7 +139,7 @@ std::size_t Annotator::match_reply() {
     channel_->at_frame_start = true;
     channel_->last_size = 0;  // a request was sent, so the stream of unsolicited frames has ended
   }
-  // A look-ahead has changed the content stored in `judge_`: decode this reply again.
+  // A look-ahead may have changed the content stored in `judge_`: decode this reply again.
   if (leaves_rest || overdue) {
     static_cast<void>(judge_.decode({.bytes = pending.bytes()}, {.bytes = rest(at_).first(size)}));
   }
@@ -241,7 +241,7 @@ std::size_t Annotator::match_unsolicited() {
   channel_->last_size = channel_->stream_size = size;
   last_reply_size_ = 0;
   const bool good = streams || !exchanges_.has_request();
-  // A look-ahead has changed the content stored in `judge_`: decode this frame again.
+  // A look-ahead may have changed the content stored in `judge_`: decode this frame again.
   static_cast<void>(judge_.decode({}, {.bytes = rest(at_).first(size)}));
   exchanges_.report_unpaired(Annotation::Kind::reply, piece(size), good ? Error::none : Error::unexpected_reply,
                              good ? Remark::none : Remark::unsolicited, good ? judge_.contents() : Contents{});

@@ -91,7 +91,8 @@ std::vector<const Unit*> units_of_characters() {
 
 constexpr Tick length = 100;  // duration of a character in ticks
 
-// Tests an encoder that sends positions without a pause; the capture begins at any of its first characters.
+// Checks that from the 200th character on every annotation is a good frame, for an encoder that sends positions without
+// a pause; the capture begins at any of the first characters.
 TEST_P(OfUnit, ALineThatNeverPauses) {
   std::vector<Character> characters;
   std::vector<Tick> begins;
@@ -144,7 +145,8 @@ TEST_P(OfUnit, ALineThatNeverPauses) {
   }
 }
 
-// Tests bytes without times, as from a terminal program or a dump: both directions in one sequence.
+// Checks that each annotation has the bytes of whole transmissions, and no error, if bytes have no times, as from a
+// terminal program or a dump: both directions in one sequence.
 TEST_P(OfUnit, BytesWithoutTimes) {
   std::vector<Character> characters;
   std::vector<Transmission> transmissions = talk(1200, 2);
@@ -201,7 +203,7 @@ TEST_P(OfUnit, FindsWireOfRequests) {
   }
 }
 
-// Noise from a plug or a motor between two exchanges is reported and affects neither exchange.
+// Checks that noise between two exchanges, as from a plug or a motor, is reported and affects neither exchange.
 TEST_P(OfUnit, NoiseBetweenExchanges) {
   const auto begins_nothing = [&](std::uint8_t byte) {
     for (const Direction direction : {Direction::request, Direction::reply}) {
@@ -330,8 +332,8 @@ TEST(Can, NodesAnswerInAnyOrder) {
   EXPECT_EQ(collector.ids, (std::vector<std::uint32_t>{0x102, 0x202, 0x102, 0x201, 0x101, 0x333, 4, 0x203, 0x204}));
 }
 
-// A toy encoder with one alarm. The validity of a position is known if its reply, or an earlier reply of the same node,
-// reports the alarm.
+// Checks readings of toy encoders with one alarm: a position's validity is known if its reply, or an earlier good reply
+// of the same node since the last unanswered request, reports the alarm.
 TEST(CompletedReadings, CompletesAReadingByWhatTheSameEncoderReported) {
   static constexpr std::array<FieldInfo, 1> fields{
       {{.name = "node", .kind = FieldInfo::Kind::number, .unit = "", .meaning = "", .role = Role::encoder}}};
@@ -366,8 +368,8 @@ TEST(CompletedReadings, CompletesAReadingByWhatTheSameEncoderReported) {
   EXPECT_TRUE(is_known_after(1, 0));
 }
 
-// The capture has a T-format ID 3 reply with counter_overflow, a reset of all errors, and ID 0 replies, which do not
-// carry that alarm.
+// Checks that counter_overflow of an ID 3 reply is remembered for ID 0 replies, which do not carry that alarm, until a
+// request that resets all errors is answered.
 TEST(CompletedReadings, ForgetsAlarmsThatWereCleared) {
   const Unit& unit = *find_unit("tformat");
   const Options options = testing::options_of(unit);
@@ -401,7 +403,8 @@ TEST(CompletedReadings, ForgetsAlarmsThatWereCleared) {
   EXPECT_EQ(cleared.alarms_reported & counter_overflow, 0u) << "not reported by any reply since";
 }
 
-// A new request ends the wait for replies to earlier requests. A bad reply is paired with its request.
+// Checks that a new request ends the wait for the reply to an earlier one, and that a bad reply is paired with its
+// request.
 TEST(Can, EachReplyBelongsToTheNewestRequest) {
   const Unit& unit = *find_unit("raa38-can");
   Options options;

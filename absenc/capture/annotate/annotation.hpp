@@ -55,7 +55,7 @@ struct Annotation {
   Frame request{};
   Frame reply{};
   Contents contents{};               // decoded content of request and reply; empty for bad frames
-  std::optional<Tick> turnaround{};  // ticks from the end of the request to the beginning of its reply
+  std::optional<Tick> turnaround{};  // ticks from the request's end to its reply's begin; CAN: between their times
 };
 
 /// Receives annotations in the order of their end times, except that a request without a reply may follow later

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Completes each reading of a capture with the alarms that earlier replies of the same encoder reported, as a host that
-// reads live does.
+// reads live does. Applies to units with `remembered`.
 #pragma once
 
 #include <algorithm>

@@ -106,7 +106,7 @@ TEST_F(SigrokSession, ErrorStatesReason) {
   }
 }
 
-// An exception thrown while libzip requests samples is passed on, and no file is left.
+// Checks that an exception thrown while libzip requests samples is passed on, and that no file is left.
 TEST_F(SigrokSession, CanBeCancelled) {
   Drawing drawing = three_wires();
   drawing.set_end(100'000'000);
@@ -132,7 +132,7 @@ TEST(Drawing, IsWrittenTwiceTheSame) {
   EXPECT_THAT(first.str(), ::testing::HasSubstr("$comment #1152921504606846976 xxx"));
 }
 
-// A full disk (ENOSPC) must be an error, not a shorter waveform.
+// Checks that a full disk (ENOSPC) is an error, not a shorter waveform.
 TEST(Drawing, ReportsFullDisk) {
   Drawing drawing("full", ScratchFile(std::fopen("/dev/full", "w+")));
   EXPECT_THROW(for (Tick at = 0; at < 100'000; ++at) drawing.change(at, 0);

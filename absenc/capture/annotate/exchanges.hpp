@@ -54,22 +54,23 @@ class Exchanges {
   [[nodiscard]] std::span<const PendingRequest> waiting() const { return {pending_.data(), count_}; }
   /// Returns whether a good request was added so far.
   [[nodiscard]] bool has_request() const { return has_request_; }
-  /// Returns whether `pending` has had no reply for so long, at the time `now`, that none will follow.
+  /// Returns whether `pending` has had no reply for so long, at the time `now`, that no host expects one.
   [[nodiscard]] bool overdue(const PendingRequest& pending, Tick now) const { return now > pending.end + ticks_.limit; }
 
-  /// Adds an outstanding request. If four are outstanding, the oldest of them is reported as unanswered.
+  /// Adds an outstanding request. If four are outstanding, `report_unanswered` reports the oldest of them before.
   void add_request(const Piece& request, Error error, Remark remark, bool is_request);
-  /// Reports `reply` as the reply to `waiting()[which]`, and all older outstanding requests as unanswered. `contents`
-  /// must be empty with an error. A damaged reply counts as a reply. A reply after the limit is paired too, but with
-  /// the error timeout: no host would accept it.
+  /// Reports `reply` as the reply to `waiting()[which]`, after `report_unanswered` for all older outstanding requests.
+  /// `contents` must be empty with an error. A damaged reply counts as a reply. A good reply after the limit is paired
+  /// too, but with the error timeout, unless it is cut: no host would accept it.
   void report_reply(std::size_t which, const Piece& reply, Error error, Remark remark, const Contents& contents);
   /// Reports the `count` oldest outstanding requests without a reply: as good if they need none, with their own error
-  /// if they are bad, else as unanswered.
+  /// if they are bad, as cut if their remark is `cut`, else as unanswered.
   void report_unanswered(std::size_t count);
   /// Reports bytes that belong to no outstanding request.
   void report_unpaired(Annotation::Kind kind, const Piece& piece, Error error, Remark remark,
                        const Contents& contents = {});
-  /// Ends the capture at `end`. Reports outstanding requests, as cut if their reply may follow after the capture.
+  /// Ends the capture at `end`. Reports the outstanding requests like `report_unanswered`, but as cut those whose reply
+  /// may follow after the capture.
   void finish(Tick end);
 
  private:

@@ -116,8 +116,8 @@ class CandumpReader final : public ParsedReader {
   }
 
  private:
-  // Finds the interfaces, and whether lines have times, in the first 64 KiB; times that do not rise are those since the
-  // previous frame.
+  // Finds the interfaces, and whether lines have times, in the first 64 KiB. If one of these times, other than 0 and
+  // below a day, is not after the one before it, all times are those since the previous frame.
   void look_ahead(std::string_view name) {
     TextLines lines(*source_);
     std::string_view line;
@@ -132,7 +132,7 @@ class CandumpReader final : public ParsedReader {
       if (find(parsed.channel) == layout_.channels.size() && layout_.channels.size() < 255) {
         layout_.channels.emplace_back(parsed.channel);
       }
-      // Two frames of one bus cannot begin at the same time, so absolute times rise from frame to frame.
+      // Two frames of one bus cannot begin at the same time, so times on one clock rise from frame to frame.
       const bool zero = parsed.at.seconds == 0 && parsed.at.picoseconds == 0;
       constexpr std::int64_t day = 86400;
       if (last && !zero && parsed.at.seconds < day) {

@@ -36,7 +36,8 @@ struct CandumpLine {
 /// and less than a day, is not after the time before it, all times are those of -t d: each is the time since the
 /// previous frame. Channels are the interfaces named in the first 64 KiB; frames of other interfaces, and those of CAN
 /// FD and CAN XL, are left out, with a note. A line of another form, or a time before that of the previous line, is a
-/// damage: the lines before it are valid. Throws OpenError if the first line has another form.
+/// damage: the lines before it are valid. Blank lines are skipped. Throws OpenError if the first other line has another
+/// form, or there is none.
 [[nodiscard]] std::unique_ptr<Reader> read_candump(std::unique_ptr<Source> source, std::string_view name);
 
 }  // namespace absenc::capture

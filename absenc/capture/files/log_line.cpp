@@ -335,7 +335,7 @@ class Prefix {
   }
 
   // Removes and handles a word that is a direction, a port, a filler or a label, like "RX", "COM3:", "COM3>". Returns
-  // false, with a problem, for another word or a second direction.
+  // false, with a problem, for another word or for a direction other than the one found before.
   bool take_word_of_prefix(std::string_view word) {
     text_.remove_prefix(word.size());
     const bool label = word.ends_with(':') || word.ends_with('=');

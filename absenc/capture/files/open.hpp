@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Opens a capture file of any known format, detected from its content, not its name, or a folder of Saleae's files.
+// Opens a capture file of any known format, detected from its content, not its name (raw samples: from `OpenChoices`),
+// or a folder of Saleae's files.
 #pragma once
 
 #include <cstdint>

@@ -62,7 +62,8 @@ class ParsedReader : public Reader {
   Damages damages_;
 };
 
-/// Clears a block for the next part of the file, except the samples, whose storage is reused as it is.
+/// Sets index, begin and end of a block for the next part of the file, and clears its content, except the level before
+/// the changes of each channel, and the samples with their size, whose storage is reused as it is.
 inline void begin_block(Block& block, std::uint64_t index, Tick first) {
   block.index = index;
   block.first = first;

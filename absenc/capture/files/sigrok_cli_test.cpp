@@ -87,7 +87,8 @@ TEST_F(SigrokCli, Sessions) {
   }
 }
 
-// Reads sessions of two writers, sigrok-cli and this library, cut off as by an interrupted copy.
+// Checks that sessions of two writers, sigrok-cli and this library, cut off as by an interrupted copy, are read up to
+// about the cut, which is the only damage.
 TEST_F(SigrokCli, CutSessions) {
   make_samples(8, 9'000'000);
   ASSERT_NO_FATAL_FAILURE(write_session(8));

@@ -347,7 +347,8 @@ TEST(Sigrok, SamplesOfThreeBytesMayBeCut) {
   EXPECT_EQ(count(second + 5), 335u);
 }
 
-// libzip writes zip64 sizes for files that may exceed 4 GiB.
+// Checks that a cut archive is read if its sizes are in a zip64 field, as libzip writes them for files that may exceed
+// 4 GiB.
 TEST(Sigrok, ACutArchiveMayHaveSizesOf64Bits) {
   const FileBytes samples = wave(1000);
   FileBytes file =

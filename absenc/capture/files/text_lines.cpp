@@ -73,8 +73,8 @@ std::int64_t digits_at(const Decimal& decimal, std::int64_t first, std::int64_t 
   return value;
 }
 
-// Parses seconds in the usual form, "12.000125", to a positive instant; returns false for other forms. It is fast,
-// because files may have a million rows.
+// Parses seconds in the usual form, "12.000125" without a sign; returns false for other forms. It is fast, because
+// files may have a million rows.
 bool read_plain_seconds(std::string_view text, Instant& instant) {
   constexpr std::ptrdiff_t most_digits = 18;
   constexpr std::array<std::int64_t, 13> picoseconds = {

@@ -73,7 +73,8 @@ std::unique_ptr<Reader> open_repeated(const std::string& part) {
       "long.vcd");
 }
 
-// Reads a dump as `absenc wave` writes it: each byte of the traffic is a comment.
+// Checks that 70 MiB of comments before the changes, more than the limit of a header, are skipped: `absenc wave` writes
+// a comment for each character, transfer or frame.
 TEST(Vcd, AnyNumberOfCommentsBeforeTheChanges) {
   const auto reader = open_repeated("$comment #123456789012 device 1A and 0 more words like these in between $end\n");
   const CaptureContents contents = read_all(*reader);
@@ -161,8 +162,8 @@ TEST(Vcd, RefusesInvalidHeaders) {
   EXPECT_NE(problem("$timescale 1 us $end $var wire 999999999 ! a $end").find("impossible width"), std::string::npos);
 }
 
-// Reads a file with many blocks, with words across the borders of the read buffer, and with identifiers of two or three
-// characters.
+// Checks the changes of a file with many blocks, with words across the borders of the read buffer, and with identifiers
+// of two or three characters.
 TEST(Vcd, LargeFiles) {
   std::string text = "$timescale 1 ns $end\n";
   constexpr std::size_t channels = 300;

@@ -83,7 +83,7 @@ TEST(ZipArchive, ReadingReportsDamage) {
   }
 }
 
-// Reads entries of other compression methods, and stored entries, whose checksum libzip always checks.
+// Checks that `open` and `read` read what `expand` refuses: stored entries, and those of bzip2 if libzip supports it.
 TEST(ZipArchive, ReadsOtherCompressionMethodsWithoutExpand) {
   for (const zip_int32_t method : {ZIP_CM_STORE, ZIP_CM_BZIP2}) {
     if (zip_compression_method_supported(method, 1) == 0) continue;

@@ -44,8 +44,8 @@ double fitted(const std::vector<Tick>& lengths, double bit, double most) {
   return bits == 0 ? bit : ticks / bits;
 }
 
-// Returns the mean lengths of groups of similar pulses, the shortest first. Pulses of rare lengths are noise and are
-// left out.
+// Returns the mean lengths of up to 8 groups of similar pulses, the shortest first. Pulses of rare lengths are noise
+// and are left out.
 std::vector<double> clusters(const std::vector<Tick>& lengths) {
   const std::size_t rare = lengths.size() < 50 ? 1 : std::max<std::size_t>(2, lengths.size() / 200);
   std::vector<double> means;

@@ -104,8 +104,8 @@ TEST(Async, ReportsWrongParity) {
   }
 }
 
-// Characters of 5 to 16 data bits, with every parity: values whose bits differ from their neighbours, and whose highest
-// bit decides.
+// Checks value, length and faults of characters of 5 to 16 data bits, with every parity. The values have alternating
+// bits, equal bits, or only the highest bit set.
 TEST(Async, DecodesCharactersOfFiveToSixteenDataBits) {
   for (unsigned data_bits = 5; data_bits <= 16; ++data_bits) {
     for (const Parity parity : {Parity::none, Parity::odd, Parity::even}) {
@@ -128,7 +128,8 @@ TEST(Async, DecodesCharactersOfFiveToSixteenDataBits) {
   }
 }
 
-// The bytes of a wide character share its time, on one line and on two, whether or not the rate is given.
+// Checks that the two bytes of a wide character share its time, on one line and on two, whether or not the rate is
+// given.
 TEST(AsyncPipeline, MakesTwoCharactersOfOneWithMoreThanEightDataBits) {
   for (const double baud : {0.0, 125e6}) {
     Pen pen(8, Parity::none, 1, 16);
@@ -251,7 +252,8 @@ TEST(Async, ASilentLineTakesTheBaudRateOfAnother) {
   EXPECT_EQ(all.outcome.measured_baud[0], 0);
 }
 
-// Decodes a sender whose clock drifts by 1 %, with more changes than the detection uses.
+// Checks that the detected bit time is the same for blocks of any size, with a sender whose clock drifts by 1 % and
+// more changes than the detection uses.
 TEST(Async, DetectionDoesNotDependOnBlocks) {
   Wires wires{{{}}};
   for (const double bit : {5.0, 5.05}) {

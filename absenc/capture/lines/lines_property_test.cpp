@@ -148,7 +148,7 @@ RC_GTEST_PROP(LinesProperty, AsyncResultDoesNotDependOnThreadsAndBlocks, (std::u
   }
 }
 
-// Baud rate and idle level are detected independently of the blocks, and the sent bytes are decoded.
+// Checks that baud rate and idle level are detected independently of the blocks, and that the sent bytes are decoded.
 RC_GTEST_PROP(LinesProperty, BaudAndIdleLevelAreFound, (std::uint64_t seed)) {
   Random random(seed);
   const double bit = 3.0 + static_cast<double>(below(random, below(random, 2) == 0 ? 3000 : 200'000)) / 1000;

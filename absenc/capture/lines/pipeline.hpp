@@ -40,9 +40,9 @@ struct AsyncOutcome {
 };
 
 /// Decodes the characters of several lines, ordered by their start bits; `Character::channel` is the index in `lines`.
-/// A baud rate and an idle level that are not given are detected from the first 16384 changes of a line; a line whose
-/// baud rate cannot be detected uses that of another line. Memory does not grow with the file. Throws exceptions of the
-/// reader and the sink.
+/// A baud rate and an idle level that are not given are detected from at most the first 16384 changes of a line; a line
+/// whose baud rate cannot be detected uses that of another line, if one has a rate. Memory does not grow with the file.
+/// Throws exceptions of the reader and the sink.
 AsyncOutcome decode_async(Reader& reader, std::span<const AsyncLine> lines, unsigned threads, const PartSink& sink);
 
 /// The beginning of a capture, split into words at rests longer than `pause`.

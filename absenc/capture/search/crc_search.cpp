@@ -245,7 +245,8 @@ class CrcSearch {
     solution.check_size = shape.check_size;
     solution.trailing = shape.trailing;
     solution.chance_log2 = shape.width - 1 + free_bits - known_checks(shape, solution.first.front()) * shape.width;
-    // The CRC with polynomial x^8 + 1 equals an exclusive or, unless its bits are reversed, and is reported as such.
+    // Over bytes, the CRC with polynomial x^8 + 1 equals an exclusive or, unless only one of input and output is
+    // reversed, and is reported as such.
     if (!frames_.of_bits && shape.width == 8 && poly == 1 && shape.refin == shape.refout) return;
     found_.solutions.push_back(std::move(solution));
   }

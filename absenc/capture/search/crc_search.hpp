@@ -47,7 +47,7 @@ struct CheckSolution {
 
 struct CheckSearch {
   std::vector<CheckSolution> solutions;  // sorted: the solution that is least likely to be chance comes first
-  std::size_t open = 0;  // number of layouts about which the frames determine too little to list solutions
+  std::size_t open = 0;  // number of attempts at a layout for which the frames determine too little to list solutions
 };
 
 /// Returns checksums of 3 to 16 bits that explain every frame: all that are found with usual init and xorout or

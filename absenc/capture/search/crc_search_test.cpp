@@ -44,7 +44,7 @@ std::vector<CheckedFrame> frames_of(const GeneratedCheck& made, std::size_t coun
   return frames;
 }
 
-// A CRC with the polynomial x^8 + 1 is an exclusive or and is reported as such.
+// Returns whether a CRC is an exclusive or, which is reported as such: its polynomial is x^8 + 1, and refin is refout.
 bool is_exclusive_or(const CrcParameters& crc) { return crc.width == 8 && crc.poly == 1 && crc.refin == crc.refout; }
 
 bool describes(const CheckSolution& solution, const GeneratedCheck& made) {
@@ -195,7 +195,7 @@ TEST(CrcSearch, FindsExclusiveOrCrcInBothBitOrders) {
   }
 }
 
-// Four frames, of which two equal the other two, count as two frames.
+// Checks that four frames, of which two equal the other two, are as much evidence as two frames.
 TEST(CrcSearch, FramesThatDifferInOneWayOnlyCountOnce) {
   std::mt19937 random(9);
   const GeneratedCheck made{.parameters = esl_8};

@@ -48,7 +48,7 @@ struct Evidence {
   [[nodiscard]] bool explains_all() const { return tried != 0 && explained == tried; }
 };
 
-/// log10 of the chance below which frames suffice as evidence, without the motion of the position.
+/// log10 of the chance up to which frames suffice as evidence for options, without the motion of the position.
 inline constexpr double frames_suffice = -2;
 
 /// Number of random replies tried for each frame if there are more than two frames, whose chances multiply.

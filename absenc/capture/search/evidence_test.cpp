@@ -149,7 +149,8 @@ TEST(Hypotheses, ListsEqualMeaningsOnce) {
   for (const Hypothesis& one : found) EXPECT_EQ(one.options[2], 0);
 }
 
-// A unit that accepts every word decodes the words of a checked protocol as positions that move plausibly.
+// Checks the order of a hypothesis with a frame check and one with plausible motion only: a unit that accepts every
+// word decodes the words of a checked protocol as positions that move plausibly.
 TEST(Hypotheses, FramesThatProveThemselvesGoFirst) {
   Hypothesis checked{.evidence = {.tried = 20, .explained = 20, .distinct = 20, .frames = -36}};
   Hypothesis moving{.evidence = {.tried = 20, .explained = 20, .distinct = 20, .frames = 0, .motion = -114}};

@@ -88,7 +88,7 @@ TEST(E201Device, AckBitsFollowClock) {
   }
 }
 
-// A reading takes the time of 64 clocks and the time of USB.
+// Checks that a reading takes longer than another command by 64 clocks and by the characters that its reply has more.
 TEST(E201Device, ReadingTakes64Clocks) {
   Bench bench;
   bench.raw("M1");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Commands of the RLS E201-9S USB interface, a letter each, some with a number, and its ASCII replies. README.md lists
-// the commands with their sources. Replies that no document describes are decoded as leniently as possible: text.hpp.
+// Commands of the RLS E201-9S USB interface, one character each, some with a number, and its ASCII replies. README.md
+// lists the commands with their sources. text.hpp decodes replies that no document describes, as leniently as possible.
 #pragma once
 
 #include <array>
@@ -227,7 +227,8 @@ struct Protocol {
     if (is_clock || is_width) text.push_back(end_of_line);
     return text;
   }
-  /// Returns the length of the request that begins with `begin`, in bytes; 0 if that is no request.
+  /// Returns the length of the request that begins with `begin`, in bytes, with its CR if it has a number; 0 if that is
+  /// no request.
   static constexpr std::size_t request_size(const Format&, Bytes begin) {
     if (!letter::is_in(letter::all, begin[0])) return 0;
     return begin[0] == letter::set_clock ? 3 : begin[0] == letter::set_width ? 4 : 1;

@@ -105,7 +105,8 @@ TEST(E201Read, ExplainsEachError) {
   EXPECT_EQ(bench.run_tampered(once, "position").error, "none");
 }
 
-// No document gives reply times: a reply that is slower than the host's timeouts counts as missing.
+// Checks the host's timeouts, which no document gives: a reply that begins or goes on later, or never ends, is not
+// accepted.
 TEST(E201Read, UsesReplyTimeouts) {
   Bench bench("singleturn_bits=19");
   const std::string good = "c0014328ff300000\r";
@@ -172,7 +173,7 @@ TEST(E201Set, ReadsClockBack) {
   EXPECT_EQ(bench.run_tampered(answering('m', {}), "set-clock", {2}).error, "timeout");
 }
 
-// The host waits 10 ms for the reply of a command that may have none.
+// Checks that the host waits 10 ms for the reply of a command that may have none, and for the end of that reply.
 TEST(E201Set, WaitsBrieflyForOptionalReply) {
   Bench bench;
   const auto tell = [&](Time after) {
@@ -221,7 +222,8 @@ TEST(E201Zero, ReadsZeroBack) {
   EXPECT_EQ(bench.run("decimal").fields, (Fields{{"counts", 275086}}));
 }
 
-// The encoder may move by 0.02 degrees, but by one count in any case: 29 counts of 19 bits, 1 count of 12 bits.
+// Checks how far the encoder may move while the zero is set: by 0.02 degrees, but by one count in any case, which are
+// 29 counts of 19 bits and 1 count of 12 bits.
 TEST(E201Zero, RefusesMovingEncoder) {
   struct Case {
     std::string bits;
@@ -257,7 +259,7 @@ TEST(E201Zero, RefusesMovingEncoder) {
   }
 }
 
-// `?` does not report the encoder's error bit.
+// Checks that no zero is set while the encoder's error bit is set: `?` does not report that bit, so `4` is read before.
 TEST(E201Zero, RefusesInvalidPosition) {
   Bench bench;
   bench.device.raise_alarms(word_error);

@@ -16,7 +16,8 @@ using testing::says;
 using testing::Tamper;
 using testing::TextReply;
 
-/// 10 us of latency and 32 + 8 bits: at most 20 bits of ACK fit, so clocks 8 (45 bits of ACK) and 7 (22) are too fast.
+// Checks a sweep with 10 us of latency and 32 + 8 bits: at most 20 bits of ACK fit, so clocks 8 (45 bits of ACK) and 7
+// (22) are too fast.
 TEST(E201Sweep, CountsRecommendsAndRestores) {
   Bench bench("singleturn_bits=32");
   bench.raw("M7\r");
@@ -89,7 +90,7 @@ TEST(E201Sweep, AbortRestoresTheClockAtAnyStep) {
   }
 }
 
-// An aborted sweep reports the results so far, and recommends no clock.
+// Checks that an aborted sweep reports the results so far, and recommends no clock.
 TEST(E201Sweep, RecommendsNothingAfterAbort) {
   Bench bench;
   unsigned emits = 0;
@@ -166,7 +167,7 @@ TEST(E201Sweep, ReportsEachErrorAndRestoresClock) {
   }
 }
 
-// Single invalid frames are a normal result of a sweep, not an error.
+// Checks that a single invalid frame is counted, and is no error of the sweep.
 TEST(E201Sweep, ContinuesAfterBadFrame) {
   Bench bench;
   int asked = 0;

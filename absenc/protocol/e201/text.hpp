@@ -41,7 +41,7 @@ using Text = ByteBuffer<64>;
 
 namespace detail {
 
-// Returns the number at index `at`, of at most 9 digits, and moves `at` to the character after the number.
+// Returns the number that the digits from index `at` on form, at most 9 of them, and moves `at` behind these digits.
 constexpr unsigned number_at(Bytes text, std::size_t& at) {
   unsigned number = 0;
   for (unsigned digits = 0; at < text.size() && is_digit(text[at]) && digits < 9; ++at, ++digits) {
@@ -78,7 +78,7 @@ struct Version {
   return std::nullopt;
 }
 
-/// Returns the first whole number in a text. Error: bad_framing (the text has no digit).
+/// Returns the first whole number in a text, at most its first nine digits. Error: bad_framing (the text has no digit).
 [[nodiscard]] constexpr Result<std::int64_t> find_number(Bytes text) {
   std::size_t at = 0;
   if (!detail::skip_to_digit(text, at)) return Error::bad_framing;

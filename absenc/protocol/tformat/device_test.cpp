@@ -68,7 +68,8 @@ TEST(TformatDevice, AnswersAbnormalRequestsLikeId3) {
   EXPECT_EQ(memory_read(bench, 5), wire(Reply{.id = DataId::read_memory, .address = 5, .value = 35}));
 }
 
-// ID D with a wrong parity bit is refused once, when its frame has ended.
+// Checks that ID D with a wrong parity bit is refused once, when its frame has ended; so are requests with an unknown
+// data ID, and with the busy bit and one byte too many.
 TEST(TformatDevice, AnswersRefusedFrameAfterItsEnd) {
   Bench bench;
   testing::RawHost host({0x6A, 0x05, 0xEF});
@@ -274,7 +275,8 @@ TEST(TformatDevice, RequestDuringTransmissionIsAViolation) {
   }
 }
 
-// The host sends its bytes in two writes: the second may arrive while the first is answered, or afterwards.
+// Checks the violations of a host that sends requests without a pause in two writes: the second arrives while the first
+// is answered, or afterwards.
 TEST(TformatDevice, DetectsRequestsWithoutPauseInAnyPieces) {
   testing::TestShaft shaft;
   const Wire one{0x1A};
@@ -292,7 +294,8 @@ TEST(TformatDevice, DetectsRequestsWithoutPauseInAnyPieces) {
   }
 }
 
-// A host that never waits for replies is detected even if the emulator reports a long delay with each reception.
+// Checks that a host that never waits for replies is detected even if the emulator reports a long delay with each
+// reception.
 TEST(TformatDevice, HostThatNeverWaitsIsNotExcused) {
   testing::TestShaft shaft;
   VirtualEncoder encoder({}, shaft);
@@ -316,7 +319,7 @@ TEST(TformatDevice, HostThatNeverWaitsIsNotExcused) {
   EXPECT_EQ(ask(thrice), 4u);
 }
 
-// Some broken rules do not count as violations, but are reported to the watcher of rules (9.1, 10).
+// Checks that some broken rules do not count as violations, but are reported to the watcher of rules (9.1, 10).
 TEST(TformatDevice, ReportsRulesThatAreNoViolations) {
   using Rules = std::vector<std::string>;
   const std::string again = "what was refused as busy was not asked for again";

@@ -88,7 +88,7 @@ TEST(TformatFrame, RefusalDiffersFromWrongLength) {
   EXPECT_EQ(decode_reply({}, {DataId::singleturn}, damaged).error(), Error::bad_checksum);
 }
 
-// Replies to memory requests (Table 5, 9.1).
+// Checks replies to a write request: address, value, and value of a busy encoder (Table 5, 9.1).
 TEST(TformatFrame, MemoryReplyMatchesItsRequest) {
   const Request write{DataId::write_memory, 5, 7};
   const auto answered = [&write](std::uint8_t address, bool busy, std::uint8_t value, bool strict = true) {
@@ -109,7 +109,7 @@ TEST(TformatFrame, RefusesInvalidRequests) {
   EXPECT_TRUE(decode_request(hex<"32010033">));
 }
 
-// Each alarm makes the parts of a reading invalid that paragraph 6.5 states.
+// Checks that each alarm makes the parts of a reading invalid that paragraph 6.5 states.
 TEST(TformatFrame, ValidityOfEachPart) {
   struct Row {
     std::uint8_t almc;
@@ -147,8 +147,7 @@ TEST(TformatFrame, PartialRepliesLeaveValidityUnknown) {
   EXPECT_EQ(to_reading({}, alarmed, 0).multiturn_validity(), Validity::unknown);
 }
 
-// SF reports only that one or more of four alarms are raised; if a reply to ID 3 has reported one of the four, that
-// alarm explains it.
+// Checks that an alarm that a reply to ID 3 has reported explains the bit of SF that stands for it and three others.
 TEST(TformatFrame, KnownAlarmExplainsStatus) {
   const Reply turns{.id = DataId::multiturn, .status = status::alarm, .multiturn = 5};
   for (const std::uint8_t harmless : {alarms::over_heat, alarms::battery_alarm}) {
@@ -159,7 +158,7 @@ TEST(TformatFrame, KnownAlarmExplainsStatus) {
   EXPECT_EQ(to_reading({}, turns, alarms::battery_error).multiturn_validity(), Validity::invalid);
 }
 
-// SF has a bit for counting_error, and one bit for four other alarms (6.3.2).
+// Checks which alarms SF reports: it has a bit for counting_error, and one bit for four other alarms (6.3.2).
 TEST(TformatFrame, StatusReportsPartOfTheAlarms) {
   constexpr std::uint8_t in_status = alarms::counting_error | alarms::shown_in_status;
   struct Row {
@@ -183,7 +182,8 @@ TEST(TformatFrame, StatusReportsPartOfTheAlarms) {
   EXPECT_EQ(to_reading({}, {.id = DataId::read_memory}).status_reported, 0u);
 }
 
-// Without a battery the bit `alarm` of SF is always set (2 (1)).
+// Checks that in a reply without ALMC the bit `alarm` of SF reports none of its four alarms if there is no battery: the
+// bit is always set then (2 (1)).
 TEST(TformatFrame, WithoutBatteryStatusLeavesFourAlarmsUnknown) {
   constexpr Format format{.battery = false};
   const auto whole = [&](std::uint8_t more) {

@@ -110,7 +110,8 @@ TEST(TformatProcedures, WritesMemoryOnlyIfItDiffersAndReadsItBack) {
   EXPECT_EQ(bench.violations(), 0u);
 }
 
-// 7.2.4 and 7.4: bit 7 enables the threshold, from 1 degC on; every byte with bit 7 clear is "off".
+// Checks that 0x80 is refused as threshold, but 0x81, 0xFF, 0x00 and 0x7F are not: bit 7 enables the threshold, from
+// 1 degC on, and every byte with bit 7 clear is "off" (7.2.4, 7.4).
 TEST(TformatProcedures, RefusesOverHeatThresholdOfZeroDegrees) {
   Bench bench;
   const auto zero = bench.run("memory-write", {overheat_address, 0x80, service_page});
@@ -139,7 +140,8 @@ TEST(TformatProcedures, RefusesClosedMemoryBeforeSending) {
   EXPECT_EQ(bench.encoder.answer_count(), 0u);
 }
 
-// The command memory-write gets the replies to these requests: page select, read, write, page select, read.
+// Checks memory-write with a changed or lost reply to one or more of its requests, which are: page select, read, write,
+// page select, read.
 TEST(TformatProcedures, VerifiesWritesByReadingBackAndNeverRepeatsThem) {
   struct Row {
     const char* what;
@@ -184,7 +186,8 @@ TEST(TformatProcedures, VerifiesWritesByReadingBackAndNeverRepeatsThem) {
   }
 }
 
-// A busy encoder is waited for up to 36 ms: a read or write is repeated each millisecond, a page select after 18 ms.
+// Checks that a busy encoder is waited for up to 36 ms: a read or write is repeated each millisecond, a page select
+// after 18 ms.
 TEST(TformatProcedures, WaitsForABusyEncoder) {
   const auto busy = [](unsigned from, unsigned to) {
     return [=](unsigned index, Wire& reply) {
@@ -265,7 +268,8 @@ TEST(TformatProcedures, SendsNoForbiddenReset) {
   }
 }
 
-// An encoder without a battery always shows battery alarms, so clearing them loses nothing.
+// Checks that battery=false removes the battery alarms and the turns from readings and lets clear-alarms run: without a
+// battery the battery alarms are always raised, so clearing them loses nothing.
 TEST(TformatProcedures, EncoderWithoutBatteryIsDeclared) {
   Bench bench;
   bench.shaft.put(7, 1000);
@@ -291,7 +295,8 @@ TEST(TformatProcedures, EncoderWithoutBatteryIsDeclared) {
   EXPECT_EQ(bench.everything().alarms, alarms::battery_alarm);
 }
 
-// Replies 0 and 1 are positions, 2 to 11 answer the reset, 12 is the verification.
+// Checks the errors of resets whose verification shows another state. Replies 0 and 1 are positions, 2 to 11 answer the
+// reset, 12 is the verification.
 TEST(TformatProcedures, DetectsResetThatFailed) {
   struct Row {
     std::string_view name;

@@ -110,7 +110,7 @@ author::Procedure find_node(Dialog& dialog, Values& found);
 /// Counts of the frames that a scan received from one node number, and the position in the last frame.
 struct NodeFrames {
   std::uint16_t unsolicited = 0;  ///< Number of frames that the node sent without a request.
-  std::uint16_t per_second = 0;   ///< Number of frames that the node sent without a request in the first second.
+  std::uint16_t per_second = 0;   ///< Those of `unsolicited` in the second from the first received reply on.
   std::uint8_t answers = 0;       ///< Number of answers to the requests for this node number.
   std::uint8_t damaged = 0;       ///< Number of requests during which frames were destroyed.
   bool readable = false;          ///< Whether the last frame is a position that fits the format.

@@ -124,7 +124,7 @@ TEST(Raa38CanCyclic, StartsAndStopsCyclicFrames) {
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
 }
 
-// A position of 49 equals the answer to order 31: only the node's send rate shows whether the order was obeyed.
+// Checks that a node that keeps its send rate is an error, although its positions of 49 equal the answer to order 31.
 TEST(Raa38CanCyclic, FailsWhenSendRateDoesNotChange) {
   for (const std::int64_t rate : {0, 10}) {
     Scripted disobedient([](const CanFrame&) { return Frames{}; });
@@ -168,7 +168,8 @@ TEST(Raa38CanZero, RefusesWhileShaftTurns) {
   EXPECT_EQ(bench.encoder().settings().writes(), 0u);
 }
 
-// The node uses order 20 for something else, or does not know it: its position does not become 0, even if it answers.
+// Checks the errors of a node that does not obey order 20: it answers but its position does not become 0, or it answers
+// neither order 20 nor 22.
 TEST(Raa38CanZero, FailsWhenPositionDoesNotBecomeZero) {
   // The answer to order 20 is 32 if it is read as a position; at 21 bits that is near 0.
   for (const std::uint32_t counts : {32u << 10, 1'000'000u}) {
@@ -184,7 +185,8 @@ TEST(Raa38CanZero, FailsWhenPositionDoesNotBecomeZero) {
   EXPECT_TRUE(ended(with(silent, "direction", {1}), Error::timeout, "is the same"));
 }
 
-// The answer to order 20 arrives late, in place of a position: at 21 bits, 32 is near 0.
+// Checks that an answer to order 20 that arrives late, in place of a position, is not taken for the position 32, which
+// is near 0 at 21 bits.
 TEST(Raa38CanZero, RejectsLateAnswerAsZeroPosition) {
   bool answer_pending = false;
   Scripted late([&](const CanFrame& request) {
@@ -195,7 +197,8 @@ TEST(Raa38CanZero, RejectsLateAnswerAsZeroPosition) {
   EXPECT_TRUE(ended(with(late, "zero", {}, {.bits = 21}), Error::cross_check_failed));
 }
 
-// The adapter delivers frames some milliseconds late: only many frames show the send rate.
+// Checks that the send rate is restored to 1 % if the adapter delivers frames up to 4 ms early or late: only many
+// frames show the rate.
 TEST(Raa38CanZero, RestoresSendRateThroughSlowCarrier) {
   unsigned left = 1000;
   unsigned rate = 0;
@@ -225,7 +228,8 @@ TEST(Raa38CanZero, ReportsNodeThatDoesNotResumeSending) {
   EXPECT_TRUE(ended(with(exhausted, "zero"), Error::cross_check_failed, "no longer sends"));
 }
 
-// The node sends one more frame after the order to stop: its position is 32, which equals the answer to order 20.
+// Checks that a cyclic position of 32, which the node sends after the order to stop, is not taken for the answer to
+// order 20, which it equals.
 TEST(Raa38CanZero, RejectsCyclicPositionThatLooksLikeAnswer) {
   for (const Time period : {80ms, 100ms}) {
     unsigned left = 1000;
@@ -269,7 +273,8 @@ TEST(Raa38CanDirection, FailsWhenPositionIsNeitherSameNorMirrored) {
   EXPECT_TRUE(ended(with(jumping, "direction", {1}), Error::cross_check_failed, "mirror image"));
 }
 
-// A position that the next reply does not repeat may be a late answer to an order, which looks like a position.
+// Checks that a position that the next reply does not repeat is an error: it may be a late answer to an order, which
+// looks like a position.
 TEST(Raa38CanDirection, RejectsPositionThatIsNotRepeated) {
   unsigned measurements = 0;
   Scripted late([&](const CanFrame& request) {

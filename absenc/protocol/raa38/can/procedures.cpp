@@ -190,7 +190,8 @@ Part<Outcome> change_quietly(Dialog& dialog, Values& found, Order order, std::ui
                     : check_direction(dialog.format(), found, first.counts, second.counts);
 }
 
-// Accepts a mean send rate within about 25 % of the wanted one, because the adapter may deliver frames in bursts.
+// Accepts a mean send rate within about 25 % of the wanted one, because the adapter may deliver frames in bursts; if 0
+// is wanted, no frame may have arrived.
 Outcome check_cyclic(Dialog& dialog, unsigned wanted, bool answered, const SendRate& heard) {
   if (wanted == 0) {
     if (heard.count == 0) return done;

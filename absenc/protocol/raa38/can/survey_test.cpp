@@ -58,13 +58,15 @@ std::vector<std::uint32_t> identifiers_of(std::string_view command, const Format
   return sent;
 }
 
-// On a CANopen bus, identifiers 201 to 27F are process data of other devices.
+// Checks that `node` sends one request, to the given number, and `scan` 255: on a CANopen bus, identifiers 201 to 27F
+// are process data of other devices.
 TEST(Raa38CanNode, PollsGivenNodeOnly) {
   EXPECT_EQ(identifiers_of("node", {.node = 0x42}), std::vector<std::uint32_t>{0x242});
   EXPECT_EQ(identifiers_of("scan", {.node = 0x42}).size(), 255u);
 }
 
-// The text `disturbs` of a command warns users before the command is sent.
+// Checks that each tested command has a text `disturbs`, which warns users before the command is sent, if and only if
+// it sends requests to other nodes.
 TEST(Raa38CanNode, CommandsThatPollOtherNodesWarn) {
   for (const Command& command : can_unit.commands) {
     if (!command.arguments.empty() && command.verb != Verb::config_set) continue;
@@ -89,8 +91,8 @@ TEST(Raa38CanNode, ReportsNodeThatAnswers) {
   EXPECT_TRUE(ended(bench.run_command(Format{}, "node"), Error::timeout, "`absenc scan` asks them all"));
 }
 
-// A slow adapter delivers answers while later numbers are requested. A frame before the request for its number is no
-// answer.
+// Checks that an answer that arrives while the next number is requested is counted, as through a slow adapter, and that
+// a frame before the request for its number is no second answer.
 TEST(Raa38CanScan, AcceptsAnswersWhileSendingNextRequest) {
   for (const bool unasked_too : {false, true}) {
     Talk conversation("scan");

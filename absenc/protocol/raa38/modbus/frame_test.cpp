@@ -88,7 +88,8 @@ TEST(Raa38ModbusFrame, AssumesRequestFromReply) {
   EXPECT_EQ(assumed_request({}, {}).function, function::read);
 }
 
-// The CRC stays valid if a 00 is appended to a valid frame.
+// Checks that a length is recognised as doubtful if a valid frame stays valid with a 00 appended, or without its last
+// byte.
 TEST(Raa38ModbusFrame, RecognizesLengthThatTheCrcDoesNotProve) {
   Wire followed = framed({1, 3, 4, 0x00, 0x00, 0x05});
   EXPECT_TRUE(decode_reply(fine, two_registers, followed));

@@ -14,7 +14,8 @@ const Wire position_of_1 = framed({1, 3, 2, 0, 9});
 
 // ---- Reading
 
-// Compares the number of positions per second with the limit that the silences on the line set.
+// Checks that at each baud rate the positions per second are more than 95 % of the limit that the silences on the line
+// set.
 TEST(Raa38ModbusHost, ReadsAsFastAsSilencesAllow) {
   for (std::size_t baud = 0; baud < bauds.size(); ++baud) {
     Bench bench({.baud = baud});
@@ -54,8 +55,9 @@ TEST(Raa38ModbusHost, RefusesOneRegisterFor17Bits) {
   EXPECT_TRUE(ended(raa38::testing::result_of<std::uint8_t>(*read), Error::invalid_argument, "16 bits"));
 }
 
-// One position in 256 has a CRC that ends with 00: without its last byte the frame is a valid frame of another form.
-// Both ReadPosition and the procedures must detect it.
+// Checks that ReadPosition and a procedure confirm a frame of doubtful length by a second request, and reject it if the
+// length stays in doubt: one position in 256 has a CRC that ends with 00, and without that byte the frame is a valid
+// frame of another form.
 TEST(Raa38ModbusHost, RejectsReplyThatLostItsLastByte) {
   Wire whole;
   std::uint32_t position = 0x100000;
@@ -276,7 +278,8 @@ TEST(Raa38ModbusSettings, ReportsRefusalWithoutRepetition) {
   EXPECT_TRUE(ended(with(refuses, "set-address", {2}), Error::request_rejected, "illegal function"));
 }
 
-// The document gives no time for storing a setting; a request right after it may read the old value, or get no reply.
+// Checks that the host waits 20 ms or more between a setting and its next request. The document gives no time for
+// storing a setting; a request right after it may read the old value, or get no reply.
 TEST(Raa38ModbusSettings, WaitsForEncoderToStoreSetting) {
   const std::pair<std::string_view, std::int64_t> commands[]{
       {"set-address", 2}, {"set-baud", 9600}, {"set-direction", 1}, {"zero", 0}};

@@ -66,7 +66,7 @@ inline constexpr Time scan_silence = 200ms;
 inline constexpr Time zero_limit = 500ms;  ///< Time within which the position must become zero after zero clearing.
 inline constexpr Time zero_poll = 10ms;    ///< Time between two polls of the position after zero clearing.
 
-// Times of the virtual encoder; the options may set other ones.
+// Times of the virtual encoder; options may set another period and another T3.
 inline constexpr Time virtual_period = 10ms;        ///< Time between the virtual encoder's frames: refresh rate 100 Hz.
 inline constexpr Time virtual_acquisition = 100us;  ///< Time T3 of the virtual encoder.
 inline constexpr Time most_backlog = 50ms;          ///< Delay above which a stream of the virtual encoder drops frames.

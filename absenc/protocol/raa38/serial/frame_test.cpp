@@ -24,8 +24,8 @@ TEST(Raa38SerialFrame, FirstFailingCheckGivesError) {
   EXPECT_EQ(error({0xFF, 0xB2, 0x01, 0x7F, 0x31}), Error::none);
 }
 
-// An encoder at standstill repeats its frame. For all its frame sizes, decoding the repetition from another byte on
-// never gives another position, so a search cannot align wrongly.
+// Checks for each position of several numbers of bits that the repeated frame of an encoder at standstill, decoded from
+// another byte on, never gives another position, so that a search cannot align wrongly.
 TEST(Raa38SerialFrame, RepeatedFrameHasNoOtherAlignment) {
   for (const unsigned bits : {10u, 14u, 16u, 17u, 21u}) {
     const Format format{.bits = bits};

@@ -27,8 +27,8 @@ inline constexpr auto fields = author::fields_of<Values>(
 /// explains why no reply was received, or what is wrong with the request.
 [[nodiscard]] Explanation explain(const Format& format, Error error, Bytes request, Bytes reply);
 
-/// Receives the frames of a streaming encoder and sends nothing. Emits every frame, and every loss of frames with its
-/// error. Ends when no valid frame arrives any more: timeout, bad_framing, out_of_range.
+/// Receives the frames of a streaming encoder and sends nothing. Emits every valid frame, and every loss of frames with
+/// its error. Ends when no valid frame arrives any more: timeout, bad_framing, out_of_range.
 class Listen final : public Conversation<std::uint8_t> {
  public:
   /// Creates a conversation that receives an encoder of this format.

@@ -115,7 +115,7 @@ TEST(Raa38SerialBus, RejectsCollisionOfTwoUnits) {
   EXPECT_TRUE(ended(bench.run_command("position"), Error::bad_checksum));
 }
 
-// A frame may contain BC AA, but its checksum never completes a request.
+// Checks that another encoder does not take BC AA inside a frame for a request.
 TEST(Raa38SerialBus, IgnoresRequestStartInsideFrame) {
   Bench bench(with(bus, &Format::bits, 16u));
   bench.add(with(bench.format, &Format::unit, std::uint8_t{2}));

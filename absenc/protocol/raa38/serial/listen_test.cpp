@@ -145,7 +145,7 @@ TEST(Raa38SerialSession, ReadsEveryFrame) {
   EXPECT_EQ(bench.encoder.answer_count(), bench.session.counters().good);
 }
 
-// After a pause of the caller, the session must not return old positions.
+// Checks that after a pause of the caller the session returns a frame that was received in the last 2 ms.
 TEST(Raa38SerialSession, TakesNewestFrameAfterPause) {
   SessionBench bench;
   bench.read(host::Take::newest);

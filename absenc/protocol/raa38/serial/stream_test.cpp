@@ -101,7 +101,8 @@ TEST(Raa38SerialStream, IgnoresFramesOfOtherUnits) {
   }
 }
 
-// Two bytes are lost: FF 81 02 .. .. FF 81 02 09 8B. The first five bytes have a valid checksum and fit into 10 bits.
+// Checks that FF 81 02 FF 81 is not taken for a frame: these five bytes have a valid checksum and fit into 10 bits, but
+// two bytes were lost between FF 81 02 and the frame FF 81 02 09 8B.
 TEST(Raa38SerialStream, RejectsFrameWithHeaderInside) {
   const Format format{.bits = 10};
   for (std::size_t piece = 1; piece < 20; ++piece) {
@@ -115,7 +116,7 @@ TEST(Raa38SerialStream, RejectsFrameWithHeaderInside) {
   }
 }
 
-// The checksum of FF 81 00 7F is FF: the decoder accepts such a frame as soon as the next header follows.
+// Checks that the frame FF 81 00 7F FF, whose checksum is FF, is accepted as soon as the next header follows.
 TEST(Raa38SerialStream, FrameWithFFWaitsForNextHeader) {
   const Format format{.bits = 14};
   StreamDecoder decoder(format);
@@ -166,7 +167,8 @@ TEST(Raa38SerialStream, RejectsFramesCloserThanRefreshRate) {
   EXPECT_EQ(accepted_without_rate, 2u);
 }
 
-// The operating system delivers bytes in pieces of any size; this must not prevent the alignment to a valid stream.
+// Checks that a stream with a refresh rate is aligned if each piece ends inside a frame, as the operating system may
+// deliver it.
 TEST(Raa38SerialStream, AlignsWhenPiecesEndInsideFrames) {
   const Format format{.bits = 14};
   const Wire wire = stream(format, 1, 100);
