@@ -166,7 +166,7 @@ class ReadingCheck {
   std::uint32_t singleturn_;
   std::uint32_t multiturn_;
   std::uint32_t alarms_ = 0;
-  bool known_ = false;  // the last reading was good, so the next one is compared with it
+  bool known_ = false;  // the last reading was plausible; the next one must be near it
   std::uint32_t good_ = 0;
   std::uint32_t failed_ = 0;
   std::uint32_t implausible_ = 0;

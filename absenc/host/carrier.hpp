@@ -38,7 +38,7 @@ class Carrier {
   /// Returns whether a conversation runs.
   [[nodiscard]] bool is_busy() const { return machine_ != nullptr; }
 
-  /// Reports that the last bit of the transfer, or of the pulse, was sent.
+  /// Reports that the last bit of the transfer, of one of its frames, or of the pulse was sent.
   void sent(Time now) {
     if (!is_busy() || !sending_) return;
     if (has_more_frames()) return wait_for_frame(now);
@@ -46,9 +46,10 @@ class Carrier {
     silent_since_ = now;
     deliver({.kind = Event<Item>::Kind::sent, .at = now});
   }
-  /// Reports received items; they are dropped while no conversation runs. If the machine sets a gap limit, single
-  /// characters are gathered, because that takes little time. They are delivered when as many as the machine expects,
-  /// at most 16, have arrived, a silence, timer or line error is reported, or several items arrive in one call.
+  /// Reports received items; they are dropped while no conversation runs. If the machine sets a gap limit and expects
+  /// at least two characters, single characters are gathered, because that takes little time. They are delivered when
+  /// as many as the machine expects, at most 16, have arrived, a silence, timer or line error is reported, or several
+  /// items arrive in one call.
   void received(std::span<const Item> items, Time now) {
     if (items.size() == 1 && gathered_ + 1u < expected_) return gather(items.front(), now);
     take_input(items, now);
@@ -59,8 +60,9 @@ class Carrier {
     deliver_input({.kind = Event<Item>::Kind::line_error, .at = now});
   }
 
-  /// Begins the pending transfer or pulse, or reports a silence or timer, if its time is reached. Call it at `due()`;
-  /// more calls do no harm. Calls that are late make the reports late, but do not report a silence that there was not.
+  /// Begins the pending transfer, frame or pulse, or reports a silence or timer, if its time is reached. Call it at
+  /// `due()`; more calls do no harm. Calls that are late make the reports late, but do not report a silence that there
+  /// was not.
   void tick(Time now) {
     if (now < due()) return;
     deliver_gathered();
@@ -78,8 +80,8 @@ class Carrier {
     at_ = never;
     deliver({.kind = Event<Item>::Kind::timer, .at = now});
   }
-  /// Returns the time at which `tick` must be called; `never`: not before a conversation starts, or something is sent
-  /// or received.
+  /// Returns the time at which `tick` must be called; `never`: not before a conversation starts or another event is
+  /// reported.
   [[nodiscard]] Time due() const {
     if (!is_busy()) return never;
     return waiting_ ? step_.at : std::min(at_, silence_end());
@@ -142,8 +144,8 @@ class Carrier {
     return silence_reported_ || limit == Time{} ? never : silent_since_ + limit + latency_;
   }
 
-  // Takes the machine's steps until it waits or is done. A transfer or pulse that begins later is stored in `step_`;
-  // the limits of the silence after it are in the wait step that follows.
+  // Takes the machine's steps until it waits or is done. A transfer or pulse that begins later or has frames is stored
+  // in `step_`; the limits of the silence after it are in the wait step that follows.
   void take_steps(Time now) {
     for (;;) {
       const Step<Item> step = machine_->next(now);

@@ -15,7 +15,7 @@ namespace absenc::host {
 
 /// Setting for the echo of an adapter: whether it receives the bytes that it sends.
 enum class EchoMode : std::uint8_t {
-  automatic,  ///< the first good exchange shows whether the adapter echoes
+  automatic,  ///< the first good exchange with a request shows whether the adapter echoes
   on,
   off,
 };
@@ -49,7 +49,7 @@ class EchoFilter final : public Machine<std::uint8_t> {
 
   /// Returns the echo mode; `automatic` while it is not known whether the adapter echoes.
   [[nodiscard]] EchoMode mode() const { return mode_; }
-  /// Returns how many of the bytes received after the last request were its echo.
+  /// Returns how many of the bytes received after the last request were removed as its echo.
   [[nodiscard]] std::size_t echoed() const { return echoed_; }
   /// Returns whether only the echo of the last request was received.
   [[nodiscard]] bool only_echo() const { return only_echo_; }

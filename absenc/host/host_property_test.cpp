@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests Reach with random speeds, and unwrapping and velocity with random motions, below and above the speed at which
-// they are valid.
+// Tests Reach and longest_gap with random speeds, and unwrapping and velocity with random motions, below and above the
+// speed at which they are valid.
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -130,7 +130,7 @@ RC_GTEST_PROP(VelocityProperty, OfUnwrappedTurnIsValidUpToHalfATurnPerStep, ()) 
   const double share = *rc::gen::inRange(-999, 1000) / 1000.0;
   const double count = 1e9 / static_cast<double>(period);
   RC_ASSERT(std::abs(measured(share * limit) - share * limit) <= count);
-  // Above the limit the shaft seems to turn in the opposite direction.
+  // Between the limit and twice the limit the shaft seems to turn in the opposite direction.
   const double above = *rc::gen::inRange(1001, 2000) / 1000.0;
   RC_ASSERT(std::abs(measured(above * limit) - (above - 2) * limit) <= count);
 }

@@ -28,7 +28,7 @@ class OutstandingRequests {
   struct Entry {
     Request request;            ///< Items of the request.
     std::size_t expect = 0;     ///< Number of items of the reply to this request; 0: unknown before it ends.
-    Buffer<Time, 4> sent_at{};  ///< Times at which the request was sent and not lost, the oldest first.
+    Buffer<Time, 4> sent_at{};  ///< Times at which the requests that are not lost were sent, the oldest first.
     /// Time at which the oldest lost request counts as sent (see `mark_lost`). Lost: the line was silent after it, so
     /// most likely no reply follows, or four newer ones are stored.
     Time lost_first{};
@@ -37,7 +37,7 @@ class OutstandingRequests {
 
     /// Returns the time at which the newest request of this entry was sent.
     [[nodiscard]] Time newest() const { return sent_at.empty() ? lost_last : sent_at[sent_at.size() - 1]; }
-    /// Returns the time at which the oldest request of this entry was sent.
+    /// Returns the time at which the oldest request of this entry was sent, or counts as sent if it is lost.
     [[nodiscard]] Time oldest() const { return lost != 0 ? lost_first : sent_at[0]; }
     /// Returns how often the request of this entry is outstanding, lost ones included.
     [[nodiscard]] std::size_t count() const { return lost + sent_at.size(); }

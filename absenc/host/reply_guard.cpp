@@ -121,9 +121,10 @@ void ReplyGuard<Item>::enter_listening(const Entry& entry) {
   listening_ = {.until = until, .suspected = suspected};
 }
 
-// Returns how long to listen, from the end of the request: normally 5/4 of the lateness `suspected`. If no earlier
-// reply was nearly as late, the line may only have stalled. A line that delays every reply keeps the interval of the
-// requests, so after a silence of that interval the delayed replies are lost. On a CAN bus the time is not shortened.
+// Returns how long to listen, from the end of the request: normally 5/4 of the lateness `suspected`. If the expected
+// lateness is at most half of that, the line may only have stalled. A line that delays every reply keeps the interval
+// of the requests, so after a silence of that interval the delayed replies are lost. On a CAN bus the time is not
+// shortened.
 template <class Item>
 Time ReplyGuard<Item>::listening_time(Time suspected) const {
   const Time always_late = std::clamp(suspected * 5 / 4, required_silence(), longest_wait());
@@ -319,8 +320,8 @@ void ReplyGuard<Item>::keep_foreign(const Item& item) {
   }
 }
 
-// Removes replies that answer an outstanding request and not the present one; the items behind these replies may be the
-// reply to the present request.
+// Removes from the beginning of the stored items each reply of known length that answers an outstanding request and not
+// the present one; the items behind it may be the reply to the present request.
 template <class Item>
 void ReplyGuard<Item>::strip_late(Time at) {
   for (std::size_t i = 0; i < outstanding_.size();) {
@@ -358,8 +359,8 @@ void ReplyGuard<Item>::conclude_matching(bool timed_out) {
                                .received_at = matching_.received_at}});
 }
 
-// Ends matching because of noise: no reply can be matched on a line that is never silent. The conversation gets none of
-// the items and ends by its own time limit.
+// Ends matching because of noise: no reply can be matched on a line that is never silent. The conversation gets a line
+// error and none of the stored items, and ends by its own time limit.
 template <class Item>
 void ReplyGuard<Item>::conclude_noise() {
   received_.clear();

@@ -20,8 +20,10 @@ namespace absenc::host {
 ///
 ///   phase       entered when                     received items       left when                             next phase
 ///   ----------  -------------------------------  -------------------  ------------------------------------  ----------
-///   forwarding  a conversation is attached, or   go to the            the conversation wants to send a      delaying
-///               an exchange has ended            conversation         request
+///   forwarding  a conversation is attached; a    go to the            the conversation wants to send a      delaying
+///               request is sent and none is      conversation         request
+///               outstanding; or matching or
+///               listening has ended
 ///   delaying    a request is to be sent          are dropped, late    the line was silent long enough, or is
 ///                                                replies counted      noisy for 100 ms: the request is sent;
 ///                                                                       no request is outstanding           forwarding
@@ -35,10 +37,10 @@ namespace absenc::host {
 ///                                                                     timeout is reported                   forwarding
 ///
 /// Delaying ends at once for a request that is not outstanding, unless it demands a pause of more than 1 ms, items
-/// still arrive, or the list of outstanding requests is full. An outstanding request is sent again after four times the
-/// longest timeout, but not before 3/2 of the expected lateness, with an upper limit of 2.5 to 10 s; late replies
-/// prolong this, except on CAN. Where no reply was late yet, half of that time is enough, and the guard does not wait
-/// for an encoder that did not answer twice.
+/// still arrive (not on CAN), or the list of outstanding requests is full. An outstanding request is sent again after
+/// four times the longest timeout, but not before 3/2 of the expected lateness, with an upper limit of 2.5 to 10 s;
+/// late replies prolong this, except on CAN. Where no reply was late yet, half of that time is enough, and the guard
+/// does not wait for an encoder that did not answer twice.
 ///
 /// Listening lasts for 5/4 of the lateness that the stored reply would have, but at least four times the longest
 /// timeout and 3/2 of the expected lateness, with the upper limit above: if the stored reply was late, the reply of the
@@ -67,7 +69,7 @@ class ReplyGuard final : public Machine<Item> {
 
   /// Returns the number of replies that arrived after their timeout and were dropped.
   [[nodiscard]] std::uint64_t late() const { return late_replies_; }
-  /// Returns the longest time between a request and its dropped late reply; 0: no reply was dropped.
+  /// Returns the longest time between a request and its dropped late reply, at most 10 s; 0: no reply was dropped.
   [[nodiscard]] Time lateness() const { return greatest_lateness_; }
 
  private:

@@ -23,7 +23,7 @@ namespace absenc::host {
 
 /// Counters of a session: its conversations and their errors.
 struct Counters {
-  std::uint64_t good = 0;       ///< conversations that ended well; each result of a stream counts
+  std::uint64_t good = 0;       ///< good conversations not found wrong later; each result of a stream counts
   std::uint64_t repeated = 0;   ///< repeated attempts, each after an error
   std::uint64_t late = 0;       ///< replies on the line, to any session, that arrived too late and were dropped
   std::uint64_t discarded = 0;  ///< damaged frames of streams, whether an error reported them or not
@@ -92,20 +92,20 @@ class Session {
   }
 
   /// Runs `command` as `run` does, but a conversation that streams continues where it stopped, if the last call was
-  /// `next` or `read` with the same `command`.
+  /// `next` or `read` with the same `command` and `doubt` was not called since.
   const Conversation<Item>* next(const Command& command, Arguments arguments = {}) {
     if (command_ != &command) streaming_ = false;
     return attempt(command, arguments, [](const Conversation<Item>&) { return true; });
   }
 
   /// Reads the position. The position is confirmed if it is as near to the one before as the speed limit allows.
-  /// Without a position before (after opening and after silence), if it is too far away, or if the time between was too
-  /// long to judge, it is read again until two consecutive positions agree; if none of ten agrees, the last one is
-  /// returned and `confirmed` is false. If those two are near the position before, the first one was damaged and counts
-  /// as an error, cross_check_failed, because no checksum detects all damage; if not, the position jumped. A position
-  /// that the encoder reports as invalid is not read again once a position was confirmed. A conversation that streams
-  /// continues where it stopped, because finding its frames again costs two of them; `take` decides whether frames that
-  /// were received meanwhile are used. `on_reading` is called with each reading.
+  /// Without a position before (as after opening or after silence), if it is too far away, or if the time between was
+  /// too long to judge, it is read again until two consecutive positions agree; if none of ten further ones agrees, the
+  /// last one is returned and `confirmed` is false. If those two are near the position before, the first one was
+  /// damaged and counts as an error, cross_check_failed, because no checksum detects all damage; if not, the position
+  /// jumped. A position that the encoder reports as invalid is not read again once a position was confirmed. A
+  /// conversation that streams continues where it stopped, because finding its frames again costs two of them; `take`
+  /// decides whether frames that were received meanwhile are used. `on_reading` is called with each reading.
   template <class OnReading>
   const Conversation<Item>* read(const Command& command, Take take, OnReading&& on_reading) {
     if (streaming_ && take == Take::newest && !current_->asks()) catch_up(machine(), *port_);

@@ -15,8 +15,8 @@
 
 namespace absenc::host {
 
-/// A distribution of reply latencies up to 68 s in a fixed 4 kB. A percentile is at most 1/32 too long, never too
-/// short.
+/// A distribution of reply latencies in a fixed 4 kB; latencies above 68 s count as 68 s in it. A percentile below that
+/// is at most 1/32 too long, never too short.
 class Latencies {
  public:
   /// Adds the latency of a reply.
@@ -35,8 +35,8 @@ class Latencies {
   /// Returns the sum of all latencies, each limited to 0 to 68 s.
   [[nodiscard]] constexpr Time sum() const { return sum_; }
 
-  /// Returns, for each of the ascending limits, how many latencies surely do not exceed it. Latencies in the last 1/32
-  /// below a limit may be counted with the next limit only.
+  /// Returns, for each of the ascending limits (all below 68 s), how many latencies surely do not exceed it. Latencies
+  /// in the last 1/32 below a limit may be counted with the next limit only.
   template <std::size_t Size>
   [[nodiscard]] constexpr std::array<std::uint64_t, Size> within(const std::array<Time, Size>& limits) const {
     std::array<std::uint64_t, Size> counts{};

@@ -44,8 +44,8 @@ class ChildProcess {
 
   [[nodiscard]] const Channel& channel() const { return channel_; }
   [[nodiscard]] pid_t number() const { return number_; }
-  /// Waits up to `longest` for the process to end, then kills it. Returns how it ended, "by signal 6 (Aborted)" or
-  /// "with status 1"; "" for status 0, if it was killed here, and for later calls.
+  /// Waits up to `longest` for the process to end, then kills it if it still runs. Returns how it ended, "by signal 6
+  /// (Aborted)" or "with status 1"; "" for status 0, if it was killed here, and for later calls.
   std::string end(Time longest);
 
  private:

@@ -38,7 +38,7 @@ void check(bool good, const std::string& what) {
 }
 
 // Returns a socket that is bound to a kernel name derived from `link`, to mark the link as in use; an empty descriptor
-// with errno on an error, EADDRINUSE if another socket has the name. The name lives as
+// with errno on an error, EADDRINUSE if another socket has the name. The name lives as long as the socket, at most as
 // long as the process that bound it, so a link left by a killed emulator can be told from one in use, even if another
 // program has got the number of its terminal. Opening the terminal instead would be noticed by its user.
 Descriptor bind_name_of(const fs::path& link) {

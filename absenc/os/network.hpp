@@ -35,8 +35,8 @@ struct Ready {
   bool to_read = false;
   bool to_write = false;
 };
-/// Waits until `socket` can be read, or with `for_writing` also until it can be written, at most `longest` or until a
-/// signal arrives. Returns the directions in which it is ready. Works with any descriptor number, unlike select().
+/// Waits until `socket` can be read, or with `for_writing` until it can be read or written, at most `longest` or until
+/// a signal arrives. Returns the directions in which it is ready. Works with any descriptor number, unlike select().
 [[nodiscard]] Ready wait_for_socket(int socket, bool for_writing, Time longest);
 
 /// Returns the name of this computer; "" if it has none.

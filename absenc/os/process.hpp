@@ -17,8 +17,8 @@ namespace absenc::os {
 /// encoder. Writing to a standard output that was closed fails. Throws Failure.
 void protect_standard_streams();
 
-/// Writes `bytes` to standard output. If that is a file and the disk has no room for all of them, none remains. Returns
-/// 0 or a value of errno.
+/// Writes `bytes` to standard output. If that is a file and the disk has no room for all of them, none remains, unless
+/// another program has written behind them. Returns 0 or a value of errno.
 [[nodiscard]] int write_standard_output(std::string_view bytes);
 
 [[nodiscard]] bool is_terminal(int descriptor);

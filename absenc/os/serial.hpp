@@ -37,8 +37,9 @@ enum class SerialUse : std::uint8_t {
 /// settings.
 class SerialPort final : public DescriptorPort {
  public:
-  /// Discards bytes received before. Throws Failure; `bad_rate` if the port's nearest rate differs by more than 1 %. A
-  /// pulse step whose wire is not named in `wires` throws `unsupported`. `kernel` must outlive the port.
+  /// Discards bytes received before. Throws Failure; `bad_rate` if the rate is 0 or the port's nearest rate differs
+  /// from it by more than 1 %. A pulse step whose wire is not named in `wires` throws `unsupported`. `kernel` must
+  /// outlive the port.
   SerialPort(const std::string& path, const LineSettings& settings, Rs485 rs485 = Rs485::automatic,
              const PulseWires& wires = {}, WireKernel& kernel = system_wires(), SerialUse use = SerialUse::both);
   ~SerialPort() override;

@@ -23,8 +23,8 @@ namespace absenc::os {
 /// Returns the name of the driver of `terminal`, for example "ftdi_sio", "serial8250"; "" if /sys does not state it.
 [[nodiscard]] std::string driver_of(const std::string& terminal, const std::filesystem::path& sys = "/sys/class/tty");
 
-/// Returns the program that holds the port at `path` or has it open, for example "absenc serve (process 4711)"; "" if
-/// there is none that this user can see.
+/// Returns the program that has locked the port at `path` or, if it is no pseudo-terminal, has it open, for example
+/// "absenc serve (process 4711)"; "" if there is none that this user can see.
 [[nodiscard]] std::string holder_of(const std::string& path);
 
 /// Properties of a port that can be read without opening it: opening raises DTR, which resets some boards.

@@ -39,7 +39,7 @@ class CancelCheck {
   /// Returns how long a wait may take before it must call `check`; `never` if no CancelCheck exists in this thread, or
   /// the newest one has an empty function.
   [[nodiscard]] static Time interval();
-  /// Calls `over` of the CancelCheck of this thread. Throws Ended if it returns true.
+  /// Calls `over` of the newest CancelCheck of this thread. Throws Ended if it returns true.
   static void check();
 
  private:

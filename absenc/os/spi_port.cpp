@@ -242,7 +242,7 @@ void SpiPort::set_word() {
   std::uint8_t given = 0;
   const bool set = control(SPI_IOC_WR_BITS_PER_WORD, &wanted) >= 0;
   const int error = set ? EINVAL : errno;
-  // The kernel reports a word length of 8 as 0.
+  // The kernel may report a word length of 8 as 0.
   if (set && control(SPI_IOC_RD_BITS_PER_WORD, &given) >= 0 && (given == word_bits || given == 0)) return;
   throw Failure(Kind::unsupported, "the controller of " + path_ + " refused words of " + std::to_string(word_bits) +
                                        " bits" + reason(error) + ": use another controller");

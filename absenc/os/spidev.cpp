@@ -11,7 +11,7 @@ namespace absenc::os {
 
 namespace {
 
-// Greatest number of bytes of a message: the default of the kernel module's parameter bufsiz.
+// Greatest number of bytes of a message in each direction: the default of the kernel module's parameter bufsiz.
 constexpr std::size_t most_bytes = 4096;
 // Greatest number of buffers of a message: a FUSE request has 256, one of which holds the list of transfers.
 constexpr std::size_t most_buffers = 255;

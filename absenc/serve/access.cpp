@@ -103,7 +103,7 @@ std::uint64_t Access::wrong_tokens() const {
 }
 
 // Counts a wrong token and returns whether the address may try again. However many guesses arrive from an address in a
-// minute, only two of them add an event to the history: the first one, and the one that exceeds the limit.
+// minute, at most two of them add an event to the history: the first one, and the one that exceeds the limit.
 bool Access::may_try_again(const std::string& peer) const {
   const Time now = os::now();
   const std::lock_guard lock(mutex_);

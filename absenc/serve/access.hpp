@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Decides which requests are allowed. Requests for the page itself and the health check need no token. A request that
-// changes an encoder needs one. Every other request needs one if the server does not listen on loopback. If it listens
-// on loopback, everybody on this computer may read and poll without a token, except that a server with tokens demands
-// one if a proxy is configured or has forwarded the request.
+// runs a command of an encoder or acknowledges an alarm needs one. Every other request needs one if the server does not
+// listen on loopback. If it listens on loopback, everybody on this computer may read and poll without a token, except
+// that a server with tokens demands one if a proxy is configured or has forwarded the request.
 #pragma once
 
 #include <cstdint>
@@ -26,7 +26,7 @@ class Access {
     open,    // the page itself and the health check: a request needs no token
     read,    // requests for data that the server has already read
     poll,    // requests that poll the encoder or interrupt its readings, without changing it
-    change,  // requests that change the encoder or acknowledge an alarm
+    change,  // requests that run a command of the encoder or acknowledge an alarm
   };
 
   struct Choices {

@@ -216,8 +216,8 @@ void Api::post(const Request& request, const Reply& reply) {
   reply.send(response);
 }
 
-// Returns the response to a health check. The server is healthy while it can write the history and loses no readings
-// for MQTT; a broker that is away does not count. Faults of encoders are in /metrics.
+// Returns the response to a health check. The server is healthy while it can write the history and the spool of MQTT
+// and drops no readings for MQTT; a broker that is away does not count. Faults of encoders are in /metrics.
 Response Api::health() const {
   std::size_t live = 0;
   const Fleet::Watches watches = fleet_->all();

@@ -45,8 +45,8 @@ class HistoryReader {
   /// Returns at most `most` events of `encoder` in `range`, the newest first; for "" those of all encoders and of the
   /// server.
   [[nodiscard]] client::Json server_events(const std::string& encoder, Range range, std::int64_t most);
-  /// Returns up to `most` rows of the history as CSV, and the time in seconds at which the next rows start; after the
-  /// last row this time is later than `range.to_s`.
+  /// Returns up to `most` rows of the history as CSV, and the time in seconds at which the next rows start; if there
+  /// were fewer than `most` rows, this time is later than `range.to_s`.
   [[nodiscard]] std::pair<std::string, std::int64_t> csv(const std::string& encoder, Range range, std::int64_t most);
   [[nodiscard]] static std::string_view csv_header();
 

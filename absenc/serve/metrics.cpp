@@ -29,7 +29,7 @@ std::string label(std::string_view text) {
 
 class Page {
  public:
-  /// Begins a metric. The format requires all lines of a metric together, so each metric lists all encoders.
+  /// Begins a metric. The format requires all lines of a metric together, so the lines of all encoders follow.
   void metric(std::string_view name, std::string_view kind, std::string_view help) {
     fmt::format_to(std::back_inserter(text), "# HELP {} {}\n# TYPE {} {}\n", name, help, name, kind);
   }

@@ -48,7 +48,7 @@ std::string MqttHealth::metrics() const {
   return text;
 }
 
-// Parts of the MQTT connection in order of dependency: each member uses those above it.
+// Parts of the MQTT connection in order of dependency: a member uses only members above it.
 struct Mqtt::Parts {
   Parts(const MqttSettings& wanted, const Fleet& fleet, ServerEvents& server_events)
       : settings(wanted),

@@ -44,7 +44,7 @@ class Mqtt {
   /// `fleet` and `server_events` must outlive this object. Throws Failure if the spool or a file of the connection
   /// cannot be used, os::Failure if the MQTT client process cannot be started.
   Mqtt(const MqttSettings& settings, const Fleet& fleet, ServerEvents& server_events);
-  /// Spools the remaining readings. A connected broker has one second to receive them.
+  /// Spools the remaining readings and events. A connected broker has one second to receive them.
   ~Mqtt();
   Mqtt(const Mqtt&) = delete;
   Mqtt& operator=(const Mqtt&) = delete;

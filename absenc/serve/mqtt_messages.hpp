@@ -31,7 +31,7 @@ namespace absenc::serve {
 /// Returns the payload of the server's state message; `state` is "online" or "offline".
 [[nodiscard]] std::string server_state_text(std::string_view state, std::string_view why);
 
-/// A retained message. The sender publishes it again when `condition` has changed.
+/// A retained message. The sender publishes it on each connection, and again when `condition` has changed.
 struct Retained {
   std::string topic;
   std::string condition;

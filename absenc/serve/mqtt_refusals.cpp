@@ -31,7 +31,7 @@ void MqttRefusals::sent(const std::string& topic) {
 
 bool MqttRefusals::refuse(const std::string& topic, const std::string& why, Time now) {
   suspect_is_out_ = false;
-  suspects_.erase(topic);  // the topic is no suspect any more: the broker has given the reason of its refusal
+  suspects_.erase(topic);  // the topic is no suspect any more: the broker has refused it
   const auto [place, is_new] = refused_.try_emplace(topic);
   Refused& refused = place->second;
   const bool is_another = refused.why != why;

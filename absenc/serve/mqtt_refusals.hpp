@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Topics that the broker refuses. Each topic is tried again after a pause that doubles; messages of other topics are
-// still sent.
+// Topics that the broker refuses. Each topic is tried again after a pause that doubles up to a minute; messages of
+// other topics are still sent.
 //
 // An MQTT 5 broker refuses a message with a reason. Other brokers just close the connection, so every topic without an
 // acknowledgement is a suspect. From the second such close in a row on, if it comes soon after the start of the

@@ -18,7 +18,7 @@ struct MqttSettings {
   std::string prefix{};          // beginning of all topics of this server
   std::string spool{};           // path of the folder of the spool
   std::int64_t spool_bytes = 0;  // greatest size of the spool in bytes
-  Time batch{};                  // readings within this time share a message, up to 250 of them
+  Time batch{};                  // an encoder's readings within this time share messages of up to 250
   std::string home_assistant{};  // prefix of the discovery topics; "": no discovery
 
   bool operator==(const MqttSettings&) const = default;

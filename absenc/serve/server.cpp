@@ -36,7 +36,7 @@ std::string url_of(const std::string& host, std::uint16_t port) {
 
 }  // namespace
 
-// Parts of the server in order of dependency: each member uses those above it.
+// Parts of the server in order of dependency: a member uses only members above it.
 struct Server::Parts {
   explicit Parts(const Choices& choices)
       : listener(os::listen_at(choices.host, choices.port)),

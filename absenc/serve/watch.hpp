@@ -155,7 +155,7 @@ class Watch {
   Time offset_;
   ServerEvents* server_events_;
 
-  mutable std::mutex mutex_;  // mutex that guards all members below
+  mutable std::mutex mutex_;  // mutex that guards the members from here to `outboxes_`
   std::condition_variable_any changed_;
   Snapshot current_;
   Details details_;

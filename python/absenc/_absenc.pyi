@@ -47,7 +47,8 @@ class Reading:
         """Names of the raised alarms; []: all are reported clear; None: none is raised, but not all are reported."""
     @property
     def status(self) -> Optional[list[str]]:
-        """Names of the status flags that are set; None: none is set, and not all are reported."""
+        """Names of the status flags that are set; []: all are reported clear; None: none is set, but not all are
+        reported."""
     @property
     def time_s(self) -> float:
         """Time at which the position was latched, in seconds of time.monotonic()."""

@@ -90,14 +90,14 @@ class Memory:
         self._encoder = encoder
 
     def read(self, address: int, count: int = 1, *, page: int = 0) -> bytes:
-        """Reads and returns `count` bytes from `address` on."""
+        """Reads and returns the bytes at `count` addresses from `address` on: one each, or a word, low byte first."""
         return self._encoder.memory_read(
             natural("address", address), natural("count", count), natural("page", page)
         )
 
     def write(self, address: int, data: bytes, *, page: int = 0, force: bool = False) -> int:
-        """Writes the bytes that differ, reads back each, and reads all again at the end. Returns the number of bytes
-        that differed. `force` also writes protected bytes."""
+        """Writes the bytes that differ, reads back each, and reads all again at the end. Returns the number of
+        addresses at which they differed. `force` also writes protected bytes."""
         return self._encoder.memory_write(natural("address", address), data, natural("page", page), force)
 
     def dump(self) -> dict[tuple[int, int], int]:

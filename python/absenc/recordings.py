@@ -19,7 +19,7 @@ from .errors import Failure, UsageError
 from .protocols import Protocol, protocol
 
 FLAG_WORDS = "names, separated by spaces"  # with these words begins the meaning of a column of flags
-ALL_CLEAR = "none"  # cell of a flags column in CSV: all are reported clear; an empty cell: not reported
+ALL_CLEAR = "none"  # cell of a flags column in CSV: all are reported clear; an empty cell: not all are reported
 NOT_ENDED = "18446744073709551615"  # attribute `rows` in HDF5 while the recording is written
 
 #: Values of one row, by column; None: missing or invalid.

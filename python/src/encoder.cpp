@@ -73,7 +73,8 @@ class PyEncoder {
     if (!std::exchange(closed_, true)) encoder_.disconnect();
   }
 
-  /// Ends the present loop over samples if `stopping`; otherwise permits new loops.
+  /// Ends the present and all later waits of the encoder if `stopping`; otherwise permits waits again. A loop over
+  /// samples ends without an exception.
   void stop(bool stopping) { stopping_ = stopping; }
 
   [[nodiscard]] const client::Encoder& encoder() const { return encoder_; }

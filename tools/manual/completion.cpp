@@ -225,7 +225,7 @@ std::string description(const Subcommand& subcommand) {
                      subcommand.name, fmt::join(arguments, " "), fmt::join(options, " "), repeats);
 }
 
-// Writes a bash table "declare -gA _absenc_models=(['tformat']='TS5700N8500 23-bit' ...)". -g, because a function may
+// Returns a bash table "declare -gA _absenc_models=(['tformat']='TS5700N8500 23-bit' ...)". -g, because a function may
 // source the script.
 template <class Names>
 std::string by_protocol(std::string_view name, std::span<const Unit* const> units, const Names& names) {

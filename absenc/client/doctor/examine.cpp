@@ -142,7 +142,8 @@ class Doctor {
       }
       examiner.conclude(seen_);
     }
-    // Other bit rates are tried only on a silent CAN bus, because they would destroy frames of other devices.
+    // On a CAN bus other settings are tried only if nothing was heard, because other bit rates would destroy frames of
+    // other devices.
     const bool disturbs = std::is_same_v<Item, CanFrame> && any_heard();
     const bool may_be_settings = none_good() && !seen_.never_silent && seen_.lateness == Time{};
     if (may_be_settings && !disturbs && !is_adapter()) try_others<Item>();

@@ -312,7 +312,7 @@ std::optional<Finding> suspected(const Case& one, const All& all, const Suspicio
 }
 
 // Finds 8th bits that are lost although replies are good: an XOR checksum can be right without them. Then a byte of the
-// position jumps between values from 60 to 7F and values below 20, at least twice.
+// reply jumps between values from 60 to 7F and values below 20, at least twice.
 std::optional<Finding> seven_bits_of_good(const Case& one) {
   constexpr std::size_t enough = 40;
   constexpr std::size_t least_wraps = 2;

@@ -75,8 +75,7 @@ bool is_same_kind(const FoundCheck& one, const FoundCheck& other) {
                                                           one.parameters.poly == other.parameters.poly));
 }
 
-// Returns whether the unit's own frames have this kind of checksum, perhaps with other parameters than width and
-// polynomial.
+// Returns whether the unit's own frames have this kind of checksum; for a CRC, of the same width and polynomial.
 bool is_of_unit(const FoundCheck& check, const Unit& unit) {
   std::vector<CheckedFrame> frames;
   for (const Vector& vector : unit.vectors) {

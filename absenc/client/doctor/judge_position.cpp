@@ -93,8 +93,8 @@ void judge_noise(const Walk& walk, std::vector<Finding>& findings) {
   findings.push_back(finding(FindingKind::position_noise, {fmt::format("{}", walk.span()), size}));
 }
 
-// Returns how many counts the shaft can move in the time `pause`. The movement between two readings is at most half of
-// the range, beyond which its direction is ambiguous.
+// Returns how many counts the position can change in the time `pause`, with a margin of a quarter and the variation at
+// rest. The movement between two readings is at most half of the range, beyond which its direction is ambiguous.
 double reach(const Walk& walk, Time pause, const host::SpeedLimit& limit) {
   const double seconds = std::chrono::duration<double>(pause).count();
   const double counts =

@@ -30,14 +30,15 @@ struct StreamBytes {
 [[nodiscard]] std::vector<Attempted> frames_between_pauses(const Unit& unit, const Options& options,
                                                            const StreamBytes& stream);
 
-/// Inserts a failed reading (Error::timeout) for each frame that did not come, if the frames come at a regular rate, at
-/// least two did not come, and neither of the last two readings follows the gap. `arrivals` are the times at which the
-/// frames of `readings` arrived. Frames that were received but damaged (Attempted::discarded) are not missing, nor is a
-/// late one.
+/// Inserts a failed reading (Error::timeout) for each frame that did not come, if the frames come at a regular rate and
+/// at least two did not come; a gap before one of the last two readings does not count. `arrivals` are the times at
+/// which the frames of `readings` arrived. Frames that were received but damaged (Attempted::discarded) are not
+/// missing, nor is a late one.
 void insert_missing_frames(std::vector<Attempted>& readings, const std::vector<Time>& arrivals);
 
 /// Returns the number of good frames that arrived twice, directly one after the other, although the position changes; 0
-/// if they are fewer than 8, or fewer than 40 % of the readings.
+/// if they are fewer than 8 or fewer than 40 % of the readings, or if fewer than 20 % of the frames differ from the one
+/// before.
 [[nodiscard]] std::size_t count_doubled(const std::vector<Attempted>& readings, const std::vector<Time>& arrivals);
 
 }  // namespace absenc::client

@@ -111,7 +111,8 @@ class Safety {
     harmful_ = harmful_to_others(unit_, address.line.rate, search_of(address));
     said_ = is_harmful(address.options);
   }
-  /// Returns whether the request may be sent; the request of the user's own command always may.
+  /// Returns whether the request may be sent: it could change no other encoder, or the user's own request could as
+  /// well.
   [[nodiscard]] bool allows(const Options& options) const { return said_ || !is_harmful(options); }
 
  private:

@@ -26,12 +26,13 @@ struct Other {
 [[nodiscard]] std::vector<Other> other_lines(const EncoderAddress& address, bool has_rate);
 
 /// Returns up to 32 settings to try: each other model, and on lines of characters each other choice of an option.
-/// Leaves out those whose requests could change an encoder of another protocol on the line. Returns none on CAN, and
-/// for a virtual encoder, which always has the given options.
+/// Leaves out those whose requests could change an encoder of another protocol on the line, unless the user's own
+/// request could as well. Returns none on CAN, and for a virtual encoder, which always has the given options.
 [[nodiscard]] std::vector<Other> other_models(const EncoderAddress& address);
 
-/// Returns each other address on the line as a setting to try, the lowest first. Returns none if polling would disturb
-/// other devices, on CAN, for encoders that send unsolicited, and for virtual encoders.
+/// Returns each other address on the line as a setting to try, the lowest first. Leaves out addresses as `other_models`
+/// does settings. Returns none if the unit has no addresses, if polling would disturb other devices, on CAN, for
+/// encoders that send unsolicited, and for virtual encoders.
 [[nodiscard]] std::vector<Other> other_addresses(const EncoderAddress& address);
 
 /// Returns the search that `identify` runs to find encoders of other protocols. Only for lines of characters.

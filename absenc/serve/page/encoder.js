@@ -156,7 +156,7 @@ export class EncoderPage {
     return key in RANGES && this.hasHistory ? key : "live";
   }
 
-  /** Shows the buttons for range and unit, and restarts the plot if the selection has changed. */
+  /** Shows the buttons for range and unit, and restarts the plot if these or the selection have changed. */
   showChoices() {
     const all = quantities(this.encoder);
     const possible = Object.entries(all).filter(([, quantity]) => !quantity.past || this.range !== "live");

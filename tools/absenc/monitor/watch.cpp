@@ -34,7 +34,8 @@ std::chrono::steady_clock::time_point to_time_point(Time time) {
   return std::chrono::steady_clock::time_point(std::chrono::duration_cast<std::chrono::steady_clock::duration>(time));
 }
 
-/// Collects the last reply's fields that the printed line of the reading leaves out.
+/// Collects the last reply's fields that the printed line of the reading leaves out, except those that repeat the
+/// request.
 class OtherFields final : public FieldSink {
  public:
   explicit OtherFields(const Unit& unit) : unit_(&unit) {}

@@ -12,7 +12,7 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// Opens the encoder's port and prints the notes about it. Throws the exceptions of Connection::connect.
+/// Opens the encoder's port and prints the notes about it. Throws the exceptions of Connection::open.
 [[nodiscard]] std::unique_ptr<Connection> open_connection(const EncoderAddress& uri);
 /// Opens the port of an encoder for samples, memory and settings, and prints the notes about the port. `period`: time
 /// between readings, see make_encoder.

@@ -136,7 +136,7 @@ void check_line(const Unit& unit, const Options& options, const Invocation& invo
   if (invocation.has("--memory")) throw UsageError("--memory keeps the memory of one encoder: not with --also");
 }
 
-/// The virtual line of the verb, its memory file and the time at which it ends.
+/// The virtual line of the verb, its memory file and the duration of --for.
 template <class Item>
 struct EmulationRun {
   EmulationRun(const Unit& unit, const Options& options, const Invocation& invocation)

@@ -9,8 +9,9 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// Asks the user, runs one command and prints its result, as the options --yes and --json state; returns the exit
-/// status. Throws UsageError if it must ask without a terminal, EncoderFailure, Failure, os::Failure, os::Interrupted.
+/// Runs one command and prints its result, as the options --yes and --json state; first asks the user if the command
+/// changes the encoder; returns the exit status. Throws UsageError if it must ask without a terminal, EncoderFailure,
+/// Failure, os::Failure, os::Interrupted.
 int run_command(const Invocation& invocation, const EncoderAddress& uri, const Command& command, Arguments arguments);
 
 /// Runs a command of Verb::scan and prints its list of encoders; returns the exit status.
