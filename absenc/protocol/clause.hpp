@@ -67,7 +67,7 @@ template <class... Some>
 inline constexpr Errors form_errors = any_of(Error::bad_framing, Error::unexpected_reply, Error::out_of_range,
                                              Error::sequence_mismatch, Error::cross_check_failed, Error::line_stuck);
 
-/// A request that the test of a clause sends, and that reading a position never sends.
+/// A request that the test of a clause sends.
 struct Ask {
   /// The whole request on the wire: bytes in hexadecimal, "ea 00 ea", or a CAN frame, "1ff:022b".
   std::string_view wire{};

@@ -83,7 +83,7 @@ class PagedMemoryDevice : public Responder {
   bool page_changed_ = false;  // no access was received yet after the busy time of the last page change
   Time page_ready_at_{};
   Time written_at_{};                              // end of the busy time of the last write; 0: none
-  std::optional<std::uint8_t> refused_address_{};  // address of the last request, if it was a read during a write
+  std::optional<std::uint8_t> refused_address_{};  // of the last request: a read during a write, if `refused_rule`
   bool fetching_ = false;
   std::uint8_t fetch_address_ = 0;
   Time fetch_begin_{};
