@@ -98,8 +98,8 @@ class Engine : public Conversation<std::uint8_t> {
   void set_times(const HostTimes& times) { times_ = times; }
   /// Sets that nothing is sent until `time`, and that `woken` is called then.
   void sleep(Time time);
-  /// Sets that the line is listened to for `duration`, from the next step on: `heard` is called for all received bytes,
-  /// and `woken` at the end. The end is checked at every step, so also after bytes, which a port delivers before timers.
+  /// Sets that the line is listened to for `duration`, from the next step on: `heard` is called for received bytes, and
+  /// `woken` at the end. The end is checked at every step, so also after bytes, which a port delivers before timers.
   void listen(Time duration);
   /// Continues to listen until the end of the time. To be called after `heard`.
   void listen_on() { state_ = State::listening; }
