@@ -236,8 +236,8 @@ struct Head {
 };
 
 // Finds the data, `size` bits, of a frame whose start bit and CDS are in the first machine word, as they nearly always
-// are. Returns false for any other frame, for samples of fewer bytes than a machine word, and for a frame that is cut or
-// has a CDS that is not accepted.
+// are. Returns false for any other frame, for samples of fewer bytes than a machine word, and for a frame that is cut
+// or has a CDS that is not accepted.
 [[nodiscard, gnu::always_inline]] constexpr bool find_data(const BitView& samples, std::size_t size, Cds cds,
                                                            Head& head) {
   if (samples.bytes.size() < sizeof(std::size_t)) return false;
