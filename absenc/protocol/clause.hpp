@@ -15,15 +15,15 @@ namespace absenc {
 
 /// Kind of a clause for encoders: the behaviour that the document demands. Names in backquotes are members of Clause.
 enum class Demand : std::uint8_t {
-  // Demands about readings, tested with the requests that every host sends; `does` is tested with those of its command
+  // Demands about readings, tested with the command that reads the position; `does` is tested with its own command
   answered,  ///< the encoder answers each request, pulse or transfer
   streamed,  ///< the encoder sends frames unsolicited
-  in_time,   ///< each reply begins before a host's timeout, because documents give typical times and no limits
+  in_time,   ///< each reply begins before a host's timeout, because documents often state no limit
   whole,     ///< replies have the length that the document states
   checked,   ///< replies have a correct checksum
   as_drawn,  ///< fixed bits, echoes and ranges are as the document draws them, and redundant values are equal
   does,      ///< the command `command`, which makes checks of its own, ends without an error each time
-  // Demands about requests that no host sends
+  // Demands about requests that a host of this encoder does not send
   foreign_silent,  ///< the encoder does not answer a request to another address
   reacts,          ///< the encoder reacts to the request `ask` as `reaction` states
   // Demands about changes of the encoder, which the test undoes

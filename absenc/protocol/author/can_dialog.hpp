@@ -40,7 +40,7 @@ class DialogOf<P> : public CanEngine, public Routine {
   using CanEngine::listen;
   using CanEngine::overhear;
 
-  /// Awaits the next frame on the bus, from any node. The result is nothing when a time limit of the last `ask`,
+  /// Returns an awaitable for the next frame on the bus, from any node; nothing when a time limit of the last `ask`,
   /// `ask_for`, `listen` or `configure` has passed: `const std::optional<CanFrame> frame = co_await dialog.heard()`.
   [[nodiscard]] auto heard() {
     struct Hear {

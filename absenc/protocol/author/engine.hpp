@@ -103,8 +103,8 @@ class Engine : public Conversation<std::uint8_t> {
   void listen(Time duration);
   /// Continues to listen until the end of the time. To be called after `heard`.
   void listen_on() { state_ = State::listening; }
-  /// Ends the conversation with `error`, but not before `hold` has passed since the last sent or received character:
-  /// until then the encoder must not be disturbed.
+  /// Sets that the conversation ends with `error`, but not before `hold` has passed since the last sent or received
+  /// character: until then the encoder must not be disturbed.
   void finish(Error error, Time hold = {});
   /// Returns the manner of the present request, with the repetitions that are left.
   [[nodiscard]] const Manner& manner() const { return manner_; }
