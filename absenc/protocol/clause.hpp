@@ -51,7 +51,7 @@ enum class Demand : std::uint8_t {
   restarts  ///< after `command` the encoder is silent at first; `value` ms later it reports the position from before
 };
 
-/// Returns whether testing a clause of this kind changes the encoder.
+/// Returns whether testing a clause of this kind may change the encoder.
 [[nodiscard]] constexpr bool changes_encoder(Demand demand) { return demand >= Demand::byte_written; }
 /// Returns whether testing a clause of this kind may lose a value of the encoder for good: a position, turns, an alarm.
 [[nodiscard]] constexpr bool loses(Demand demand) { return demand >= Demand::zero; }
@@ -79,8 +79,8 @@ struct Ask {
   /// Writes the request into `request` and returns its length, for requests that depend on the options and that no
   /// command sends. Null: `wire` or the request of `command` is sent.
   Result<std::size_t> (*make)(const Options& options, MutableBytes request) = nullptr;
-  /// Bit rate of the request in 1/1000 of the line's rate: a slower request has its last bit where the receiver expects
-  /// the stop bit. 0: the line's rate.
+  /// Bit rate of the request in 1/1000 of the line's rate: at a suitable lower rate the last bit is where the receiver
+  /// expects the stop bit. 0: the line's rate.
   std::uint32_t permille = 0;
 };
 
