@@ -15,15 +15,15 @@ namespace absenc {
 
 /// Kind of a clause for encoders: the behaviour that the document demands. Names in backquotes are members of Clause.
 enum class Demand : std::uint8_t {
-  // Demands about readings, tested with the requests that every host sends; `does` is tested with those of its command
+  // Demands about readings, tested with the command that reads the position; `does` is tested with its own command
   answered,  ///< the encoder answers each request, pulse or transfer
   streamed,  ///< the encoder sends frames unsolicited
-  in_time,   ///< each reply begins before a host's timeout, because documents give typical times and no limits
+  in_time,   ///< each reply begins before a host's timeout, because documents often state no limit
   whole,     ///< replies have the length that the document states
   checked,   ///< replies have a correct checksum
   as_drawn,  ///< fixed bits, echoes and ranges are as the document draws them, and redundant values are equal
   does,      ///< the command `command`, which makes checks of its own, ends without an error each time
-  // Demands about requests that no host sends
+  // Demands about requests that a host of this encoder does not send
   foreign_silent,  ///< the encoder does not answer a request to another address
   reacts,          ///< the encoder reacts to the request `ask` as `reaction` states
   // Demands about changes of the encoder, which the test undoes
@@ -51,7 +51,7 @@ enum class Demand : std::uint8_t {
   restarts  ///< after `command` the encoder is silent at first; `value` ms later it reports the position from before
 };
 
-/// Returns whether testing a clause of this kind changes the encoder.
+/// Returns whether testing a clause of this kind may change the encoder.
 [[nodiscard]] constexpr bool changes_encoder(Demand demand) { return demand >= Demand::byte_written; }
 /// Returns whether testing a clause of this kind may lose a value of the encoder for good: a position, turns, an alarm.
 [[nodiscard]] constexpr bool loses(Demand demand) { return demand >= Demand::zero; }
@@ -67,7 +67,7 @@ template <class... Some>
 inline constexpr Errors form_errors = any_of(Error::bad_framing, Error::unexpected_reply, Error::out_of_range,
                                              Error::sequence_mismatch, Error::cross_check_failed, Error::line_stuck);
 
-/// A request that the test of a clause sends, and that reading a position never sends.
+/// A request that the test of a clause sends.
 struct Ask {
   /// The whole request on the wire: bytes in hexadecimal, "ea 00 ea", or a CAN frame, "1ff:022b".
   std::string_view wire{};
@@ -79,8 +79,8 @@ struct Ask {
   /// Writes the request into `request` and returns its length, for requests that depend on the options and that no
   /// command sends. Null: `wire` or the request of `command` is sent.
   Result<std::size_t> (*make)(const Options& options, MutableBytes request) = nullptr;
-  /// Bit rate of the request in 1/1000 of the line's rate: a slower request has its last bit where the receiver expects
-  /// the stop bit. 0: the line's rate.
+  /// Bit rate of the request in 1/1000 of the line's rate: at a suitable lower rate the last bit is where the receiver
+  /// expects the stop bit. 0: the line's rate.
   std::uint32_t permille = 0;
 };
 

@@ -87,7 +87,7 @@ class CompiledWord {
     return numbers;
   }
 
-  // Turns and position are one Gray-coded number, the first of them on the wire its upper part.
+  // Decodes turns and position, which are one Gray-coded number; the first of the two on the wire is its upper part.
   constexpr void decode_gray(std::uint64_t& position, std::uint64_t& multiturn) const {
     const bool turns_first = multiturn_.shift > position_.shift;
     std::uint64_t& upper = turns_first ? multiturn : position;

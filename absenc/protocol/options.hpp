@@ -33,13 +33,13 @@ struct Option {
   std::string_view name;                        ///< Name of the option.
   std::string_view meaning;                     ///< Meaning of the option, with its unit.
   std::int64_t default_value;                   ///< Value if the user does not set the option.
-  std::int64_t minimum = 0;                     ///< Lowest value, if the option is a number.
+  std::int64_t minimum = 0;                     ///< Lowest value of a number, apart from the 0 of `or_zero`.
   std::int64_t maximum = 0;                     ///< Highest value, if the option is a number.
   std::span<const std::string_view> choices{};  ///< Words for the values from 0 on; empty: the option is a number.
   bool probeable = false;                       ///< true: captured frames can show the value of the option
   unsigned decimals = 0;                        ///< Most digits after the decimal point that the user may write.
   bool describes_word = false;  ///< true: a word format replaces this option, so the two cannot be given together
-  std::uint32_t step = 1;       ///< permitted values are `minimum` plus multiples of this step
+  std::uint32_t step = 1;       ///< permitted numbers are `minimum` plus multiples of this step, and see `or_zero`
   Role role = Role::other;      ///< Role by which programs that do not know the unit find the option.
   bool in_hex = false;          ///< true: texts show the value in hexadecimal, as with FieldInfo::in_hex
   bool or_zero = false;         ///< true: 0 is permitted too, although it is below `minimum`
@@ -68,7 +68,7 @@ inline constexpr std::string_view word_option_name = "word";
 /// The values of all options of a unit, by the index of the option.
 struct Options {
   std::array<std::int64_t, maximum_options> values{};  ///< Values in the order of the unit's options.
-  const Model* model = nullptr;                        ///< model that the user named or whose values match; null: none
+  const Model* model = nullptr;                        ///< model that the user named, or that no setting contradicts; null: none
   WordFormat word{};  ///< word format, which replaces the options that describe a word; empty: those options apply
 
   /// Returns whether the user gave a word format.
@@ -104,7 +104,7 @@ struct Unit;
 /// Computes the values of all options from a model and single settings, which override the model, and stores them in
 /// `resolved`. Returns why it is impossible, or an error of kind `none`. Without a model name the first model that
 /// contradicts no setting is used, so a setting that fits only one model also selects the other values of that model;
-/// if no model fits, the unit's defaults apply. With a word format no model is used.
+/// if no model fits, options that are not set have the unit's defaults. With a word format no model is used.
 [[nodiscard]] OptionError resolve_options(const Unit& unit, std::string_view model,
                                           std::span<const OptionText> settings, Options& resolved);
 

@@ -33,7 +33,7 @@ enum class Role : std::uint8_t {
   // Roles in memory, registers and settings
   address,   ///< argument: address of the byte or register
   page,      ///< argument: page of the byte, if the memory has pages
-  count,     ///< argument: number of bytes to read; commands without it read one byte
+  count,     ///< argument: number of bytes to read; commands without it read one byte, word or register
   force,     ///< argument: 1 also writes a protected byte, or a value that the encoder has already
   value,     ///< argument, field: the byte, or the content of a register, most significant byte first
   data,      ///< field: several bytes of memory, or the bytes of a register

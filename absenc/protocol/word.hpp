@@ -253,8 +253,8 @@ constexpr bool encode_word(const WordFormat& format, const Word& word, BitBuffer
   return true;
 }
 
-/// Puts the fields of the word into `sink`, in the order of the wire, without parity and skipped bits. The position is
-/// also put as an angle, or as a distance if the length of a count is known.
+/// Puts the fields of the word into `sink`, in the order of the wire, without parity and skipped bits. A rotary
+/// position is also put as an angle, a linear one as a distance if the length of a count is known.
 constexpr void put_word(FieldSink& sink, const WordFormat& format, const Word& word, const Scale& scale) {
   for (std::size_t i = 0; i < format.fields().size(); ++i) {
     const WordField& field = format.fields()[i];

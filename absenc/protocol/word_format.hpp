@@ -72,8 +72,8 @@ struct WordFormatError {
   std::size_t at = 0;         ///< index in the text at which the error is; its length: something is missing at the end
 };
 
-/// Format of a position word as data: its fields in order. It is made from options or from a text, and used by all code
-/// that decodes and sends words.
+/// Format of a position word as data: its fields in order. It is made from options or from a text, and used by the code
+/// that decodes or sends words.
 class WordFormat {
  public:
   static constexpr std::size_t maximum_fields = 12;  ///< Greatest number of fields of a word.

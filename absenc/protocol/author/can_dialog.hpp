@@ -32,15 +32,15 @@ class DialogOf<P> : public CanEngine, public Routine {
   /// Returns the format of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
 
-  /// Sends a frame not before `pause` after the last request, or its answer if `keep` stored one. `ask`, `ask_for`,
-  /// `listen` or `configure` must be called before the first await of a received frame.
+  /// Sets the frame to send next, not before `pause` after the last request, or its answer if `keep` stored one. `ask`,
+  /// `ask_for`, `listen` or `configure` must be called before the first await of a received frame.
   void ask(const CanFrame& frame, Time pause = {}) { CanEngine::ask(frame, P::host_times(format_), pause); }
   using CanEngine::ask_for;
   using CanEngine::configure;
   using CanEngine::listen;
   using CanEngine::overhear;
 
-  /// Awaits the next frame on the bus, from any node. The result is nothing when the time limit of the last `ask`,
+  /// Returns an awaitable for the next frame on the bus, from any node; nothing when a time limit of the last `ask`,
   /// `ask_for`, `listen` or `configure` has passed: `const std::optional<CanFrame> frame = co_await dialog.heard()`.
   [[nodiscard]] auto heard() {
     struct Hear {

@@ -55,19 +55,20 @@ class CanEngine : public Conversation<CanFrame> {
   CanEngine() = default;
   ~CanEngine() = default;
 
-  /// Sends `frame`, not before `pause` after the last request, or its answer if `keep` stored one. Receives until the
-  /// bus is silent for `times.answer_limit`, or until `times.busy_limit` has passed.
+  /// Sets that `frame` is sent next, not before `pause` after the last request, or its answer if `keep` stored one, and
+  /// that frames are then received until the bus is silent for `times.answer_limit` or `times.busy_limit` has passed.
   void ask(const CanFrame& frame, const CanHostTimes& times, Time pause = {});
-  /// Sends `frame` at once and receives frames for exactly `duration`.
+  /// Sets that `frame` is sent next, without a pause, and that frames are then received for exactly `duration`.
   void ask_for(const CanFrame& frame, Time duration);
   /// Sets whether frames that were received before the request was sent are delivered, not only later ones: they may
   /// answer earlier requests.
   void overhear(bool yes = true) { receives_early_ = yes; }
   /// Returns whether the delivered frame was received before the request was sent.
   [[nodiscard]] bool came_early() const { return early_; }
-  /// Receives frames for `duration` without sending.
+  /// Sets that frames are received next for `duration` without sending.
   void listen(Time duration);
-  /// Switches this end of the bus to `rate` bits per second, then receives frames for `duration` without sending.
+  /// Sets that the next step switches this end of the bus to `rate` bits per second, and that frames are then received
+  /// for `duration` without sending.
   void configure(std::uint32_t rate, Time duration);
   /// Ends the conversation with the error and texts of `outcome`.
   void finish(const Outcome& outcome);
@@ -79,7 +80,7 @@ class CanEngine : public Conversation<CanFrame> {
   /// Handles a received frame, which was complete at `at`. To send, listen or end, it calls one of the functions above;
   /// otherwise receiving continues.
   virtual void heard(const CanFrame& frame, Time at) = 0;
-  /// Handles the end of the time limit. Calls one of the functions above, otherwise the conversation ends.
+  /// Handles the end of a time limit. Calls one of the functions above, otherwise the conversation ends.
   virtual void over() = 0;
 
  private:

@@ -52,8 +52,8 @@ class ClockedEngine : public Conversation<std::uint8_t> {
   ClockedEngine(const ClockedHostTimes& times, MutableBytes storage) : times_(times), storage_(storage) {}
   ~ClockedEngine() = default;
 
-  /// Begins a transfer of `count` clocks after a pause of the clock, during which the clock line is idle (high) or,
-  /// with `hold_low`, held low. If the storage is too small, the conversation ends with invalid_argument.
+  /// Sets that a transfer of `count` clocks follows after a pause of the clock, in which the clock line is idle (high)
+  /// or, with `hold_low`, held low. If the storage is too small, the conversation ends with invalid_argument.
   void clock(unsigned count, bool hold_low = false);
   /// Ends the conversation with `error`; `Error::none`: with success.
   void finish(Error error);

@@ -13,7 +13,7 @@
 
 namespace absenc::author {
 
-/// The members that a protocol of clocked bits must have, `Request` only if it is that of a unit:
+/// The members that a protocol of clocked bits must have; `Request` only if a unit is declared for the protocol:
 ///
 ///   struct Protocol {
 ///     using Format, Reply;
@@ -64,7 +64,7 @@ class ClockedHostOf : public ClockedEngine {
   ClockedHostOf(const Format& format, Later) : ClockedEngine(P::host_times(format), storage_), format_(format) {}
   ~ClockedHostOf() = default;
 
-  /// Begins a transfer of one reading.
+  /// Sets that a transfer of one reading follows.
   void ask() { clock(P::clocks(format_)); }
   /// Decodes the bits of a transfer, and stores a valid reply. Returns the first error of an invalid one.
   [[nodiscard]] Error take(BitView bits) {

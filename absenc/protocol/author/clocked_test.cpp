@@ -32,8 +32,8 @@ struct Toy {
   static Reading reading(const Format&, const Reply& reply) { return {.singleturn = reply, .singleturn_bits = 8}; }
 };
 
-/// A host that adds transfers until there are more than the first byte of the last one states. Each added transfer has
-/// 16 clocks more than that byte states.
+/// A host that adds transfers until there are more than the first byte of the last one states, or an error occurs. Each
+/// added transfer has 16 clocks more than the first byte of the one before states.
 class Host final : public ClockedHostOf<Toy> {
  public:
   explicit Host(const Toy::Format& format) : ClockedHostOf(format) {}
@@ -49,7 +49,8 @@ class Host final : public ClockedHostOf<Toy> {
   }
 };
 
-/// Feeds the host with `transfers`, each 100 us long. Returns the host's steps as text.
+/// Feeds the host with `transfers`, each 100 us long, and expects that it waits during each. Returns as text how it
+/// sets the rate, its transfers, and whether it ends or waits for more.
 std::string run(Host& host, const std::vector<std::vector<std::uint8_t>>& transfers) {
   std::string log;
   Time now = 1ms;

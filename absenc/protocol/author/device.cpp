@@ -71,7 +71,7 @@ void Responder::forget() {
 }
 
 // Notes a damaged character: the rest of the request is ignored until the line is silent. While the encoder is off or
-// sends, only the begun request is forgotten.
+// sends, it only forgets the begun request, or the reply of another encoder.
 void Responder::damage(Time at) {
   if (!is_on(at) || transmitting_) return forget();
   received_at_ = at;
@@ -79,7 +79,8 @@ void Responder::damage(Time at) {
   refusing_ = is_refused(Flaw::damaged, request_) || refusing_;
 }
 
-// Handles silence of the line, which ends an incomplete request. A request that was refused is answered now.
+// Handles silence of the line, which ends an incomplete request. A request that was refused is answered now, unless the
+// encoder is off or sends.
 void Responder::end_run(Time at) {
   reply_.clear();
   if (is_on(at) && !transmitting_) {
@@ -126,7 +127,8 @@ void Responder::check_frame_pause(Time at, Time before) {
   expect(at - times_.character - (before - late_) >= times_.frame_pause, times_.frame_rule, at);
 }
 
-// Searches for a request at the later received bytes, because none begins with the first byte.
+// Searches for a request at the later received bytes, because none begins with the first byte; a refusal ends the
+// search.
 void Responder::search_again(Time at) {
   refusing_ = is_refused(Flaw::unknown, request_);
   const ByteBuffer<32> heard = request_;

@@ -48,7 +48,7 @@ class Responder : public EncoderOn<std::uint8_t> {
   explicit Responder(const DeviceTimes& times) : EncoderOn(times.start_time), times_(times) {}
   ~Responder() = default;
 
-  /// Transmits `bytes` at `at` without a request on the line: after chip select, or unsolicited.
+  /// Sets that `bytes` are sent at `at` without a request on the line: after chip select, or unsolicited.
   void transmit(Bytes bytes, Time at);
   /// Returns whether the encoder is sending, or is about to send a reply.
   [[nodiscard]] bool is_transmitting() const { return transmitting_; }
@@ -71,10 +71,10 @@ class Responder : public EncoderOn<std::uint8_t> {
     for_others,
     refused,  ///< the reply is made by `refuse` when the line is silent
   };
-  /// Delays the present reply by `time`. To be called from `respond`.
+  /// Sets that the present reply begins later by `time`. To be called from `respond`.
   void take_longer(Time time) { longer_ = time; }
   /// States that all encoders of the line answer the present request in turn: this one `delay` later than it would
-  /// alone, and the last one before `all` has passed since the first one began. To be called from `respond`.
+  /// alone. The last reply ends before `all` has passed since the first one began. To be called from `respond`.
   void take_turn(Time delay, Time all) {
     longer_ = delay;
     turns_ = all;

@@ -67,9 +67,9 @@ class HostOf : public Engine {
 
   /// Sets the format, when the encoder has reported properties that the options left open.
   void set_format(const Format& format) { format_ = format; }
-  /// Sends `request` as Protocol::manner states, not before `earliest`.
+  /// Sets that `request` is sent next, as Protocol::manner states, not before `earliest`.
   void ask(const Request& request, Time earliest = {}) { ask(request, P::manner(format_, request), earliest); }
-  /// Sends `request` as `manner` states, not before `earliest`.
+  /// Sets that `request` is sent next, as `manner` states, not before `earliest`.
   void ask(const Request& request, const Manner& manner, Time earliest = {}) {
     request_ = request;
     request_bytes_ = P::encode(format_, request);
@@ -135,7 +135,7 @@ class DialogOf : public HostOf<P>, public Routine {
    public:
     /// Constructs the question for the request that `dialog` has prepared.
     explicit Question(DialogOf& dialog) : dialog_(dialog) {}
-    /// Sends the request only after `pause` since the last received or sent character.
+    /// Sets that the request is sent only after `pause` since the last received or sent character.
     Question& after(Time pause) {
       dialog_.earliest_ = dialog_.received_at() + pause;
       return *this;
@@ -155,7 +155,7 @@ class DialogOf : public HostOf<P>, public Routine {
       dialog_.changing_ = true;
       return *this;
     }
-    /// Accepts the reply only when silence follows it, as with Manner::ends_by_silence.
+    /// Sets that the reply is accepted only when silence follows it, as with Manner::ends_by_silence.
     Question& until_silence() {
       dialog_.asking_.ends_by_silence = true;
       return *this;
@@ -168,7 +168,7 @@ class DialogOf : public HostOf<P>, public Routine {
 
     /// Returns false, so that co_await always suspends the procedure: a reply takes time.
     [[nodiscard]] bool await_ready() const { return false; }
-    /// Sends the request and suspends the procedure until the exchange has ended.
+    /// Sets that the request is sent next; the procedure continues, or ends, when the exchange has ended.
     void await_suspend(std::coroutine_handle<>) { dialog_.ask_it(must); }
     /// Returns the reply; without `must` the reply or the error.
     auto await_resume() const {
@@ -205,17 +205,17 @@ class DialogOf : public HostOf<P>, public Routine {
     };
     return Rest{*this, pause};
   }
-  /// Delivers the present result to the caller (step `emit`), before the next pause or request, or before the end.
+  /// Sets that the caller gets the present result (step `emit`) before the next pause or request, or before the end.
   void emit() { HostOf<P>::emit(); }
   using HostOf<P>::set_format;
-  /// Switches this end of the line to `rate` bits per second before the next request, and uses the time limits `times`
-  /// from then on.
+  /// Sets that this end of the line is switched to `rate` bits per second before the next request, pause or end, and
+  /// replaces the time limits by `times`.
   void set_rate(std::uint32_t rate, const HostTimes& times) {
     HostOf<P>::set_rate(rate);
     this->set_times(times);
   }
-  /// Listens without sending for `duration`, from the next await of `heard` on, which returns the received bytes until
-  /// the time is over.
+  /// Sets that the line is listened to for `duration`, without sending, from the next await of `heard` on; awaiting
+  /// `heard` again gives further bytes until the time is over.
   void listen(Time duration) {
     heard_ = {};
     HostOf<P>::listen(duration);

@@ -87,23 +87,24 @@ class Engine : public Conversation<std::uint8_t> {
   Engine(const HostTimes& times, MutableBytes storage) : storage_(storage), times_(times) {}
   ~Engine() = default;
 
-  /// Sends `request` as `manner` states, not before `earliest`. The bytes must stay valid until the exchange has ended.
+  /// Sets that `request` is sent next, as `manner` states, not before `earliest`. The bytes must stay valid until the
+  /// exchange has ended.
   void send(Bytes request, const Manner& manner, Time earliest);
-  /// Delivers the present result to the caller (step `emit`) before any other step but a change of the rate.
+  /// Sets that the caller gets the present result (step `emit`) before any other step but a change of the rate.
   void emit() { emitting_ = true; }
-  /// Switches this end of the line to `rate` bits per second, before the next transfer or the end of the conversation.
+  /// Sets that this end of the line is switched to `rate` bits per second before any other step; 0: it is not.
   void set_rate(std::uint32_t rate) { rate_ = rate; }
   /// Replaces the time limits, for example after a change of the rate.
   void set_times(const HostTimes& times) { times_ = times; }
-  /// Sends nothing until `time`, then calls `woken`.
+  /// Sets that nothing is sent until `time`, and that `woken` is called then.
   void sleep(Time time);
-  /// Listens without sending for `duration`, from the next step on: calls `heard` for all received bytes and `woken` at
-  /// the end. The end is checked at every step, so also after bytes, which a port delivers before timers.
+  /// Sets that the line is listened to for `duration`, from the next step on: `heard` is called for received bytes, and
+  /// `woken` at the end. The end is checked at every step, so also after bytes, which a port delivers before timers.
   void listen(Time duration);
   /// Continues to listen until the end of the time. To be called after `heard`.
   void listen_on() { state_ = State::listening; }
-  /// Ends the conversation with `error`, but not before `hold` has passed since the last sent or received character:
-  /// until then the encoder must not be disturbed.
+  /// Sets that the conversation ends with `error`, but not before `hold` has passed since the last sent or received
+  /// character: until then the encoder must not be disturbed.
   void finish(Error error, Time hold = {});
   /// Returns the manner of the present request, with the repetitions that are left.
   [[nodiscard]] const Manner& manner() const { return manner_; }
@@ -116,7 +117,7 @@ class Engine : public Conversation<std::uint8_t> {
   /// Returns whether a reply with this error is complete, as a refusal is, so that nothing follows it. After any other
   /// error more bytes may follow, which must not collide with the next request.
   [[nodiscard]] virtual bool is_whole(Error error) const = 0;
-  /// Handles the end of an exchange. `error`: none, or the error of the last repetition. Calls `send`, `sleep`,
+  /// Handles the end of an exchange. `error`: none, or the error of the last attempt. Calls `send`, `sleep`,
   /// `listen` or `finish`.
   virtual void concluded(Error error) = 0;
   /// Is called when the time of `sleep` or `listen` has passed.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Declares a field by the member of a struct that has its value, or by a function that computes the value from the
-// struct. The type of the value gives the kind of the field, and the order of the declarations that of put fields.
+// struct. The type of the value gives the kind of the field, apart from flags, and the order of the declarations is the
+// order in which fields are put.
 #pragma once
 
 #include <algorithm>

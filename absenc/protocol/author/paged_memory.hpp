@@ -82,8 +82,9 @@ class PagedMemoryDevice : public Responder {
   std::uint8_t page_ = 0;
   bool page_changed_ = false;  // no access was received yet after the busy time of the last page change
   Time page_ready_at_{};
-  Time written_at_{};                              // end of the busy time of the last write; 0: none
-  std::optional<std::uint8_t> refused_address_{};  // address of the last request, if it was a read during a write
+  Time written_at_{};  // end of the busy time of the last write; 0: none
+  // Address of the last request, if it was a read during a write and `refused_rule` is not empty.
+  std::optional<std::uint8_t> refused_address_{};
   bool fetching_ = false;
   std::uint8_t fetch_address_ = 0;
   Time fetch_begin_{};

@@ -150,7 +150,7 @@ struct FrameInRoutine {
 };
 
 /// Return type of a coroutine that executes a whole command: `Procedure name(Dialog& dialog, Found& found, ...)`. Such
-/// a coroutine ends with `co_return done;` or `co_return {Error::..., "..."};`.
+/// a coroutine returns an Outcome: `co_return done;` or `co_return {Error::..., "..."};`.
 struct Procedure {
   /// Functions that the compiler calls for a coroutine that returns a Procedure.
   struct promise_type : FrameInRoutine {

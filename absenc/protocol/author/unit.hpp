@@ -212,8 +212,8 @@ struct Descriptor {
     }
   }
 
-  /// Constructs the conversation of a command in `storage`; a Refusal if an argument is missing or outside its range,
-  /// otherwise what CommandOf::run returns.
+  /// Constructs the conversation of a command in `storage`; a Refusal if an argument is missing, outside its range or
+  /// too many, otherwise what CommandOf::run returns.
   static Any<Conversation> host(const Options& values, const Command& command, Arguments arguments,
                                 std::span<std::byte> storage) {
     if (!are_good(command, arguments)) {
@@ -231,7 +231,7 @@ struct Descriptor {
     return make_device<typename Declared::Encoder>(storage, f, shaft);
   }
 
-  /// Returns the numbers of bits of position and turns with these options.
+  /// Returns the resolution of an encoder with these options.
   static constexpr Resolution resolution(const Options& values) {
     if constexpr (declared.resolution != nullptr) {
       return declared.resolution(declared.format(values));
@@ -276,7 +276,7 @@ struct Descriptor {
     }
   }
 
-  /// Returns the document's explanation of an invalid reply, whose error is `error`.
+  /// Returns the document's explanation of an invalid or missing reply, whose error is `error`.
   static Explanation explain(const Options& values, Error error, Frame asked, Frame reply) {
     return declared.report.explain(declared.format(values), error, items(asked), items(reply));
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Life counter and CRC after a BiSS word; the encoder's maker chooses their sizes and parameters. Sources: BiSS C
-// Protocol Description rev D2; application note 21 (its start value is the content of the CRC register in normal
-// notation).
+// Protocol Description rev D2; application note 21 (the start value of the CRC is the content of the CRC register in
+// normal notation).
 #pragma once
 
 #include <cstddef>

@@ -151,7 +151,8 @@ template <const auto& report, class F>
   };
 }
 
-/// Returns cause and advice for `error` of a frame; empty if none is known.
+/// Returns the cause of `error` of a frame, with advice where the general advice does not suffice; empty if no cause is
+/// known.
 template <class F>
 [[nodiscard]] Explanation explain_frame(const F& format, Error error, Bytes = {}, Bytes reply = {}) {
   switch (error) {

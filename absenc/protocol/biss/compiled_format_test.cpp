@@ -35,7 +35,7 @@ ChannelData random_data(sim::Random& random) {
   return {.word = random_values(random), .life_counter = static_cast<std::uint8_t>(random.next() & 0x3F)};
 }
 
-// The samples as a line may change them: cut off, with bits after the frame, or with flipped bits.
+// Returns the samples as a line may change them: cut off, with bits after the frame, with flipped bits, or unchanged.
 Samples disturbed(const Samples& samples, sim::Random& random) {
   Samples changed;
   const std::uint64_t kind = random.below(8);
@@ -129,7 +129,7 @@ TEST(BissCompiledSafetyFormat, EqualsFormatForRandomFormatsAndFrames) {
     const CompiledSafetyFormat compiled(format);
     for (unsigned j = 0; j < 8; ++j) {
       SafetyReply sent{.ack_bits = random_ack(random), .cpw = random_data(random), .spw = random_data(random)};
-      // Without this nearly no pair of words agrees and no counter follows.
+      // Makes the words agree, and mostly the counter follow: random ones hardly ever do.
       const unsigned spw_bits = format.spw.word.bits_of(Meaning::position);
       const unsigned cpw_bits = format.cpw.word.bits_of(Meaning::position);
       const std::uint64_t upper = sent.cpw.word.position & low_mask(cpw_bits);

@@ -19,7 +19,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
   /// Type of a decoded position frame.
   using Reply = typename ProtocolOf<F>::Reply;
 
-  /// Clocks the next frame: `const Result<Reply> reply = co_await dialog.frame()`.
+  /// Returns an awaitable that clocks the next frame: `const Result<Reply> reply = co_await dialog.frame()`.
   [[nodiscard]] auto frame() {
     struct Frame {
       ControlDialog& dialog;
@@ -33,7 +33,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
   void set_cdm(bool cdm) { cdm_ = cdm; }
   /// Returns the number of clocked frames, without a stuck first frame that the start sequence follows.
   [[nodiscard]] std::uint32_t frames() const { return frames_; }
-  /// Returns the number of frames that failed a check.
+  /// Returns the number of frames that failed a check, without frames that are accepted although they lack data.
   [[nodiscard]] std::uint32_t bad_frames() const { return bad_frames_; }
   /// Returns the time at which the last frame was received.
   [[nodiscard]] Time now() const { return this->received_at(); }

@@ -130,7 +130,7 @@ struct Format {
 }
 
 /// Returns the number of clocks that the slaves between an encoder and the host add to the ACK: each passes the start
-/// bit on one clock later. 0 for a single encoder.
+/// bit on one clock later. 0 for all formats but ChainFormat, which has a function of its own.
 template <class AnyFormat>
 [[nodiscard]] constexpr unsigned relay_bits(const AnyFormat&) {
   return 0;
@@ -236,7 +236,8 @@ struct Head {
 };
 
 // Finds the data, `size` bits, of a frame whose start bit and CDS are in the first machine word, as they nearly always
-// are. Returns false for any other frame, and for one that is cut or has a CDS that is not accepted.
+// are. Returns false for any other frame, for samples of fewer bytes than a machine word, and for a frame that is cut
+// or has a CDS that is not accepted.
 [[nodiscard, gnu::always_inline]] constexpr bool find_data(const BitView& samples, std::size_t size, Cds cds,
                                                            Head& head) {
   if (samples.bytes.size() < sizeof(std::size_t)) return false;
@@ -271,7 +272,8 @@ template <class Values, class Channel, class Otherwise>
   });
 }
 
-// The word and check of a format that is known at compile time, with a table of just the rows that its bits need.
+// The word and check of a format that is known at compile time, with a table of the rows that the word and a life
+// counter need.
 template <const Format& format>
 inline constexpr CompiledChannel<std::conditional_t<(format.check.width > 8), std::uint16_t, std::uint8_t>,
                                  (format.word.bits() + life_counter_bits + 3) / 4>

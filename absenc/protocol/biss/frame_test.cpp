@@ -68,8 +68,8 @@ TEST(BissFrame, DecodesAtEveryOffsetInSixtyFourSamples) {
 
 bool skips(const Format& format) { return format.word.find(Meaning::skip) != nullptr; }
 
-// Decodes noise, cut frames and frames with flipped bits. The decoder of a format known at compile time must give the
-// same results as that of a format known at run time.
+// Decodes noise, whole frames, cut frames and frames with flipped bits. The decoder of a format known at compile time
+// must give the same results as that of a format known at run time.
 template <const Format& format>
 void agree(std::uint64_t seed) {
   sim::Random random(seed);

@@ -131,7 +131,8 @@ Part<Error> change_register(ControlDialog<F>& dialog, ControlMaster& master, uns
   co_return error;
 }
 
-/// Selects `bank` and returns the error; writes nothing if `address` belongs to no bank or `bank` is selected already.
+/// Selects `bank` and returns the error. Writes nothing if `address` belongs to no bank, `bank` is selected already, or
+/// `bank` is 0 and the encoder refuses to read its bank select register.
 template <class F>
 Part<Error> select_bank(ControlDialog<F>& dialog, ControlMaster& master, unsigned bank, unsigned address) {
   if (address >= registers::bank_size) co_return Error::none;

@@ -92,7 +92,8 @@ constexpr std::uint64_t compared_bits(const Channel& channel, const WordWith<siz
 
 }  // namespace detail
 
-/// Returns whether both CRC polynomials are usable and both positions have the number of compared bits.
+/// Returns whether both CRC polynomials are usable, and `compare_bits` is at least 1 and not above the bits of either
+/// position.
 [[nodiscard]] constexpr bool is_usable(const SafetyFormat& format) {
   if (!is_usable(format.cpw.check) || !is_usable(format.spw.check)) return false;
   return format.compare_bits >= 1 && format.compare_bits <= format.cpw.word.bits_of(Meaning::position) &&

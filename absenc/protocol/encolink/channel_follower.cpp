@@ -65,7 +65,7 @@ void ChannelFollower::take_byte(const Format& format, std::uint64_t number, cons
 void ChannelFollower::take_answer(std::uint8_t byte) {
   if (!awaits_answer_) return;
   const bool writes = last_access_[access_keys.size()] == static_cast<std::uint8_t>(RegisterRequest::Operation::write);
-  // A channel 3 byte before the answer reports that the encoder is idle or busy, so it is dropped.
+  // A channel 3 byte before the answer, such as idle or busy, is dropped.
   if (answer_.empty() && byte != (writes ? channel3::write_ready : channel3::read_ready)) return;
   answer_.push_back(byte);
   if (answer_.size() < 2) return;

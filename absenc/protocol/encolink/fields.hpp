@@ -199,7 +199,7 @@ constexpr void put_position(FieldSink& sink, const Format& format, const Positio
                     : wrapped_difference(load_big_endian(bytes), 0, bits);
 }
 
-/// Puts the value of register `index` of the table into `sink`.
+/// Puts the value of register `index` of the table into `sink`; for calibration_status also the number of calibrations.
 constexpr void put_value(FieldSink& sink, std::size_t index, Bytes bytes) {
   FieldValue shown{.info = &register_fields[index], .bytes = bytes};
   switch (registers[index].content) {

@@ -295,7 +295,7 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
 }
 
 /// Returns `format` with the resolution of `identity`. An identity reports whether the encoder counts turns, but not
-/// the number of bits of the turn counter: it becomes 16 or 0 if `format` does not agree with the identity.
+/// the number of bits of the turn counter: it becomes 16 or 0 if it is unknown in `format` or contradicts the identity.
 [[nodiscard]] constexpr Format as_identified(const Format& format, const Identity& identity) {
   Format known = format;
   known.resolution = identity.resolution;

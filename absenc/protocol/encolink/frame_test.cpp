@@ -74,7 +74,7 @@ TEST(EncolinkFrame, StatusBitsReportOnlyClearAlarms) {
   EXPECT_EQ(to_reading(alone, {}).status_reported, general::error | general::warning);
 }
 
-// The earlier cycle reported which error is set. The clear warning bit of the frame only reports that no warning is
+// A cycle reports which alarms are set; the status bits of a later frame only show whether an error or a warning is
 // set.
 TEST(EncolinkFrame, RemembersAlarmsOfCycleWhileStatusBitsAgree) {
   constexpr Position bad{.singleturn = 5, .error = true};

@@ -55,7 +55,7 @@ struct Frames {
 };
 
 /// The content of successive frames: the position, and cycles of channel 2. A cycle takes one byte of each frame, from
-/// a reset of the channels until a frame is lost.
+/// a reset of the channels until a frame is lost or a cycle has an error.
 struct Channels {
   Reading reading{};                      ///< Reading from the last valid frame; empty before the first.
   std::optional<std::uint16_t> status{};  ///< Detailed status in the last valid cycle; no value before it.

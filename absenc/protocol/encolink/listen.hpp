@@ -57,7 +57,7 @@ class Listen final : public Conversation<std::uint8_t> {
   bool received_anything_ = false;  // whether bytes or damaged characters were received since the last valid frame
   bool done_ = false;
   Error last_bad_ = Error::wrong_length;
-  std::array<std::uint8_t, 1024> bytes_{};  // received bytes; the size is the most that a port delivers at once
+  std::array<std::uint8_t, 1024> bytes_{};  // received bytes; those for which there is no room are skipped
   std::size_t begin_ = 0;                   // index of the first byte that was not examined yet
   std::size_t end_ = 0;
   ReplyBytes frame_;  // last frame that was received, valid or damaged

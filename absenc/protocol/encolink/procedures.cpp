@@ -116,8 +116,8 @@ Part<Error> receive(Dialog& dialog, ProcedureState& found) {
   co_return Error::none;
 }
 
-// Ends a register access whose answer was lost. A write that the encoder may have executed is not repeated before the
-// register was read back.
+// Ends an attempt of a register access whose answer is missing or invalid. A write that the encoder may have executed
+// is not repeated before the register was read back.
 AccessOutcome lost(ProcedureState& found, Error error, std::string_view detail = {}) {
   if (found.ended.value_or(Error::none) != Error::none) {
     detail = *found.ended == Error::cross_check_failed ? channels_disagree : channel2_damaged;
@@ -161,7 +161,7 @@ Part<AccessOutcome> try_to_execute(Dialog& dialog, ProcedureState& found) {
   co_return found.end(AccessOutcome::good, done);
 }
 
-// Executes the present register access in several attempts. Reads the identity first, because registers of an AksIM-4
+// Executes the present register access in up to five attempts. Reads the identity first, because registers of an AksIM-4
 // must not be accessed.
 Part<AccessOutcome> execute(Dialog& dialog, ProcedureState& found) {
   if (!dialog.format().has_ch2) co_await dialog.stop({Error::unsupported, no_channel2});

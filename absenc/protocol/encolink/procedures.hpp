@@ -20,7 +20,7 @@ using Dialog = author::DialogOf<Frames>;
 enum class AccessOutcome : std::uint8_t {
   good,     ///< The encoder executed the access.
   refused,  ///< The encoder refused the access, or was busy with it for longer than `busy_limit`.
-  lost,     ///< Frames arrive, but the answer to the access does not: the encoder may have executed the access.
+  lost,     ///< Frames arrive, but no valid answer; `was_sent` tells whether the encoder may have executed the access.
   gone,     ///< No frames arrive; `was_sent` tells whether the encoder may have executed the access.
 };
 

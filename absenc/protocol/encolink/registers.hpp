@@ -17,7 +17,7 @@
 
 namespace absenc::encolink {
 
-/// Values of the channel 3 byte of a cycle while it is not a byte of an answer.
+/// Values of the channel 3 byte of a cycle: the state of the encoder, or the first byte of its answer.
 namespace channel3 {
 inline constexpr std::uint8_t idle = 0x33;  ///< The encoder executes no register access.
 inline constexpr std::uint8_t busy = 0x66;  ///< The encoder is executing a register access.

@@ -141,7 +141,7 @@ constexpr std::size_t reply_size(const Format& format, Bytes begin) {
   return 0;
 }
 
-// Returns whether a checksum covers `bit` of a reply. The channel 2 byte is outside the checksum of a position frame,
+// Returns whether the checks cover `bit` of a reply. The channel 2 byte is outside the checksum of a position frame,
 // and a byte that follows an identity is outside the checksum of the identity.
 bool is_checked(const Options& values, Frame request, Frame reply, std::size_t bit) {
   const Format format = assumed(options.format(values), reply.bytes);

@@ -243,8 +243,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   bool stands(Time at) {
     return expect(magnitude(shaft_->at(at).speed_millirpm) <= standing_still, "reset while the shaft turns", at);
   }
-  // Executes a memory request and returns the reply. Nothing with several encoders on the line, and for an address
-  // that does not exist, because the document defines no answer to it.
+  // Executes a memory request and returns the reply. Returns nothing with several encoders on the line, and for a
+  // request for which `exists` is false, because the document defines no answer to it.
   std::optional<Reply> access_memory(const Request& request, Time at) {
     if (!expect(profile_.bus != sharing_yes, "memory access with several encoders on the line", at))
       return std::nullopt;

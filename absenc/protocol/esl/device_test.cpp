@@ -128,7 +128,7 @@ struct Alone {
 };
 constexpr auto waits = Step<std::uint8_t>::Kind::wait;
 
-// The second of three characters of a request is damaged: the answer follows the end of the frame set.
+// The second of three received characters is damaged: the answer follows the end of the frame set.
 TEST(EslDevice, ReportsWrongStopBitAfterTheRequest) {
   Alone alone;
   alone.feed(Alone::LinkEvent::received, 1us, {control_field({}, 0, DataId::position)});

@@ -24,7 +24,8 @@ constexpr std::array all_ids{DataId::position,         DataId::singleturn,      
 
 constexpr std::array<std::uint8_t, 9> check_input{'1', '2', '3', '4', '5', '6', '7', '8', '9'};
 
-// Returns one profile for each combination of the options that change frames.
+// Returns one profile for each combination of the options that the document leaves open, except sequence_step, which
+// does not change frames.
 std::vector<Profile> all_profiles() {
   std::vector<Profile> profiles{Profile{}};
   for (std::size_t option = 0; option < open_options; ++option) {
@@ -270,7 +271,7 @@ TEST(EslUnit, AnswerToAWrongParityBitIsARefusal) {
     const Explanation why = unit.explain(values, Error::request_rejected, {.bytes = asked}, {.bytes = refused});
     EXPECT_NE(why.detail.find("wrong parity bit"), std::string_view::npos) << why.detail;
   }
-  // A reply that is no refusal is not explained by the parity bit.
+  // A reply that is no refusal does not give request_rejected.
   reply.one.status = status::ready;
   reply.two.status = status::ready | status::channel_2;
   const ReplyBytes taken = encode_reply({}, reply, field);

@@ -199,8 +199,8 @@ TEST(EslSafetyCampaign, StuckCountersAndPositionsOfOneChannel) {
   EXPECT_EQ(accepted, 0u);
 }
 
-// The bytes of a reply to ID 1, and the bits of each that the checks detect when they are stuck before the CRC is
-// computed.
+// The bytes of a reply to ID 1 without its CRCs, and the bits of each byte that the checks detect when they are stuck
+// before the CRC is computed.
 struct StuckField {
   const char* name;
   std::size_t byte;

@@ -70,7 +70,8 @@ constexpr Result<Request> request_behind(const Profile& profile, Bytes request, 
   return detail::split_request(profile, *id, reply, busy);
 }
 
-// Returns the failed check of a reply that gave `error`; `passed` if no check of the reply gives this error.
+// Returns the refusal in the reply to a request with a wrong parity bit; otherwise the failed check of a reply that
+// gave `error`, or `passed` if no check of the reply gives this error.
 Check check_of(const Profile& profile, Error error, Bytes request, Bytes reply) {
   if (reply.empty()) return Check::passed;
   if (const Check refusal = check_refusal(profile, request, reply); refusal != Check::passed) return refusal;

@@ -35,7 +35,8 @@ inline constexpr std::uint8_t refusal_bit = 0x80;
 /// Byte order of a received CRC, or `wrong`. Two equal bytes are reported as `low_first`, the order of Modbus.
 enum class CrcOrder : std::uint8_t { low_first, high_first, wrong };
 
-/// Returns the byte order in which the last two bytes of a frame are its CRC; `wrong` if they are not.
+/// Returns the byte order in which the last two bytes of a frame are its CRC; `wrong` if they are not, or if the frame
+/// is shorter than `shortest_frame`.
 [[nodiscard]] constexpr CrcOrder crc_order(Bytes frame) {
   if (frame.size() < shortest_frame) return CrcOrder::wrong;
   const Bytes crc = frame.last(crc_size);

@@ -191,7 +191,7 @@ class PausingHost final : public Machine<std::uint8_t> {
 };
 
 TEST(ModbusLine, ServerReportsGapsInsideFrame) {
-  const std::tuple<int, Wire, std::string_view> rows[]{// 4 characters of pause make two invalid frames
+  const std::tuple<int, Wire, std::string_view> rows[]{// the pause of 4 characters makes two invalid frames
                                                        {1, good_reply, ""},
                                                        {2, good_reply, "1.5 characters"},
                                                        {4, {}, ""}};

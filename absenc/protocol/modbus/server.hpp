@@ -42,7 +42,7 @@ class Server : public Device<std::uint8_t> {
   /// reply without its CRC, or nothing. It must call `check_line_rules` if the frame is for this server.
   virtual void request(Bytes body, Time at, FrameBytes& reply) = 0;
 
-  /// Changes the baud rate when the present transmission is over.
+  /// Sets that the baud rate changes to `rate` as soon as nothing is transmitted.
   void set_rate(std::uint32_t rate);
   /// Records whether the host kept `rule` of the document; returns `satisfied`.
   bool expect(bool satisfied, std::string_view rule, Time at) { return rules_.expect(satisfied, rule, at); }

@@ -29,7 +29,7 @@ class CompiledFormat {
   }
 
  private:
-  // Decodes long words, words with bits after them, and words with an error.
+  // Decodes long words, readings with bits after the word or of a wrong length, and words with an error.
   [[nodiscard, gnu::noinline]] constexpr Result<Word> decode_otherwise(const BitView& bits) const {
     return ssi::decode(format_, bits);
   }
