@@ -26,9 +26,9 @@ struct TapChoices {
 };
 
 /// An input range of rows with the columns of `Decoded`, one for each exchange on the line. Rows are ordered by the end
-/// of their frames and available as soon as their last frame is complete. Up to 64 MiB of bytes that arrive while the
-/// caller is busy are stored. `time_s` is the time of arrival at this computer since the first byte. It is too coarse
-/// for the latency of an encoder, so `turnaround_us` is empty.
+/// of their frames and available as soon as their last frame is complete; an unanswered request may follow later rows.
+/// Up to 64 MiB of bytes that arrive while the caller is busy are stored. `time_s` is the time of arrival at this
+/// computer since the first byte. It is too coarse for the latency of an encoder, so `turnaround_us` is empty.
 class Tap {
  public:
   /// Type of the values in the range.
