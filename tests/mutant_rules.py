@@ -22,8 +22,8 @@ The fine rules:
   shift        shifts by one bit more
   sign         swaps + 1 and - 1
 
-A check is one of these: an `if` that refuses, with an error or with nothing (`return false`, `return std::nullopt`); the
-condition of `expect` or `note`; `good ? value : Error::x`; and an error that is returned after all cases. Drop and edge
+A check is one of these: an `if` that refuses, with an error or with nothing (`return false`, `return std::nullopt`);
+the condition of `expect` or `note`; `good ? value : Error::x`; an error that is returned after all cases. Drop and edge
 also apply to returned and assigned values.
 """
 
