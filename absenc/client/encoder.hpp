@@ -130,7 +130,7 @@ class Encoder {
   /// options allow, otherwise from a reading of the position, confirmed or not.
   [[nodiscard]] Reading read_alarms();
   /// Returns samples for a loop, which continues after a lost port is back. The loop ends after `count` samples, at the
-  /// deadline, or with `cancel`.
+  /// deadline, with `cancel`, or once the function of `end_when` returns true.
   [[nodiscard]] Samples samples(const SampleChoices& choices = {});
   /// Takes one sample and returns it: reads once, or, while the port is lost, waits up to a quarter of a second and
   /// tries to open the port again. Throws os::Interrupted, UsageError, Failure, Cancelled.

@@ -47,14 +47,14 @@ class Tap {
   Tap& operator=(Tap&&) noexcept;
   ~Tap();
 
-  /// Waits for the first row and returns an iterator to it; call it once. Throws os::Failure, Failure, os::Interrupted
-  /// or, after `cancel`, Cancelled, as every later step does.
+  /// Waits for the first row and returns an iterator to it, at the end if there is no row; call it once. Throws
+  /// os::Failure, Failure, os::Interrupted or, after `cancel`, Cancelled, as every later step does.
   [[nodiscard]] Iterator begin();
   /// Returns the end of the range, for comparison with an iterator.
   [[nodiscard]] static Iterator::End end() { return {}; }
   /// Returns the present row, or null at the end of the range. The row is valid until `advance`.
   [[nodiscard]] const Row* current() const { return row_; }
-  /// Waits until the next row is complete.
+  /// Waits until the next row is complete or the range ends, and moves there.
   void advance();
   /// Cancels from any thread: a caller that waits for a row, now or later, gets the exception Cancelled.
   void cancel();
