@@ -66,7 +66,7 @@ class RequestRates final : public capture::AnnotationSink {
   }
 
  private:
-  // limit of the number of kinds; requests of further kinds are counted with the last one
+  // limit of the number of kinds; requests of further kinds are counted with the kind that was added last
   static constexpr std::size_t most_kinds = 64;
 
   struct SampleRequest {
