@@ -563,8 +563,8 @@ class Requests(Case):
 
 
 class ControlFrames(Case):
-    """Compares the absenc command's decoding of control frames with frames that this test builds from the document
-    alone."""
+    """Compares the control frames that the absenc command encodes, decodes and draws with frames that this test
+    builds and reads from the document alone."""
 
     def control(self, cdm, cds):
         return decode("biss", "--request", cdm, "--hex", cds)

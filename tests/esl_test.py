@@ -23,7 +23,7 @@ WRONG_CHANNEL_2 = "084000efcdab3412553b5e086000afd5b069"
 
 
 def control_field(data_id, address=0):
-    parity = (bin(data_id).count("1") + 1) & 1  # parity bit that makes the number of ones odd
+    parity = (bin(data_id).count("1") + 1) & 1  # parity bit that makes the number of ones in ID and parity bit odd
     return parity << 7 | (data_id & 0xF) << 3 | address
 
 
@@ -501,7 +501,8 @@ class Doctor(EslCase):
 
 
 class TwoChannels(EslCase):
-    """Tests that flags which only one channel reports are shown in every output of a reading."""
+    """Tests that flags which only one channel reports are shown by `read`, `info`, `alarms` and `monitor`, in CSV
+    and in recordings."""
 
     NONE = {"ch1_status": ["ready"], "ch1_alarms": [], "ch2_status": ["channel_2", "ready"], "ch2_alarms": [],
             "alarms": []}

@@ -124,8 +124,8 @@ class FirstMinutes(Case):
                 self.assertIn(unit["protocol"], named)
 
     def test_settings_have_same_form_in_every_verb(self):
-        """Settings after `?` in an address have the same form and meaning in each verb that takes a protocol or an
-        encoder."""
+        """Settings after `?` in an address have the same form and meaning in the tested verbs, which take a
+        protocol or an encoder."""
         settings = "model=23-bit"
         capture = self.file("capture.vcd")
         for arguments in [["read", f"sim:tformat?{settings}"], ["wave", f"tformat?{settings}", capture],

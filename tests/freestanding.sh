@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # usage: freestanding.sh LINKED.o OBJECT.o...
-# Fails if the linked object needs symbols that a compiler does not provide, or if an object that is not from tests/ has
-# initialized data in writable memory. Prints the sizes of the objects.
+# Fails if the linked object needs symbols other than those allowed below, which the compiler and its C library provide,
+# or if an object that is not from tests/ has initialized data in writable memory. Prints the sizes of the objects.
 set -euo pipefail
 nm=${NM:-arm-none-eabi-nm}
 size=${SIZE:-arm-none-eabi-size}

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Helpers shared by all fuzz targets.
+// Helpers that fuzz targets share.
 #pragma once
 
 #include <cstdlib>

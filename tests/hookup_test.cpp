@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests the firmware adapters in docs/firmware.md (UART, SPI, CAN) with stubs of the hardware: the host reads a
-// position through each adapter, whether its reply arrives whole or in pieces.
+// position through each adapter; over UART also if the reply arrives in pieces.
 #include <gtest/gtest.h>
 
 #include <array>

@@ -44,7 +44,8 @@ class Keys(Case):
         shown = header(absenc("read", encoder, "--count", "1", "--csv").stdout)
         with open(self.recorded(encoder, "csv"), encoding="utf-8") as file:
             columns = header(file.read())
-        # A recording has the columns of `read` in the same order, and further columns for speed and lost readings.
+        # A recording has the columns of `read` in the same order, and further columns for continued position, speed and
+        # lost readings.
         self.assertEqual([name for name in columns if name in shown], shown)
         with open(self.recorded(encoder, "jsonl"), encoding="utf-8") as file:
             # Rows without `ok` describe events, not readings.

@@ -152,7 +152,8 @@ class LateReplyTest(unittest.TestCase):
                 self.assertGreater(self.check(encoder, relay, rows), 10)
 
     def test_all_replies_late(self):
-        """Every reply arrives after its timeout. The command must report an error with advice, and no position."""
+        """Every reply arrives after its timeout. The command must report an error with advice, and no position of
+        an earlier request."""
         for encoder in ("tformat", "esl", "e201"):
             with self.subTest(encoder):
                 relay, address = self.pty_relay(encoder, lambda n: 0.25)

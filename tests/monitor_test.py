@@ -219,7 +219,7 @@ class Screen(MonitorCase):
         self.assertEqual(screen.splitlines()[15].rstrip(), KEYS)
 
     def test_long_names_stay_distinguishable(self):
-        """At every width the screen must show the part in which long names differ, and the alarm mark."""
+        """At 64, 80 and 100 columns the screen must show the part in which long names differ, and the alarm mark."""
         path = self.emulator_of_two().path
         addresses = [f"esl:{path}?latency=300&address={number}" for number in (0, 3)]
         terminal = Terminal(self, *addresses, columns=64, rows=20)

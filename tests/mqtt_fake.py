@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A fake MQTT broker (5 and 3.1.1) that follows the protocol unless a test supplies other replies."""
+"""A fake MQTT broker (5 and 3.1.1) for clients that publish with QoS 0 or 1 and subscribe to nothing. It follows the
+protocol unless a test supplies other replies."""
 import json
 import socket
 import threading

@@ -85,7 +85,8 @@ class Broker(Daemon):
 
 
 class Receiver:
-    """A client that collects all messages of a topic in order: (topic, payload as JSON or None, retained)."""
+    """A client that collects the messages of a topic filter in the order of arrival: (topic, payload as JSON or
+    None, retained)."""
 
     def __init__(self, port, topics="#", version=paho.MQTTv5, client_id="", login=None):
         self.messages = []

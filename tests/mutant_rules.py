@@ -4,8 +4,8 @@
 The rules work on the tokens of sources formatted by clang-format, where a binary operator has spaces around it and a
 template's bracket has none. The coarse rules, by the name in a mutant's id:
 
-  never        a check never refuses: its condition becomes false, or loses one of the terms joined by ||; a protocol
-               rule counts as kept
+  never        a check never refuses: its condition, or one of its terms joined by || or &&, counts as having the value
+               with which nothing is refused; a final error becomes Error::none; a protocol rule counts as kept
   skip         leaves out a step of a procedure whose result is not used
   half, twice  changes a time in a header, where the document's times are
   zero, ten    changes a time in a source, which its author chose, to zero or to ten times its value
@@ -16,14 +16,14 @@ The fine rules:
                detects such a change detects this one
   edge         swaps `<` and `<=`, or `>` and `>=`, in a condition
   true, false  fixes the result of a predicate that compares with `==` or `!=`
-  number       adds one to a constant or to a length that a function returns; doubles it from 256 on; inverts the lowest
+  number       adds one to a constant or to a number that a function returns; doubles it from 256 on; inverts the lowest
                set bit of a hexadecimal or binary constant
   bit          clears the lowest set bit of a mask
   shift        shifts by one bit more
   sign         swaps + 1 and - 1
 
-A check is one of these: an `if` that refuses, with an error or with nothing (`return false`, `return std::nullopt`); the
-condition of `expect` or `note`; `good ? value : Error::x`; and an error that is returned after all cases. Drop and edge
+A check is one of these: an `if` that refuses, with an error or with nothing (`return false`, `return std::nullopt`);
+the condition of `expect` or `note`; `good ? value : Error::x`; an error that is returned after all cases. Drop and edge
 also apply to returned and assigned values.
 """
 
@@ -67,8 +67,8 @@ class Mutant(NamedTuple):
     after: str
     id: str
     switch: "Switch | None"
-    # Name of the constant that the mutant changes, None for any other mutant. The mutant is switched only if the
-    # constant can become a function (as_functions).
+    # Name of the constant that the mutant changes, None or empty for any other mutant. The mutant is switched only if
+    # the constant can become a function (as_functions).
     constant: "str | None" = None
 
     def applied_to(self, text):
@@ -208,7 +208,8 @@ class Finder:
                 self._refusal(i)
 
     def _mark(self, first, last):
-        """Marks the tokens from `first` to `last`, exclusive, as conditions of a check, except inside lambdas."""
+        """Marks the tokens from `first` to `last`, exclusive, as conditions of a check, except inside braces, such
+        as those of lambdas."""
         i = first
         while i < last:
             if self.source[i] == "{":

@@ -3,10 +3,11 @@
 """Breaks the units in one place at a time and checks whether a test fails.
 
 tests/mutant_rules.py finds the places. In a copy of the sources (build/mutants) most mutants of a unit are compiled
-together, each behind a switch. For each mutant, the generic tests that concern its unit, the seeds of its fuzzer and
-its own tests run until one fails, the fastest first. Mutants that cannot be switched (a few constants) and those that
-survive are compiled one at a time, which includes the checks at compile time. A mutant that survives means that a test
-is missing, or that the mutant changes nothing: tests/mutants_survivors.txt lists those with a reason."""
+together, each behind a switch. For each mutant, the generic tests that concern its unit, the seeds of its fuzzer
+and its own tests run until one fails, the fastest first. Mutants that cannot be switched (those of the fine rules,
+and a few constants) and those that survive are compiled one at a time, which includes the checks at compile time. A
+mutant that survives means that a test is missing, or that the mutant changes nothing: tests/mutants_survivors.txt
+lists those with a reason."""
 
 import argparse
 import fcntl
@@ -302,7 +303,7 @@ class Tree:
 
 
 class Campaign:
-    """A run over the mutants of all units, which are distributed to the trees, one thread for each tree."""
+    """A run over the chosen mutants. Their units are distributed to the trees, one thread for each tree."""
 
     def __init__(self, known, folders, verbose, quick):
         self.known = known

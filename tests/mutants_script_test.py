@@ -130,7 +130,7 @@ class Rules(unittest.TestCase):
             ("co_await dialog.ask();", "if (chosen_mutant(1)) {} else co_await dialog.ask();"),
             ("rest(10ms);", "rest((chosen_mutant(1) ? Time(Time(10ms) / 2) : Time((chosen_mutant(2) ? "
              "Time(Time(10ms) * 2) : Time(10ms)))));"),
-            ("constexpr Time pause = 40us;", None),  # a constant local to a function has no mutant
+            ("constexpr Time pause = 40us;", None),  # mutants of a function's local constant have no switch
         )
         for line, expected in lines:
             text = f"void f() {{ {line} }}"

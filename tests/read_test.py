@@ -154,8 +154,8 @@ class Simulator(EncoderCase):
         self.assertEqual(len(readings), 6)
         for one in readings:
             away = min(one["singleturn"], 4096 - one["singleturn"])
-            # A confirmed SSI position may differ from the true one by 4 counts, because damaged words may match by
-            # chance.
+            # A confirmed SSI position may differ from the true one by up to 4 counts, because damaged words may match
+            # by chance.
             self.assertTrue(not one["confirmed"] or away <= 4, one)
         doubtful = [one for one in readings if not one["confirmed"]]
         self.assertTrue(doubtful)
@@ -180,7 +180,7 @@ class Simulator(EncoderCase):
 
 
 class ErrorMessages(EncoderCase):
-    """Tests that each error message states what happened, the transmitted bytes, and what to try."""
+    """Tests that error messages state what happened and, where they apply, the transmitted bytes and what to try."""
 
     def test_silence(self):
         result = absenc("read", f"tformat:{self.emulator('--fault', 'silence=1').path}")

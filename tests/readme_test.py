@@ -47,8 +47,8 @@ def masked(text):
 
 
 class Page:
-    """Runs the examples of a page in a temporary folder, with a virtual encoder in place of the port in the
-    examples."""
+    """Runs the examples of a page in a temporary folder, with the virtual encoder that a comment in the page names
+    in place of the port in the examples."""
 
     def __init__(self, name, folder):
         self.text = (SOURCE / name).read_text(encoding="utf-8")

@@ -126,8 +126,8 @@ class Hdf5(RecordCase):
         self.assertNotIn("is whole", messages)
 
     def test_full_disk(self):
-        """A limit on the file size has the effect of a full disk. The file must have as many rows as the message
-        reports."""
+        """A limit on the file size has the effect of a full disk. The file must have as many readings as the
+        message reports."""
         limit = ("import resource, signal, os, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN); "
                  "resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000)); os.execv(sys.argv[1], sys.argv[1:])")
         result = subprocess.run([sys.executable, "-c", limit, ABSENC, "record", "sim:tformat?motion=rpm=60", "--rate", "0",

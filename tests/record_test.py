@@ -179,8 +179,8 @@ class Gaps(RecordCase):
     line is too slow."""
 
     def record_and_stop(self, name, stopped, *arguments):
-        """Records for 3 s, stops the process for `stopped` seconds during that time, and returns the final message of
-        `record`."""
+        """Starts a recording of 3 s, stops the process for `stopped` seconds after the first readings, and returns
+        the final message of `record`."""
         path = self.output(name)
         process = self.start("record", "sim:tformat", "--output", path, "--rate", "200", "--for", "3", *arguments)
         wait_until(lambda: os.path.exists(path) and os.path.getsize(path) > 3000, "readings")

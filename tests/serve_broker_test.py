@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc serve` with a broker that violates MQTT: encoders must still be read, and no message may be lost."""
+"""Tests `absenc serve` with a broker that violates MQTT or refuses messages, and with an MQTT client process that
+ends or hangs: encoders must still be read, and no message may be lost."""
 import json
 import os
 import shutil

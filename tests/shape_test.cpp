@@ -290,7 +290,7 @@ TEST_F(Can, StandardFrameWinsOverExtendedFrameWithSamePrefix) {
   EXPECT_EQ(standard.log, "242000 sent, 534000 received 04800000:");
 }
 
-// (f) A pulse on a separate wire requests each frame: 10 us wide, the reply begins 30 us after its edge.
+// (f) A pulse on a separate wire requests each frame: 10 us wide, the reply begins 30 us after its leading edge.
 TEST(Trigger, RequestsEachFrameWithLongEnoughPulse) {
   sim::Line<Byte> line(LinkKind::half_duplex, {.rate = 1'000'000});
   ByteToy device([](ByteToy& self, const Event<Byte>& event) {

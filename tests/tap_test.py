@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Tests `tap` on a line between a host and an emulator; a relay copies both directions to a third pseudo-terminal.
-`--all` runs up to ten thousand exchanges per unit."""
+`--all` reads up to ten thousand positions per unit."""
 import collections
 import os
 import re

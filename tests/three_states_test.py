@@ -8,8 +8,8 @@ import unittest
 
 from command_support import Case, absenc, json_lines
 
-# Replies of T-format; the digit is the data ID. A reply to ID 0 has only the status field SF, one to ID 3 also the
-# alarm field ALMC.
+# Requests of T-format with their replies; the digit is the data ID. A reply to ID 0 has only the status field SF, one
+# to ID 3 also the alarm field ALMC.
 CLEAR_3 = "1A 1A 00 45 23 01 11 34 12 00 00 4A"
 CLEAR_0 = "02 02 00 CD AB 01 65"
 ALARM_0 = "02 02 20 CD AB 01 45"

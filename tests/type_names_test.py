@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""A name of a type has one meaning: a type that two files define under one name is renamed, or stands in SHARED, or for
-now in AMBIGUOUS.
+"""A name of a type has one meaning: a type that two files define under one name is renamed, or stands in SHARED, or
+for now in AMBIGUOUS.
 
-Counts types at the scope of a namespace or of a class, in absenc/ and tools/ without tests. Types inside of functions
-do not count. The same alias in several files is one meaning.
+Counts types at the scope of a namespace or of a class, in absenc/ and tools/ without tests. Types inside of
+functions do not count. The same alias in several files is one meaning, and so is one qualified name in several
+files of a folder.
 """
 
 import os

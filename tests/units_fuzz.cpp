@@ -96,8 +96,8 @@ std::vector<Item> items_of(const Unit& unit, Bytes bytes) {
   }
 }
 
-// Runs a conversation whose reply is the input, in pieces of `piece` items. The conversation must end within 30000
-// steps, and report nothing together with an error.
+// Runs a conversation whose reply is the input, in pieces of `piece` items. The conversation is aborted at step 300. It
+// must end within 30000 steps, and report nothing together with an error.
 template <class Item>
 void converse(const Unit& unit, const Options& options, const Command& command, Bytes input, std::size_t piece) {
   using Kind = typename Event<Item>::Kind;
@@ -143,8 +143,9 @@ void converse(const Unit& unit, const Options& options, const Command& command, 
   require(false);
 }
 
-// Feeds the input to the virtual encoder, with pauses before bytes from F0 on. After each item the encoder must wait
-// again within 100 steps, and it must not send an empty frame.
+// Feeds the input to the virtual encoder, with a pause before each byte from F0 on, and before each CAN frame whose
+// index is that of such a byte. After each item the encoder must wait again within 100 steps, and it must not send an
+// empty frame.
 template <class Item>
 void ask_device(const Unit& unit, const Options& options, Bytes input) {
   using Kind = typename Event<Item>::Kind;

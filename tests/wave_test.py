@@ -227,7 +227,7 @@ class Wave(Case):
 
     @staticmethod
     def wait_for_work(process):
-        """Waits until the process has written some data, because it catches signals from then on."""
+        """Waits until the process has written more than 1 MiB, because it catches signals by then."""
         deadline = time.monotonic() + PATIENCE
         while time.monotonic() < deadline:
             with open(f"/proc/{process}/io", encoding="ascii") as file:

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs the changing commands of every unit with every fault that its link can have, and with a port that is lost after
-// various numbers of steps. Compares the reported change with the memory of the virtual encoder, in virtual time.
+// Runs the changing commands that each unit confirms on a good line, with every fault that its link can have, and with
+// a port that is lost after various numbers of steps. Compares the reported change with the memory of the virtual
+// encoder, in virtual time.
 #include "absenc/client/change.hpp"
 
 #include <gtest/gtest.h>

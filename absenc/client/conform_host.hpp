@@ -15,8 +15,8 @@ namespace absenc::client {
 
 /// Length of a conformance test of a host, and its callbacks.
 struct ConformHostChoices {
-  std::size_t answers = 100;  ///< Number of good replies before and after the faults together, at least 2.
-  Time patience = std::chrono::seconds(10);       ///< Longest silence of the host after its first request.
+  std::size_t answers = 100;  ///< Number of replies before the first and after the last fault, at least 2.
+  Time patience = std::chrono::seconds(10);       ///< Longest silence of the host after it first sent something.
   std::function<void(const Emulation&)> ready{};  ///< Called with the running emulation when the host can connect.
   /// Polled during the test; once it returns true, the test ends and the host is judged. Empty: never.
   std::function<bool()> over{};
@@ -24,8 +24,8 @@ struct ConformHostChoices {
 
 /// Tests a host and returns the results. Suppresses replies for a while, then damages replies, then, if the unit has a
 /// clause about it, requests; the host must continue with its requests. Ends when the number of answered requests or
-/// the silence of the host after its first request reaches its limit, or when `over` returns true. `text` and `place`
-/// are those of `emulate`. Throws UsageError, os::Interrupted and exceptions of the port.
+/// the silence of the host, after it first sent something, reaches its limit, or when `over` returns true. `text` and
+/// `place` are those of `emulate`. Throws UsageError, os::Interrupted and exceptions of the port.
 [[nodiscard]] Conformance conform_host(std::string_view text, const EmulateChoices& place = {},
                                        const ConformHostChoices& choices = {});
 

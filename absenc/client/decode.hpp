@@ -59,14 +59,14 @@ class Decoded {
   /// Ends the decoding threads, even in the middle of the file.
   ~Decoded();
 
-  /// Waits for the first row and returns an iterator to it; call it once. Throws UsageError, Failure or, after
-  /// `cancel`, Cancelled, as every later step does.
+  /// Waits for the first row and returns an iterator to it, at the end if there is no row; call it once. Throws
+  /// UsageError, Failure or, after `cancel`, Cancelled, as every later step does.
   [[nodiscard]] Iterator begin();
   /// Returns the end of the range, for comparison with an iterator.
   [[nodiscard]] static Iterator::End end() { return {}; }
   /// Returns the present row, or null at the end of the range. The row is valid until `advance`.
   [[nodiscard]] const Row* current() const { return row_; }
-  /// Moves to the next row, and waits until it is decoded.
+  /// Moves to the next row and waits until it is decoded, or moves to the end of the range.
   void advance();
   /// Cancels from any thread: a caller that waits for a row, now or later, gets the exception Cancelled.
   void cancel();

@@ -116,11 +116,11 @@ struct Reported {
 
 /// Times, rates and settings that were measured during the diagnosis.
 struct Measured {
-  Time time{};          ///< Time from the first to the last reading.
+  Time time{};          ///< Time from the begin of the first reading to that of the last.
   double failures = 1;  ///< Upper limit of the share of failed readings, 0 to 1, at 95 % confidence (Wilson).
   Time quickest{};      ///< Shortest time from the end of a request to the end of its good reply; 0: not known.
   Time slowest{};       ///< Longest time from the end of a request to the end of its good reply; 0: not known.
-  double rate = 0;      ///< Number of good readings per second; 0: not known.
+  double rate = 0;      ///< Number of good readings per second; 0: none, or not known.
   /// Echo of the adapter: "echo seen", "no echo" or "echo not known", or the user's setting, as "echo=off"; "": not a
   /// line of characters, or no good reading.
   std::string echo{};
@@ -132,7 +132,7 @@ struct Measured {
 /// Result of `examine`: its findings, and the measurements behind them.
 struct Examination {
   std::vector<Finding> findings{};  ///< Findings, in the order in which the user should mend them.
-  std::size_t tried = 0;            ///< Number of attempts to read.
+  std::size_t tried = 0;            ///< Number of attempts to read, without those with other settings.
   std::size_t good = 0;             ///< Number of good readings.
   Reported reported{};              ///< How many readings report alarms and validity.
   Measured measured{};              ///< Times, rates and settings that were measured.
@@ -148,11 +148,11 @@ struct Examination {
 
 /// Limits of the diagnosis, and its callbacks.
 struct DoctorChoices {
-  std::size_t readings = 100'000;        ///< Greatest number of readings to take.
-  Time limit = std::chrono::seconds(3);  ///< Time limit of the readings while the shaft is as it is.
+  std::size_t readings = 100'000;        ///< Greatest number of readings of a series with the given settings.
+  Time limit = std::chrono::seconds(3);  ///< Time limit of such a series while the shaft is as it is.
   Time turning{};                        ///< Time of further readings while the user turns the shaft by hand; 0: none.
   std::function<void(const std::string& what)> progress{};  ///< Called with the step that begins, as a phrase.
-  /// Polled during the whole diagnosis; once it returns true, the diagnosis ends with Cancelled. Empty: never.
+  /// Polled during each wait of the diagnosis; once it returns true, the diagnosis ends with Cancelled. Empty: never.
   std::function<bool()> over{};
 };
 

@@ -42,7 +42,7 @@ struct RequestCounts {
   /// Number of byte runs or CAN frames that are no request, and of damaged characters, received before the first good
   /// request; 0 until there is one.
   std::uint64_t before = 0;
-  std::string first_bad = {};  ///< Text of the first item counted in `bad`; "" for a damaged character.
+  std::string first_bad = {};  ///< Text of the first item counted in `bad`; "" for a damaged character or none.
 };
 
 /// A running virtual encoder, served by its own thread until this object is destroyed. Any thread may call the

@@ -117,7 +117,8 @@ class Encoder {
   void connect();
   /// Closes the port; counters and statistics remain. The next reading or command opens the port again.
   void disconnect();
-  /// Returns whether the port is open: from `open` until `disconnect`, or until a sample reports the loss of the port.
+  /// Returns whether the port is open: not after `disconnect`, nor after a sample that reports the loss of the port,
+  /// until the port is opened again.
   [[nodiscard]] bool connected() const;
 
   /// Returns a reading of the position with all alarms that the encoder can report. If no second reading confirmed the
@@ -129,7 +130,7 @@ class Encoder {
   /// options allow, otherwise from a reading of the position, confirmed or not.
   [[nodiscard]] Reading read_alarms();
   /// Returns samples for a loop, which continues after a lost port is back. The loop ends after `count` samples, at the
-  /// deadline, or with `cancel`.
+  /// deadline, with `cancel`, or once the function of `end_when` returns true.
   [[nodiscard]] Samples samples(const SampleChoices& choices = {});
   /// Takes one sample and returns it: reads once, or, while the port is lost, waits up to a quarter of a second and
   /// tries to open the port again. Throws os::Interrupted, UsageError, Failure, Cancelled.
@@ -210,7 +211,8 @@ class Encoder {
 /// UsageError, which names the wrong part and, for an unknown name, a similar one if there is one.
 [[nodiscard]] Encoder open(std::string_view text, std::span<const std::string> settings = {});
 
-/// An input range of samples at equal distances in time, without drift. Samples whose time has passed are left out.
+/// An input range of samples. With a rate they are at equal distances in time, without drift, and samples whose time
+/// has passed are left out; without one they follow as fast as possible.
 class Samples {
  public:
   /// Type of the values in the range.

@@ -9,8 +9,7 @@
 
 namespace absenc::client {
 
-/// Exception: the caller requested something impossible. The text is a sentence that names the wrong value and its
-/// place.
+/// Exception: the caller requested something impossible. The text is a sentence that says what is wrong.
 struct UsageError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };

@@ -53,8 +53,9 @@ struct CheckFindings {
   std::string advice{};
 };
 
-/// Returns all checks of 3 to 16 bits that explain every frame. Throws UsageError for fewer than two frames, for bytes
-/// and bits together, and for frames that are too short or longer than 64 bytes or 128 bits.
+/// Returns the checks of 3 to 16 bits that explain every frame: all of them, unless `is_open`. Throws UsageError for
+/// fewer than two frames, for bytes and bits together, and for frames that are too short or longer than 64 bytes or 128
+/// bits.
 [[nodiscard]] CheckFindings find_crc(std::span<const CheckedFrame> frames);
 
 /// A unit with options that configure it for a found check.

@@ -41,7 +41,8 @@ struct Column {
 /// Type of a value that is a sequence of bytes.
 using ByteVector = std::vector<std::uint8_t>;
 
-/// Alternative of `Value` for a value that the encoder reported as invalid. The value itself is not stored.
+/// Alternative of `Value` for a value that the encoder reported as invalid, or that is computed from values not known
+/// to be valid. The value itself is not stored.
 struct Invalid {
   /// Returns true, because all invalid values are equal.
   friend bool operator==(const Invalid&, const Invalid&) = default;

@@ -26,9 +26,9 @@ struct TapChoices {
 };
 
 /// An input range of rows with the columns of `Decoded`, one for each exchange on the line. Rows are ordered by the end
-/// of their frames and available as soon as their last frame is complete. Up to 64 MiB of bytes that arrive while the
-/// caller is busy are stored. `time_s` is the time of arrival at this computer since the first byte. It is too coarse
-/// for the latency of an encoder, so `turnaround_us` is empty.
+/// of their frames and available as soon as their last frame is complete; an unanswered request may follow later rows.
+/// Up to 64 MiB of bytes that arrive while the caller is busy are stored. `time_s` is the time of arrival at this
+/// computer since the first byte. It is too coarse for the latency of an encoder, so `turnaround_us` is empty.
 class Tap {
  public:
   /// Type of the values in the range.
@@ -47,14 +47,14 @@ class Tap {
   Tap& operator=(Tap&&) noexcept;
   ~Tap();
 
-  /// Waits for the first row and returns an iterator to it; call it once. Throws os::Failure, Failure, os::Interrupted
-  /// or, after `cancel`, Cancelled, as every later step does.
+  /// Waits for the first row and returns an iterator to it, at the end if there is no row; call it once. Throws
+  /// os::Failure, Failure, os::Interrupted or, after `cancel`, Cancelled, as every later step does.
   [[nodiscard]] Iterator begin();
   /// Returns the end of the range, for comparison with an iterator.
   [[nodiscard]] static Iterator::End end() { return {}; }
   /// Returns the present row, or null at the end of the range. The row is valid until `advance`.
   [[nodiscard]] const Row* current() const { return row_; }
-  /// Waits until the next row is complete.
+  /// Waits until the next row is complete or the range ends, and moves there.
   void advance();
   /// Cancels from any thread: a caller that waits for a row, now or later, gets the exception Cancelled.
   void cancel();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that a user can follow the advice for each alarm and error, and that following it has an effect.
+// Checks that a user can follow the advice for each alarm and error, and that following that for an alarm has an effect
+// or an explanation.
 #include <algorithm>
 #include <array>
 #include <cctype>

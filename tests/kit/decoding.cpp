@@ -101,8 +101,8 @@ class Decoding {
   }
 
  private:
-  // Tries each value of the open bytes of a frame and reports the first good frame. Returns whether there is one, to
-  // which `frame` then is set; true if the frame has no open bytes.
+  // Tries each value of the open bytes of a frame, if they have at most 16 bits, and reports the first good frame.
+  // Returns whether there is one, to which `frame` then is set; true if the frame has no open bytes.
   template <class IsGood>
   bool close(std::string_view name, std::vector<std::uint8_t>& frame, OpenBytes open, IsGood is_good) {
     if (open.count == 0) return true;

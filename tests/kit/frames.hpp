@@ -81,14 +81,15 @@ struct Configuration {
   bool is_model = false;
 };
 /// Returns the configurations of a unit, without repetitions: each model, or the defaults if it has none; and the first
-/// of these with each choice of each option and with the minimum and maximum of each option.
+/// of these with each choice of each option or, for an option without choices, its minimum and maximum.
 [[nodiscard]] std::vector<Configuration> configurations(const Unit& unit);
 
 using Values = std::vector<std::int64_t>;
 /// Returns arguments for the command: the default of each optional argument and the minimum of each required one.
 [[nodiscard]] Values least_arguments(const Command& command);
 [[nodiscard]] Values most_arguments(const Command& command);
-/// Returns random arguments for the command, each within its range. A quarter of the values are the minimum or maximum.
+/// Returns random arguments for the command, each within its range. About a quarter of the values are the minimum or
+/// maximum.
 [[nodiscard]] Values random_arguments(const Command& command, sim::Random& random);
 /// Returns the bytes of the command's request, or the error of `Unit::encode`.
 [[nodiscard]] Result<Wire> encoded(const Unit& unit, const Options& options, const Command& command, Arguments values);

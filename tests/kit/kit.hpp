@@ -30,15 +30,16 @@ namespace absenc::kit {
 /// may succeed. Does not apply where the host clocks the line, because such a line is never silent.
 [[nodiscard]] Findings check_silence(const Unit& unit);
 
-/// Encodes every command with random arguments and decodes the request: its fields must contain these arguments.
-/// Arguments outside their ranges must be refused.
+/// Encodes every command with random arguments and decodes the request: its fields must contain each of these arguments
+/// that it has a field for. Arguments outside their ranges must be refused.
 [[nodiscard]] Findings check_requests(const Unit& unit, std::uint64_t seed);
 
 /// Runs each command in the smallest storage that it accepts. This must be no larger than the declared size, no byte
 /// after it may be written, and one byte less must be refused. A device must need exactly its declared size.
 [[nodiscard]] Findings check_storage(const Unit& unit);
 
-/// Checks that the commands and arguments exist which the descriptor names for memory, registers and settings.
+/// Checks that the commands, arguments, fields and options exist which memory, registers, settings and verbs of the
+/// descriptor need, and that each alarm has a meaning and advice.
 [[nodiscard]] Findings check_declarations(const Unit& unit);
 
 /// Runs every command that sets a setting, the zero or the turns, or clears alarms, and checks its effect in the

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Program inside the virtual machine that runs the tests, and prints one line for each: "ok NAME", or "not ok NAME:
-WHY"."""
+"""Program inside the virtual machine that runs the tests, and prints for each "ok NAME", or "not ok NAME: WHY" with
+details in lines that begin with #."""
 import fnmatch
 import os
 import subprocess

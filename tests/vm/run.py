@@ -47,7 +47,8 @@ def boot(kernel, initramfs, folder):
 
 
 def judge(output, trouble):
-    """Prints the failed tests. Returns how many tests passed and how many failed."""
+    """Prints the failed tests. Returns how many tests passed and how many failed; incomplete output counts as a
+    failure."""
     good = re.findall(r"^ok (.*)$", output, re.MULTILINE)
     bad = re.findall(r"^not ok .*\n(?:#.*\n)*", output, re.MULTILINE)
     for report in bad:

@@ -108,8 +108,8 @@ TEST(CampaignTest, EveryFaultIsThere) {
   }
 }
 
-// The host accepts delayed frames of an encoder that sends unsolicited frames, because they do not show when they were
-// sent.
+// Checks that older positions occur and are counted among the wrong ones: the host accepts delayed unsolicited frames,
+// because they do not show when they were sent.
 TEST(CampaignTest, OldFramesAreCounted) {
   const CampaignResult result = run("raa38", {"late=0.1"}, 20'000);
   EXPECT_GT(result.older.count, 0u);

@@ -118,7 +118,7 @@ std::optional<std::uint32_t> CheckCode::syndrome_of(AlteredReply& asked, std::si
 }
 
 // Returns whether 1000 random errors, each of a random reply, agree with the syndromes: code words pass the checksum,
-// other errors do not, and a reply passes all checks once the check bits of the syndrome are flipped.
+// other errors do not, and no reply fails the checksum once the check bits of the syndrome are flipped.
 bool CheckCode::is_linear(const Unit& unit, const Options& options, std::span<const GoodReply> replies) const {
   sim::Random random(1);
   for (unsigned i = 0; i < 1000; ++i) {

@@ -42,7 +42,8 @@ class CheckCode {
 
   [[nodiscard]] std::size_t bits() const { return syndromes_.size(); }
   [[nodiscard]] unsigned check_bits() const { return static_cast<unsigned>(check_.size()); }
-  /// Returns the number of bits of a reply that the checksum does not cover: bits before the frame, and constant bits.
+  /// Returns the number of bits of a reply that are left out of the code: bits before the frame, and bits whose error
+  /// the decoder rejects by another check than the checksum.
   [[nodiscard]] std::size_t fixed_bits() const { return fixed_; }
   /// Returns the numbers of code words of each weight from 0 to `most`, by MacWilliams' identity from the 2^check_bits
   /// words of the dual code.

@@ -11,7 +11,7 @@ namespace {
 
 using capture::Annotation;
 
-/// Indexes of the row columns that precede the columns of the unit's fields.
+/// Indexes of the columns that precede the columns of the unit's fields, and of the first of these.
 enum At : std::size_t { at_begin, at_end, at_kind, at_request, at_reply, at_turnaround, at_position, first_field };
 
 std::vector<Column> columns_of(const Unit& unit, const Options& options, bool has_time) {

@@ -15,7 +15,7 @@ namespace absenc::client {
 
 namespace {
 
-// Names of each wire: first the wire's own name, then other names under which captures record the wire.
+// A name of a wire: the wire's own name, or another name under which captures record it.
 struct WireName {
   std::string_view wire;
   std::string_view name;

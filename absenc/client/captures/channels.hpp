@@ -20,12 +20,13 @@ namespace absenc::client {
 /// was not recorded.
 struct WireChannels {
   std::vector<std::optional<unsigned>> wires;
-  bool assumed = false;  // full duplex: true if neither --channel nor channel names show which wire is the host's
+  bool assumed = false;  // full duplex: whether a --channel value names no wire, or channels were assigned in order
 };
 
 /// Assigns channels by --channel ("D0", "clock=D0"); without it, by the channels' names or, if no name fits, in order
 /// (not on clocked lines and SPI, nor with more channels than wires). Throws UsageError, which lists the channels or
-/// wires, for an unknown name, for more channels than wires and for a needed wire without a channel.
+/// wires, for an unknown name, for more --channel values than wires, for a needed wire without a channel, and if no
+/// wire has one.
 [[nodiscard]] WireChannels find_wires(LinkKind link, std::span<const std::string> channels,
                                       std::span<const std::string> wanted);
 

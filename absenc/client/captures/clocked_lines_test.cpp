@@ -186,7 +186,7 @@ TEST_F(ClockedLines, BissOfAnyClockTimeoutAndMaster) {
 }
 
 // The master may set the control bit by a falling edge of MA at any time before the timeout elapses, because the
-// encoder samples MA only when the timeout elapses.
+// encoder samples MA only then. Checks edges at 50 % and 60 % of the timeout.
 TEST_F(ClockedLines, AControlBitMayComeLateInTheTimeout) {
   for (const std::int64_t khz : {100, 250, 1000, 10'000}) {
     const std::int64_t period = 1'000'000 / khz;

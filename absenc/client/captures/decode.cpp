@@ -133,7 +133,7 @@ struct Decoded::Parts {
   Batch taken;
   std::size_t at = 0;
 
-  std::mutex mutex;  // guards all following members except the thread
+  std::mutex mutex;  // guards the following members except `changed` and `thread`
   std::condition_variable changed;
   std::deque<Batch> ready;
   std::vector<Batch> used;  // batches that the caller has read, to be filled again

@@ -71,10 +71,11 @@ struct Possible final : EvidenceSink {
 
 }  // namespace
 
-// Selects the baud rate with more good frames at the beginning of the capture: the unit's own rate (also if
-// `reads_silence`), or the rate that the level changes suggest. Few level changes fit many rates, but only one rate
-// gives right checksums. If characters are damaged or no frame is found, selects the parity with more good frames: a
-// parity bit taken for a stop bit is wrong half of the time.
+// Selects what the user left open, except for standard input. Baud rate: the unit's own, if it gives a good frame and
+// at the beginning of the capture at least as many as the rate that the level changes suggest, or if `reads_silence`;
+// few level changes fit many rates, but only one rate gives right checksums. Parity, if characters are damaged or
+// neither a good frame nor an unanswered request is found: the one with most good frames, because a parity bit taken
+// for a stop bit is wrong half of the time.
 CaptureRun::Speed CaptureRun::likely_speed(const Lines& lines) const {
   constexpr std::size_t enough_characters = 20'000;
   Speed best{choices_.how.baud, choices_.how.parity.value_or(line_.parity)};
@@ -150,8 +151,8 @@ std::size_t CaptureRun::likely_pause(std::span<const capture::PauseReading> read
   const auto differs = [&](std::size_t i) { return readings[i].bursts.size() != readings[best].bursts.size(); };
   const auto other = std::find_if(faultless.begin(), faultless.end(), differs);
   if (other == faultless.end() || is_proved) return best;
-  // Takes the shortest pause in which the data line shows the end of the timeout: after a shorter pause the encoder
-  // would continue the old word.
+  // Takes the shortest pause without bad words in which the data line shows the end of the timeout: after a shorter
+  // pause the encoder would continue the old word.
   const auto shown =
       std::find_if(faultless.begin(), faultless.end(), [&](std::size_t i) { return readings[i].timed_out; });
   if (shown != faultless.end()) return *shown;

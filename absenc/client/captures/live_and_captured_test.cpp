@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs each command of each unit, except `scan`, against its virtual encoder in virtual time, draws the conversation as
+// Runs the commands of each unit, except `scan`, against its virtual encoder in virtual time, draws the conversation as
 // `absenc wave` does, decodes it as `absenc decode` does, and compares both results.
 #include <gtest/gtest.h>
 

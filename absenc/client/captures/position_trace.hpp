@@ -55,7 +55,7 @@ class PositionTrace {
   };
 
   void halve();
-  // Offset that makes negative turns sort before positive ones.
+  // Returns the offset that makes negative turns sort before positive ones; 0 if turns are not plotted or not signed.
   [[nodiscard]] std::uint64_t offset() const { return turns_ && signed_ ? std::uint64_t{1} << 63 : 0; }
   [[nodiscard]] double value(std::uint64_t counts) const;
   [[nodiscard]] std::string_view unit() const;
@@ -67,7 +67,7 @@ class PositionTrace {
   std::uint64_t count_ = 0;
   unsigned bits_ = 1;
   bool signed_ = false;
-  bool turns_ = false;  // whether the first valid position had turns; a position without turns then leaves a gap
+  bool turns_ = false;  // whether the first valid position had turns, with at most 64 bits in all; see `add`
   double unit_um_ = 0;
 };
 

@@ -45,8 +45,8 @@ struct CaptureOutcome {
 
 class CaptureRun {
  public:
-  /// Opens the capture. Throws UsageError if the capture's content does not fit the link of `unit`, and the exceptions
-  /// of `open_capture`.
+  /// Opens the capture. Throws UsageError if the capture holds bytes or CAN frames that do not fit the link of `unit`,
+  /// and the exceptions of `open_capture`.
   CaptureRun(const Unit& unit, const Options& options, const CaptureChoices& choices);
   ~CaptureRun();
 

@@ -77,7 +77,8 @@ class Stage {
 
   [[nodiscard]] LineSettings line() const { return address.line.with_some_rate(); }
 
-  /// Runs the commands one after the other, with pauses long enough for every reply. Stores the results in `live`.
+  /// Runs the commands one after the other, with pauses long enough for every reply. Stores in `live` the results that
+  /// a capture can show.
   void run(const std::vector<const Command*>& commands) {
     if (device_.bytes() != nullptr) {
       run_on(*device_.bytes(), commands);

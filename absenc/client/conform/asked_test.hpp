@@ -16,7 +16,7 @@
 namespace absenc::client {
 
 /// Parses the address. If its encoder sends unsolicited frames, selects the first value of an option with which the
-/// encoder is polled.
+/// encoder is polled; if there is none, returns the address as it is.
 inline EncoderAddress polled_address(const std::string& text) {
   const EncoderAddress usual = parse_address(text);
   const Unit& unit = *usual.unit;
@@ -31,7 +31,7 @@ inline EncoderAddress polled_address(const std::string& text) {
   return usual;
 }
 
-/// Returns addresses of the unit's virtual encoder: with default options, and with each option at other values (each
+/// Returns addresses of the unit's virtual encoder: with default options, and with each option at several values (each
 /// choice, both ends of a range, both neighbours of the default). Leaves out values that no virtual encoder has.
 inline std::vector<EncoderAddress> variations_of(const Unit& unit) {
   std::vector<EncoderAddress> all{parse_address(fmt::format("sim:{}", unit.id))};

@@ -26,8 +26,8 @@ constexpr std::uint32_t beside = 4;  // number of bytes before the written byte 
 // positions are equal if at most this fraction of a turn, 1/512, is between them
 constexpr unsigned position_tolerance = 512;
 
-/// Thrown when a command fails, or when a value or position of the encoder is not as expected, so that the clause is
-/// broken.
+/// Thrown when a command fails, or when a value or position of the encoder is missing or not as expected, so that the
+/// clause is broken.
 struct ClauseBroken {
   std::string evidence;
 };
@@ -164,7 +164,7 @@ void ChangeTester::test_busy(const Clause& clause, ClauseResult& result) {
   conclude(result, reply && reply->busy, std::move(seen));
 }
 
-// At the end, reads a byte of the page that is selected after power-on, to select that page again.
+// Saves byte 0 of page 0, the page that is selected after power-on: `put_back` reads it, which selects that page again.
 void ChangeTester::test_closed(const Clause& clause, ClauseResult& result) {
   save({.look = [this] { return std::int64_t{read_byte(0, 0)}; }, .write = [](std::int64_t) {}});
   static_cast<void>(read_byte(clause.page, clause.address));

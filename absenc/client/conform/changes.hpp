@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the clauses that change an encoder, and restores the changed values however the test ends, except values that
-// `resets` allows it to erase.
+// Tests the clauses that change an encoder, and tries to restore the changed values however the test ends, except
+// values that `resets` allows it to erase.
 #pragma once
 
 #include <algorithm>

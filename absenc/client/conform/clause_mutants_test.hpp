@@ -31,7 +31,8 @@ inline void flip_bit(FrameList& items, std::size_t bit) {
   byte = static_cast<std::uint8_t>(byte ^ 1U << bit % 8);
 }
 
-/// Lets the mutant flip a bit of its reply and search for the last two bytes with which the checksum is right again.
+/// Lets the mutant flip a bit of its reply and search for the last two bytes with which the checksum is right again;
+/// does nothing on CAN.
 template <class Item>
 void flip_and_repair(Mutant<Item>& mutant, const EncoderAddress& address, std::size_t bit) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
@@ -70,6 +71,7 @@ void add_reply_mutants(ReplyChanges<Item>& all, void (*change_reply)(std::vector
 }
 
 /// Adds mutants that send their first reply again: the whole reply, or its first bits with the rest of a later reply.
+/// Adds none on CAN or without a clause error that they could cause.
 template <class Item>
 void add_stale_mutants(ReplyChanges<Item>& all, const Clause& clause) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {

@@ -58,7 +58,7 @@ Conformance judge_host(const Unit& unit, HostStage& stage, const ConformHostChoi
   while (!trial.over() && !(choices.over && choices.over())) {
     HostTrial::TrialCounts seen = stage.seen();
     const std::uint64_t now_sent = seen.answered + seen.requests.good + seen.requests.bad;
-    // Measures the host's silence only after its first request.
+    // Measures the host's silence only after it has sent something.
     if (now_sent != sent || sent == 0) heard_at = os::now();
     sent = now_sent;
     if (os::now() - heard_at > choices.patience) break;

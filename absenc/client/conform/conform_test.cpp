@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Checks that the virtual encoder satisfies every clause that does not change it, and that at least two mutants break
-// each such clause, one of them no other clause.
+// each such clause, one of them no other clause; clauses about commands may break together.
 #include <gtest/gtest.h>
 
 #include <cstdio>

@@ -53,7 +53,7 @@ ObservedFrame request_of(const Unit& unit, const Options& options, const Command
   return {.can = parse_wire_text(unit.link, "a request", text).can};
 }
 
-// Returns the requests of all commands, addressed to this encoder and to one with another address.
+// Returns the requests of all commands, addressed to this encoder and, if the unit has addresses, to another one.
 std::vector<ObservedFrame> other_requests(const Unit& unit, const Options& options) {
   std::vector<ObservedFrame> requests;
   const auto add = [&](const Options& with, const Command& command) {
@@ -138,8 +138,8 @@ std::size_t detected_changes(const Unit& unit, const Options& options, const Obs
   }
   for (const ObservedFrame& request : other_requests(unit, options)) try_one(request, good.reply);
   if (unit.link == LinkKind::clocked) return noticed;  // on a clocked link the checksum is no byte at the end
-  // Flips a bit of a field before the checksum: the checksum would hide the change, so every value of the last byte is
-  // tried. One of them makes a checksum of one byte right.
+  // If no change was reported, flips each bit before the last byte: the checksum would hide the change, so every value
+  // of the last byte is tried. One of them makes a checksum of one byte right.
   ObservedFrame changed = good.reply;
   for (std::size_t bit = 0; noticed == 0 && changed.bytes.size() > 2 && bit < bits_of(good.reply) - 8; ++bit) {
     flip(changed, bit);

@@ -38,7 +38,7 @@ class HostTrial {
 
  private:
   enum class Phase : std::uint8_t { good, silence, after_silence, damage, after_damage, refusal, last, over };
-  // number of requests after a fault that proves that the host continues
+  // number of requests after a fault that suffice as proof that the host continues
   static constexpr std::uint64_t requests_to_continue = 3;
 
   [[nodiscard]] std::uint64_t counted() const;

@@ -136,7 +136,8 @@ Error error_of(const EncoderAddress& address, const std::vector<CanFrame>& reque
   return address.unit->check(address.options, {.can = request.data()}, {});
 }
 
-/// Returns all variants of the request for a position in which one wrong bit makes the request invalid.
+/// Returns all variants of the request for a position in which one wrong bit makes the request invalid; on CAN, leaves
+/// out frames of other devices.
 template <class Item>
 std::vector<std::vector<Item>> damaged_requests(const EncoderAddress& address) {
   std::vector<std::vector<Item>> all;
@@ -242,8 +243,8 @@ void expect_none_kept(const Conformance& found, std::string_view who) {
   EXPECT_EQ(with_verdict(found, Verdict::kept), std::vector<std::string>{}) << who << "\n" << found.report();
 }
 
-/// Judges senders of random bytes or CAN frames, of damaged requests and of requests of other units, which ignore
-/// replies. They must keep no clause.
+/// Judges senders of random bytes or CAN frames, of damaged requests (also in turn with good ones) and of requests of
+/// other units, which ignore replies. They must keep no clause.
 template <class Item>
 void check_stranger_hosts(const EncoderAddress& address) {
   const auto judged_sending = [&](const auto& next) { return Host<Item>(address, {}).judged_sending(next); };

@@ -197,7 +197,8 @@ std::size_t good_replies(EncoderAddress address, const Clause& clause, const Tap
   return good;
 }
 
-/// Returns whether the port `tap` stored the request of the clause.
+/// Returns whether the port `tap` stored the request of the clause; if that has no bytes, whether it stored requests of
+/// more than one kind.
 template <class Item>
 bool was_sent(const EncoderAddress& address, const Clause& clause, const TapPort<Item>& tap) {
   const Unit& unit = *address.unit;
@@ -214,7 +215,7 @@ bool was_sent(const EncoderAddress& address, const Clause& clause, const TapPort
       return std::ranges::any_of(tap.exchanges, [&](const auto& one) { return one.request == wanted; });
     }
   }
-  // The clause has no request text: returns whether requests other than those of readings were sent.
+  // The clause has no request in bytes, as on CAN: returns whether requests of more than one kind were sent.
   std::set<std::string> different;
   for (const auto& one : tap.exchanges) {
     if (!one.request.empty()) different.insert(to_wire_text(unit.link, frame_of(one.request).frame()));
@@ -274,7 +275,7 @@ void check_strangers(const EncoderAddress& address, const ConformChoices& choice
   }
 }
 
-// The device is a real encoder on a line that damages every reply, or every second reply.
+// Judges a virtual encoder of the unit whose every reply, or every second reply, is damaged.
 template <class Item>
 void check_damaged_line(const EncoderAddress& address, const ConformChoices& choices) {
   for (const unsigned every : {1u, 2u}) {

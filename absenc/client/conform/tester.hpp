@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the clauses about readings and about requests that no host sends, and gives ChangeTester access to the line.
+// Tests the clauses about readings, about commands and about requests that no host sends, and gives ChangeTester access
+// to the line.
 #pragma once
 
 #include <fmt/format.h>

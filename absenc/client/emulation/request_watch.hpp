@@ -65,7 +65,8 @@ class RequestWatch final : public Machine<Item> {
     }
   }
 
-  // Counts requests. Ignores frames that no host sends to such an encoder: they belong to other devices on the bus.
+  // Counts good and bad requests. Ignores frames that no host sends to such an encoder: they belong to other devices on
+  // the bus.
   void look_at_frames(std::span<const CanFrame> frames) {
     for (const CanFrame& frame : frames) {
       const Error error = error_of({.can = &frame});

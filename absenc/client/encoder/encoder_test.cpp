@@ -255,7 +255,8 @@ TEST(ClientSamples, AreRowsOfNamedValues) {
   EXPECT_EQ(rows.of_gap(Time{}, 12).get<std::uint64_t>("missed"), 12u);
 }
 
-// Two wrong bits at the same place of two bytes pass the checksum of T-Format, which is an exclusive OR of the bytes.
+// Two wrong bits at the same place of two bytes pass the checksum of T-Format, an exclusive OR of the bytes. Checks
+// that the host refuses positions with such errors and continues the true position.
 TEST(ClientEncoder, APositionThatNoShaftReachesIsReadAgain) {
   Encoder encoder = open("sim:tformat?singleturn=1000&fault=corrupt=0.6");
   const std::uint64_t& refused = encoder.counters().errors[static_cast<std::size_t>(Error::cross_check_failed)];

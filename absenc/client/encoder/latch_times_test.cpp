@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks latch times for every model, and for some modes, in virtual time. The true instant must be within the measured
-// bounds, however late a request leaves, and its end and the reply are noticed; and no speed may differ from the true
-// one by more than its uncertainty.
+// Checks latch times for every model, and for some modes, in virtual time. The true instant of a requested reading must
+// be within the measured bounds, whether or not its request leaves late, or its end or the reply is noticed late; and
+// no speed may differ from the true one by more than its uncertainty.
 #include "absenc/client/encoder/latch_times.hpp"
 
 #include <gtest/gtest.h>
@@ -244,7 +244,7 @@ TEST_P(LatchTimes, MakeNoSpeedThatIsFartherOffThanItSays) {
   }
 }
 
-// The measured speed must be the mean between the two instants, even if the shaft accelerates.
+// The measured speed must be, within its uncertainty, the mean between the two instants, even if the shaft accelerates.
 TEST_P(LatchTimes, MakeTheMeanSpeedOfAShaftThatSwings) {
   const double swing = revolutions_a_second(GetParam()) / 5;
   for (const Time most : most_late) {

@@ -40,7 +40,7 @@ std::size_t place_of(const Answer& answer, std::string_view name) {
 }
 
 // Runs a command that writes a setting. If the port is lost after the setting may have been written, throws a Failure
-// that lists the values with which the encoder may be left.
+// that lists the values with which the encoder may be left, if the command knows them.
 void write(Connection& encoder, const Command& setter, Arguments arguments, SettingSink& told) {
   try {
     run_into(encoder, setter, arguments, told);
@@ -60,7 +60,8 @@ void write(Connection& encoder, const Command& setter, Arguments arguments, Sett
   }
 }
 
-// Compares the setting, read again by its own command, with the value that the setter has verified.
+// Compares the setting, read again by its own command, with the value that the setter has verified. Throws Failure if
+// they differ.
 void require_same(const Answer& now, const Answer& written, std::string_view name) {
   for (std::size_t i = 0; i < written.columns.size(); ++i) {
     const std::size_t place = place_of(now, written.columns[i].name);

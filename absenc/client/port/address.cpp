@@ -264,7 +264,8 @@ EncoderAddress parse_place(std::string_view address) {
   return uri;
 }
 
-// Returns whether the text may be a name of absenc.toml: it has no ':' or '/' and is no protocol.
+// Returns whether the text may be a name of absenc.toml: it is not empty, has no ':' or '/', and is neither a protocol
+// nor "sim".
 bool is_name(std::string_view address) {
   return !address.empty() && address.find_first_of(":/") == std::string_view::npos && address != "sim" &&
          find_unit(address) == nullptr;
@@ -297,8 +298,9 @@ void require_once(std::span<const OptionText> settings) {
   }
 }
 
-// Checks the last of `settings` after all others, which were checked before, so that the last one causes the error.
-// Makes a virtual encoder only if the last one is no option, because the encoder needs all options first.
+// Checks the last of `settings` after all others, which were checked before, so that the last one causes the error. For
+// sim:, also makes the virtual encoder, but only if the last one is no option, because the encoder needs all options
+// first.
 void try_settings(EncoderAddress uri, std::span<const OptionText> settings) {
   take_settings(uri, settings);
   const bool options_are_set = find_link_parameter(settings.back().name) != nullptr;

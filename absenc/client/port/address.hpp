@@ -81,8 +81,9 @@ inline constexpr std::array<LinkParameter, 30> link_parameters{{
     {"seed", "N", "another series of faults", "sim"},
 }};
 
-/// Returns the option that a setting of this name sets; null if there is none. If the unit has an option for the rate,
-/// because its silences are measured in characters, `rate_setting` sets that option, whatever the option's name is.
+/// Returns the option that a setting of this name sets; null if there is none. If a unit on a serial line has an option
+/// for the rate, because its silences are measured in characters, `rate_setting` sets that option, whatever the
+/// option's name is.
 [[nodiscard]] const Option* find_option(const Unit& unit, std::string_view name);
 
 /// Returns the link parameter of this name; null if there is none.

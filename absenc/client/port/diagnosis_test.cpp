@@ -63,7 +63,7 @@ std::vector<const Unit*> units_of_bytes() {
 }
 
 // Checks the messages about encoders that are set up differently from their host, with each choice of each option: a
-// message names the setting that would help, and only once.
+// setting that the diagnosis finds is named once, and no clause is repeated.
 TEST(Diagnosis, ASettingThatWouldHelpIsNamedOnce) {
   std::set<std::string> named;
   for (const Unit* unit : units_of_bytes()) {

@@ -62,7 +62,7 @@ void check_bus(const FileSection& bus) {
   if (bus.find("port") == nullptr) refuse(bus.place, fmt::format("the bus {} has no port", bus.name));
 }
 
-// Refuses a name that is a protocol, is empty, begins with '-', or has ':', '/' or '?'.
+// Refuses a name that is a protocol or "sim", is empty, begins with '-', or has ':', '/' or '?'.
 void check_name(const FileSection& encoder) {
   if (encoder.name == "sim" || find_unit(encoder.name) != nullptr) {
     refuse(encoder.place, fmt::format("\"{}\" is a protocol: give the encoder another name", encoder.name));

@@ -44,7 +44,7 @@ struct Attempted {
   const FieldInfo* counter_field = nullptr;
   bool possible = true;  // whether the unit can run the command with these options
 
-  /// Returns whether the reply began after its time limit.
+  /// Returns whether there is a reply with a time limit and it began after that limit.
   [[nodiscard]] bool is_late() const { return answered && limit > Time{} && answered_after > limit; }
 };
 

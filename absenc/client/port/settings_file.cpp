@@ -18,7 +18,7 @@ namespace absenc::client {
 
 namespace {
 
-// Settings whose value must be a text, such as a name or a path; a number is refused as a mistake.
+// Settings whose value must be a text, such as a name or a path; a value of another type is refused as a mistake.
 constexpr std::array<std::string_view, 4> text_only{"protocol", "model", "bus", "port"};
 
 constexpr const char* variable = "ABSENC_CONFIG";

@@ -48,8 +48,8 @@ class SharedLink {
  public:
   explicit SharedLink(Link link) : link_(std::move(link)) {}
 
-  /// Runs `work`, one conversation, with exclusive use of the line, and returns its result. If the port is lost
-  /// meanwhile, it is closed, and every other user gets the os::Failure at its next turn.
+  /// Runs `work`, one conversation, with exclusive use of the line, and returns its result. If `work` throws an
+  /// os::Failure, the port counts as lost: it is closed, and every other user gets the os::Failure at its next turn.
   template <class Work>
   auto take_turn(const Work& work) {
     const std::lock_guard turn(turns_);
@@ -93,8 +93,8 @@ class SharedLink {
   std::optional<Loss> loss_;
 };
 
-/// Returns whether both encoders are on the same line. Throws UsageError if they are, but need different settings of
-/// the line.
+/// Returns whether both encoders are on the same line; false for SPI and sim:, whose ports are not shared. Throws
+/// UsageError if they are on the same line, but need different settings of it.
 [[nodiscard]] bool share_line(const EncoderAddress& one, const EncoderAddress& other);
 
 /// Checks that encoders can be read at the same time. Throws UsageError if two are the same encoder or on the same SPI

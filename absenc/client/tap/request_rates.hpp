@@ -25,7 +25,7 @@ class RequestRates final : public capture::AnnotationSink {
     capture::Tick begin = 0;   // tick of the first request
     capture::Tick last = 0;    // tick of the last request
 
-    /// Returns the number of requests per second; 0 for fewer than two requests.
+    /// Returns the number of requests per second; 0 for fewer than two requests, or if all have the same tick.
     [[nodiscard]] double per_second() const {
       return count > 1 && last > begin
                  ? static_cast<double>(count - 1) * static_cast<double>(arrival_ticks_per_second) /
@@ -66,7 +66,7 @@ class RequestRates final : public capture::AnnotationSink {
   }
 
  private:
-  // limit of the number of kinds; requests of further kinds are counted with the last one
+  // limit of the number of kinds; requests of further kinds are counted with the kind that was added last
   static constexpr std::size_t most_kinds = 64;
 
   struct SampleRequest {

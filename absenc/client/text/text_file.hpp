@@ -17,11 +17,11 @@ inline constexpr std::string_view dump_title = "absenc dump 1";           // dum
 /// read or has more than about 16 MiB.
 [[nodiscard]] std::string read_text_file(std::string_view what, const std::string& path);
 
-/// Returns the path at the end of a chain of symbolic links, even if that file does not exist.
+/// Returns the path at the end of a chain of up to 40 symbolic links, even if that file does not exist.
 [[nodiscard]] std::string link_target(const std::string& path);
 
-/// Checks, before long work, that a file can be written to this path. Throws Failure if not: only a regular file may be
-/// replaced.
+/// Checks, before long work, that the path is that of a regular file that can be replaced, or of no file in an existing
+/// folder. Throws Failure if not.
 void require_replaceable(const std::string& path);
 
 /// Iterates over the lines of a text that are neither empty nor begin with #, and removes blanks at the end of each

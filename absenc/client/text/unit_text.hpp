@@ -118,7 +118,7 @@ struct RoleArgument {
 [[nodiscard]] std::string_view name_of(Role role);
 
 /// Returns the validity of a field that depends on position or turns, from the reading of the same frame. Other fields,
-/// and fields whose value the reading does not have, are `valid`. All output of fields uses this rule.
+/// and fields whose value the reading does not have, are `valid`. Output of fields uses this rule.
 [[nodiscard]] Validity validity_of(const FieldInfo& field, const Reading& reading);
 [[nodiscard]] bool holds(const FieldInfo& field, const Reading& reading);
 /// Returns `value`, the text of a field, marked by its validity: "74565 counts", "unknown (74565 counts)" or "INVALID
