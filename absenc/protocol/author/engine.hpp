@@ -170,7 +170,8 @@ class Engine : public Conversation<std::uint8_t> {
   std::size_t due_ = 0;  // bytes of the reply still to be received
   MutableBytes storage_;
   HostTimes times_;
-  // A byte received at this time or later shows that the line is never silent; without such a byte silence is reported.
+  // A byte received at this time or later shows that the line is never silent. Without such a byte the port reports
+  // silence, which ends the exchange.
   Time noise_end_{};
   Time received_at_{};
   Manner manner_{};

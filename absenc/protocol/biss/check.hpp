@@ -31,8 +31,8 @@ struct Check {
   friend constexpr bool operator==(const Check&, const Check&) = default;
 };
 
-/// Returns whether the polynomial of the CRC ends in 1; an even one does not detect every single bit error. True for
-/// a check without a CRC.
+/// Returns whether the polynomial of the CRC ends in 1: with an even one, the last bit of the CRC never changes, so the
+/// CRC is as weak as a shorter one. True for a check without a CRC.
 [[nodiscard]] constexpr bool is_usable(const Check& check) { return check.width == 0 || (check.poly & 1) != 0; }
 
 inline constexpr Check crc6{};  ///< Check of most encoders: a CRC of 6 bits.

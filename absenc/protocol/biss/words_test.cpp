@@ -44,7 +44,7 @@ TEST(BissWords, SafetyNeedsValidCheckInBothWords) {
   expect_unusable(format);
 }
 
-// With an even polynomial the CRC does not detect every single bit error.
+// With an even polynomial the last bit of the CRC never changes.
 TEST(BissWords, RejectsEvenPolynomial) {
   Options options;
   const std::array<OptionText, 2> even{{{"crc_width", "6"}, {"crc_poly", "2"}}};
