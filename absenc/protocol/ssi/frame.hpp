@@ -49,8 +49,8 @@ struct Format {
   /// pauses for this time and `pause_margin`.
   Time pause = 50us;
   std::uint32_t clock_khz = 200;  ///< Clock rate in kHz.
-  /// Monoflop time Tm of the virtual encoder, at most `pause`; 0: equal to `pause`. Data sheets of usual encoders state 9
-  /// to 41 us, that of the RAA38S6 500 us.
+  /// Monoflop time Tm of the virtual encoder, at most `pause`; 0: equal to `pause`. Data sheets of usual encoders state
+  /// 9 to 41 us, that of the RAA38S6 500 us.
   Time monoflop = 20us;
   std::uint32_t slowest_khz = 100;  ///< Slowest clock that the virtual encoder allows, in kHz.
   /// Fastest clock that the virtual encoder allows, in kHz. The document's Tcs, more than 4 us, is its period.
