@@ -44,16 +44,16 @@ struct Line<Item>::State {
   std::size_t bits = 0;                ///< spi, clocked: number of bits of the transfer
   std::size_t frame = 0;               ///< number of items of each frame of `out`; 0: one frame
   std::size_t expect = 0;              ///< number of items that the node expects
-  Time width{};  ///< `width` of the step (link/step.hpp): duration, pause, or time of driving low
-  std::uint8_t behind_out = 0xFF;  ///< spi, clocked: byte that the host samples after `out` has ended
-  bool hold_low = false;           ///< clocked: the host holds the clock line low before the transfer
-  Time accepted_at{};              ///< time at which the machine requested the transfer
-  Time lead{};                     ///< spi: time from chip select to the first clock
-  ExtraWire pulse_wire{};          ///< wire of the pulse
-  Time start{};                    ///< start of the transfer, or of its present frame
-  std::size_t index = 0;           ///< index of the item of `out` that is on the wire
-  std::size_t on_wire = 0;         ///< characters: number of items of the frame of `out` that is on the wire; 0: none
-  Time each{};                     ///< duration of one byte
+  Time width{};                        ///< `width` of the step (link/step.hpp): duration, pause, or time of driving low
+  std::uint8_t behind_out = 0xFF;      ///< spi, clocked: byte that the host samples after `out` has ended
+  bool hold_low = false;               ///< clocked: the host holds the clock line low before the transfer
+  Time accepted_at{};                  ///< time at which the machine requested the transfer
+  Time lead{};                         ///< spi: time from chip select to the first clock
+  ExtraWire pulse_wire{};              ///< wire of the pulse
+  Time start{};                        ///< start of the transfer, or of its present frame
+  std::size_t index = 0;               ///< index of the item of `out` that is on the wire
+  std::size_t on_wire = 0;  ///< characters: number of items of the frame of `out` that is on the wire; 0: none
+  Time each{};              ///< duration of one byte
 
   /// Returns whether a transfer of this node has begun and has items left to send.
   [[nodiscard]] bool frame_pending() const {

@@ -161,8 +161,8 @@ Part<AccessOutcome> try_to_execute(Dialog& dialog, ProcedureState& found) {
   co_return found.end(AccessOutcome::good, done);
 }
 
-// Executes the present register access in up to five attempts. Reads the identity first, because registers of an AksIM-4
-// must not be accessed.
+// Executes the present register access in up to five attempts. Reads the identity first, because registers of an
+// AksIM-4 must not be accessed.
 Part<AccessOutcome> execute(Dialog& dialog, ProcedureState& found) {
   if (!dialog.format().has_ch2) co_await dialog.stop({Error::unsupported, no_channel2});
   if (found.protocol_version == 0) co_await identify(dialog, found, false);
