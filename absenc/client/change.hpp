@@ -44,7 +44,7 @@ struct Change {
 
 /// Base class of exceptions that carry the state of a change.
 struct Changing {
-  /// Makes the part of an exception that carries `what_became`, the change and its state.
+  /// Makes the part of an exception that carries the state of a change, `what_became`.
   explicit Changing(Change what_became) : change(std::move(what_became)) {}
   virtual ~Changing() = default;
   Change change;  ///< The change and its state when the exception was thrown.

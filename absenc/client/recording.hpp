@@ -32,8 +32,8 @@ struct RecordingSettings {
   std::optional<Time> part_time{};  ///< Time after which the next part begins; without a value: no limit.
 };
 
-/// A recording in progress. With a limit of the parts, the files are NAME-0001.csv, NAME-0002.csv and so on; each has
-/// the header and can be read alone.
+/// A recording in progress. With a limit of the parts, the files of log.csv are log-0001.csv, log-0002.csv and so on;
+/// each has the header and can be read alone.
 class Recording {
  public:
   /// Creates the first file, for readings of `encoder`, which must outlive this object. Throws UsageError, and

@@ -143,7 +143,8 @@ TEST(Unwrapper, ReadingsThatArriveTogetherMayBeFarApart) {
 }
 
 TEST(Unwrapper, DetectsJumpOfShaft) {
-  // The limit allows a tenth of a turn per ms; 1 ms is added to the time, because the latch times are uncertain.
+  // The speed limit is a tenth of a turn per ms. A jump is more than four times that in the elapsed time plus 1 ms
+  // (uncertain latch times), plus 4 counts.
   Unwrapper unwrapper(SpeedLimit{.rpm = 6000});
   EXPECT_FALSE(unwrapper.jumps(multiturn(9, 0, 0ms))) << "nothing is known yet";
   unwrapper.add(multiturn(5, 0, 0ms));

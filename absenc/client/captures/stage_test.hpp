@@ -33,7 +33,7 @@ struct Said {
   Answer answer{};
   std::optional<Reading> reading{};
   bool reads = false;       // whether all values come from replies of the encoder
-  bool is_special = false;  // whether only this unit has the command; such a command may try requests that fail
+  bool is_special = false;  // whether its verb is `run`; such a command may try requests that fail
   unsigned exchanges = 0;   // number of requests, pulses or transfers of the conversation
   // whether the error is a verdict of the procedure over several replies, not an error of the last reply
   bool is_verdict = false;

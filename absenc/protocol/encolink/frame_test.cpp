@@ -85,7 +85,8 @@ TEST(EncolinkFrame, RemembersAlarmsOfCycleWhileStatusBitsAgree) {
   EXPECT_EQ(remembered(lost, to_reading(multi, bad)).alarms_reported, 0xFFFFu);
   EXPECT_EQ(remembered(hot, to_reading(multi, warned)).alarms, status::temperature);
   EXPECT_EQ(remembered(hot, to_reading(multi, warned)).alarms_reported, 0xFFFFu);
-  // An alarm was raised or cleared: only the next cycle reports which one.
+  // A set bit does not say which alarm was raised: only the next cycle does. A clear bit says that all alarms of its
+  // kind are clear.
   EXPECT_EQ(remembered(hot, to_reading(multi, bad)).alarms, 0u);
   EXPECT_EQ(remembered(hot, to_reading(multi, bad)).alarms_reported, status::warnings);
   EXPECT_EQ(remembered(lost, to_reading(multi, {.singleturn = 5})).alarms, 0u);
