@@ -578,7 +578,7 @@ class SharedLine(EslCase):
 
     def test_monitor_reads_encoders_in_turn(self):
         line = self.encoder("--also", "address=3&singleturn=70000", "--also", "address=6&singleturn=0x5555", "--also",
-                            "address=6&singleturn=0xAAAA", latency=20)
+                            "address=6&singleturn=0xAAAA", latency=50)
         names = [line, f"{line}&address=3", f"{line}&address=6", f"{line}&address=7"]
         result, last = self.lines(*names, "--rate", "0", seconds=6)
         # The readings of two of the four encoders failed, so the exit status is 1.
