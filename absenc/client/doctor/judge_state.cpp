@@ -157,7 +157,9 @@ std::optional<Finding> judge_start(const Case& one) {
   if (failed < 2 || failed + one.good != readings.size()) return {};
   const auto silent = std::count_if(readings.begin(), first, [](const Attempted& attempt) { return !attempt.heard; });
   // The last failures may be damaged replies, because the encoder may begin to reply in the middle of a request.
-  if (static_cast<std::size_t>(silent) * 2 < failed || may_be_the_computer(one.seen, failed)) return {};
+  if (static_cast<std::size_t>(silent) * 2 < failed) return {};
+  // A computer that stood still for as long may have delayed the first replies.
+  if (first->began - readings.front().began <= one.seen.woken_late) return {};
   if (-log_choose(readings.size(), failed) > std::log(chance)) return {};
   return finding(FindingKind::starting,
                  {fmt::format("no good reply came for the first {}, and then all {} readings were good",
