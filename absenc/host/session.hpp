@@ -27,8 +27,8 @@ struct Counters {
   std::uint64_t repeated = 0;   ///< repeated attempts, each after an error
   std::uint64_t late = 0;       ///< replies on the line, to any session, that arrived too late and were dropped
   std::uint64_t discarded = 0;  ///< damaged frames of streams, whether an error reported them or not
-  std::array<std::uint64_t, error_texts.size()>
-      errors{};  ///< number of errors of each kind, also of repeated attempts; indexed by Error
+  /// Number of errors of each kind, also of repeated attempts; indexed by Error.
+  std::array<std::uint64_t, error_texts.size()> errors{};
 
   /// Returns the number of errors of all kinds, also of attempts that were repeated.
   [[nodiscard]] constexpr std::uint64_t bad() const {

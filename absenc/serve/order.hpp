@@ -35,8 +35,8 @@ struct Order {
   std::vector<std::int64_t> arguments{};
   client::MemoryImage addresses{};
   std::string who{};
-  std::function<void(const OrderResult&)>
-      done{};  // called once: in the encoder's thread after the order's event, or where a waiting order is given up
+  // called once: in the encoder's thread after the order's event, or where a waiting order is given up
+  std::function<void(const OrderResult&)> done{};
 
   /// Returns the name of the order for messages: "zero", "doctor".
   [[nodiscard]] std::string_view name() const;

@@ -50,8 +50,8 @@ struct LatencyFigures {
   Time median{};
   Time percentile_99{};
   Time longest{};
-  std::array<std::uint64_t, latency_limits.size()>
-      within{};  // cumulative histogram: number of latencies up to each of `latency_limits`
+  // cumulative histogram: number of latencies up to each of `latency_limits`
+  std::array<std::uint64_t, latency_limits.size()> within{};
   std::uint64_t count = 0;
   Time sum{};
 };

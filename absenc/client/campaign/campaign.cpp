@@ -174,10 +174,9 @@ class Campaign {
 
 std::optional<CheckWorth> worth_of(const Unit& unit, const Options& options, double bit_errors) {
   if (unit.link == LinkKind::can) return {};
-  constexpr unsigned frames =
-      // Number of sample replies. A reply whose frame is shifted passes the check only at some positions of the shaft,
-      // so many replies are needed.
-      20'000;
+  // Number of sample replies. A reply whose frame is shifted passes the check only at some positions of the shaft,
+  // so many replies are needed.
+  constexpr unsigned frames = 20'000;
   constexpr unsigned samples = 500'000;
   const std::vector<GoodReply> replies = Campaign<std::uint8_t>(unit, options, {}, 7).good_replies(frames);
   if (replies.empty()) return {};

@@ -62,8 +62,8 @@ class MeasuredShaft final : public Shaft {
   }
   [[nodiscard]] std::size_t count() const { return std::min(count_, samples_.size()); }
   [[nodiscard]] const ShaftSample* find(const Reading& reading) const {
-    constexpr Time vague =
-        2ms;  // uncertainty of the time of measurement: an encoder may measure more often than it is polled
+    // uncertainty of the time of measurement: an encoder may measure more often than it is polled
+    constexpr Time vague = 2ms;
     for (std::size_t i = 0; i < count(); ++i) {
       const bool then = last(i).at >= reading.latched - vague && last(i).at <= reading.latched + vague;
       if (then && sim::is_at(reading, last(i).position)) return &last(i);

@@ -23,10 +23,9 @@ namespace absenc::client {
 
 namespace {
 
-constexpr std::size_t first_readings =
-    // number of readings with another setting before it is compared with the user's; a setting without any good reply
-    // is dropped
-    2;
+// number of readings with another setting before it is compared with the user's; a setting without any good reply
+// is dropped
+constexpr std::size_t first_readings = 2;
 constexpr std::size_t trial_readings = 5;  // number of readings with each setting per turn of the comparison
 constexpr unsigned trial_turns = 2;
 constexpr Time trial_limit = std::chrono::milliseconds(500);

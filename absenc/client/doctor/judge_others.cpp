@@ -121,8 +121,8 @@ std::optional<Finding> text_of_others(const Case& one, Bytes bytes) {
     const std::size_t at = text.find(word);
     if (at != std::string::npos) return finding(FindingKind::modem_answers, {quoted(bytes, at)});
   }
-  constexpr std::size_t enough_kinds =
-      6;  // least number of different characters in a text: a frame that repeats may contain letters, too
+  // least number of different characters in a text: a frame that repeats may contain letters, too
+  constexpr std::size_t enough_kinds = 6;
   const bool has_lines = text.find_first_of("\r\n") != std::string::npos;
   if (bytes.size() < enough || !has_lines || std::set(text.begin(), text.end()).size() < enough_kinds) return {};
   if (printed(bytes) * 20 < bytes.size() * 19 || speaks_text(one.unit)) return {};

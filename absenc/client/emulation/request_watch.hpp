@@ -148,9 +148,8 @@ class RequestWatch final : public Machine<Item> {
   bool sending_ = false;
   Time heard_at_{};
   bool waits_ = false;  // whether the reply is outstanding, so that the host must wait
-  bool skipping_ =
-      // whether bytes are ignored until the line is silent, after a collision or after bytes that begin no request
-      false;
+  // whether bytes are ignored until the line is silent, after a collision or after bytes that begin no request
+  bool skipping_ = false;
   std::vector<std::uint8_t> pending_{};
   RequestCounts counts_{};
 };

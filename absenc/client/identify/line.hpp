@@ -33,9 +33,8 @@ struct LineFindings {
   std::size_t heard = 0;     // number of bytes or frames that were received after requests, without echo
   // number of bytes or frames that were received while listening, before the first request at each setting of the line
   std::size_t unsolicited = 0;
-  std::size_t searches =
-      // number of combinations of protocol, settings and encoder that were tried as an explanation of received frames
-      0;
+  // number of combinations of protocol, settings and encoder that were tried as an explanation of received frames
+  std::size_t searches = 0;
   bool only_echo = false;          // whether in some conversation nothing but the adapter's echo was received
   std::set<std::string> lines{};   // the kinds of lines that were tried, in words
   std::vector<std::string> notes;  // sentences about impossible attempts and contradictory identities

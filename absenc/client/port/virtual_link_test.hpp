@@ -28,10 +28,9 @@ struct VirtualClock {
 struct VirtualPort {
   bool echo = false;                      // whether the adapter echoes requests
   std::optional<std::uint64_t> pauses{};  // seed of random delays before each request; nothing: no delays
-  std::optional<sim::RoughRates>
-      // fault rates of a line that carries whole frames, which is faster than a line of bits, but has no echo; without
-      // a value the line carries bits and has no faults
-      rough{};
+  // fault rates of a line that carries whole frames, which is faster than a line of bits, but has no echo; without
+  // a value the line carries bits and has no faults
+  std::optional<sim::RoughRates> rough{};
   std::uint64_t seed = 1;         // seed of the faults of `rough`
   VirtualClock* clock = nullptr;  // clock of the port; null: time begins with the link and jumps from event to event
   std::uint32_t rate = 0;         // rate of the host's end in bits per second; 0: that of the encoder

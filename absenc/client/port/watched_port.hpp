@@ -113,10 +113,9 @@ class WatchedPort final : public Port<Item> {
   /// Returns whether a conversation was asked to end early since the last call of this function.
   [[nodiscard]] bool take_aborted() { return std::exchange(aborted_, false); }
 
-  std::function<bool()>
-      // function that is polled during each wait: if it returns true, the wait ends with os::Ended; if it throws
-      // os::Interrupted, the conversation is asked to end early
-      over;
+  // function that is polled during each wait: if it returns true, the wait ends with os::Ended; if it throws
+  // os::Interrupted, the conversation is asked to end early
+  std::function<bool()> over;
   // function that asks the conversation to end early; returns false if it cannot end by itself
   std::function<bool()> abort;
   Time deadline = never;  // time by the port's clock; a wait that reaches it throws OutOfTime

@@ -16,8 +16,8 @@
 
 namespace absenc::biss {
 
-inline constexpr unsigned control_pause =
-    14;  ///< Zeros of CDM before a start bit; within a control frame, this many zeros end it.
+/// Zeros of CDM before a start bit; within a control frame, this many zeros end it.
+inline constexpr unsigned control_pause = 14;
 inline constexpr unsigned control_slaves = 8;    ///< Greatest number of slaves that can have an ID.
 inline constexpr std::size_t control_most = 64;  ///< Greatest number of data bytes of one control frame.
 

@@ -152,8 +152,8 @@ inline constexpr std::uint8_t self_calibrate = 0x41;  ///< Starts the self-calib
 /// Bits of the register calibration_status.
 namespace calibration {
 inline constexpr std::uint8_t count = 0x03;  ///< Mask of the number of finished self-calibrations, modulo 4.
-inline constexpr std::uint8_t timed_out =
-    0x04;  ///< The shaft did not turn far enough in time for the last self-calibration.
+/// The shaft did not turn far enough in time for the last self-calibration.
+inline constexpr std::uint8_t timed_out = 0x04;
 inline constexpr std::uint8_t out_of_range = 0x08;  ///< The last self-calibration found the ring too eccentric.
 }  // namespace calibration
 

@@ -122,8 +122,8 @@ Result<Request> memory_writing(const Format&, Arguments arguments) {
   return writing(static_cast<std::uint32_t>(arguments[0]), arguments[2], arguments[1]);
 }
 
-constexpr MakeRequest not_encodable =
-    nullptr;  // null where the value depends on the position, or where nothing is sent
+// null where the value depends on the position, or where nothing is sent
+constexpr MakeRequest not_encodable = nullptr;
 
 // ---- End of a frame: the shortest of the possible lengths with a right checksum decides
 

@@ -200,9 +200,8 @@ void draw_position(Screen& screen, int row, const MonitoredEncoder& shown) {
   const Snapshot& snapshot = shown.snapshot;
   const Unit& unit = *shown.watch->uri().unit;
   if (is_live(snapshot)) {
-    const bool has_room =
-        // The flags of an encoder with two channels do not fit into this line: they are drawn among the fields below.
-        unit.second_status == nullptr && unit.second_alarms == nullptr;
+    // The flags of an encoder with two channels do not fit into this line: they are drawn among the fields below.
+    const bool has_room = unit.second_status == nullptr && unit.second_alarms == nullptr;
     const Reading& reading = snapshot.last.reading;
     const Doubt doubt = doubt_of(snapshot.last);
     const std::string text =

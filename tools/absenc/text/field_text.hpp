@@ -53,8 +53,8 @@ struct FieldTable final : FieldSink {
   void put_flags(const FieldInfo& field, std::uint64_t bits);
 
   std::vector<ValidatedRow> judged_;
-  std::vector<std::pair<std::size_t, const FlagInfo*>>
-      sends_to_alarms_;  // row number and flag, for flags whose advice is to read the alarms
+  // row number and flag, for flags whose advice is to read the alarms
+  std::vector<std::pair<std::size_t, const FlagInfo*>> sends_to_alarms_;
   bool shows_alarms_ = false;
 };
 
