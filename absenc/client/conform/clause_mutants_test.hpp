@@ -204,29 +204,24 @@ ReplyChanges<Item> special_request_mutants(const Clause& clause) {
       }
     }
   } else {
-    // A mutant whose reply carries the node number of the request.
-    all.push_back({.change = [hears_good](M& m) {
-      const auto requested = std::make_shared<std::uint32_t>(0);
-      m.change_request = [&m, requested](List& last_request) {
-        *requested = last_request.front().id;
-        if (m.is_special) last_request = m.good;
-      };
-      m.changes_special = true;
-      m.change_reply = [requested](List& reply_items, Step<Item>&) {
-        reply_items.front().id = (reply_items.front().id & ~0xFFU) | (*requested & 0xFF);
-      };
-    }});
-    all.push_back({.change = [hears_good](M& m) {
-      const auto requested = std::make_shared<std::uint32_t>(0);
-      m.change_request = [&m, requested](List& last_request) {
-        *requested = last_request.front().id;
-        if (m.is_special) last_request = m.good;
-      };
-      m.changes_special = true;
-      m.change_reply = [requested](List& reply_items, Step<Item>&) {
-        reply_items.front() = {.id = 0x100 | (*requested & 0xFF), .size = 8, .data = {0x11}};
-      };
-    }});
+    // Adds a mutant whose reply is changed by `change`, which gets the id of the request.
+    const auto with_request_id = [&all](void (*change)(Item & reply, std::uint32_t id)) {
+      all.push_back({.change = [change](M& m) {
+        const auto requested = std::make_shared<std::uint32_t>(0);
+        m.change_request = [&m, requested](List& last_request) {
+          *requested = last_request.front().id;
+          if (m.is_special) last_request = m.good;
+        };
+        m.changes_special = true;
+        m.change_reply = [change, requested](List& reply_items, Step<Item>&) {
+          change(reply_items.front(), *requested);
+        };
+      }});
+    };
+    // The reply carries the node number of the request.
+    with_request_id([](Item& reply, std::uint32_t id) { reply.id = (reply.id & ~0xFFU) | (id & 0xFF); });
+    with_request_id(
+        [](Item& reply, std::uint32_t id) { reply = {.id = 0x100 | (id & 0xFF), .size = 8, .data = {0x11}}; });
   }
   return all;
 }

@@ -28,6 +28,14 @@ bool is_mended(const Case& one, const Frame& request, std::vector<std::uint8_t> 
 
 }  // namespace
 
+All damaged(const std::vector<Attempted>& attempts) {
+  All all;
+  for (const Attempted& attempt : attempts) {
+    if (attempt.error != Error::none && attempt.heard) all.push_back(&attempt);
+  }
+  return all;
+}
+
 bool decodes(const Case& one, const Frame& request, const Frame& reply) {
   return one.unit.check(one.options, request, reply) == Error::none;
 }

@@ -21,6 +21,9 @@ template <class Is>
   return those;
 }
 
+/// Returns the attempts in which something was received, but no good reply, in their order.
+[[nodiscard]] All damaged(const std::vector<Attempted>& attempts);
+
 /// Returns whether the reply is good with the user's options. With an empty request, a good reply to any request
 /// counts.
 [[nodiscard]] bool decodes(const Case& one, const Frame& request, const Frame& reply);

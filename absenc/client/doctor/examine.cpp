@@ -43,11 +43,6 @@ bool may_be_another(const EncoderAddress& address) {
   return characters && (address.port_kind == PortKind::serial || address.port_kind == PortKind::tcp);
 }
 
-std::size_t count_good(const std::vector<Attempted>& attempts) {
-  return static_cast<std::size_t>(
-      std::ranges::count_if(attempts, [](const Attempted& one) { return one.error == Error::none; }));
-}
-
 bool streams(const EncoderAddress& address) {
   return address.unit->streams != nullptr && address.unit->streams(address.options);
 }
@@ -144,7 +139,7 @@ class Doctor {
     // On a CAN bus other settings are tried only if nothing was heard, because other bit rates would destroy frames of
     // other devices.
     const bool disturbs = std::is_same_v<Item, CanFrame> && any_heard();
-    const bool may_be_settings = none_good() && !seen_.never_silent && seen_.lateness == Time{};
+    const bool may_be_settings = hardly_any_good(seen_.readings) && !seen_.never_silent && seen_.lateness == Time{};
     if (may_be_settings && !disturbs && !is_adapter()) try_others<Item>();
     if constexpr (std::is_same_v<Item, std::uint8_t>) {
       if (may_be_another(address_) && seen_.trials.empty() && is_unexplained()) identify_others();
@@ -153,8 +148,6 @@ class Doctor {
     }
   }
 
-  // Returns whether at most one in 20 readings is good: a short checksum accepts some damaged replies.
-  [[nodiscard]] bool none_good() const { return count_good(seen_.readings) * 20 < seen_.readings.size() + 1; }
   [[nodiscard]] bool any_good() const {
     return std::any_of(seen_.readings.begin(), seen_.readings.end(),
                        [](const Attempted& one) { return one.error == Error::none; });
@@ -168,11 +161,7 @@ class Doctor {
   // of text never have one.
   [[nodiscard]] bool is_adapter() const {
     const Case one{*address_.unit, address_.options, seen_, count_good(seen_.readings)};
-    All all;
-    for (const Attempted& attempt : seen_.readings) {
-      if (attempt.error != Error::none && attempt.heard) all.push_back(&attempt);
-    }
-    const std::optional<Finding> adapter = damage_by_adapter(one, all);
+    const std::optional<Finding> adapter = damage_by_adapter(one, damaged(seen_.readings));
     return adapter && adapter->finding_kind != FindingKind::seven_bits;
   }
 

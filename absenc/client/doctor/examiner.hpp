@@ -70,7 +70,6 @@ class Examiner {
       const std::size_t before = seen.readings.size();
       std::vector<Attempted> failed;  // failed requests of the present reading
       StreamBytes stream;
-      std::vector<Time> arrivals;
       const Hook hook(runner_, [&](const LineExchange<Item>& line) { record_failure(line, failed); });
       const auto attempt = [&] {
         failed.clear();
@@ -78,15 +77,12 @@ class Examiner {
         // The last request is part of the reading itself.
         if (!failed.empty() && failed.back().began == runner_.last().sent_at) failed.pop_back();
         std::ranges::move(failed, std::back_inserter(seen.repeated));
-        if (!streams_) return one;
-        const Time arrived = runner_.last().marks.empty() ? Time{} : runner_.last().marks.back().at;
-        arrivals.push_back(arrivals.empty() ? arrived : std::max(arrived, arrivals.back()));
-        stream.append(runner_.last());
+        if (streams_) stream.append(runner_.last());
         return one;
       };
       runner_.repeat(series(count, limit), attempt, seen.readings);
       // An encoder that sends a frame for each pulse is polled, too.
-      if (streams_ && before == 0 && runner_.port().requests == 0) conclude_stream(stream, arrivals, seen);
+      if (streams_ && before == 0 && runner_.port().requests == 0) conclude_stream(unit_, options_, stream, seen);
     }
   }
 
@@ -153,31 +149,6 @@ class Examiner {
       return;
     one.error = one.answered ? unit_.check(options_, request, one.exchange.reply.frame()) : Error::timeout;
     if (one.error != Error::none) failed.push_back(std::move(one));
-  }
-
-  void conclude_stream(const StreamBytes& stream, const std::vector<Time>& arrivals, Observations& seen) const {
-    seen.is_stream = true;
-    const auto is_good = [](const Attempted& one) { return one.error == Error::none; };
-    const auto good = static_cast<std::size_t>(std::ranges::count_if(seen.readings, is_good));
-    std::vector<Attempted> frames = frames_between_pauses(unit_, options_, stream);
-    if (good * 20 < seen.readings.size() + 1) {
-      // The reading of a stream goes on to the next good frame, so hardly any good frame means hardly any reading: the
-      // frames themselves are examined instead; without any frames, the first bytes.
-      if (frames.empty() && !stream.bytes.empty()) {
-        constexpr std::size_t most_shown = 256;
-        Attempted& last = seen.readings.back();
-        last.heard = last.answered = true;
-        last.raw.assign(stream.bytes.begin(),
-                        stream.bytes.begin() + static_cast<std::ptrdiff_t>(std::min(stream.bytes.size(), most_shown)));
-        last.exchange.reply.bytes = last.raw;
-      }
-      if (!frames.empty()) seen.readings = std::move(frames);
-      return;
-    }
-    std::erase_if(frames, is_good);
-    seen.damaged_frames = std::move(frames);
-    seen.doubled = count_doubled(seen.readings, arrivals);
-    if (arrivals.size() == seen.readings.size()) insert_missing_frames(seen.readings, arrivals);
   }
 
   static constexpr unsigned pieces = 5;

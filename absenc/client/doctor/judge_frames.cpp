@@ -38,14 +38,6 @@ bool is_good(const Case& one, const Frame& request, Bytes reply) { return decode
 
 // ---- Judges for lines on which no reply is good
 
-All damaged(const std::vector<Attempted>& attempts) {
-  All all;
-  for (const Attempted& attempt : attempts) {
-    if (is_damaged(attempt)) all.push_back(&attempt);
-  }
-  return all;
-}
-
 Finding counted(FindingKind finding_kind, const Case& one, const All& those) {
   return finding(finding_kind,
                  {fmt::format("{}", those.size()), fmt::format("{}", one.seen.readings.size()),
@@ -82,28 +74,22 @@ std::optional<Finding> own_echo(const Case& one, const All& all) {
   return finding(FindingKind::only_echo, {fmt::format("{}", all.size()), to_hex(all.front()->exchange.request.bytes)});
 }
 
-bool holds_two(const Case& one, const Attempted& attempt) {
+// Returns whether the attempt received a good reply to the request `first`, followed by a good reply to its own
+// request. With an empty `first`, a good reply to any request counts.
+bool holds_two(const Case& one, const Attempted& attempt, const Frame& first) {
   const Frame request = attempt.exchange.request.frame();
   const Bytes bytes = attempt.exchange.reply.bytes;
   for (std::size_t size = 2; size + 1 < bytes.size(); ++size) {
-    if (is_good(one, request, bytes.first(size)) && is_good(one, request, bytes.subspan(size))) return true;
-  }
-  return false;
-}
-
-// Returns whether the attempt received a good reply to any request, followed by a good reply to its own.
-bool begins_with_reply(const Case& one, const Attempted& attempt) {
-  const Frame request = attempt.exchange.request.frame();
-  const Bytes bytes = attempt.exchange.reply.bytes;
-  for (std::size_t size = 2; size + 1 < bytes.size(); ++size) {
-    if (is_good(one, {}, bytes.first(size)) && is_good(one, request, bytes.subspan(size))) return true;
+    if (is_good(one, first, bytes.first(size)) && is_good(one, request, bytes.subspan(size))) return true;
   }
   return false;
 }
 
 std::optional<Finding> two_frames(const Case& one, const All& all) {
   if (one.unit.link != LinkKind::half_duplex && one.unit.link != LinkKind::full_duplex) return {};
-  const auto is_double = [&](const Attempted* attempt) { return holds_two(one, *attempt); };
+  const auto is_double = [&](const Attempted* attempt) {
+    return holds_two(one, *attempt, attempt->exchange.request.frame());
+  };
   const auto two = static_cast<std::size_t>(std::count_if(all.begin(), all.end(), is_double));
   if (two * 2 < all.size() || two == 0) return {};
   const auto first = std::find_if(all.begin(), all.end(), is_double);
@@ -401,6 +387,9 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
     findings.push_back(contradiction(one, all));
     all.clear();
   }
+  const std::size_t silent =
+      stuck.size() + static_cast<std::size_t>(std::ranges::count_if(one.seen.readings, is_silent) +
+                                              std::ranges::count_if(one.seen.repeated, is_silent));
   if (std::optional<Finding> two = two_frames(one, all); two && all.size() * 4 > one.seen.readings.size()) {
     findings.push_back(std::move(*two));
   } else if (one.seen.overfull * 4 > one.seen.readings.size()) {
@@ -413,9 +402,7 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
     // A late reply stands before the reply to the next request, and the request of the late reply seems not to be
     // answered.
     const bool are_late =
-        std::ranges::all_of(all, [&](const Attempted* one_of) { return begins_with_reply(one, *one_of); });
-    const auto silent = static_cast<std::size_t>(std::ranges::count_if(one.seen.readings, is_silent) +
-                                                 std::ranges::count_if(one.seen.repeated, is_silent));
+        std::ranges::all_of(all, [&](const Attempted* one_of) { return holds_two(one, *one_of, {}); });
     const bool is_explained = are_late && (silent >= all.size() || may_be_the_computer(one.seen, all.size()));
     if (!is_explained) findings.push_back(std::move(*extra));
   } else if (!all.empty() || !repeated.empty()) {
@@ -423,9 +410,6 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
     both.insert(both.end(), repeated.begin(), repeated.end());
     if (!all.empty() || !may_be_the_computer(one.seen, repeated.size())) findings.push_back(some_damage(one, both));
   }
-  const std::size_t silent =
-      stuck.size() + static_cast<std::size_t>(std::ranges::count_if(one.seen.readings, is_silent) +
-                                              std::ranges::count_if(one.seen.repeated, is_silent));
   const std::size_t late = one.unit.link == LinkKind::can ? 0 : one.seen.late;
   // A late reply may make the next reading fail as well, so silent readings are compared with twice the late replies.
   if (silent > 2 * late && !may_be_the_computer(one.seen, silent)) {

@@ -2,6 +2,7 @@
 // The observations of an encoder and its port, from which the judges derive their findings.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -71,6 +72,17 @@ struct Observations {
   std::string clash{};            // address that two encoders share, "address 3"; "": none
   bool complete = true;
 };
+
+/// Returns the number of good attempts.
+[[nodiscard]] inline std::size_t count_good(const std::vector<Attempted>& attempts) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(attempts, [](const Attempted& one) { return one.error == Error::none; }));
+}
+
+/// Returns whether at most one in 20 attempts is good: a short checksum accepts some damaged replies.
+[[nodiscard]] inline bool hardly_any_good(const std::vector<Attempted>& attempts) {
+  return count_good(attempts) * 20 < attempts.size() + 1;
+}
 
 /// Derives the findings from the observations, in the order of their kinds, and returns the result of the examination.
 [[nodiscard]] Examination judge(const Unit& unit, const Options& options, const Observations& seen);

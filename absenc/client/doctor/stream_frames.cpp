@@ -92,6 +92,8 @@ Time period_of(std::vector<Time> distances) {
 }  // namespace
 
 void StreamBytes::append(const LineExchange<std::uint8_t>& line) {
+  const Time arrived = line.marks.empty() ? Time{} : line.marks.back().at;
+  arrivals.push_back(arrivals.empty() ? arrived : std::max(arrived, arrivals.back()));
   constexpr std::size_t most = std::size_t{1} << 20;
   if (bytes.size() + line.received.size() > most) return;
   const std::size_t before = bytes.size();
@@ -159,6 +161,28 @@ std::size_t count_doubled(const std::vector<Attempted>& readings, const std::vec
   }
   const bool are_most = doubled >= enough && doubled * 10 >= readings.size() * 4;
   return are_most && changed * 10 >= readings.size() * 2 ? doubled : 0;
+}
+
+void conclude_stream(const Unit& unit, const Options& options, const StreamBytes& stream, Observations& seen) {
+  seen.is_stream = true;
+  std::vector<Attempted> frames = frames_between_pauses(unit, options, stream);
+  if (!hardly_any_good(seen.readings)) {
+    std::erase_if(frames, [](const Attempted& one) { return one.error == Error::none; });
+    seen.damaged_frames = std::move(frames);
+    seen.doubled = count_doubled(seen.readings, stream.arrivals);
+    insert_missing_frames(seen.readings, stream.arrivals);
+  } else if (!frames.empty()) {
+    // The reading of a stream goes on to the next good frame, so hardly any good frame means hardly any reading: the
+    // frames themselves are examined instead.
+    seen.readings = std::move(frames);
+  } else if (!stream.bytes.empty()) {
+    constexpr std::size_t most_shown = 256;
+    Attempted& last = seen.readings.back();
+    last.heard = last.answered = true;
+    last.raw = stream.bytes;
+    last.raw.resize(std::min(last.raw.size(), most_shown));
+    last.exchange.reply.bytes = last.raw;
+  }
 }
 
 }  // namespace absenc::client

@@ -19,8 +19,9 @@ struct StreamBytes {
   };
   std::vector<std::uint8_t> bytes{};
   std::vector<Mark> marks{};
+  std::vector<Time> arrivals{};  // for each reading, the time at which its last byte arrived, or that of the one before
 
-  /// Appends the bytes received during one reading; the bytes of a very long examination are left out.
+  /// Appends the bytes received during one reading, and its arrival. Bytes beyond the first MiB are left out.
   void append(const LineExchange<std::uint8_t>& line);
 };
 
@@ -40,5 +41,10 @@ void insert_missing_frames(std::vector<Attempted>& readings, const std::vector<T
 /// if they are fewer than 8 or fewer than 40 % of the readings, or if fewer than 20 % of the frames differ from the one
 /// before.
 [[nodiscard]] std::size_t count_doubled(const std::vector<Attempted>& readings, const std::vector<Time>& arrivals);
+
+/// Adds to `seen`, which has the readings of a stream, what the bytes of the stream show: damaged frames, frames that
+/// came twice, and frames that did not come. If hardly any reading is good, the frames between the pauses replace the
+/// readings; if there are none, the last reading gets the first bytes of the stream.
+void conclude_stream(const Unit& unit, const Options& options, const StreamBytes& stream, Observations& seen);
 
 }  // namespace absenc::client
