@@ -164,13 +164,16 @@ class MqttProcess {
                                           payload.data(), qos, retain);
     const bool only_this = error == MOSQ_ERR_OVERSIZE_PACKET || error == MOSQ_ERR_QOS_NOT_SUPPORTED ||
                            error == MOSQ_ERR_RETAIN_NOT_SUPPORTED;
-    if (error == MOSQ_ERR_SUCCESS) {
-      if (qos != 0) numbers_[given] = number;
-    } else if (only_this) {
-      acknowledge(number, ::mosquitto_strerror(error));
-    } else {
-      lose(fmt::format("{}: {}", topic, ::mosquitto_strerror(error)));
+    const bool connection_failed =
+        error == MOSQ_ERR_ERRNO || error == MOSQ_ERR_CONN_LOST || error == MOSQ_ERR_NO_CONN || error == MOSQ_ERR_TLS;
+    if (only_this) return acknowledge(number, ::mosquitto_strerror(error));
+    if (error != MOSQ_ERR_SUCCESS && !connection_failed) {
+      return lose(fmt::format("{}: {}", topic, ::mosquitto_strerror(error)));
     }
+    if (qos != 0) numbers_[given] = number;
+    // The broker closed the connection before this message was sent. What it sent before, for example the reason or
+    // acknowledgements, is read next.
+    if (connection_failed) broker_events_ |= POLLHUP;
   }
 
   // Does the work of mosquitto_loop, which would wait for the broker only and not for the parent.
