@@ -116,11 +116,12 @@ struct Reported {
 
 /// Times, rates and settings that were measured during the diagnosis.
 struct Measured {
-  Time time{};          ///< Time from the begin of the first reading to that of the last.
-  double failures = 1;  ///< Upper limit of the share of failed readings, 0 to 1, at 95 % confidence (Wilson).
-  Time quickest{};      ///< Shortest time from the end of a request to the end of its good reply; 0: not known.
-  Time slowest{};       ///< Longest time from the end of a request to the end of its good reply; 0: not known.
-  double rate = 0;      ///< Number of good readings per second; 0: none, or not known.
+  Time time{};           ///< Time from the begin of the first reading to that of the last.
+  double failures = 1;   ///< Upper limit of the share of failed readings, 0 to 1, at 95 % confidence (Wilson).
+  Time quickest{};       ///< Shortest time from the end of a request to the end of its good reply; 0: not known.
+  Time slowest{};        ///< Longest time from the end of a request to the end of its good reply; 0: not known.
+  Time computer_late{};  ///< Greatest delay of this computer itself; 0: not measured.
+  double rate = 0;       ///< Number of good readings per second; 0: none, or not known.
   /// Echo of the adapter: "echo seen", "no echo" or "echo not known", or the user's setting, as "echo=off"; "": not a
   /// line of characters, or no good reading.
   std::string echo{};

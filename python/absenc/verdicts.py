@@ -37,6 +37,7 @@ class Examination(NamedTuple):
     readings_per_second: Optional[float] = None
     echo: Optional[str] = None  #: whether the adapter receives its own transmission
     latency_ms: Optional[float] = None  #: latency that adapter and driver add, if known
+    computer_late_ms: Optional[float] = None  #: greatest delay of this computer itself, if measured
     quickest_reply_ms: Optional[float] = None  #: shortest time from a request to the end of its reply
     slowest_reply_ms: Optional[float] = None  #: longest time from a request to the end of its reply
 

@@ -16,8 +16,8 @@
 #include "absenc/client/error.hpp"
 #include "absenc/client/identify/line.hpp"
 #include "absenc/client/text/unit_text.hpp"
+#include "absenc/os/delay_watch.hpp"
 #include "absenc/os/signals.hpp"
-#include "absenc/os/wakeup_watch.hpp"
 
 namespace absenc::client {
 
@@ -120,10 +120,10 @@ class Doctor {
       }
       tell("reading");
       try {
-        std::optional<os::WakeupWatch> watch;
-        if (surroundings_.on_the_clock && address_.port_kind != PortKind::sim) watch.emplace();
+        std::optional<os::DelayWatch> watch;
+        if (surroundings_.on_the_clock && address_.port_kind != PortKind::sim) watch.emplace(is_serial(address_));
         examiner.observe(*read_, choices_.readings, choices_.limit, seen_);
-        if (watch) seen_.woken_late = watch->latest();
+        if (watch) seen_.computer_late = watch->latest();
         if (any_good() && choices_.turning > Time{}) {
           tell("turn the shaft by hand now");
           examiner.read(*read_, most_turned, choices_.turning, seen_.turned);
@@ -340,6 +340,7 @@ Json to_json(const Examination& examination) {
   json.set("seconds", in_seconds(measured.time)).set("failures_below", measured.failures);
   if (measured.rate > 0) json.set("readings_per_second", measured.rate);
   if (!measured.echo.empty()) json.set("echo", measured.echo);
+  if (measured.computer_late > Time{}) json.set("computer_late_ms", in_seconds(measured.computer_late) * 1e3);
   if (measured.latency) json.set("latency_ms", in_seconds(*measured.latency) * 1e3);
   if (measured.slowest > Time{}) {
     json.set("quickest_reply_ms", in_seconds(measured.quickest) * 1e3);

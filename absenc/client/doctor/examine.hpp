@@ -16,7 +16,7 @@ struct Surroundings {
   std::function<os::PortFacts(const std::string& path)> facts = [](const std::string& path) {
     return os::port_facts(path);
   };
-  // whether the port runs in real time, so that the wake-up delay of this computer must be measured
+  // whether the port runs in real time, so that the delay of this computer must be measured
   bool on_the_clock = false;
 };
 
@@ -25,8 +25,8 @@ struct Surroundings {
                                   const Surroundings& surroundings = {.on_the_clock = true});
 
 /// Converts the result to {"ok","findings":[{"id","severity","evidence","cause","action"}],"readings","good",
-/// "complete","seconds","failures_below","verdict"}; if known, also "readings_per_second", "echo", "latency_ms",
-/// "quickest_reply_ms", "slowest_reply_ms".
+/// "complete","seconds","failures_below","verdict"}; if known, also "readings_per_second", "echo", "computer_late_ms",
+/// "latency_ms", "quickest_reply_ms", "slowest_reply_ms".
 [[nodiscard]] Json to_json(const Examination& examination);
 
 }  // namespace absenc::client

@@ -127,9 +127,9 @@ void judge_lateness(const Case& one, std::vector<Finding>& findings) {
   if (!often && (seen.late < 2 || may_be_the_computer(seen, seen.late))) return;
   Time limit{};
   for (const Attempted& attempt : seen.readings) limit = std::max(limit, attempt.limit);
-  const bool is_ours = seen.woken_late > Time{} && seen.lateness - limit <= seen.woken_late;
+  const bool is_ours = seen.computer_late > Time{} && seen.lateness - limit <= seen.computer_late;
   const bool is_one_of_few = seen.late < 2 && !nothing_else;
-  if ((!often || is_one_of_few) && is_ours) return;  // late by no more than this computer's own wake-up delay
+  if ((!often || is_one_of_few) && is_ours) return;  // late by no more than this computer's own delay
   const auto allowance = std::chrono::ceil<std::chrono::milliseconds>(seen.lateness * 3 / 2).count();
   findings.push_back(finding(often ? FindingKind::reply_late : FindingKind::sometimes_late,
                              {fmt::format("{}", std::min<std::size_t>(seen.late, tried)), fmt::format("{}", tried),
@@ -255,6 +255,7 @@ Measured measured_of(const Unit& unit, const Observations& seen, std::size_t goo
     measured.rate = static_cast<double>(good) / std::chrono::duration<double>(measured.time).count();
   }
   measured.failures = Share{seen.readings.size() - good, seen.readings.size()}.high();
+  measured.computer_late = seen.computer_late;
   measured.turned = !seen.turned.empty();
   for (const Attempted& one : seen.readings) {
     if (one.error != Error::none || one.after <= Time{}) continue;

@@ -104,15 +104,15 @@ double reach(const Walk& walk, Time pause, const host::SpeedLimit& limit) {
 
 // Finds positions that the shaft cannot have reached. `damaged` is the number of readings that failed by damage. A sum
 // of 8 bits misses one of 20 errors of three bits, and each missed error causes two jumps; so up to `damaged` jumps are
-// taken for damage. `woken_late`: a pause may have been this much longer, because this computer read the first of two
-// positions late.
-void judge_jumps(const Walk& walk, const host::SpeedLimit& limit, Time woken_late, std::size_t damaged,
+// taken for damage. `computer_late`: a pause may have been this much longer, because this computer read the first of
+// two positions late.
+void judge_jumps(const Walk& walk, const host::SpeedLimit& limit, Time computer_late, std::size_t damaged,
                  std::vector<Finding>& findings) {
   std::size_t jumps = 0;
   std::int64_t furthest = 0;
   for (std::size_t i = 0; i < walk.steps.size(); ++i) {
     const auto way = std::abs(walk.steps[i]);
-    if (walk.pauses[i] <= Time{} || static_cast<double>(way) <= reach(walk, walk.pauses[i] + woken_late, limit))
+    if (walk.pauses[i] <= Time{} || static_cast<double>(way) <= reach(walk, walk.pauses[i] + computer_late, limit))
       continue;
     ++jumps;
     furthest = std::max(furthest, way);
@@ -171,7 +171,7 @@ void judge_position(const Case& one, const std::vector<Attempted>& readings, boo
   }
   const auto is_damaged = [](const Attempted& reading) { return reading.error != Error::none && reading.heard; };
   const auto damaged = static_cast<std::size_t>(std::ranges::count_if(readings, is_damaged));
-  judge_jumps(walk, limit, one.seen.woken_late, damaged, findings);
+  judge_jumps(walk, limit, one.seen.computer_late, damaged, findings);
   judge_bits(walk, findings);
 }
 

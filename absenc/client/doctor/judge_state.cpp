@@ -159,7 +159,7 @@ std::optional<Finding> judge_start(const Case& one) {
   // The last failures may be damaged replies, because the encoder may begin to reply in the middle of a request.
   if (static_cast<std::size_t>(silent) * 2 < failed) return {};
   // A computer that stood still for as long may have delayed the first replies.
-  if (first->began - readings.front().began <= one.seen.woken_late) return {};
+  if (first->began - readings.front().began <= one.seen.computer_late) return {};
   if (-log_choose(readings.size(), failed) > std::log(chance)) return {};
   return finding(FindingKind::starting,
                  {fmt::format("no good reply came for the first {}, and then all {} readings were good",

@@ -67,7 +67,7 @@ struct Observations {
   host::EchoMode echo_said{};     // echo mode that the user set
   host::EchoMode echo{};          // echo mode that was detected
   std::optional<Time> latency{};  // latency that the user set
-  Time woken_late{};              // greatest wake-up delay of this computer during the readings
+  Time computer_late{};           // greatest delay of this computer during the readings (os::DelayWatch)
   host::SpeedLimit limit{};       // speed limit of the encoder's shaft
   std::string clash{};            // address that two encoders share, "address 3"; "": none
   bool complete = true;

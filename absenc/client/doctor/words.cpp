@@ -352,7 +352,13 @@ std::string Examination::verdict() const {
   std::string evidence = fmt::format("good: {} of {} readings in {:.3g} s", good, tried,
                                      std::chrono::duration<double>(measured.time).count());
   if (measured.rate > 0) evidence += fmt::format(", {:.{}f} a second", measured.rate, measured.rate < 100 ? 1 : 0);
-  if (good < tried) evidence += fmt::format(" ({} failed)", tried - good);
+  if (good < tried) {
+    evidence += fmt::format(" ({} failed", tried - good);
+    if (measured.computer_late > Time{}) {
+      evidence += fmt::format("; this computer itself was up to {} late", to_text(measured.computer_late));
+    }
+    evidence += ")";
+  }
   evidence += fmt::format(" (95 %: less than {:.2g} % fail)", 100 * measured.failures);
   evidence += reported.valid == good ? ", each with a valid position"
                                      : fmt::format(", {} with a position that is said to be valid", reported.valid);

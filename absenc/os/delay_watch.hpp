@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// Measures how late this computer is: a reply delayed by no more than the measured time may be punctual.
+#pragma once
+
+#include <atomic>
+#include <thread>
+#include <vector>
+
+#include "absenc/core/time.hpp"
+#include "absenc/os/descriptor.hpp"
+
+namespace absenc::os {
+
+/// A measurement of this computer's own delays in a thread of its own, as long as the object exists: how late the
+/// thread is woken, and, with `terminals`, how long bytes take through pseudo-terminals that only this object uses. The
+/// kernel passes received bytes of every terminal, also of a serial port, to programs by its own worker threads; on a
+/// busy computer these get the processor much later than a waiting program does.
+class DelayWatch {
+ public:
+  /// `terminals`: whether pseudo-terminals are measured, too. One that cannot be opened is left out.
+  explicit DelayWatch(bool terminals);
+
+  /// Returns the longest delay that was measured so far.
+  [[nodiscard]] Time latest() const { return Time(latest_.load()); }
+
+ private:
+  /// A pseudo-terminal through which one byte at a time is sent.
+  struct Terminal {
+    Descriptor from{};
+    Descriptor to{};
+    Time sent_at{};  // if `is_out`: when the byte was sent; else when the next one is due
+    bool is_out = false;
+  };
+
+  static Terminal open_terminal();
+  void watch(const std::stop_token& stop);
+  void exchange(Terminal& terminal);
+  void note(Time delay);
+
+  std::vector<Terminal> terminals_{};
+  std::atomic<Time::rep> latest_{0};
+  std::jthread thread_;
+};
+
+}  // namespace absenc::os
