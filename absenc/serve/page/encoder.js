@@ -389,7 +389,7 @@ export class EncoderPage {
       ["readings", `${live ? numberText(encoder.rate_hz, encoder.rate_hz < 10 ? 1 : 0) : 0} /s`],
       ["reply after", encoder.readings === 0 ? "no reply yet" : `${microseconds(latency.p50)}, at most ${microseconds(latency.max)}`],
       ["errors, last minute", numberText(encoder.errors_last_minute)],
-      ["errors of all readings", `${numberText(Object.values(encoder.errors).reduce((sum, count) => sum + count, 0))} of ${numberText(encoder.readings)}`],
+      ["failed attempts", `${numberText(Object.values(encoder.errors).reduce((sum, count) => sum + count, 0))} beside ${numberText(encoder.readings)} good readings`],
       ["requests repeated", numberText(encoder.repeated)],
       ["port lost", encoder.losses === 1 ? "once" : `${numberText(encoder.losses)} times`],
     ]));

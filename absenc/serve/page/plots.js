@@ -46,7 +46,7 @@ function gridLines(quantity) {
 
 // Kinds of events that are drawn as marks. A label that would overlap others is omitted; the history tab lists events
 // of all kinds.
-const MARKED = ["alarm", "lost", "silent", "ended", "restarted"];
+const MARKED = ["alarm", "lost", "ended", "restarted"];
 export const isMarked = (event) => MARKED.includes(event.kind);
 export const markText = (event) => (event.kind === "alarm" ? plain(event.text.split(":")[0]) : eventKind(event.kind)[1]);
 

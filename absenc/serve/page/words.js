@@ -138,7 +138,7 @@ export function faultLines(encoder) {
     if (encoder.alarms === null && encoder.status?.length) list.push(["bad", `Status: ${encoder.status.map(plain).join(", ")}.`, ""]);
     if (encoder.alarms === null) list.push(["faint", "", "Alarms not reported."]);
   }
-  if (encoder.message) list.push([encoder.state === "examined" ? "warn" : "bad", "", sentence(encoder.message)]);
+  if (encoder.message) list.push([encoder.state === "examined" ? "warn" : "bad", "", sentence(forPeople(encoder.message))]);
   return list;
 }
 
@@ -150,7 +150,7 @@ export function fieldText(value, missing = "INVALID") {
 
 /** Severity and text of kinds of events; other kinds have the severity "plain" and their own name. */
 const EVENT_KINDS = {
-  alarm: ["bad", "alarm raised"], alarm_over: ["good", "alarm over"], acknowledged: ["plain", "acknowledged"], lost: ["bad", "lost"], silent: ["warn", "no reply"],
+  alarm: ["bad", "alarm raised"], alarm_over: ["good", "alarm over"], acknowledged: ["plain", "acknowledged"], lost: ["bad", "lost"],
   failing: ["warn", "replies fail"], back: ["good", "back"], restarted: ["warn", "position restarted"], ended: ["bad", "stopped"],
   examined: ["plain", "examined"], command: ["plain", "command"], change: ["plain", "change"],
 };
