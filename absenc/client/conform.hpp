@@ -42,9 +42,10 @@ struct Conformance {
   /// Returns `broken` if any clause is broken or the encoder is left changed; otherwise `kept` if any clause is kept;
   /// otherwise `untested`.
   [[nodiscard]] Verdict verdict() const;
-  /// Returns the results in the Test Anything Protocol, version 13, with "Bail out!" if the verdict is `untested`.
+  /// Returns the results in the Test Anything Protocol, version 13, with "Bail out!" if the verdict is `untested` or
+  /// the encoder is left changed.
   [[nodiscard]] std::string tap() const;
-  /// Returns the results as JUnit XML, with an error if the verdict is `untested`.
+  /// Returns the results as JUnit XML, with an error if the verdict is `untested` or the encoder is left changed.
   [[nodiscard]] std::string junit() const;
   /// Returns the results as text for people: three lines for each clause, the commands that restore an encoder that is
   /// left changed, the numbers of verdicts and, if the verdict is `untested`, a line that says so.

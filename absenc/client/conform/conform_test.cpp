@@ -191,8 +191,12 @@ TEST(Conformance, TapBailsOutIfNoClauseWasJudged) {
   Conformance some = nothing;
   some.clauses.push_back({"b", "doc", "2", "y", Verdict::kept, "seen"});
   EXPECT_EQ(some.verdict(), Verdict::kept);
+  EXPECT_EQ(some.tap().find("Bail out!"), std::string::npos);
   some.left.emplace_back("absenc config set ...");
   EXPECT_EQ(some.verdict(), Verdict::broken);
+  EXPECT_NE(some.tap().find("Bail out! the encoder is left changed\n"), std::string::npos);
+  EXPECT_NE(some.junit().find("errors=\"1\""), std::string::npos);
+  EXPECT_NE(some.junit().find("<error message=\"the encoder is left changed\"/>"), std::string::npos);
 }
 
 // The text for people names the document and then the paragraph, so the document's name must not contain the paragraph

@@ -12,6 +12,12 @@ namespace {
 
 constexpr std::string_view nothing_judged = "nothing was seen that could be judged";
 
+// Returns why the result as a whole is not good, whatever the verdicts of single clauses are; "": there is no reason.
+std::string_view failure_of_all(const Conformance& one) {
+  if (!one.left.empty()) return "the encoder is left changed";
+  return one.verdict() == Verdict::untested ? nothing_judged : std::string_view();
+}
+
 std::string xml(std::string_view text) {
   std::string escaped;
   for (const char letter : text) {
@@ -55,13 +61,14 @@ std::string Conformance::tap() const {
     if (one.verdict == Verdict::broken) text += fmt::format("# {}\n", one.evidence);
   }
   for (const std::string& command : left) text += fmt::format("# left changed; to put it back: {}\n", command);
-  if (verdict() == Verdict::untested) text += fmt::format("Bail out! {}\n", nothing_judged);
+  if (const std::string_view why = failure_of_all(*this); !why.empty()) text += fmt::format("Bail out! {}\n", why);
   return text;
 }
 
 std::string Conformance::junit() const {
   std::string text = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n";
-  const std::size_t errors = verdict() == Verdict::untested ? 1 : 0;
+  const std::string_view why = failure_of_all(*this);
+  const std::size_t errors = why.empty() ? 0 : 1;
   text += fmt::format("<testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"{}\">\n",
                       xml(protocol), clauses.size() + errors, count(Verdict::broken), errors, count(Verdict::untested));
   for (const ClauseResult& one : clauses) {
@@ -72,8 +79,8 @@ std::string Conformance::junit() const {
     text += "</testcase>\n";
   }
   if (errors != 0) {
-    text += fmt::format("  <testcase classname=\"{}\" name=\"any clause\"><error message=\"{}\"/></testcase>\n",
-                        xml(protocol), nothing_judged);
+    text += fmt::format("  <testcase classname=\"{}\" name=\"all clauses\"><error message=\"{}\"/></testcase>\n",
+                        xml(protocol), why);
   }
   return text + "</testsuite>\n";
 }
