@@ -59,7 +59,7 @@ void FramePort::transfer(const Step<CanFrame>& step) {
     at = os::now();
     send(frame);
   }
-  pending_events_.push_back({EventKind::sent, at});
+  push_event({EventKind::sent, at});
 }
 
 Event<CanFrame> FramePort::wait(const Step<CanFrame>& step) {

@@ -53,8 +53,9 @@ OwnedFile::OwnedFile(const std::string& path) : path_(path) {
     // The file may have been replaced before it was locked.
     if (identity_of(path) == identity_of(opened)) return;
   }
-  // After all tries: the path is a link to itself, or another process replaces the file again and again.
-  throw system_failure("opening " + path, ELOOP);
+  // After all tries: the path is a link to itself or to nothing, or another process replaces the file again and again.
+  struct stat named {};
+  throw system_failure("opening " + path, ::stat(path.c_str(), &named) < 0 ? errno : ELOOP);
 }
 
 void OwnedFile::replace(std::string_view content, Durable durable) {

@@ -74,6 +74,16 @@ TEST_F(OwnedFileTest, IsARegularFile) {
   EXPECT_EQ(refusal(directory.path() / "loop"), Failure::Kind::system);
 }
 
+TEST_F(OwnedFileTest, LinkToNothingIsRefusedWithItsReason) {
+  fs::create_symlink(directory.path() / "gone", path);
+  try {
+    const OwnedFile file(path);
+    FAIL() << "was opened";
+  } catch (const Failure& failure) {
+    EXPECT_NE(std::string(failure.what()).find("No such file or directory"), std::string::npos) << failure.what();
+  }
+}
+
 TEST_F(OwnedFileTest, FailedWriteLeavesOldFile) {
   OwnedFile file(path);
   file.replace("old", Durable::no);
