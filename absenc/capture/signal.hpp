@@ -42,7 +42,7 @@ struct Changes {
 /// A character of an asynchronous line.
 struct Character {
   Tick begin = 0;  // time of the falling edge of the start bit
-  Tick end = 0;    // time of the end of the stop bit
+  Tick end = 0;    // time of the end of the stop bit, or of an earlier falling edge behind the stop bit's middle
   std::uint8_t value = 0;
   std::uint8_t channel = 0;  // index among the decoded channels, not among the file's channels
   // Data bits above the eighth, until decode_async makes two characters of a byte each.

@@ -27,7 +27,7 @@ struct LineFault {
 
 /// Settings of a campaign: the virtual encoder, the number of exchanges, and the faults with their rates.
 struct CampaignChoices {
-  std::string model{};                 ///< Name of a model of the unit; empty: its first model.
+  std::string model{};                 ///< Name of a model; empty: the first that fits `options`.
   std::vector<std::string> options{};  ///< Options of the unit, as "address=3".
   /// Faults with their rates from 0 to 1, as "bit=0.001"; others have rate 0. Empty: the default rates of all faults.
   std::vector<std::string> faults{};

@@ -16,7 +16,7 @@ namespace absenc::client {
 enum class Verdict : std::uint8_t {
   kept,      ///< the tested behaviour was observed, and the clause was satisfied
   broken,    ///< the tested behaviour was observed, and the clause was violated
-  untested,  ///< the tested behaviour was not observed
+  untested,  ///< nothing was observed that decides
 };
 
 /// Result of the test of one clause, a requirement of a document.
@@ -55,7 +55,7 @@ struct Conformance {
 /// Limits of a conformance test of an encoder: its length, and the changes it may make.
 struct ConformChoices {
   std::size_t readings = 100;  ///< Number of readings, at least 1.
-  /// Whether clauses that change the encoder are tested too; the test restores the encoder afterwards.
+  /// Whether clauses that change the encoder are tested too; the test then tries to restore the values.
   bool changes = false;
   /// With `changes`, whether the test may erase a zero, turns or alarms, which nothing can restore. If not, it tests
   /// such clauses only on an encoder that has none of them to lose.

@@ -15,7 +15,7 @@ namespace absenc::client {
 
 /// Length of a conformance test of a host, and its callbacks.
 struct ConformHostChoices {
-  std::size_t answers = 100;  ///< Number of replies before the first and after the last fault, at least 2.
+  std::size_t answers = 100;  ///< Number of replies, half before the first and half after the last fault; at least 2.
   Time patience = std::chrono::seconds(10);       ///< Longest silence of the host after it first sent something.
   std::function<void(const Emulation&)> ready{};  ///< Called with the running emulation when the host can connect.
   /// Polled during the test; once it returns true, the test ends and the host is judged. Empty: never.

@@ -22,17 +22,17 @@ struct DecodeChoices {
   /// Channels of the wires, as "D0" or "clock=D0"; one entry may hold several, separated by commas.
   std::vector<std::string> channels{};
   unsigned raw_channels = 0;  ///< Number of channels in a file of raw samples; 0: the file is of another kind.
-  std::uint64_t samples_per_second = 0;  ///< Number of samples per second; 0: the rate that the file states.
+  std::uint64_t samples_per_second = 0;  ///< Samples per second of a file that states no rate; 0: not given.
   double baud = 0;                       ///< Baud rate of the line, in bits per second; 0: the unit's, or detected.
   /// Parity of the line; without a value the parity of the unit, or the parity detected in the capture.
   std::optional<Parity> parity{};
-  std::string model{};                 ///< Name of a model of the unit; empty: the default model.
+  std::string model{};                 ///< Name of a model; empty: the first that fits `options`.
   std::vector<std::string> options{};  ///< Options of the unit, as "name=value".
 };
 
-/// An input range of rows, ordered by the end of their frames; an unanswered request may follow later rows. Rows are
-/// produced while the file is read, so its size is unlimited. Other threads decode the file up to about 2500 rows ahead
-/// of the caller.
+/// An input range of rows, mostly in the order of the end of their frames: a request without a reply may follow later
+/// rows. Rows are produced while the file is read, so its size is unlimited. Other threads decode the file up to about
+/// 2500 rows ahead of the caller.
 ///
 /// Columns: `time_s` (`tick` in a capture without times), `end_s` (`end_tick`), `kind` ("exchange", "request", "reply",
 /// "noise"), `request` and `reply` (bytes; text for CAN and clocked links, as "1FF:022B" and "0001"), `turnaround_us`,

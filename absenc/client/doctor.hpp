@@ -15,7 +15,7 @@
 
 namespace absenc::client {
 
-/// Kinds of findings, in the order of the diagnosis.
+/// Kinds of findings, in the order in which an examination lists them.
 enum class FindingKind : std::uint8_t {
   // Faults of the port
   port_missing,
@@ -32,7 +32,7 @@ enum class FindingKind : std::uint8_t {
   can_bus_off,
   can_not_acknowledged,
   can_errors,
-  // Faults of the line
+  // Faults of the line and of what is connected to it
   never_silent,
   line_inverted,
   wrong_baud,
@@ -46,7 +46,7 @@ enum class FindingKind : std::uint8_t {
   modem_answers,
   no_answer,
   baud_pattern,
-  // Faults of frames: first what an adapter or its driver does to bytes, then what the line does
+  // Faults of frames, beginning with what an adapter or its driver does to bytes
   byte_before,
   byte_after,
   flow_control,
@@ -133,7 +133,7 @@ struct Measured {
 /// Result of `examine`: its findings, and the measurements behind them.
 struct Examination {
   std::vector<Finding> findings{};  ///< Findings, in the order in which the user should mend them.
-  std::size_t tried = 0;            ///< Number of attempts to read, without those with other settings.
+  std::size_t tried = 0;            ///< Number of attempts to read with the given settings and an untouched shaft.
   std::size_t good = 0;             ///< Number of good readings.
   Reported reported{};              ///< How many readings report alarms and validity.
   Measured measured{};              ///< Times, rates and settings that were measured.

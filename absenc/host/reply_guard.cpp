@@ -10,14 +10,14 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Silence that is required before the same request is sent again, in timeouts.
+// Required silence in multiples of the longest timeout; see `required_silence`.
 constexpr int silent_timeouts = 4;
-// Longest lateness of a reply that is assumed to be usual: only lines that delay every reply are expected to exceed it.
+// Upper limit of a wait for late replies, unless 3/2 of the expected lateness is longer.
 constexpr Time longest_silence = 2500ms;
 // Least silence after which the replies that a stalled line delayed count as lost.
 constexpr Time stall_silence = 500ms;
 constexpr Time longest_lateness = 10s;  // a reply later than this counts as lost
-// Items that arrive for longer than this are noise: no reply lasts so long.
+// Items that arrive for this time or longer are noise; not on CAN.
 constexpr Time noise_limit = 100ms;
 constexpr Time tick{1};
 
@@ -53,8 +53,8 @@ Time ReplyGuard<Item>::longest_wait() const {
 
 // ---- Transitions between phases
 
-// Ends the exchange. The last request becomes outstanding if no reply to it was received. If older requests are
-// outstanding, an invalid reply does not count as one.
+// Ends the exchange. A last request whose reply may still arrive becomes outstanding if no reply to it was received;
+// while older requests are outstanding, an invalid reply does not count.
 template <class Item>
 void ReplyGuard<Item>::end_exchange() {
   const bool unmatched = phase_ == Phase::matching || phase_ == Phase::listening;
@@ -77,7 +77,7 @@ void ReplyGuard<Item>::enter_delaying(const Step<Item>& request, Time now) {
   received_.clear();
   outstanding_.remove_older(now - longest_lateness);
   pending_ = {.step = request, .deadline = std::max(now, request.at) + 4 * longest_wait()};
-  // During a pause of more than 1 ms that the request demands the guard waits for late replies. A shorter pause is left
+  // During a pause of more than 1 ms that the request demands the guard waits for late replies. Any other pause is left
   // to the port, which keeps it more exactly than a timer.
   delaying_ = {.until = request.at > now + 1ms ? request.at : now + tick, .received_at = now - request.gap};
   // If the list is full, all outstanding requests count as lost after this silence, and `send` removes them.
@@ -121,10 +121,9 @@ void ReplyGuard<Item>::enter_listening(const Entry& entry) {
   listening_ = {.until = until, .suspected = suspected};
 }
 
-// Returns how long to listen, from the end of the request: normally 5/4 of the lateness `suspected`. If the expected
-// lateness is at most half of that, the line may only have stalled. A line that delays every reply keeps the interval
-// of the requests, so after a silence of that interval the delayed replies are lost. On a CAN bus the time is not
-// shortened.
+// Returns how long to listen, from the end of the request: 5/4 of the lateness `suspected`, within limits. If the
+// expected lateness is at most half of `suspected`, the line may only have stalled: then, except on CAN, a shorter time
+// may be enough, because a line that delays every reply keeps the intervals of the requests.
 template <class Item>
 Time ReplyGuard<Item>::listening_time(Time suspected) const {
   const Time always_late = std::clamp(suspected * 5 / 4, required_silence(), longest_wait());
@@ -143,8 +142,7 @@ Step<Item> ReplyGuard<Item>::next(Time now) {
         return forward(now);
       case Phase::delaying:
         if (now < delaying_.until) return {.at = delaying_.until, .gap = pending_.step.gap};
-        // The request must not collide with items that still arrive. If the items never end, the conversation reports
-        // noise.
+        // The request must not collide with items that still arrive; after `noise_limit` it is sent nevertheless.
         if (delaying_.noise_end == never) delaying_.noise_end = now + noise_limit;
         if (!is_can && delaying_.received_at + pending_.step.gap > now && now < delaying_.noise_end) {
           delaying_.until = delaying_.received_at + pending_.step.gap;
@@ -157,7 +155,7 @@ Step<Item> ReplyGuard<Item>::next(Time now) {
           const std::size_t due = expected - std::min(expected, received_.size());
           return {.expect = due, .at = matching_.until, .answer = pending_.step.answer, .gap = pending_.step.gap};
         }
-        // The time limit has passed and items that are no reply still arrive; on CAN other nodes send them.
+        // The time limit has passed, mostly because items that are no reply still arrive; on CAN other nodes send them.
         received_.clear();
         matching_.damaged = !is_can;
         conclude_matching(true);
@@ -169,8 +167,9 @@ Step<Item> ReplyGuard<Item>::next(Time now) {
   }
 }
 
-// Returns the conversation's next step; if that is a request, enters delaying and returns the step of that phase. The
-// step is constructed in place, because steps are large and this runs for each event.
+// Returns the conversation's next step; if that is a request, enters delaying and returns the step of that phase. A
+// request or `done` ends the exchange. The step is constructed in place, because steps are large and this runs for each
+// event.
 template <class Item>
 Step<Item> ReplyGuard<Item>::forward(Time now) {
   Step<Item> step = next_of_conversation(now);
@@ -321,7 +320,7 @@ void ReplyGuard<Item>::keep_foreign(const Item& item) {
 }
 
 // Removes from the beginning of the stored items each reply of known length that answers an outstanding request and not
-// the present one; the items behind it may be the reply to the present request.
+// the present one, and counts it as late; the items behind it may be the reply to the present request.
 template <class Item>
 void ReplyGuard<Item>::strip_late(Time at) {
   for (std::size_t i = 0; i < outstanding_.size();) {
@@ -360,7 +359,7 @@ void ReplyGuard<Item>::conclude_matching(bool timed_out) {
 }
 
 // Ends matching because of noise: no reply can be matched on a line that is never silent. The conversation gets a line
-// error and none of the stored items, and ends by its own time limit.
+// error and none of the stored items.
 template <class Item>
 void ReplyGuard<Item>::conclude_noise() {
   received_.clear();
@@ -372,7 +371,8 @@ void ReplyGuard<Item>::conclude_noise() {
 
 // ---- Delaying and listening
 
-// Drops received items, and counts late replies to outstanding requests and second replies to the last request.
+// Keeps the last items, which the conversation does not get, to detect and count late replies to outstanding requests
+// and, except on CAN, second replies to the last request.
 template <class Item>
 void ReplyGuard<Item>::drop_items(Items items, Time at) {
   if (phase_ == Phase::delaying) delaying_.received_at = at;
@@ -411,8 +411,8 @@ bool ReplyGuard<Item>::ends_with_reply(Items request, std::size_t expect) const 
   return size != 0 && received_.size() >= size && outstanding_.is_reply(request, received_.view().last(size));
 }
 
-// Drops a late reply. `entry`: the outstanding request that the reply answers; null: it is a second reply to the last
-// request.
+// Drops and counts a late reply, and adapts the end of delaying or listening. `entry`: the outstanding request that the
+// reply answers; null: it is a second reply to the last request.
 template <class Item>
 void ReplyGuard<Item>::drop_late_reply(Entry* entry, Time at) {
   received_.clear();

@@ -69,7 +69,8 @@ class ReplyGuard final : public Machine<Item> {
 
   /// Returns the number of replies that arrived after their timeout and were dropped.
   [[nodiscard]] std::uint64_t late() const { return late_replies_; }
-  /// Returns the longest time between a request and its dropped late reply, at most 10 s; 0: no reply was dropped.
+  /// Returns the longest time, as estimated, between a request and its dropped late reply, at most 10 s; 0 if `late()`
+  /// is 0.
   [[nodiscard]] Time lateness() const { return greatest_lateness_; }
 
  private:
@@ -80,7 +81,7 @@ class ReplyGuard final : public Machine<Item> {
 
   enum class Phase : std::uint8_t { forwarding, delaying, matching, listening };
 
-  // Events that the conversation is fed before its next step, in this order.
+  // Events that the conversation is still to be fed, in this order.
   struct Report {
     bool sent = false;
     bool line_error = false;
@@ -89,22 +90,22 @@ class ReplyGuard final : public Machine<Item> {
     Time received_at{};
   };
   struct Forwarding {
-    bool answerable = false;  // the reply of the last request may still arrive
+    bool answerable = false;  // the last request belongs to the present exchange
     bool received = false;    // items were received that may belong to the reply to the last request
-    bool doubtful = false;    // the received items are no valid reply, and older requests are outstanding
+    bool doubtful = false;    // matching found no valid reply, so older requests are still outstanding
     Report report{};
   };
   struct Delaying {
-    Time until{};            // when the delayed request is sent
-    Time received_at{};      // when the last item was received, before the request
+    Time until{};            // earliest time at which the delayed request is sent
+    Time received_at{};      // when the last item was received while delaying; at first, `gap` before
     Time noise_end = never;  // when the request is sent even if items still arrive
   };
   struct Matching {
     // End of the time limit for the reply, which starts at the end of the request.
     Time until = never;
     Time first_at{};       // when the first of the stored items was received
-    Time received_at{};    // when the last of the stored items was received
-    bool damaged = false;  // a line error was received, or the time limit passed while items arrived
+    Time received_at{};    // when the last of the stored items was received; if none was stored, end of the request
+    bool damaged = false;  // a line error was received; not on CAN also: the time limit passed while items arrived
     // CAN: a frame that would be the reply if its identifier had 11 bits instead of 29; it explains a timeout.
     Buffer<Item, 1> foreign_frame{};
   };
@@ -121,7 +122,7 @@ class ReplyGuard final : public Machine<Item> {
     bool exists = false;
     Request items{};  // items of the last request; empty if it was a pulse
     std::size_t expect = 0;
-    Time sent_at{};  // end of the last transfer, even if that was no request
+    Time sent_at{};  // time of the last `sent` event, even if not of a request; until then, when `send` was called
   };
 
   [[nodiscard]] bool is_request(const Step<Item>& step) const;

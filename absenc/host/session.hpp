@@ -85,27 +85,28 @@ class Session {
     streaming_ = false;  // `run` always begins anew; only `next` and `read` continue a stream
     return conversation;
   }
-  /// Runs `command` to its end and ignores all results but the last. Returns the conversation, or null if the unit
-  /// cannot run the command or `storage` is too small.
+  /// Runs `command` as above and ignores all results but the last. Returns the conversation, or null if the unit cannot
+  /// run the command or `storage` is too small.
   const Conversation<Item>* run(const Command& command, Arguments arguments = {}) {
     return run(command, arguments, [](const Conversation<Item>&) { return true; });
   }
 
-  /// Runs `command` as `run` does, but a conversation that streams continues where it stopped, if the last call was
-  /// `next` or `read` with the same `command` and `doubt` was not called since.
+  /// Runs `command` as `run` does, but a conversation that streams and has not ended continues where it stopped, if the
+  /// last call was `next` or `read` with the same `command` and `doubt` was not called since.
   const Conversation<Item>* next(const Command& command, Arguments arguments = {}) {
     if (command_ != &command) streaming_ = false;
     return attempt(command, arguments, [](const Conversation<Item>&) { return true; });
   }
 
-  /// Reads the position. The position is confirmed if it is as near to the one before as the speed limit allows.
+  /// Reads the position. The position is confirmed if it is near enough to the one before (FirstReading::is_near).
   /// Without a position before (as after opening or after silence), if it is too far away, or if the time between was
-  /// too long to judge, it is read again until two consecutive positions agree; if none of ten further ones agrees, the
-  /// last one is returned and `confirmed` is false. If those two are near the position before, the first one was
-  /// damaged and counts as an error, cross_check_failed, because no checksum detects all damage; if not, the position
-  /// jumped. A position that the encoder reports as invalid is not read again once a position was confirmed. A
-  /// conversation that streams continues where it stopped, because finding its frames again costs two of them; `take`
-  /// decides whether frames that were received meanwhile are used. `on_reading` is called with each reading.
+  /// too long to judge, it is read again until two consecutive positions agree or an error occurs; if none of ten
+  /// further ones agrees, the last one is returned and `confirmed` is false. If those two are near the position before,
+  /// the first one was damaged and counts as an error, cross_check_failed, because no checksum detects all damage; if
+  /// not, the position jumped. A position that the encoder reports as invalid is not read again if a position was
+  /// confirmed since the last timeout or `doubt`. A conversation that streams continues where it stopped, because
+  /// finding its frames again costs two of them; `take` decides whether frames that were received meanwhile are used.
+  /// `on_reading` is called with each reading.
   template <class OnReading>
   const Conversation<Item>* read(const Command& command, Take take, OnReading&& on_reading) {
     if (streaming_ && take == Take::newest && !current_->asks()) catch_up(machine(), *port_);
@@ -155,8 +156,7 @@ class Session {
   void share(ReplyGuard<Item>& guard) { guard_ = &guard; }
   /// Sets the filter that is used from the next command on; null: none. The filter must outlive the session.
   void set_filter(Filter<Item>* filter) { filter_ = filter; }
-  /// Returns the longest time between a request and its late reply on this line, as of the end of the last command; 0:
-  /// no reply was late.
+  /// Returns ReplyGuard::lateness as of the end of the last command.
   [[nodiscard]] Time lateness() const { return lateness_; }
 
   /// Sets the options from the next command on.
@@ -204,16 +204,16 @@ class Session {
   [[nodiscard]] Reach reach() const { return Reach::of(limit_, unit_->resolution(options_)); }
   [[nodiscard]] Times times() const { return sends_unsolicited(*unit_, options_) ? Times::arrived : Times::latched; }
 
-  // Returns whether the speed limit excludes that the shaft moved from the last position to that of `reading`; false if
-  // there is no last position, or the time between is too long to judge.
+  // Returns whether the position of `reading` is not near the last one (FirstReading::is_near); false if there is no
+  // last position, or the time between is too long to judge.
   [[nodiscard]] bool contradicts(const Reading& reading) const {
     const Time between = apart_.since_last(reading.latched);
     return first_.has_last() && first_.can_judge(reading, between) && !first_.is_near(reading, between);
   }
 
-  // Returns whether the last position confirms that of `reading`; `follows`: it was read directly after the last one.
-  // After a pause that is too long to judge, only a directly following reading confirms. If even that one takes too
-  // long to judge, the speed limit alone decides.
+  // Returns whether the last position confirms that of `reading`, and stores `reading` as the last one. `follows`: it
+  // was read directly after the last one. After a pause that is too long to judge, only a directly following reading
+  // confirms. If even that one takes too long to judge, the speed limit alone decides.
   bool confirms(const Reading& reading, bool follows) {
     const Time between = apart_.since_last(reading.latched);
     bool near = first_.is_near(reading, between);
@@ -231,8 +231,8 @@ class Session {
     if (statistics_ != nullptr) statistics_->add(damaged);
   }
 
-  // Repeats whole commands. In a procedure that is not repeatable (a reset, a write) the engine repeats the single
-  // requests that only read.
+  // Repeats whole commands. In a command that is not repeatable (a reset, a write) the engine repeats single requests,
+  // as far as the protocol permits.
   template <class OnEmit>
   const Conversation<Item>* attempt(const Command& command, Arguments arguments, OnEmit&& on_emit) {
     const unsigned attempts = command.repeatable ? attempts_ : 1;
@@ -305,7 +305,7 @@ class Session {
   template <class OnEmit>
   bool drive_one(const Command& command, Conversation<Item>& conversation, OnEmit&& on_emit, bool again) {
     if (!again) guarded_ = guarded(command);
-    // The guard is attached again if it has served another encoder on the line meanwhile.
+    // A stream that continues attaches the guard only if it has served another encoder on the line meanwhile.
     if (guarded_ && !(again && guard_->serves(conversation))) {
       guard_->attach(conversation, *unit_, options_, !command.changes_encoder);
     }
@@ -331,7 +331,7 @@ class Session {
   const Command* command_ = nullptr;       // command that `current_` executes
   ReplyGuard<Item> own_guard_;
   ReplyGuard<Item>* guard_ = &own_guard_;
-  bool guarded_ = false;  // whether the guard serves the present conversation
+  bool guarded_ = false;  // whether the present conversation is guarded
   Filter<Item>* filter_ = nullptr;
   Time lateness_{};
   EchoFilter echo_;

@@ -43,7 +43,7 @@ struct Bench {
     session = std::make_unique<Session<std::uint8_t>>(unit, options, *port, host_storage, mode, attempts);
   }
   const Conversation<std::uint8_t>& read() { return *session->read(*find_command(unit, Verb::read)); }
-  /// Reads once and returns the number of answers that the reading took.
+  /// Reads once, expects no error, and returns the number of answers that the reading took.
   std::uint64_t answers_of_a_reading() {
     const std::uint64_t before = device->answer_count();
     EXPECT_EQ(read().error(), Error::none);

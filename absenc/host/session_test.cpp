@@ -310,8 +310,8 @@ TEST(SessionGuard, ConfirmsNothingWithoutAgreement) {
   EXPECT_EQ(device->answer_count(), 3u * 11);
 }
 
-// An encoder that was read once needs no second reading for a position that it reports as invalid. That position is
-// not confirmed.
+// An encoder whose position was confirmed needs no second reading for a position that it reports as invalid. That
+// position is not confirmed.
 TEST(SessionGuard, ReturnsInvalidPositionOfKnownEncoderAtOnce) {
   Bench bench(EchoMode::off);
   bench.read();

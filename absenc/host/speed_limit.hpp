@@ -19,7 +19,7 @@ struct SpeedLimit {
   std::uint32_t mm_s = 20'000;
 };
 
-/// Multiple of the speed limit up to which a movement is too fast, but no jump.
+/// Multiple of the speed limit up to which a movement is too fast, but no jump; its users add margins.
 inline constexpr unsigned most_excess = 4;
 
 /// Returns the speed limit of the model in `options`, or else the default limit.
@@ -62,7 +62,7 @@ class Reach {
     return {turns_a_ns_of_1_rpm * (rpm < fastest ? rpm : fastest), 47, true};
   }
   /// Returns the reach of a carriage of at most `mm_s` mm/s whose encoder counts `unit_um` micrometres. Uses floating
-  /// point, once.
+  /// point.
   [[nodiscard]] static constexpr Reach of_carriage(std::uint32_t mm_s, double unit_um) {
     double factor = mm_s / unit_um / 1e6;  // speed limit in counts per nanosecond
     std::int8_t shift = 0;

@@ -15,8 +15,8 @@
 
 namespace absenc::host {
 
-/// A distribution of reply latencies in a fixed 4 kB; latencies above 68 s count as 68 s in it. A percentile below that
-/// is at most 1/32 too long, never too short.
+/// A distribution of reply latencies in a fixed 4 kB; latencies above 68.7 s count as 68.7 s in it. A percentile
+/// below that is at most 1/32 too long, never too short.
 class Latencies {
  public:
   /// Adds the latency of a reply.
@@ -32,7 +32,7 @@ class Latencies {
   [[nodiscard]] constexpr std::uint64_t count() const { return count_; }
   /// Returns the longest latency.
   [[nodiscard]] constexpr Time longest() const { return longest_; }
-  /// Returns the sum of all latencies, each limited to 0 to 68 s.
+  /// Returns the sum of all latencies, each limited to 0 to 68.7 s.
   [[nodiscard]] constexpr Time sum() const { return sum_; }
 
   /// Returns, for each of the ascending limits (all below 68 s), how many latencies surely do not exceed it. Latencies
@@ -140,9 +140,10 @@ struct BadExchange {
 template <class Item>
 class Statistics {
  public:
-  static constexpr std::size_t most_stored = 8;  ///< Number of failed exchanges that are stored, the last ones.
+  /// Greatest number of stored failed exchanges; only the last ones are stored.
+  static constexpr std::size_t most_stored = 8;
 
-  /// Adds a conversation that ended: its latency, or after an error its exchange.
+  /// Adds the result of a conversation: its latency, or after an error its exchange.
   void add(const Conversation<Item>& conversation) {
     const Exchange<Item> exchange = conversation.exchange();
     if (conversation.error() == Error::none) {

@@ -13,8 +13,8 @@ namespace absenc::host {
 
 /// A continuous position: adds the shorter of the two distances from each reading to the next. That is right while the
 /// position changes by less than half of the counted range: half a revolution for a single-turn encoder. The counted
-/// range follows from the readings, not from the options. If the position can have changed by more at the speed limit,
-/// it starts again with the encoder's own turns and counts.
+/// range follows from the readings, not from the options. If the time between two readings is too long for that at the
+/// speed limit (`longest_gap`), it starts again with the encoder's own turns and counts.
 class Unwrapper {
  public:
   /// How a reading joins the positions before it.
@@ -47,8 +47,8 @@ class Unwrapper {
   }
 
   /// Returns whether the position of `reading` is farther from the last added one than `most_excess` times the speed
-  /// limit allows: a speed a little over the limit is no jump. A jump is damage that the checksum does not detect, or a
-  /// moved zero. False if nothing can be compared or the time between is too long to judge.
+  /// limit allows in the time between plus 1 ms, plus 4 counts. A jump is damage that the checksum does not detect, or
+  /// a moved zero. False if nothing can be compared or the time between is too long to judge.
   [[nodiscard]] constexpr bool jumps(const Reading& reading) const {
     if (!started_ || !has_position(reading) || !is_near(reading)) return false;
     constexpr Time vague{1'000'000};  // uncertainty of the latch time: 1 ms
@@ -59,8 +59,8 @@ class Unwrapper {
            most_excess * counts_per_second(resolution_of(reading), limit_) * seconds + noise;
   }
 
-  /// Returns the continuous position in counts of the single-turn resolution. It starts with the encoder's own turns
-  /// and counts.
+  /// Returns the continuous position in counts of the single-turn resolution. It starts with the encoder's own counts,
+  /// and turns if they are valid.
   [[nodiscard]] constexpr std::int64_t position() const { return static_cast<std::int64_t>(position_); }
 
   /// Returns whether the continuous position started with turns that the encoder counts. If not, it started within an
@@ -86,7 +86,8 @@ class Unwrapper {
     return turn_bits(reading) != 0 && turn_bits(last_) != 0;
   }
 
-  // Returns the resolution of `reading`, without its turns if they or those of the last reading are invalid.
+  // Returns the resolution of `reading`, without its turns unless both it and the last reading have turns
+  // (`turn_bits`).
   [[nodiscard]] constexpr Resolution resolution_of(const Reading& reading) const {
     return {reading.singleturn_bits, have_turns(reading) ? reading.multiturn_bits : 0, reading.unit_um};
   }

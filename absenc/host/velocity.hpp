@@ -26,8 +26,8 @@ class Velocity {
   static constexpr std::size_t most_positions = 48;  ///< Greatest number of positions that are stored.
   static constexpr int longest_windows = 20;         ///< Longest window, as a multiple of the shortest one.
 
-  /// `window` is the shortest time over which the speed is measured. If readings are farther apart, it is the time
-  /// between two readings. Until readings span `window`, a shorter time is used if the shaft has moved far enough.
+  /// `window`: roughly the shortest time over which the speed is measured. If readings are farther apart, it is the
+  /// time between two readings. Until readings span `window`, a shorter time is used if the shaft has moved far enough.
   explicit constexpr Velocity(Time window = std::chrono::milliseconds(50)) : window_(window) {}
 
   /// Adds a position of `Unwrapper`. A position that was not latched after the one before is ignored, and no speed is
@@ -72,7 +72,7 @@ class Velocity {
     LatchTime at;
   };
   static constexpr std::size_t none = ~std::size_t{0};
-  // Before the longest window: least distance in counts, and least ratio of the window to its uncertainty.
+  // Before the longest window: least distance in counts, if not 0, and least ratio of the window to its uncertainty.
   static constexpr int enough = 20;
   static constexpr int least = 4;  // least ratio of the longest window to its uncertainty
 
@@ -145,7 +145,7 @@ class Velocity {
   }
 
   Time window_;
-  std::array<Sample, most_positions> positions_{};  // last positions with their latch times, the oldest first
+  std::array<Sample, most_positions> positions_{};  // stored positions with their latch times, the oldest first
   std::size_t size_ = 0;
   std::size_t start_ = none;  // index of the position that begins the selected window
 };

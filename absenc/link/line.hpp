@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Settings of a line, and the extra wires beside the data: common to every kind of link.
+// Settings of a line of any kind, and the extra wires beside the data.
 #pragma once
 
 #include <cstdint>
@@ -35,7 +35,7 @@ struct LineSettings {
   Parity parity = Parity::none;  ///< Parity of each character.
   std::uint8_t stop_bits = 1;    ///< Number of stop bits, 1 or 2.
   /// Data bits of each character, 5 to 16, the lowest first. A character of more than 8 bits carries two bytes, the low
-  /// one first; the high one has zeros above the data. Serial ports refuse them; pseudo-terminals do not.
+  /// one first; the high one has zeros above the data. Serial ports refuse more than 8 bits; pseudo-terminals do not.
   std::uint8_t data_bits = 8;
   std::uint8_t spi_mode = 0;     ///< spi, clocked: 2 * CPOL + CPHA
   std::uint8_t idle_clocks = 0;  ///< clocked: number of clocks before the first bit, during which the line stays idle

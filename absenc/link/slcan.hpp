@@ -117,7 +117,7 @@ class LineReader {
     nothing,
     line,     ///< `line()` is complete and valid until the next byte; may be empty
     refused,  ///< the adapter refused a command (BEL)
-    garbage,  ///< bytes that cannot be a line were discarded
+    garbage,  ///< bytes that are no complete line were discarded
   };
 
   /// Adds a received byte and returns the event that it completes.

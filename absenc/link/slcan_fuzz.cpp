@@ -41,7 +41,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     require(reader.line().size() <= slcan::line_capacity);
     check(reader.line());
   }
-  // The reader must find a valid frame that follows arbitrary bytes.
   const CanFrame frame{.id = 0x120, .size = 1, .data = {0x47}};
   slcan::LineReader::LineEvent found{};
   const slcan::LineText text = slcan::encode(frame);

@@ -17,10 +17,10 @@ namespace absenc {
 /// The next action that a machine requests. Times are protocol time: the port adds its own latency to `answer` and
 /// `gap`. Item is std::uint8_t (characters, SPI bytes, clocked bits packed MSB first) or CanFrame.
 ///
-/// A transfer is returned once; after it the machine returns `wait`. `expect`, `answer` and `gap` are set in both
-/// steps: in the transfer because a microcontroller must prepare its receiver before the last bit is out, in the wait
-/// because they change while items arrive. A machine that may be fed another event at the exact time of its timer
-/// must compare the timer's time with `now` in `next` itself.
+/// A transfer is returned once; while its reply is awaited, the machine returns `wait`. `expect`, `answer` and `gap`
+/// are set in both steps: in the transfer because a microcontroller must prepare its receiver before the last bit is
+/// out, in the wait because they change while items arrive. A machine that may be fed another event at the exact time
+/// of its timer must compare the timer's time with `now` in `next` itself.
 template <class Item>
 struct Step {
   /// Actions that a machine requests from its port.

@@ -77,8 +77,7 @@ void limit(__rlimit_resource what, rlim_t most) {
   ::setrlimit(what, &both);
 }
 
-// Returns the memory that the kernel counts for RLIMIT_DATA (private, writable pages): the sixth number of statm
-// (proc(5)).
+// Returns the size of data and stack in bytes (sixth number of statm, proc(5)); RLIMIT_DATA does not count the stack.
 std::size_t data_bytes() {
   std::ifstream file("/proc/self/statm");
   std::size_t pages = 0;

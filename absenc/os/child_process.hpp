@@ -53,8 +53,9 @@ class ChildProcess {
   pid_t number_ = -1;
 };
 
-/// Returns the child's end of the channel; the child must call this first. From then on the process ends with its
-/// parent, appears as `name` in process lists, writes no core file and can allocate at most `bytes` more memory.
+/// Returns the child's end of the channel; the child must call this first. From then on the process ends with the
+/// thread that created it, appears as `name` in process lists, writes no core file and can allocate about `bytes` more
+/// memory at most.
 [[nodiscard]] Channel become_child(const char* name, std::size_t bytes);
 
 }  // namespace absenc::os

@@ -143,8 +143,8 @@ void EmulatorPort::make_link() {
 }
 
 std::size_t EmulatorPort::read_some(MutableBytes into, std::span<const int> ready) {
-  // A program's open or close of the slave is handled first: bytes that arrive from now on must not be discarded as
-  // leftovers.
+  // A program's open or close of the slave is handled first, so that the reply to a request that is read below is not
+  // discarded as a leftover.
   if (std::find(ready.begin(), ready.end(), watch_.get()) != ready.end()) users_changed();
   std::size_t filled = 0;
   for (const int descriptor : ready) {

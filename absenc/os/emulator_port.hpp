@@ -23,9 +23,10 @@ namespace absenc::os {
 /// line (sim::Bus) are not affected by rates.
 class EmulatorPort final : public StreamPort {
  public:
-  /// `link` is the path of a symbolic link to the pseudo-terminal, removed by the destructor; empty for none. It
-  /// replaces only a link to a pseudo-terminal that no other EmulatorPort uses. `tcp_port` is the port to listen on at
-  /// 127.0.0.1; 0 for any free one, empty for none. Throws Failure: `in_use` (the link or the TCP port), `system`.
+  /// `link` is the path of a symbolic link to the pseudo-terminal, removed by the destructor if it still leads there;
+  /// empty for none. It replaces only a link to a pseudo-terminal that no other EmulatorPort uses. `tcp_port` is the
+  /// port to listen on at 127.0.0.1; 0 for any free one, empty for none. Throws Failure: `in_use` (the link or the TCP
+  /// port), `system`.
   explicit EmulatorPort(std::string link = {}, std::optional<std::uint16_t> tcp_port = {});
   ~EmulatorPort() override;
 

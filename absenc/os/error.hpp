@@ -11,17 +11,17 @@
 namespace absenc::os {
 
 /// A failure of a port, a file or another object of the operating system. `what()` reports to the user what happened
-/// and what to try.
+/// and mostly what to try.
 class Failure : public std::runtime_error {
  public:
   /// Kind of a failure.
   enum class Kind : std::uint8_t {
     not_found,      ///< the port, host, listener, file, folder or GPIO line does not exist or cannot be reached
-    no_permission,  ///< the port or file exists, but this user may not open it
+    no_permission,  ///< this user may not open or create the port or file
     in_use,         ///< another program uses the port or file, or a new file would replace another
     unsupported,    ///< the port, file or kernel is of a kind that cannot do what was requested
     bad_rate,       ///< this port does not support the requested baud rate
-    lost,           ///< the port or file existed and has disappeared
+    lost,           ///< the port, connection or file has disappeared, or the file was cut
     system,         ///< any other error of the operating system
   };
 
@@ -42,8 +42,8 @@ class Failure : public std::runtime_error {
   [[nodiscard]] Kind kind() const { return kind_; }
   /// Returns the state of the CAN bus that caused the failure; `unknown` if no such state did.
   [[nodiscard]] Bus bus() const { return bus_; }
-  /// Returns the kind of program that holds the port; `unknown` if the failure is not `in_use` or the program was not
-  /// found.
+  /// Returns the kind of program that holds the port; `unknown` if the failure is not `in_use` or the program is not
+  /// known.
   [[nodiscard]] Holder holder() const { return holder_; }
 
  private:

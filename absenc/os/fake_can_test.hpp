@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Test replacement for the kernel behind a CAN port: one interface, can0, whose other end the test holds.
+// Test replacement for the kernel behind a CAN port: one interface, whose other end the test holds.
 #pragma once
 
 #include <linux/can.h>

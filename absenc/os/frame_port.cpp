@@ -11,7 +11,7 @@ namespace absenc::os {
 using namespace std::chrono_literals;
 
 namespace {
-// Greatest number of events that wait to be reported; older ones are dropped.
+// If as many events wait to be reported, the next received one displaces the oldest.
 constexpr std::size_t most_pending = 4096;
 }  // namespace
 

@@ -17,7 +17,7 @@ class InputLines {
   /// returned in parts of 4096 bytes; the last part may be empty. At the end of the input an incomplete last line is
   /// returned.
   [[nodiscard]] std::vector<std::string> take();
-  /// Returns whether the input has ended.
+  /// Returns whether the input has ended, or reading it failed.
   [[nodiscard]] bool ended() const { return ended_; }
 
  private:

@@ -11,10 +11,12 @@
 
 namespace absenc::os {
 
-/// A new file that this process writes. Every write checks that the file still has its name.
+/// A new file that this process writes. LineFile and BlockFile check at each write that the file still has its name,
+/// once it has one.
 class OutputFile {
  public:
-  /// Waits until the content is on the disk. Throws Failure, also as `require_there` does.
+  /// Waits until the content is on the disk, where the file system can do that. Throws Failure, also as `require_there`
+  /// does.
   void sync();
   /// Throws Failure `lost` if the path does not lead to this file any more or the file was truncated: nobody would find
   /// further data. Throws Failure `system` if that cannot be checked. Checks nothing before the file has its name.
@@ -33,8 +35,8 @@ class OutputFile {
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  /// Writes `bytes` at offset `at`. Written bytes survive the end of this process, and a power failure only after
-  /// `sync`. Returns 0 or a value of errno.
+  /// Writes `bytes` at offset `at`. Bytes of a file with a name survive the end of this process, but a power failure
+  /// only after `sync`. Returns 0 or a value of errno; then a part of `bytes` may have been written.
   [[nodiscard]] int put(std::uint64_t at, std::string_view bytes);
 
   std::string path_;
@@ -48,8 +50,8 @@ class OutputFile {
 class LineFile final : public OutputFile {
  public:
   explicit LineFile(const std::string& path) : OutputFile(path, Appears::at_once) {}
-  /// Writes `lines` to the system at once, which takes a few us. If the disk has no room for all of them, none remains
-  /// in the file. Throws Failure, also as `require_there` does.
+  /// Writes `lines` to the system at once. If the disk has no room for all of them, none remains in the file. Throws
+  /// Failure, also as `require_there` does.
   void append(std::string_view lines);
 };
 

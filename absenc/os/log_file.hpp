@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A folder owned by one process, with files that are only appended to.
+// A folder owned by one process, and a file to which bytes are appended.
 #pragma once
 
 #include <cstddef>
@@ -42,7 +42,7 @@ class LogFile {
   [[nodiscard]] bool shrink_to(std::string_view bytes);
   /// Returns up to `size` bytes of the file from `offset`; fewer at its end. Throws Failure.
   [[nodiscard]] std::string read(std::size_t offset, std::size_t size) const;
-  /// Waits until the content of the file is on the disk.
+  /// Waits until the content of the file is on the disk. Errors are ignored.
   void sync() const;
   [[nodiscard]] std::size_t size() const { return size_; }
   /// Returns whether the file still has a name.

@@ -18,8 +18,8 @@ class Datagrams {
   /// Resolves `host`, a name or an address, once. Throws Failure: `not_found`, `system`.
   Datagrams(const std::string& host, std::uint16_t port);
 
-  /// Sends `text` as one datagram. Returns false if the datagram is lost, because the send buffer is full or the other
-  /// side is unreachable.
+  /// Sends `text` as one datagram. Returns false if the system did not take it, for example because the send buffer is
+  /// full.
   [[nodiscard]] bool send(std::string_view text);
 
  private:

@@ -31,13 +31,14 @@ struct PortFacts {
   bool pseudo_terminal = false;  // whether the port is a pseudo-terminal, which has no line and so no rate
 };
 
-/// Returns the properties of the port at `path`. The port should not be open in any program, or its driver does not
-/// report all of them. `sys` is a parameter for tests.
+/// Returns the properties of the port at `path`. The port is opened to read its direction and counts; they stay unknown
+/// if that fails, for example because a program has locked it. `sys` is a parameter for tests.
 [[nodiscard]] PortFacts port_facts(const std::string& path, const std::filesystem::path& sys = "/sys/class/tty");
 
-/// Returns whether `driver` is a driver of mobile modems, whose ports lead to no serial line.
+/// Returns whether `driver` is known as a driver of mobile modems, whose ports lead to no serial line.
 [[nodiscard]] bool is_modem_driver(const std::string& driver);
-/// Returns whether `driver` is a driver of built-in UARTs, which have no transceiver that switches direction by itself.
+/// Returns whether `driver` is known as a driver of built-in UARTs, which have no transceiver that switches direction
+/// by itself.
 [[nodiscard]] bool is_bare_uart(const std::string& driver);
 
 }  // namespace absenc::os

@@ -74,7 +74,7 @@ class NewFile {
 /// disappears when it is closed. Throws Failure.
 [[nodiscard]] Descriptor nameless_file(const std::string& folder);
 
-/// Replaces the file at `path` by a new one with `content`, so that `path` always leads to a complete file. Throws
+/// Replaces the file at `path` by a new one with `content`, so that `path` never leads to an incomplete file. Throws
 /// Failure.
 void replace_file(const std::string& path, std::string_view content, Durable durable);
 

@@ -103,8 +103,8 @@ SerialPort::~SerialPort() {
   if (!pseudo_) ::ioctl(descriptor(), TIOCNXCL);
 }
 
-// Locks the port twice: flock keeps out every program that uses flock, also those of root; TIOCEXCL keeps out all
-// programs except those of root.
+// Locks the port twice, a pseudo-terminal only with flock: flock keeps out every program that uses flock, also those of
+// root; TIOCEXCL keeps out all programs except those of root.
 void SerialPort::lock() const {
   if (::flock(descriptor(), LOCK_EX | LOCK_NB) < 0) throw open_failure(path_, errno);
   // TIOCEXCL lasts until the last descriptor is closed. A virtual encoder keeps its side of the slave open, so the flag

@@ -46,7 +46,7 @@ class SerialPort final : public DescriptorPort {
 
   /// Returns hints about settings of this port that could be better, one sentence each, with the remedy.
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
-  /// Returns whether the kernel switches the transceiver's direction.
+  /// Returns whether this port has made the kernel switch the transceiver's direction.
   [[nodiscard]] bool kernel_direction() const { return kernel_direction_; }
 
  private:

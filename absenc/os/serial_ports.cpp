@@ -47,7 +47,8 @@ std::string program(const std::string& process) {
   return (name.empty() ? "a program" : name) + " (process " + process + ")";
 }
 
-// Returns the process that holds a flock on the file, from a line like "1: FLOCK  ADVISORY  WRITE 4711 00:1a:7 0 EOF".
+// Returns the text (`program`) of the process that holds a flock on the file, or "". A line of /proc/locks is like "1:
+// FLOCK  ADVISORY  WRITE 4711 00:1a:7 0 EOF".
 std::string lock_holder(const struct stat& file) {
   std::ifstream locks("/proc/locks");
   std::string number, kind, mode, access, process, inode, rest;
@@ -63,7 +64,8 @@ std::string lock_holder(const struct stat& file) {
   return {};
 }
 
-// Returns another process that has the file open; "" if none is found. Only root can inspect processes of other users.
+// Returns the text (`program`) of another process that has the file open; "" if none is found. Only root can inspect
+// processes of other users.
 std::string opener(const fs::path& file) {
   std::error_code ignored;
   for (const auto& process : fs::directory_iterator("/proc", ignored)) {

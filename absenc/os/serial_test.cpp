@@ -133,7 +133,6 @@ TEST(SerialPort, IsForOneProgramAtATime) {
     const Failure failure = failure_of([&] { const SerialPort second(terminal.path, {.rate = 9600}); });
     EXPECT_EQ(failure.kind(), Kind::in_use);
     EXPECT_TRUE(contains(failure, "(process " + std::to_string(::getpid()) + ")")) << failure.what();
-    // The rate of the first user is not changed.
     EXPECT_EQ(rate_of(*terminal_state(terminal.master.get())), fast.rate);
   }
   int exclusive = 1;

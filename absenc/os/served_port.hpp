@@ -8,8 +8,8 @@
 namespace absenc::os {
 
 /// The files of one server: one file per port in $RUNTIME_DIRECTORY, which systemd gives to a service, or else in
-/// $XDG_RUNTIME_DIR/absenc. `set` writes them, the destructor removes them. Without these folders, or if they cannot be
-/// written, there are no files: a program that opens the port then finds only the process that holds it.
+/// $XDG_RUNTIME_DIR/absenc. `set` writes them, the destructor removes them. Without these variables, or if the files
+/// cannot be written, there are none: a program that opens the port then finds only the process that holds it.
 class ServedPorts {
  public:
   /// `url` is the address of the server's page, for example "http://127.0.0.1:8420/".

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The signal handler makes an eventfd readable, which `wait_for` and Poller watch. Unlike blocking the signals outside
-// ppoll, this also interrupts prompts and computations, wakes all threads, and works on a line that is never quiet.
+// ppoll, this also ends prompts, and waits on a line that is never quiet.
 #include "absenc/os/signals.hpp"
 
 #include <sys/eventfd.h>

@@ -33,7 +33,7 @@ void SlcanLine::collect(Time deadline) {
   received_any_ = false;
   deadline = reach(bytes_->now()) ? Time{} : std::min(deadline, due());
   // If the deadline is past, all available bytes are read, in at most `most_reads` reads; otherwise the reads end after
-  // the first one that completes a line.
+  // the first one that completes a line, a refusal or garbage.
   const bool everything = deadline <= bytes_->now();
   for (unsigned reads = 0; reads < most_reads && (everything || !received_any_); ++reads) {
     const Time now = bytes_->now();
@@ -102,8 +102,8 @@ void SlcanPort::apply(const LineSettings& settings) {
   }
 }
 
-// Waits until late replies of the adapter have been received. Replies carry no number, so replies to earlier commands
-// must not arrive after the next command.
+// Waits until no more late replies of the adapter arrive. Replies carry no number, so replies to earlier commands must
+// not arrive after the next command.
 void SlcanPort::settle() {
   constexpr unsigned most_replies = 64;
   bool any = true;
@@ -232,7 +232,7 @@ bool SlcanAdapter::execute(Bytes line) {
       if (!open_) return false;
       send_reply("F00\r");
       return true;
-    case 's':  // bit timing registers, acceptance code and mask: accepted, without effect
+    case 's':  // bit timing registers, acceptance code and mask: accepted while closed, without effect
     case 'M':
     case 'm':
       if (open_) return false;

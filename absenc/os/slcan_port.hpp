@@ -20,7 +20,7 @@ class SlcanLine : public FramePort {
 
   void write(Bytes text);
   void collect(Time deadline) final;
-  /// Calls `collect` and returns whether a line was received before `deadline`.
+  /// Calls `collect` and returns whether it received a line, a refusal or garbage.
   bool receives_until(Time deadline);
   /// Returns the time of the next event that does not depend on received bytes; `never` if none is due.
   [[nodiscard]] virtual Time due() const { return never; }

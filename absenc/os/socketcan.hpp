@@ -14,8 +14,8 @@ struct can_frame;
 
 namespace absenc::os {
 
-/// The system calls of SocketCan; tests override them where the kernel has no CAN. Each returns a negative number and
-/// sets errno on failure, like the call that it is named after.
+/// The system calls of SocketCan; tests override them, because the kernel may have no CAN. Each returns a negative
+/// number and sets errno on failure, like the call that it is named after.
 struct CanKernel {
   virtual ~CanKernel() = default;
   /// Calls socket(PF_CAN, SOCK_RAW, CAN_RAW), non-blocking.
@@ -26,7 +26,8 @@ struct CanKernel {
   /// Binds the socket to the interface with this index.
   virtual int bind(int descriptor, int index);
   virtual ssize_t write(int descriptor, const can_frame& frame);
-  /// Reads a frame. `at` is the time at which the kernel received it, on the clock of os::now.
+  /// Reads a frame. `at` is the time at which the kernel received it, on the clock of os::now; without a kernel time
+  /// stamp the time of the read.
   virtual ssize_t read(int descriptor, can_frame& frame, Time& at);
 };
 [[nodiscard]] CanKernel& system_can_kernel();
@@ -49,7 +50,7 @@ class SocketCan final : public FramePort {
   void set_options();
   void take(const can_frame& frame, Time at);
   void take_error(const can_frame& frame, Time at);
-  // Returns whether the interface is virtual: then it has no bit rate and every rate is accepted.
+  // Returns whether the name is that of a virtual interface: then it has no bit rate and every rate is accepted.
   [[nodiscard]] bool is_virtual() const { return interface_.starts_with("vcan") || interface_.starts_with("vxcan"); }
   [[nodiscard]] std::string up_command(std::uint32_t rate) const;
   [[noreturn]] void fail(const std::string& what, int error) const;

@@ -13,7 +13,8 @@ namespace {
 
 constexpr Time deselected_time = std::chrono::microseconds(10);  // time for which the kernel deselects the chip
 
-constexpr std::size_t most_received = 4096;  // limit in bytes for a chip that stays selected: no device reads more
+// Limit in bytes of what the device receives in one selection: no device reads more.
+constexpr std::size_t most_received = 4096;
 
 constexpr bool idles_high(std::uint8_t mode) { return (mode & 2) != 0; }
 constexpr bool samples_at_trailing_edge(std::uint8_t mode) { return (mode & 1) != 0; }

@@ -49,7 +49,7 @@ TEST_F(SpiEncoder, SsiOfEveryLength) {
   }
 }
 
-// Clocks 1000 bits, although the frame needs only 41, on each kind of port that carries a clocked line.
+// Clocks 1000 bits, more than the frame needs, on three kinds of port that carry a clocked line.
 TEST_F(SpiEncoder, SloIsLowBehindTheCrcOnEveryPort) {
   constexpr std::size_t clocks = 1000;
   const auto samples = [&](Port<std::uint8_t>& port) {
@@ -148,7 +148,7 @@ TEST_F(SpiEncoder, BissIsStartedByAByteOfPulses) {
   EXPECT_EQ(encoder.violation_count(), 0u);
 }
 
-// On a controller whose clock can only idle high, positions can be read; only a register access fails, with advice.
+// On a controller whose clock can only idle high, positions can be read, but a register access fails, with advice.
 TEST_F(SpiEncoder, AControllerThatOnlyIdlesHighReadsNoRegisters) {
   BissRegisters registers(kernel, shaft);
   SpiPort port(FakeSpi::path, LinkKind::clocked, biss::line_settings, {}, kernel);

@@ -27,7 +27,7 @@ using Kind = Failure::Kind;
 
 namespace {
 
-constexpr std::uint8_t word_bits = 8;  // the word length that every controller supports
+constexpr std::uint8_t word_bits = 8;  // the word length that nearly every controller supports
 
 std::string reason(int error) { return " (" + std::generic_category().message(error) + ")"; }
 
@@ -155,7 +155,8 @@ void SpiPort::transfer(const ByteStep& step) {
 void SpiPort::send_message(bool with_output) {
   std::array<spi_ioc_transfer, 2> transfers{};
   const auto lead = std::chrono::ceil<std::chrono::microseconds>(settings_.select_lead).count();
-  // The first transfer has no bytes: it only waits between chip select and the first clock.
+  // The first transfer, which is sent only if there is a lead, has no bytes: it only waits between chip select and the
+  // first clock.
   transfers[0].delay_usecs = static_cast<std::uint16_t>(lead);
   spi_ioc_transfer& bytes = transfers[1];
   if (with_output) bytes.tx_buf = reinterpret_cast<std::uintptr_t>(out_.data());

@@ -73,7 +73,7 @@ class SpiPort final : public Port<std::uint8_t> {
   SpiChoice choice_;
   SpiKernel* kernel_;
   Descriptor descriptor_;
-  std::uint32_t board_flags_ = 0;  // mode flags that describe how the chip select is wired
+  std::uint32_t board_flags_ = 0;  // mode flags of the board's wiring, which stay as they are
   LineSettings settings_{};
 
   std::vector<std::uint8_t> out_;
@@ -83,7 +83,7 @@ class SpiPort final : public Port<std::uint8_t> {
   Time sent_late_{};               // duration of the system call of the last transfer
   bool sent_pending_ = false;      // whether the event `sent` is still to be reported
   bool received_pending_ = false;  // whether the event `received` is still to be reported, after `sent`
-  bool idle_low_ = false;          // whether the data line was low before the first bit of a clocked transfer
+  bool idle_low_ = false;          // whether the data line was low at all idle clocks of the last clocked transfer
 };
 
 /// Returns the chip selects of all SPI controllers, "/dev/spidev0.0" and so on, sorted. `sys` is a parameter for tests.

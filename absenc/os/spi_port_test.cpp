@@ -166,7 +166,7 @@ TEST_F(SpiPortTest, ReportsTimerGapAndAnswer) {
   const ByteStep quiet{.at = port.now() + 1h, .answer = 1h, .gap = 3ms};
   const ByteEvent silence = port.wait(quiet);
   EXPECT_EQ(silence.kind, ByteEvent::Kind::silence);
-  const Time again = port.now() + 5ms;  // each transfer reports one silence
+  const Time again = port.now() + 5ms;  // each transfer reports at most one silence
   EXPECT_EQ(port.wait({.at = again, .gap = 3ms}).kind, ByteEvent::Kind::timer);
   port.begin({.kind = ByteStep::Kind::transfer});  // an empty transfer: nothing is received
   EXPECT_EQ(port.wait({}).kind, ByteEvent::Kind::sent);

@@ -152,8 +152,8 @@ int Spidev::set_mode(std::uint32_t wanted) {
   return 0;
 }
 
-// Processes a message in three calls: the first requests the list of transfers, the second the list again with its
-// buffers, the third clocks them. Another thread of the program may change the list before the third call: then the
+// Processes a message in up to three calls: the first requests the list of transfers, the second the list again with
+// its buffers, the third clocks them. Another thread of the program may change the list before the third call: then the
 // list that came with the buffers is used, or requested again if the sizes of the buffers do not match it.
 SpidevReply Spidev::message(std::uint64_t address, std::size_t size, Bytes in, std::size_t room, Time now) {
   if (size % sizeof(spi_ioc_transfer) != 0) return error_reply(EINVAL);

@@ -93,7 +93,7 @@ class StreamPort : public Port<std::uint8_t> {
 
   Waiting<std::uint8_t> waiting_;
   Time sent_at_{};  // end of the last transfer or pulse
-  // Greatest time by which the last transfer may have ended before `sent_at_`.
+  // Greatest time by which the last transfer or pulse may have ended before `sent_at_`.
   Time sent_late_{};
   bool sent_pending_ = false;  // whether the event `sent` is still to be reported
   std::array<std::uint8_t, 4096> buffer_;

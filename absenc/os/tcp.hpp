@@ -13,9 +13,9 @@ namespace absenc::os {
 /// pulse steps throw `unsupported`.
 class TcpPort final : public DescriptorPort {
  public:
-  /// Connects to `host`: a name, an IPv4 address, or an IPv6 address with or without brackets. Tries every address of a
-  /// name, for 3 s in total. Throws Failure: `not_found`, `lost` (no connection in time), `system`; throws Interrupted
-  /// and Ended as `wait_for` does.
+  /// Connects to `host`: a name, an IPv4 address, or an IPv6 address with or without brackets. Tries the addresses of a
+  /// name one after the other, for 3 s in total. Throws Failure: `not_found`, `lost` (no connection in time), `system`;
+  /// throws Interrupted and Ended as `wait_for` does.
   TcpPort(const std::string& host, std::uint16_t port);
 
  private:

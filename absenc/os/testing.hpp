@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Helpers shared by the tests of this folder.
+// Helpers for tests that use this folder.
 #pragma once
 
 #include <fcntl.h>

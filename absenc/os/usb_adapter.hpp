@@ -30,7 +30,7 @@ struct AdapterChip {
 [[nodiscard]] std::optional<UsbAdapter> usb_adapter(const std::string& terminal,
                                                     const std::filesystem::path& sys = "/sys/class/tty");
 
-/// Returns the chip of `adapter`, or null if its identification numbers do not identify the chip.
+/// Returns the chip of `adapter`, or null if it is none of the known chips.
 [[nodiscard]] const AdapterChip* chip_of(const UsbAdapter& adapter);
 
 }  // namespace absenc::os

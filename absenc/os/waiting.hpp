@@ -51,7 +51,7 @@ class Waiting {
 
  private:
   Time known_time_{};
-  Time timer_ = never;    // time of the requested timer; `never` if it was reported or none is requested
+  Time timer_ = never;    // time of the requested timer; `never` if there is none to report
   Time silence_ = never;  // time at which silence is due in this wait
 };
 

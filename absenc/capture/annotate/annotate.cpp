@@ -10,7 +10,7 @@ namespace absenc::capture {
 
 namespace {
 
-// number of characters of both channels after which the channel of the requests is decided
+// number of characters of both channels after which, at the latest, the channel of the requests is decided
 constexpr std::size_t enough_characters = 2000;
 
 struct Score final : AnnotationSink {
@@ -75,7 +75,7 @@ void Annotator::store_undecided(const Character& character) {
 }
 
 // Decodes the stored characters once for each assignment of requests and replies to the channels, and takes the
-// assignment that explains more of the characters.
+// assignment whose annotations score more points.
 void Annotator::find_roles() {
   constexpr std::array<std::array<Carries, 2>, 2> assignments{
       {{Carries::requests, Carries::replies}, {Carries::replies, Carries::requests}}};
@@ -137,8 +137,8 @@ void Annotator::parse(Channel& channel, bool whole, bool cut) {
   at_ = last_reply_size_ = 0;
   whole_ = whole;
   cut_ = cut;
-  // The frame boundaries of a run without a pause before it are unknown: a complete run is then reported as cut. A run
-  // that never pauses is parsed in spite of that.
+  // The frame boundaries of a run without a pause before it are unknown: if it ends before it is full, it is
+  // reported as cut. A full run is parsed in spite of that.
   if (whole && !channel.synchronised && !settings_.by_arrival) {
     const Run& run = channel.run;
     const Piece all{run.bytes(), run.begin(0), run.end()};

@@ -34,8 +34,8 @@ enum class Carries : std::uint8_t {
 /// A pause on the line ends a frame. The first characters of a capture, up to the first pause, may be the end of a
 /// frame or no characters at all: they are reported as cut, unless the line was silent before them. On a line that
 /// never pauses, the first frame is accepted only if more good frames follow it, because a weak checksum finds frames
-/// everywhere. On a line with both directions a frame is classified as request or reply by the frames before and behind
-/// it, never by its bytes alone: some replies equal their requests.
+/// everywhere. On a line with both directions the bytes of a frame do not show whether it is a request or a reply: some
+/// replies equal their requests.
 ///
 /// With arrival times (`by_arrival`) a pause may lie within a frame and be missing between two frames. Frames are then
 /// separated by length and content, and pauses only help to judge bytes that are no good frame and requests without a
@@ -77,10 +77,10 @@ class Annotator {
   struct Channel {
     Carries carries = Carries::both;
     Run run;
-    bool synchronised = false;    // frames are searched for: a pause was found, or a run was filled without one
+    bool synchronised = false;    // false: a run that ends is reported as cut (not with arrival times)
     bool at_frame_start = false;  // a frame is known to begin at the next character to parse
-    std::size_t last_size = 0;    // size of the last good unsolicited frame in this run; 0: none, or a reply followed
-    std::size_t stream_size = 0;  // size of the last good unsolicited frame in any run
+    std::size_t last_size = 0;    // as `stream_size`, in this run only; 0 too after a reply with arrival times
+    std::size_t stream_size = 0;  // size of the last good unsolicited frame in any run; 0: none
   };
 
   // These functions find which channel carries requests and which carries replies.
@@ -94,8 +94,8 @@ class Annotator {
   void close(Channel& channel, bool cut);
   void parse(Channel& channel, bool whole, bool cut);
 
-  // These functions parse the run from index `at_` on. Those that return a number return how many characters they
-  // consumed or would consume, 0 for none.
+  // These functions parse the run from index `at_` on. Those that return a `std::size_t` return how many characters
+  // they consumed or would consume, 0 for none.
   std::size_t next_frame();
   std::size_t whole_frame();
   std::size_t match_reply();
@@ -136,7 +136,7 @@ class Annotator {
   bool whole_ = true;  // no characters will be added to the run
   bool cut_ = false;   // the capture ends with this run, perhaps within its last frame
   std::size_t last_reply_at_ = 0;
-  std::size_t last_reply_size_ = 0;  // size of the reply that ended at `at_`; 0: no reply ended there
+  std::size_t last_reply_size_ = 0;  // size of the reply that begins at `last_reply_at_`; 0: none
 };
 
 }  // namespace absenc::capture

@@ -34,9 +34,8 @@ bool Annotator::stands_alone(std::size_t size) const {
   return has_gap(at_) && (is_end || has_gap(at_ + size));
 }
 
-// Returns the size of the good frame at `at_`, after it reported a reply or stored a request. Returns 0, and reports
-// nothing, if the beginning of a frame is unknown, if there is no good frame, or if the next characters may belong to
-// it.
+// Returns the size of the good frame at `at_`, after it reported a reply or stored a request; 0 if the characters added
+// so far do not show such a frame for certain.
 std::size_t Annotator::whole_frame() {
   if (!channel_->at_frame_start) return 0;
   const auto answered = [&](std::size_t size) {

@@ -44,7 +44,7 @@ void BurstAnnotator::put(const Burst& burst) {
 }
 
 // Decodes the word in `burst`; returns its error. `word` receives the decoded bits, in which the encoder's control
-// communication bit is cleared while a control frame is in progress. `answered` receives that bit.
+// communication bit is cleared while a control frame is in progress. `answered` receives the bit as it was sampled.
 Error BurstAnnotator::decode_as(const Burst& burst, bool with_last, Frame& word, bool& answered) {
   word = word_of(burst, with_last);
   const std::optional<std::size_t> place = judge_.control_bit(word);
@@ -194,8 +194,8 @@ bool CanAnnotator::pair_bad_reply(const CanRecord& record) {
   return false;
 }
 
-// Reports earlier requests to the same encoder as unanswered: a host that sends a new request no longer expects their
-// replies.
+// Reports earlier requests with the identifier of `request` as unanswered: a host that sends a new request no longer
+// expects their replies.
 void CanAnnotator::end_earlier_requests(const CanFrame& request) {
   for (std::size_t i = 0; i < request_count_;) {
     const CanFrame& sent = requests_[i].frame;

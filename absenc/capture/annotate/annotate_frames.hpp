@@ -82,7 +82,7 @@ class BurstAnnotator {
 
   Judge judge_;
   AnnotationSink& sink_;
-  std::vector<std::uint8_t> shifted_;   // last word without the bits of the idle line before it
+  std::vector<std::uint8_t> shifted_;   // storage of a word that differs from its burst
   std::vector<std::uint8_t> silenced_;  // last word with the encoder's control communication bit cleared
   ControlFrames control_;
 };

@@ -338,8 +338,8 @@ TEST_P(Characters, EveryExchangeWithoutFaults) {
   expect_same(annotate(settings_of(unit)), truth.expected);
 }
 
-// Returns whether more than 1/64 of random replies, as long as the reply of a test vector, pass the check: damaged
-// replies then cannot be told from good ones.
+// Returns whether more than 1/64 of random replies, as long as the reply of a test vector, pass the check: too many
+// damaged replies then look good.
 bool has_weak_check(const Unit& unit, const Options& options) {
   NoFields nowhere;
   sim::Random random(1);
@@ -365,8 +365,8 @@ TEST_P(Characters, FindsEveryErrorAtItsPlace) {
   EXPECT_GT(errors[Error::none], 2000);
 }
 
-// Checks that a recording of the encoder's pair of wires only (full duplex) gives at least as many positions as that of
-// both pairs.
+// Checks that a recording of the encoder's pair of wires only (full duplex) gives at least as many positions as the
+// encoder sent.
 TEST_P(Characters, FindsRepliesWithoutRequests) {
   talk({}, 500, 3);
   if (unit.link != LinkKind::full_duplex) return;

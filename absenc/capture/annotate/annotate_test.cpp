@@ -92,7 +92,7 @@ std::vector<const Unit*> units_of_characters() {
 constexpr Tick length = 100;  // duration of a character in ticks
 
 // Checks that from the 200th character on every annotation is a good frame, for an encoder that sends positions without
-// a pause; the capture begins at any of the first characters.
+// a pause; the capture begins at each of the first characters in turn.
 TEST_P(OfUnit, ALineThatNeverPauses) {
   std::vector<Character> characters;
   std::vector<Tick> begins;

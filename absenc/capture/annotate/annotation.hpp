@@ -58,8 +58,7 @@ struct Annotation {
   std::optional<Tick> turnaround{};  // ticks from the request's end to its reply's begin; CAN: between their times
 };
 
-/// Receives annotations in the order of their end times, except that a request without a reply may follow later
-/// annotations, when its reply is no longer expected.
+/// Receives annotations, mostly in the order of their end times: a request without a reply may follow later ones.
 struct AnnotationSink {
   virtual void put(const Annotation& annotation) = 0;
 

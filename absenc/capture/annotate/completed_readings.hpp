@@ -18,8 +18,8 @@ namespace absenc::capture {
 /// annotators, so that it sees all replies in the order of time.
 ///
 /// No frame reports that an encoder was switched off and on, but the encoder sends no replies while it is off: an
-/// unanswered request clears the stored alarms of all encoders. The reply to a request that clears alarms or resets the
-/// turns also clears the stored alarms of its encoder. Otherwise the encoder is assumed to have stayed on.
+/// unanswered request clears the stored alarms of all encoders. A reading in the reply to a request that clears alarms
+/// or resets the turns clears those of its encoder. Otherwise the encoder is assumed to have stayed on.
 class CompletedReadings final : public AnnotationSink {
  public:
   /// `unit` and `sink` must outlive this object.

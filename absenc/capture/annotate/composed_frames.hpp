@@ -61,7 +61,7 @@ class ComposedFrames final : public AnnotationSink {
   AnnotationSink& sink_;
   std::unique_ptr<std::byte[]> storage_;
   Follower* follower_ = nullptr;
-  std::deque<Tick> begins_;  // begin times of the last exchanges, the newest last
+  std::deque<Tick> begins_;  // begin times of the last good exchanges, the newest last
   std::uint64_t count_ = 0;
 };
 

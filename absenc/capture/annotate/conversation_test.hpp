@@ -72,7 +72,7 @@ class Talker {
     }
   }
 
-  /// Runs one random command to its end, waits for late replies and 1 ms, and returns the traffic.
+  /// Runs one random command to its end, waits (for late replies too on a line of characters), and returns the traffic.
   TalkRecord talk() {
     record_ = {};
     shaft_.put(static_cast<std::int64_t>(random_.below(60'000)), static_cast<std::int64_t>(random_.below(4096)));

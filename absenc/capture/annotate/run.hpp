@@ -15,8 +15,8 @@ namespace absenc::capture {
 
 class Run {
  public:
-  /// Largest number of characters, longer than any frame: without arrival times only a line that is never silent fills
-  /// the run.
+  /// Largest number of characters, longer than any frame: without arrival times only a line without a pause for that
+  /// many characters fills the run.
   static constexpr std::size_t capacity = 512;
 
   void push(const Character& character) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests the whole path from wires to annotations: conversations of every unit that does not use CAN are drawn as a
-// waveform, read back, decoded to characters or bursts, and annotated like an unknown capture.
+// waveform, read back, decoded to characters or bursts, and annotated, as they are annotated without the waveform.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -13,7 +13,7 @@
 
 namespace absenc::capture {
 
-/// Content of one line of a candump log.
+/// Content of one line of candump's output.
 struct CandumpLine {
   enum class Kind : std::uint8_t { frame, other_can };  // other_can: CAN FD or XL
   Kind kind = Kind::frame;
@@ -36,8 +36,8 @@ struct CandumpLine {
 /// and less than a day, is not after the time before it, all times are those of -t d: each is the time since the
 /// previous frame. Channels are the interfaces named in the first 64 KiB; frames of other interfaces, and those of CAN
 /// FD and CAN XL, are left out, with a note. A line of another form, or a time before that of the previous line, is a
-/// damage: the lines before it are valid. Blank lines are skipped. Throws OpenError if the first other line has another
-/// form, or there is none.
+/// damage: the lines before it are valid. Blank lines are skipped. Throws OpenError if there is no other line, or
+/// the first of them has another form.
 [[nodiscard]] std::unique_ptr<Reader> read_candump(std::unique_ptr<Source> source, std::string_view name);
 
 }  // namespace absenc::capture

@@ -85,7 +85,7 @@ bool is_column(std::string_view text, Bytes bytes) {
   return trim(text).empty() || is_text_of(trim(text), bytes);
 }
 
-// Parses the rest of a line as bytes, perhaps followed by their text. Returns false if the rest is invalid.
+// Parses the rest of a line as bytes, perhaps followed by their text. Returns false if the rest is none or ambiguous.
 bool take_bytes(std::string_view text, HexLine& parsed) {
   constexpr std::string_view between = " \t,;";
   for (;;) {
@@ -153,8 +153,8 @@ ParsedTime match_clock(std::string_view text, const std::string& date) {
   return {parse_clock(date.empty() ? clock : date + ' ' + clock), size};
 }
 
-// Returns the date at the beginning of `text` in the form "2026-11-21", converted from "2026/11/21", "21.11.2026" or
-// "11/21/2026"; "" if `text` begins otherwise.
+// Returns the date at the beginning of `text` in the form "2026-11-21", converted from forms such as "2026/11/21",
+// "21.11.2026" and "11/21/2026"; "" if there is none.
 std::string match_date(std::string_view text) {
   if (text.size() < 10) return "";
   text = text.substr(0, 10);

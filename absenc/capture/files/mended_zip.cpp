@@ -14,7 +14,7 @@ namespace absenc::capture {
 
 namespace {
 
-// Signatures and sizes of PKWARE's APPNOTE 6.3.10, 4.3.7 to 4.3.16 and 4.5.3.
+// Numbers of PKWARE's APPNOTE 6.3.10, 4.3.7 to 4.4.9 and 4.5.3, except `largest_directory`.
 constexpr std::uint64_t local_signature = 0x04034B50;
 constexpr std::uint64_t directory_signature = 0x02014B50;
 constexpr std::uint64_t zip64_end_signature = 0x06064B50;
@@ -44,7 +44,7 @@ struct Directory {
   }
 };
 
-// The local header of a zip archive, which is stored before each entry.
+// The local header of an entry, which is stored before the data of the entry.
 struct Header {
   std::vector<std::uint8_t> bytes;
   std::uint64_t size = 0;

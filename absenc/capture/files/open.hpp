@@ -15,7 +15,7 @@ namespace absenc::capture {
 
 /// Properties of a capture that the user states, because the file may not contain them.
 struct OpenChoices {
-  unsigned channels = 0;                 // raw samples: 1 to 64, required; other files: must match the content
+  unsigned channels = 0;                 // raw samples: 1 to 64, required; other files: 0, or the number in the file
   std::uint64_t samples_per_second = 0;  // raw samples: required; other files: used if the file has no rate
 };
 
@@ -26,8 +26,8 @@ struct OpenChoices {
 /// invalid beginning, or does not fit `choices`.
 [[nodiscard]] std::unique_ptr<Reader> open_capture(const std::filesystem::path& path, const OpenChoices& choices);
 
-/// Opens a capture from any source, like the function for a path; `name` is used in messages and as the channel name of
-/// a binary export. Throws OpenError.
+/// Opens a capture from any source, like the function for a path; `name` is used in messages and for the channel name
+/// of a binary export. Throws OpenError.
 [[nodiscard]] std::unique_ptr<Reader> open_capture(std::unique_ptr<Source> source, std::string_view name,
                                                    const OpenChoices& choices);
 

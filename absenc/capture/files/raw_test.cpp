@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the reader of raw samples, and errors that `open_capture` reports for files of any format.
+// Tests the reader of raw samples, and some errors of `open_capture`.
 #include "absenc/capture/files/raw.hpp"
 
 #include <gtest/gtest.h>

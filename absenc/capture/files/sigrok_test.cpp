@@ -247,7 +247,7 @@ TEST(Sigrok, ReadsEverythingBeforeACut) {
       const FileBytes file = cut_at(good, size);
       if (size < first + 39) {  // the first piece is completely missing
         const std::string why = problem(file);
-        // The last byte of deflated data only marks the end: without it, the data is complete all the same.
+        // The last byte of these deflated entries only marks their end: without it, the data is complete all the same.
         const std::size_t seen = size + (deflate ? 1 : 0);
         EXPECT_NE(why.find("cut off at byte "), std::string::npos) << why;
         EXPECT_NE(why.find(seen < metadata - 30 ? "version:"

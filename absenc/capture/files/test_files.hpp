@@ -47,8 +47,8 @@ inline void require_that(bool condition) {
   if (!condition) std::abort();
 }
 
-/// Reads a capture to its end, into one reused block, and returns its contents; aborts if a block violates the rules in
-/// signal.hpp.
+/// Reads a capture to its end, into one reused block, and returns its contents; aborts if it finds a violation of the
+/// rules in signal.hpp.
 inline CaptureContents read_all(Reader& reader) {
   CaptureContents all;
   Block block;
@@ -148,7 +148,7 @@ inline std::string sigrok_metadata(std::string_view rate, unsigned channels, uns
   return text + "unitsize=" + std::to_string(unit_size) + "\n";
 }
 
-/// Writes little endian numbers for tests of Saleae's binary exports.
+/// Writes numbers, in the computer's own byte order (little endian), and text for tests of binary files.
 struct BinaryWriter {
   FileBytes bytes;
 

@@ -94,7 +94,7 @@ bool read_plain_seconds(std::string_view text, Instant& instant) {
   return at == end;
 }
 
-// Parses seconds in any decimal form into `instant`; returns false if `text` is no number.
+// Parses seconds in any decimal form into `instant`; returns false if `text` is no number or 10^18 or more.
 bool read_seconds(std::string_view text, Instant& instant) {
   const std::optional<Decimal> decimal = parse_decimal(text);
   if (!decimal || decimal->point > 18) return false;

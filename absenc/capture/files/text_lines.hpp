@@ -46,7 +46,7 @@ class TextLines {
 inline constexpr std::int64_t nanosecond = 1000;  // number of picoseconds in a nanosecond
 inline constexpr std::int64_t picoseconds_per_second = 1'000'000'000'000;
 
-/// A time of day, or a time on the counter of any program, with a resolution of a picosecond.
+/// A time of day, with or without a date, or a time on the counter of any program; the resolution is a picosecond.
 struct Instant {
   std::int64_t seconds = 0;
   std::int64_t picoseconds = 0;  // picoseconds to add to `seconds`, 0 to 10^12 - 1

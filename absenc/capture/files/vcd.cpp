@@ -172,7 +172,7 @@ class VcdReader final : public ParsedReader {
     return true;
   }
 
-  // Changes the channels of a vector. Missing upper bits are unknown if the first written bit is unknown (x or z),
+  // Changes the channels of a vector. Missing upper bits are unknown if the first written bit is unknown (as x or z),
   // otherwise 0.
   bool change_vector(const VcdVariable& variable, std::string_view bits, std::uint64_t offset) {
     const Value extension = to_value(bits[0]) == Value::unknown ? Value::unknown : Value::low;
@@ -205,7 +205,7 @@ class VcdReader final : public ParsedReader {
   Tick now_ = 0;
   bool started_ = false;  // a time or a value change was read
   bool valued_ = false;   // a value change was read
-  bool initial_ = true;   // the present time is the first time in the file
+  bool initial_ = true;   // no time after that of the first value change was read
   bool last_changed_ = false;
   bool done_ = false;
   Occurrences unknown_;

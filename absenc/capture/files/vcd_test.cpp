@@ -73,8 +73,8 @@ std::unique_ptr<Reader> open_repeated(const std::string& part) {
       "long.vcd");
 }
 
-// Checks that 70 MiB of comments before the changes, more than the limit of a header, are skipped: `absenc wave` writes
-// a comment for each character, transfer or frame.
+// Checks that 70 MiB of comments, more than the limit of a header, are skipped: `absenc wave` writes a comment for each
+// character, transfer or frame.
 TEST(Vcd, AnyNumberOfCommentsBeforeTheChanges) {
   const auto reader = open_repeated("$comment #123456789012 device 1A and 0 more words like these in between $end\n");
   const CaptureContents contents = read_all(*reader);

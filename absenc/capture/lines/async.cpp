@@ -25,7 +25,7 @@ struct AsyncDecoder::Candidate {
   unsigned levels;
   Tick last;      // time of the last change within the character
   unsigned bits;  // number of bits from the character's `begin` to `last`
-  Tick next;      // first falling edge behind the middle of the stop bit
+  Tick next;      // falling edge at which decoding continues
 };
 
 AsyncDecoder::Statistics& AsyncDecoder::Statistics::operator+=(const Statistics& other) {
@@ -51,7 +51,7 @@ AsyncDecoder::AsyncDecoder(const AsyncFormat& format, std::uint8_t channel, Star
       length_(static_cast<Tick>(std::llround(format.bit * (stop_ + format.stop_bits)))),
       per_tick_(1 / format.bit),
       start_(start) {
-  // An edge at tick t lies between t - 1 and t, so half a tick may be rounded away.
+  // An edge at tick t lies between t - 1 and t, so a fraction of a tick may be cut off.
   for (unsigned i = 0; i < middle_.size(); ++i) middle_[i] = static_cast<Tick>(format.bit * (i + 0.5));
 }
 
@@ -62,8 +62,8 @@ void AsyncDecoder::restart(Start start) {
   unsure_.reset();
 }
 
-// Visits the characters from the falling edge with index `start` on, as long as `needed` ticks of a character lie
-// before `limit`. `visit` returns false to stop before the character passed to it. Returns the index of the falling
+// Visits the candidates from the falling edge with index `start` on, as long as `needed` ticks of a candidate lie
+// before `limit`. `visit` returns false to stop before the candidate passed to it. Returns the index of the falling
 // edge at which to continue, which may be that of the next edge, not known yet. `edges_` ends with `never`.
 template <class Visit>
 std::size_t AsyncDecoder::walk(std::size_t start, Tick limit, Tick needed, Visit&& visit) const {

@@ -104,8 +104,7 @@ TEST(Async, ReportsWrongParity) {
   }
 }
 
-// Checks value, length and faults of characters of 5 to 16 data bits, with every parity. The values have alternating
-// bits, equal bits, or only the highest bit set.
+// Checks value, length and faults of characters of 5 to 16 data bits, without parity and with odd and even parity.
 TEST(Async, DecodesCharactersOfFiveToSixteenDataBits) {
   for (unsigned data_bits = 5; data_bits <= 16; ++data_bits) {
     for (const Parity parity : {Parity::none, Parity::odd, Parity::even}) {
@@ -252,8 +251,8 @@ TEST(Async, ASilentLineTakesTheBaudRateOfAnother) {
   EXPECT_EQ(all.outcome.measured_baud[0], 0);
 }
 
-// Checks that the detected bit time is the same for blocks of any size, with a sender whose clock drifts by 1 % and
-// more changes than the detection uses.
+// Checks that the detected bit time is the same for blocks of three sizes, with a sender whose clock drifts by 1 %
+// and more changes than the detection uses.
 TEST(Async, DetectionDoesNotDependOnBlocks) {
   Wires wires{{{}}};
   for (const double bit : {5.0, 5.05}) {

@@ -67,7 +67,7 @@ void CanDecoder::finish(std::vector<CanRecord>& frames) {
   if (state_ == State::stuffed || state_ == State::tail) state_ = State::waiting;
 }
 
-// Handles a level that lasted from `from` to `to`, as the number of bits that fits the time best; of an idle bus only
+// Handles a level that lasted from `from` to `to`, as the number of bits that fits the time best; of a long level only
 // as many bits as matter.
 void CanDecoder::level_for(bool level, Tick from, Tick to, std::vector<CanRecord>& frames) {
   constexpr double enough = 32;
@@ -140,8 +140,8 @@ std::uint32_t CanDecoder::field(std::size_t first, std::size_t count) const {
   return value;
 }
 
-// Decodes the frame's header from the stored bits: start, 11 identifier bits, RTR or SRR, IDE; then r0 and DLC, or 18
-// identifier bits, RTR, r1, r0 and DLC.
+// Decodes header and data of the frame from the stored bits: start, 11 identifier bits, RTR or SRR, IDE; then r0 and
+// DLC, or 18 identifier bits, RTR, r1, r0 and DLC; then the data.
 void CanDecoder::interpret() {
   if (length_ != 0 || bits_.size() < 19) return;
   const bool extended = bits_[13];

@@ -138,8 +138,8 @@ void ClockedDecoder::sample_last_bit() {
   burst_.has_last = true;
 }
 
-// Detects whether the data line changed during a rest of the clock, up to and including the time `until`: if both
-// change in one sample, it cannot be known which changed first.
+// Detects whether the data line changed during a rest of the clock, from `settle` on, up to and including the time
+// `until`: if both change in one sample, it cannot be known which changed first.
 void ClockedDecoder::detect_data_change(Tick until) {
   if (format_.change_pause == 0 || !has_in_ || until - last_ <= format_.settle) return;
   if (open_) sample_last_bit();

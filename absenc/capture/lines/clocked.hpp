@@ -21,7 +21,7 @@ struct ClockedFormat {
   // Without chip select: the last bit is sampled this long behind the last clock change, in ticks; 0: not sampled.
   Tick settle = 0;
   // Without chip select: a clock that rests longer than this also ends a word if the data line changes during the rest,
-  // later than `settle` (end of a timeout or a monoflop); 0: it does not.
+  // from `settle` on (end of a timeout or a monoflop); 0: it does not.
   Tick change_pause = 0;
 };
 
@@ -77,7 +77,7 @@ class ClockedDecoder {
     void begin(const Changes* changes, Tick first, bool known);
     [[nodiscard]] Tick next() const;
     void step();
-    bool before(Tick at);  // returns the level just before the tick `at`
+    bool before(Tick at);  // handles the changes before the tick `at` and returns the level behind them
   };
   struct Targets {
     std::span<const Burst> bursts;
@@ -108,8 +108,8 @@ class ClockedDecoder {
   Tick last_ = 0;  // time of the last clock change, or the beginning of the capture, in ticks
   bool seen_pause_ = false;
   bool open_ = false;
-  bool lone_ = false;     // the clock has changed only once in the present burst
-  bool fell_ = false;     // since the last word the clock has changed once and then rested low
+  bool lone_ = false;     // the clock has changed at most once in the present burst
+  bool fell_ = false;     // since the last word a single clock change was followed by a rest low
   bool changed_ = false;  // the data line has changed during the present rest of the clock
   Burst burst_;
 };

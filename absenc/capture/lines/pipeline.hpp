@@ -61,11 +61,11 @@ struct ClockedLine {
   bool rising = false;               // true: the rising edge of the clock samples a bit; false: the falling edge
   bool select_high = false;          // true: chip select is active high
   Tick pause = 0;  // without chip select: a clock that rests longer ends a word, in ticks; 0: `choose` decides
-  // `settle` and `change_pause` of ClockedFormat; not used if `pause` is 0 and there is no chip select.
+  // `settle` and `change_pause` of ClockedFormat; `settle` is measured instead if `pause` is 0.
   Tick settle = 0;
   Tick change_pause = 0;
-  /// Returns the index of the reading to use, of all possible ways to split the beginning of the capture. Null: rests
-  /// longer than three periods of the clock end a word.
+  /// Returns the index of the reading to use, of several ways to split the beginning of the capture. Null: rests longer
+  /// than three periods of the clock end a word.
   std::function<std::size_t(std::span<const PauseReading>)> choose{};
 };
 

@@ -117,7 +117,7 @@ TEST(Evidence, UsesMotionWhereFramesProveNothing) {
   EXPECT_GT(motion_of({0, 130, 20, 190, 60, 180}).chance(), -0.7);
 }
 
-// Tests that streams of 12 to 2048 random bytes are attributed to no unit.
+// Tests that streams of 12 to 2048 random bytes are attributed to no unit that uses characters.
 class RandomStream : public ::testing::TestWithParam<unsigned> {};
 
 TEST_P(RandomStream, MatchesNoUnit) {

@@ -56,8 +56,8 @@ class HypothesisSearch {
   HypothesisSearch(const Unit& unit, std::span<const ObservedExchange> exchanges)
       : unit_(unit), exchanges_(exchanges) {}
 
-  /// Adds a hypothesis if `options` explain at least one exchange, and as many as the best hypotheses so far; it
-  /// replaces them if it explains more.
+  /// Adds a hypothesis if `options` are new and explain at least one exchange, and as many as the best hypotheses so
+  /// far; it replaces them if it explains more. Options that decode the same content as others are left out.
   void add(const Options& options, bool at_least = false) {
     if (contains(best_, options)) return;
     ++tried_;
@@ -68,7 +68,6 @@ class HypothesisSearch {
       meanings_.clear();
     }
     most_ = count;
-    // Options that decode all frames to the same content as other options are no further explanation.
     const std::uint64_t meaning = meaning_of(options);
     if (std::find(meanings_.begin(), meanings_.end(), meaning) != meanings_.end()) return;
     meanings_.push_back(meaning);

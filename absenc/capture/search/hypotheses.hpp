@@ -11,13 +11,12 @@
 namespace absenc::capture {
 
 /// Options that explain exchanges, with their evidence. Every attempt raises the chance of a false match. Here the
-/// attempts are the hypotheses tried so far; `rank` (client/identify) adds every unit, setting and encoder tried, and
-/// in a stream every byte counts at which a frame might begin.
+/// attempts are those of one search; `rank` (client/identify) adds every unit, setting and encoder tried.
 struct Hypothesis {
   Options options{};
   Evidence evidence{};
-  std::size_t tried = 1;  // number of hypotheses tried up to and including this one, each of which may match by chance
-  bool at_least = false;  // the position may have more bits: these are the fewest that explain as many exchanges
+  std::size_t tried = 1;  // number of attempts, including this one, each of which may match by chance
+  bool at_least = false;  // the position may have more bits than `options` state
 
   /// Returns log10 of the probability that one of `tried` hypotheses is as good as this one by chance.
   [[nodiscard]] double chance() const;

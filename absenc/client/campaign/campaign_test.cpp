@@ -31,7 +31,7 @@ void PrintTo(const Named& named, std::ostream* out) { *out << named.protocol << 
 
 class Computed : public ::testing::TestWithParam<Named> {};
 
-// Both the count and the computed rate vary by chance, so their difference may be up to five standard deviations.
+// Checks that the rate of wrong positions is the computed one within five standard deviations: both vary by chance.
 TEST_P(Computed, IsWhatIsCounted) {
   const Named& named = GetParam();
   const CampaignResult result = run(named.protocol, {named.fault}, 200'000);
@@ -116,8 +116,8 @@ TEST(CampaignTest, OldFramesAreCounted) {
   EXPECT_LE(result.older.count, result.wrong.count);
 }
 
-// A damaged request may set the encoder's zero, which makes every later reading wrong, so the campaign must replace the
-// encoder.
+// Checks that few readings fail or are wrong although damaged requests change encoders: a changed zero would make every
+// later reading wrong.
 TEST(CampaignTest, EncodersThatWereChangedAreReplaced) {
   const CampaignResult result = run("raa38-can", {"request_corrupt=0.05"}, 100'000);
   EXPECT_GT(result.changed.count, 0u);

@@ -210,8 +210,9 @@ TEST_F(ClockedLines, AControlBitMayComeLateInTheTimeout) {
   }
 }
 
-// An interrupted host: its clock pauses inside a word for up to nearly the timeout; the pause after each of the first
-// 50 words is at most 1 us longer than the timeout. Only the data line SLO shows where the timeout has elapsed.
+// Checks the words of an interrupted host: its clock pauses inside a word for up to nearly the timeout; the pause after
+// each of the first 50 words is at most 1 us longer than the timeout. Only the data line SLO shows where the timeout
+// has elapsed.
 TEST_F(ClockedLines, ATimeoutThatIsOverEndsAWordWhoseClockRestsAsLong) {
   constexpr std::int64_t timeout = 12'500;
   const std::string frame = biss_frame(17, false);

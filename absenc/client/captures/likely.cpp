@@ -151,8 +151,8 @@ std::size_t CaptureRun::likely_pause(std::span<const capture::PauseReading> read
   const auto differs = [&](std::size_t i) { return readings[i].bursts.size() != readings[best].bursts.size(); };
   const auto other = std::find_if(faultless.begin(), faultless.end(), differs);
   if (other == faultless.end() || is_proved) return best;
-  // Takes the shortest pause without bad words in which the data line shows the end of the timeout: after a shorter
-  // pause the encoder would continue the old word.
+  // Takes the first reading without bad words in which the data line shows the end of the timeout in every pause: after
+  // a shorter pause the encoder would continue the old word.
   const auto shown =
       std::find_if(faultless.begin(), faultless.end(), [&](std::size_t i) { return readings[i].timed_out; });
   if (shown != faultless.end()) return *shown;

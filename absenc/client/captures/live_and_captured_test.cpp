@@ -122,7 +122,8 @@ constexpr std::uintmax_t long_file = 300'000;  // size in bytes above which a ca
 /// The commands of one capture: all commands that change nothing, or one that changes the encoder.
 struct Together {
   std::vector<const Command*> commands;
-  // whether the capture is long, so that it is not repeated for encoders that differ only in a detail
+  // whether the capture of a changing command is long, so that it is not repeated for encoders that differ only in a
+  // detail
   bool is_long = false;
 };
 

@@ -22,7 +22,7 @@ inline constexpr std::uint64_t arrival_ticks_per_second = 1'000'000;
 
 struct ReceivedCharacters {
   std::vector<capture::Character> characters{};  // characters with times in arrival ticks
-  capture::Tick gap = 1;  // length of the pause that ends a frame, as in Annotator::Settings::gap
+  capture::Tick gap = 1;  // shortest pause that must come from the line, see Annotator::Settings::gap
 };
 
 class ReceivedReader final : public capture::ParsedReader {

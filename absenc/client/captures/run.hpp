@@ -39,8 +39,8 @@ struct CaptureOutcome {
   std::vector<capture::Damage> damages;
 };
 
-/// Opens the capture and returns its reader. Throws UsageError for binary data from standard input, Failure if the
-/// capture cannot be opened.
+/// Opens the capture and returns its reader. Throws UsageError for raw samples or binary data from standard input,
+/// Failure if the capture cannot be opened.
 [[nodiscard]] std::unique_ptr<capture::Reader> open_capture(const CaptureChoices& choices);
 
 class CaptureRun {

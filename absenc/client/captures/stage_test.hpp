@@ -32,7 +32,7 @@ struct Said {
   std::string words{};
   Answer answer{};
   std::optional<Reading> reading{};
-  bool reads = false;       // whether all values come from replies of the encoder
+  bool reads = false;       // whether its verb is `read` or `read_part`: all values come from replies of the encoder
   bool is_special = false;  // whether its verb is `run`; such a command may try requests that fail
   unsigned exchanges = 0;   // number of requests, pulses or transfers of the conversation
   // whether the error is a verdict of the procedure over several replies, not an error of the last reply

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Prints the result for people and for programs that count tests.
+// Converts the results to text for people, to TAP, to JUnit XML and to JSON.
 #include "absenc/client/conform/conform_text.hpp"
 
 #include <fmt/format.h>

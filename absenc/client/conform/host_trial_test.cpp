@@ -284,7 +284,7 @@ TEST_P(HostClauses, StrangerKeepsNoClause) {
   }
 }
 
-// The host sends two requests in one write, so that the second does not wait for the reply to the first.
+// Checks that two requests in one write break a clause: the second does not wait for the reply to the first.
 TEST_P(HostClauses, TwoRequestsInOneWriteBreakAClause) {
   const Unit& unit = *GetParam();
   if (unit.link != LinkKind::half_duplex) GTEST_SKIP() << "its host need not wait";

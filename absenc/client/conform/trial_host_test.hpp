@@ -30,9 +30,9 @@ namespace absenc::client {
 /// Defects of a host; by default the host has none.
 struct Flaws {
   bool is_silent = false;
-  unsigned stops_at_silence = 0;  // number of missing replies after which the host stops; 0: it never stops
-  unsigned stops_at_damage = 0;   // number of damaged replies after which the host stops; 0: it never stops
-  unsigned stops_at_refusal = 0;  // number of damaged requests after which the host stops; 0: it never stops
+  unsigned stops_at_silence = 0;  // requests without a reply after which, at the latest, the host stops; 0: never
+  unsigned stops_at_damage = 0;   // damaged replies after which, at the latest, the host stops; 0: never
+  unsigned stops_at_refusal = 0;  // damaged requests after which, at the latest, the host stops; 0: never
   Time skipped_wait{};            // longest wait in its memory reads that the host skips; 0: none
   std::vector<HostStep> sends{};
   // Defects of an SPI controller:

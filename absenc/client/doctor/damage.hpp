@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Analyses damaged replies for parts of good frames.
+// Analyses damaged replies: good frames in them, changes by adapters, other settings and checksums.
 #pragma once
 
 #include <algorithm>

@@ -359,8 +359,8 @@ TEST(Doctor, FindingsSayWhatHelps) {
 
 // ---- Healthy encoders
 
-/// Examines all units that have a command `read`, with random pauses between readings; about every second encoder
-/// turns.
+/// Checks that encoders of all units with a command `read` give no finding with random pauses between readings; about
+/// every second encoder turns.
 TEST(Doctor, AThousandHealthyEncodersGiveNoFinding) {
   std::mt19937_64 random(16);
   std::size_t runs = 0;
@@ -390,7 +390,8 @@ TEST(Doctor, AFlickeringLastBitIsNoNoise) {
   EXPECT_THAT(ids(judged(positions([](std::size_t i) { return i * i / 3 + i; }))), IsEmpty());
 }
 
-/// Ends the examination after 0, 1, 3, 10 or 60 polls of `over`, with an encoder that replies and on a silent line.
+/// Checks that an examination ends soon after `over` returns true, at its poll 1, 2, 4, 11 or 61, with an encoder that
+/// replies and on a silent line.
 TEST(Doctor, EndsAsSoonAsItIsToldTo) {
   for (const bool answers : {true, false}) {
     const auto open = [&](const EncoderAddress&) {

@@ -17,7 +17,7 @@ using testing::IsEmpty;
 using testing::Not;
 using testing::StartsWith;
 
-/// Doctor must read for the whole time limit, not only a fixed number of readings, so that it finds a loose contact.
+/// Checks the evidence of a contact that opens again and again: its bursts of failures, and their period if it is even.
 TEST(Doctor, FailuresThatComeAndGoAreToldWithTheirPeriod) {
   const Examination even = examine_contact(5s, [](Time at) { return at % 1s < 300ms; });
   EXPECT_THAT(even.findings.at(0).evidence, AllOf(HasSubstr("bursts of about 3"), HasSubstr("one every 1 s")));
@@ -31,8 +31,8 @@ TEST(Doctor, FailuresThatComeAndGoAreToldWithTheirPeriod) {
   EXPECT_THAT(ids(any), Not(Contains("comes_and_goes")));
 }
 
-/// The user turns the shaft by hand: by several turns, which change where the position passes zero, and by less than
-/// one.
+/// Checks a shaft that the user turns by hand: by several turns, which change where the position passes zero, and by
+/// less than one.
 TEST(Doctor, AShaftThatFollowsTheHandGivesNoFinding) {
   const auto place = [](std::size_t i) { return i * hand_counts; };
   EXPECT_THAT(ids(judged(turned_by_hand(
@@ -55,7 +55,8 @@ TEST(Doctor, ALatenessOfThisComputerIsNotTheEncoders) {
   EXPECT_THAT(ids(judged(seen)), Contains("sometimes_late"));
   seen.computer_late = 13ms;
   EXPECT_THAT(ids(judged(seen)), IsEmpty());
-  // One late reply of nine is more than a tenth, but still a single one, which this computer may have caused.
+  // Four late replies of nine are a finding. One of nine is more than a tenth too, but a single one, which this
+  // computer may have caused.
   seen.readings.resize(9);
   EXPECT_THAT(ids(judged(seen)), Contains("reply_late"));
   seen.late = 1;
@@ -144,7 +145,8 @@ TEST(Doctor, AComputerThatStoodStillExplainsSilence) {
   EXPECT_THAT(ids(judged(seen)), Contains("sometimes_silent"));
 }
 
-/// Frames of a stream that waited in this computer are read at once, so the speed of the shaft between them is unknown.
+/// Checks that frames of a stream that waited in this computer are no jump: they are read at once, so the speed of the
+/// shaft between them is unknown.
 TEST(Doctor, APositionThatThisComputerTookLateIsNoJump) {
   Observations seen = positions([](std::size_t i) { return i * 20; });
   for (std::size_t i = 100; i < 150; ++i)

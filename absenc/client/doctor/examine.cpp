@@ -245,8 +245,8 @@ class Doctor {
     examiner.conclude(seen_);
   }
 
-  // Takes `count` readings with these settings and returns their duration, 0 if the port fails. A port that does not
-  // open adds no attempts.
+  // Takes up to `count` readings with these settings and returns their duration, 0 if the port fails. A port that does
+  // not open adds no attempts.
   template <class Item>
   Time ask(const EncoderAddress& address, std::size_t count, std::vector<Attempted>& attempts) {
     const Command* read = find_command(*address.unit, Verb::read);

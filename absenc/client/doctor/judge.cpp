@@ -97,7 +97,7 @@ std::string inversion(const Case& one) {
   return {};
 }
 
-// Finds the reason for missing replies if no reading received anything, on any kind of line.
+// Finds the reason for missing replies if no reading received anything and no other finding explains that.
 void judge_silence(const Case& one, std::vector<Finding>& findings) {
   const Observations& seen = one.seen;
   if (seen.readings.empty() || count(seen.readings, was_heard) != 0 || seen.never_silent) return;
@@ -120,7 +120,7 @@ void judge_lateness(const Case& one, std::vector<Finding>& findings) {
   const std::size_t tried = seen.readings.size();
   // Skips CAN: encoders there send unsolicited frames, so a frame after an unanswered request is no late reply to it.
   if (seen.late == 0 || one.unit.link == LinkKind::can) return;
-  // A single late reply may be due to this busy computer. The verdict of the examination counts the failed reading
+  // Single late replies may be due to this busy computer. The verdict of the examination counts the failed readings
   // nevertheless.
   const bool nothing_else = one.good == 0 && count(seen.readings, was_heard) * 10 < tried;
   const bool often = seen.late * 10 >= tried || nothing_else;

@@ -154,7 +154,7 @@ bool contains(const ByteList& bytes, std::uint8_t value) {
   return std::find(bytes.begin(), bytes.end(), value) != bytes.end();
 }
 
-/// A change that an adapter may make to the bytes of every reply, and how to undo it.
+/// A change that an adapter may make to the bytes of replies, and how to undo it.
 struct Suspicion {
   FindingKind finding_kind;
   bool (*fits)(const ByteList& raw);  // returns false if this reply, good or not, proves that the change is not made
@@ -267,8 +267,9 @@ std::size_t variety(const All& all) {
   return sum;
 }
 
-// Returns the finding of this change if undoing it makes at least 8 of 10 of the tried damaged replies good, far more
-// than chance would; otherwise nothing. Lost 8th bits need no comparison with chance if the replies vary enough.
+// Returns the finding of this change if no reply contradicts it, and undoing it makes at least 8 of 10 of the tried
+// damaged replies good, far more than chance would; otherwise nothing. Lost 8th bits need no comparison with chance if
+// the replies vary enough.
 std::optional<Finding> suspected(const Case& one, const All& all, const Suspicion& suspicion) {
   constexpr std::size_t enough = 4;
   const bool of_nearly_all = all.size() * 10 >= one.seen.readings.size() * 8;

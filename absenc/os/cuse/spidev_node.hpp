@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A character device that this process serves (CUSE): any program that uses spidev reaches a Spidev. It is a library of
-// its own, linked only by the command and not installed, so that users of absenc-os do not need libfuse.
+// its own and not installed, so that users of absenc-os do not need libfuse.
 #pragma once
 
 #include <cstdint>

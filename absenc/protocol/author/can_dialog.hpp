@@ -60,7 +60,7 @@ class DialogOf<P> : public CanEngine, public Routine {
   void keep() { CanEngine::keep(*frame_, heard_at_); }
 
  protected:
-  /// Runs a procedure with an encoder of this format; the coroutine frames are in `arena`.
+  /// Constructs the conversation with an encoder of this format; the coroutine frames of its procedure are in `arena`.
   DialogOf(const Format& format, std::span<std::byte> arena) : Routine(arena), format_(format) {}
   ~DialogOf() = default;
 

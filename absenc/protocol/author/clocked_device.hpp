@@ -30,9 +30,9 @@ class ClockedDevice : public EncoderOn<std::uint8_t> {
   explicit ClockedDevice(Time start_time = {}) : EncoderOn(start_time) {}
   ~ClockedDevice() = default;
 
-  /// Is called when the clock starts. Puts the bits that the encoder drives into `bits`, which is empty. `period`:
-  /// period of the clock; 0: unknown. `held_low`: the clock line was held low before, not idle, which few protocols
-  /// use.
+  /// Is called when the clock starts while the encoder is on. Puts the bits that the encoder drives into `bits`, which
+  /// is empty. `period`: period of the clock; 0: unknown. `held_low`: the clock line was held low before, not idle,
+  /// which few protocols use.
   virtual void selected(Time at, Time period, bool held_low, DrivenBits& bits) = 0;
   /// Is called when the host has stopped the clock after `clocks` clocks, at least one.
   virtual void clocked(Time at, std::size_t clocks) = 0;

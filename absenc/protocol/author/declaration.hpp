@@ -70,7 +70,7 @@ struct Declaration {
   /// Checks a frame and puts its fields into the sink. Null: functions of the protocol and the report do.
   Error (*decode)(const Format&, Frame request, Frame reply, FieldSink&) = nullptr;
   /// For clocked links with `control_bit`: checks the bits that host and encoder exchanged, one with each frame, and
-  /// puts their fields into the sink. Required with `control_bit`.
+  /// puts their fields into the sink.
   Error (*decode_control)(Frame request, Frame reply, FieldSink&) = nullptr;
 
   /// For clocked links: writes the bits that the host sends for a command into `out`, as text of 0 and 1, and returns

@@ -293,8 +293,8 @@ TEST(Declaration, SizesReplies) {
   EXPECT_EQ(end.size, 9u);
 }
 
-// A declaration with a `decode` and no `is_answered` makes a Unit that knows neither which requests are answered nor
-// their pauses.
+// A declaration with a `decode` and no `is_answered` makes a Unit that decodes by it, and has neither `is_answered` nor
+// `pause`.
 TEST(Declaration, DecodesByItself) {
   NoFields sink;
   constexpr Unit made = Descriptor<decoding>::make();

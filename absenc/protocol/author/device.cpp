@@ -8,7 +8,7 @@ namespace absenc::author {
 
 namespace {
 constexpr std::string_view turn_rule = "request during the encoder's transmission";
-// Shortest time that a host is assumed to wait for a reply: a pseudo-terminal alone delays the bytes by this time.
+// Shortest time that a host is assumed to wait for a reply: a pseudo-terminal alone may delay the bytes by this time.
 constexpr Time least_patience = std::chrono::milliseconds(1);
 // Greatest number of consecutive replies during which the host may send without a violation, because a delay of this
 // program can explain it.

@@ -252,7 +252,7 @@ class DialogOf : public HostOf<P>, public Routine {
   }
 
  protected:
-  /// Runs a procedure with an encoder of this format; the coroutine frames are in `arena`.
+  /// Constructs the conversation with an encoder of this format; the coroutine frames of its procedure are in `arena`.
   DialogOf(const typename P::Format& format, std::span<std::byte> arena) : HostOf<P>(format), Routine(arena) {}
   ~DialogOf() = default;
 

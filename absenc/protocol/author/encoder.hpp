@@ -68,7 +68,7 @@ class EncoderOn : public Device<Item> {
     }
     return power_ == Power::on;
   }
-  /// Returns the alarms that `raise_alarms` has raised.
+  /// Returns the alarms that `raise_alarms` has raised and `lower_alarms` has not ended.
   [[nodiscard]] std::uint32_t raised() const { return raised_; }
   /// Increments `memory_version`; to be called after each change of the memory.
   void change_memory() { ++memory_version_; }

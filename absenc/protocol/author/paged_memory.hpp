@@ -46,7 +46,7 @@ class PagedMemoryDevice : public Responder {
   };
   /// Content of the reply to a memory request.
   struct MemoryAnswer {
-    bool busy;           ///< Whether the memory is busy, so that the request was not executed.
+    bool busy;           ///< Whether the memory is busy: the request was not executed, or only began to fetch the byte.
     std::uint8_t value;  ///< The byte that was read or written; 0 if busy.
   };
 
