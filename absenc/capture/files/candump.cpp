@@ -117,12 +117,14 @@ class CandumpReader final : public ParsedReader {
 
  private:
   // Finds the interfaces, and whether lines have times, in the first 64 KiB. If one of these times, other than 0 and
-  // below a day, is not after the one before it, all times are those since the previous frame.
+  // below a day, is less than the one before it, or equal to it on the same interface, all times are those since the
+  // previous frame.
   void look_ahead(std::string_view name) {
     TextLines lines(*source_);
     std::string_view line;
     CandumpLine parsed;
     std::optional<Instant> last;
+    std::string last_channel;
     bool first = true;
     bool rises = true;
     while (lines.next(line) && lines.offset() < times_examined) {
@@ -132,13 +134,15 @@ class CandumpReader final : public ParsedReader {
       if (find(parsed.channel) == layout_.channels.size() && layout_.channels.size() < 255) {
         layout_.channels.emplace_back(parsed.channel);
       }
-      // Two frames of one bus cannot begin at the same time, so times on one clock rise from frame to frame.
+      // Times on one clock rise from frame to frame; only frames of different interfaces may have the same time.
       const bool zero = parsed.at.seconds == 0 && parsed.at.picoseconds == 0;
       constexpr std::int64_t day = 86400;
       if (last && !zero && parsed.at.seconds < day) {
-        rises = rises && ticks_between(*last, parsed.at, nanosecond).value_or(0) != 0;
+        const std::int64_t passed = ticks_between(*last, parsed.at, nanosecond).value_or(-1);
+        rises = rises && (passed > 0 || (passed == 0 && parsed.channel != last_channel));
       }
       last = parsed.at;
+      last_channel = parsed.channel;
     }
     if (first) throw OpenError(std::string(name) + " holds no frames that candump printed");
     deltas_ = timed_ && !rises;

@@ -74,6 +74,8 @@ TEST(Candump, TimesOfAllKinds) {
             (Ticks{0, 10'000'000, 15'000'000}));  // as `candump -t d` prints times
   EXPECT_EQ(times(" (000.000000)  c  001   [0]\n (000.010000)  c  001   [0]\n (000.010000)  c  001   [0]\n"),
             (Ticks{0, 10'000'000, 20'000'000}));
+  EXPECT_EQ(times(" (000.000000)  c  001   [0]\n (000.010000)  c  001   [0]\n (000.010000)  d  001   [0]\n"),
+            (Ticks{0, 10'000'000, 10'000'000}));  // frames of two interfaces
   EXPECT_EQ(times(" (2026-11-21 17:55:24.000001)  c  001   [0]\n (2026-11-21 17:55:25.000000)  c  001   [0]\n"),
             (Ticks{0, 999'999'000}));  // as `candump -t A` prints times
 }
