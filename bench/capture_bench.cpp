@@ -151,7 +151,7 @@ class RawReader final : public Reader {
   std::vector<Damage> damages_;
 };
 
-// Decodes the whole file, checks each character and returns the cost.
+// Decodes the whole file and returns the cost. More than 20 wrong or missing characters end the program.
 Cost decode(const File& file, unsigned threads) {
   RawReader reader(file);
   std::uint64_t count = 0;
@@ -176,7 +176,7 @@ Cost decode(const File& file, unsigned threads) {
   return cost;
 }
 
-// Reads and sums up the blocks that the decoder reads: the highest possible rate of this machine.
+// Reads and sums up the blocks that the decoder reads, and returns the cost.
 Cost plain_read(const File& file) {
   RawReader reader(file);
   std::uint64_t sum = 0;

@@ -124,7 +124,7 @@ void biss_compiled(benchmark::State& state) {
   });
 }
 
-// The format as it is, whose fields are looked up for each frame.
+// Decodes with the format as it is: its fields are looked up for each frame.
 template <unsigned bits>
 void biss_any(benchmark::State& state) {
   biss::Format any = format_of<bits>;

@@ -17,7 +17,8 @@ SECONDS = float(sys.argv[1]) if len(sys.argv) > 1 else 10
 UPDATES = float(sys.argv[2]) if len(sys.argv) > 2 else 30
 TICK = os.sysconf("SC_CLK_TCK")
 
-# Records states of the server as text, so that the measurement includes parsing, then shows them with current times.
+# RECORD stores states of the server as text, so that the measurement includes parsing. FORCE shows them with current
+# times.
 RECORD = """
 const done = arguments[arguments.length - 1];
 (async () => {

@@ -3,7 +3,7 @@
 // main program evaluates the readings. Between two series of readings it clears an alarm and writes to the encoder's
 // memory.
 //
-//   drive POSITIONS SINGLETURN MULTITURN LATENCY_MS: number of readings, the position that each
+//   drive POSITIONS SINGLETURN MULTITURN LATENCY_MS: number of confirmed readings, the position that each
 //   must report, and the latency of the line
 #include <array>
 #include <new>
@@ -23,8 +23,8 @@ using namespace std::chrono_literals;
 constexpr Time tick_period = 500us;  // one position per tick while the line is free
 constexpr tformat::Format format{.singleturn_bits = 17, .multiturn_bits = 16, .encoder_id = 0x11};
 // Highest speed of the axis, not of the encoder. The XOR checksum of T-format does not detect two flipped bits at the
-// same place of two bytes. These change a position by 255 or more counts or by turns, which so slow an axis cannot do
-// between two readings.
+// same place of two bytes. In two bytes of the position they change it by 255 or more counts or by turns, which so
+// slow an axis cannot do between two readings.
 constexpr std::uint32_t axis_rpm = 1;
 
 struct Result {
@@ -120,7 +120,8 @@ class Axis {
 alignas(Axis) std::byte axis_memory[sizeof(Axis)];
 Axis* axis = nullptr;
 
-// Checks each confirmed reading against the expected position, and counts all readings by their result.
+// Checks each confirmed reading against the expected position, and counts readings by their result. A plausible reading
+// that nothing confirms yet is not counted.
 class ReadingCheck {
  public:
   ReadingCheck(std::uint32_t singleturn, std::uint32_t multiturn) : singleturn_(singleturn), multiturn_(multiturn) {}
@@ -187,9 +188,8 @@ void read(ReadingCheck& check, std::uint32_t until) {
   while (axis->take(result)) check.take(result);
 }
 
-// Runs a command of the unit and returns whether it succeeded. A command that changes the encoder is never repeated
-// automatically. This program may repeat its commands, because clearing alarms or writing the same byte twice does no
-// harm.
+// Runs a command of the unit, up to ten times, and returns whether it succeeded. The library never repeats a command
+// that changes the encoder. This program may, because clearing alarms or writing the same byte twice does no harm.
 bool command(std::string_view name, Arguments arguments) {
   alignas(std::max_align_t) static std::array<std::byte, 4096> storage;
   const Unit& unit = tformat::unit;

@@ -107,8 +107,8 @@ int main() {
   for (std::uint32_t reported = 0;;) {
     const machine::InterruptLock lock;
     encoder->tick(machine::now());
-    // Waits for an interrupt; a pending interrupt ends `wfi` at once. A busy loop would keep the emulator from serving
-    // its socket.
+    // Waits for an interrupt if the carrier has nothing due; a pending interrupt ends `wfi` at once. A busy loop would
+    // keep the emulator from serving its socket.
     if (encoder->is_at_rest()) asm volatile("wfi");
     if (encoder->broken_rules() == reported) continue;
     reported = encoder->broken_rules();

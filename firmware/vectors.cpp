@@ -23,7 +23,7 @@ std::string_view cut(std::string_view& text, char end) {
   return front;
 }
 
-// Resolves options from a text "name=value name=value"; returns false if one is invalid.
+// Resolves options from a text "name=value name=value"; returns false if one is invalid or they are too many.
 bool resolve(const Unit& unit, std::string_view text, Options& options) {
   Buffer<OptionText, maximum_options> settings;
   while (!text.empty()) {
@@ -34,7 +34,8 @@ bool resolve(const Unit& unit, std::string_view text, Options& options) {
   return resolve_options(unit, {}, settings, options).kind == OptionError::Kind::none;
 }
 
-// Compares decoded fields with a vector of tests/*.json: flags by names, other lists as text, the rest by value.
+// Compares decoded fields with a vector of tests/*.json: flags by names, bytes in hexadecimal, texts and lists as text,
+// numbers by value.
 class ReferenceCheck final : public FieldSink {
  public:
   explicit ReferenceCheck(std::span<const ExpectedField> expected) : expected_(expected) {}

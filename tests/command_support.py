@@ -19,7 +19,7 @@ import unittest
 
 ABSENC = os.path.abspath(os.environ.get("ABSENC", "build/release/bin/absenc"))
 os.environ.setdefault("ABSENC_CHANGES", "none")  # tests do not write to the user's journal of changes
-# Time limit of every wait, in seconds. Only a hang takes that long. A test in a virtual machine sets a longer limit.
+# Usual time limit of a wait, in seconds. Only a hang takes that long. A test in a virtual machine sets a longer limit.
 PATIENCE = float(os.environ.get("ABSENC_PATIENCE", "60"))
 
 

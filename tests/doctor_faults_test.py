@@ -19,7 +19,7 @@ PATIENT = "latency=40"  # milliseconds that a busy machine may add to a reply
 # The check bits of these protocols accept so many damaged replies that they do not show how the bytes were changed.
 WEAK_CHECK = {"amt21"}
 
-# Findings that also explain what a protocol's frames become.
+# By protocol and fault: a further finding that explains the frames that the fault makes of the protocol's frames.
 ALSO = {
     # Byte 00 of channel 2 is outside the checksum: a frame without it is a good frame of has_ch2=false.
     ("encolink", "NUL lost"): "wrong_settings",

@@ -156,7 +156,7 @@ class Gap(EmulateCase):
         present = {"esl": ("0875", 18), "raa38-modbus": ("010300000001840a", 7)}
         for protocol, gap in itertools.product(absent, ("2", "10000")):
             with self.subTest(protocol=protocol, gap=gap):
-                # On a busy machine the emulator may receive these two requests as one; only the gap separates them.
+                # On a busy machine the emulator may receive several requests as one; only the gap separates them.
                 self.assertTrue(any(self.answers(protocol, gap, number, absent[protocol], *present[protocol])
                                     for number in range(10)))
 
@@ -276,7 +276,7 @@ class DataIds(EmulateCase):
         self.assertEqual(client.receive(11)[:2], bytes([0x1A, 0x40]))
         client.send([0xEA, 5, 0])  # a request with a wrong CRC
         self.assertEqual(client.receive(11), everything)
-        self.assertEqual(client.exchange(0x6, 127, 6, length=11), everything)  # a write to a closed page
+        self.assertEqual(client.exchange(0x6, 127, 6, length=11), everything)  # a write that selects a closed page
         client.send([0xEA])  # a request that ends after its first byte
         self.assertEqual(client.receive(11), everything)
         client.send([0x19, 0x1A])  # a byte that is no sync code precedes a request

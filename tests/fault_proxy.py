@@ -9,7 +9,7 @@ import time
 
 from command_support import FakeLine
 
-GAP = 0.003  # seconds of silence that end a reply; a busy emulator pauses for less within a reply
+GAP = 0.003  # seconds of silence that end a reply; even a busy emulator mostly pauses for less within a reply
 
 
 class Fault:

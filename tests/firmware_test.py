@@ -27,7 +27,7 @@ ALL = bool(os.environ.get("ABSENC_FIRMWARE_ALL"))
 CORES = ("m0plus", "m4f") if ALL else ("m0plus",)
 MACHINES = {"microbit": "microbit", "m0plus": "mps2-an385", "m4f": "mps2-an386", "rv32": "virt"}
 SINGLETURN, MULTITURN = 74565, 4660
-LATENCY = 250  # timeout in ms; a reply that a busy machine delays by more would count as a fault that was not injected
+LATENCY = 250  # latency in ms; a reply that a busy machine delays by more would count as a fault that was not injected
 
 
 def emulator_of(program, machine, *arguments, serial="null"):

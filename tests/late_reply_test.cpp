@@ -66,7 +66,8 @@ class DelayedSession {
         port(line, std::move(delay)),
         session(unit, options, port, host_storage, host::EchoMode::automatic) {}
 
-  /// Runs one command that reports a position, and adds its outcome to `outcomes`.
+  /// Runs one command that reports a position, and adds its outcome to `outcomes`. If `confirmed`, an unconfirmed
+  /// reading does not count.
   void read(const Command& command, bool confirmed, Outcomes& outcomes) {
     const Conversation<Item>* ended = confirmed ? session.read(command) : session.run(command);
     if (ended->error() != Error::none) {

@@ -41,7 +41,7 @@ ARITHMETIC = {"bit", "shift", "sign"}  # rules on arithmetic, of which at most o
 EDGE = {"<": "<=", "<=": "<", ">": ">=", ">=": ">"}
 REFUSES = re.compile(r"fail|failed|refuse\w*|reject\w*|settle\w*")
 NOTHING = {"returnfalse;", "returnstd::nullopt;", "returnnullptr;", "return{};", "std::nullopt", "nullptr"}
-# Names of tables whose numbers, beside texts, are not mutated.
+# Words in the declaration of a table: the table's numbers, which stand beside texts, are not mutated.
 TABLES = {"array", "to_array", "Option", "option", "Argument", "Command", "Fields"}
 DURATION = re.compile(r"[\d'.]+(ns|us|ms|s|min|h)")
 INTEGER = re.compile(r"(0[xX][\da-fA-F']+|0[bB][01']+|[\d']+)(?:u|U|l|L|ul|UL|z|uz)?")
@@ -349,7 +349,7 @@ class Finder:
                 continue
             for j in range(body, source.partner[body]):
                 end = source.right(j + 1, {";"})
-                # The statement returns more than a name.
+                # The statement returns more than one token, such as a name.
                 if source[j] == "return" and end > j + 2 and not self.left_alone[j]:
                     self._times(j + 1, end)
                     for k in range(j, end):

@@ -81,8 +81,8 @@ class PlatformIO(Case):
 
 
 class Zephyr(Case):
-    # Checks that module.yml has only keys that the schema in Zephyr's own scripts/zephyr_module.py allows, and that
-    # its paths exist.
+    # Checks that module.yml has exactly these keys, which the schema in Zephyr's own scripts/zephyr_module.py allows,
+    # and that its paths exist.
     def test_module_file(self):
         module = yaml.safe_load((ROOT / "zephyr/module.yml").read_text())
         self.assertEqual(module.keys(), {"name", "build"})

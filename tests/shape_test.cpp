@@ -23,7 +23,7 @@ using Kind = Event<Byte>::Kind;
 struct RequestReply : testing::Test {
   sim::Line<Byte> line{LinkKind::half_duplex, {.rate = 2'500'000}};
   std::vector<Byte> answer{0x1A, 0x00, 0x55};
-  std::string expected_counts;  // the `expect` value of every wait, one digit each
+  std::string expected_counts;  // the number of missing bytes after each event of the host, one digit each
   std::size_t missing = 3;
   ByteToy device{[this](ByteToy& self, const Event<Byte>& event) {
     if (event.kind == Kind::received) self.send(answer, event.at + microseconds(3));

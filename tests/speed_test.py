@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from command_support import ABSENC, Busy, Emulator, EncoderCase, absenc
 
 SPEEDS = (1, 12, 60, 3000)  # speeds of the shaft in rpm
-# Options of those units that are tested with more than their defaults, such as streaming encoders.
+# Options with which a unit is tested, "" for the defaults. A unit that is missing here is tested with its defaults.
 OPTIONS = {"encolink": ("", "stream_rate=500&resolution=20"), "raa38": ("mode=bus", "mode=timing")}
 
 

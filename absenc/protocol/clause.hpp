@@ -15,7 +15,8 @@ namespace absenc {
 
 /// Kind of a clause for encoders: the behaviour that the document demands. Names in backquotes are members of Clause.
 enum class Demand : std::uint8_t {
-  // Demands about readings, tested with the command that reads the position; `does` is tested with its own command
+  // Demands about readings, tested with the command that reads the position; the last one is tested with its own
+  // command
   answered,  ///< the encoder answers each request, pulse or transfer
   streamed,  ///< the encoder sends frames unsolicited
   in_time,   ///< each reply begins before a host's timeout, because documents often state no limit
@@ -84,17 +85,16 @@ struct Ask {
   std::uint32_t permille = 0;
 };
 
-/// Reaction of an encoder to a request that it cannot accept.
+/// Reaction of an encoder to the request `ask` of a clause.
 enum class Reaction : std::uint8_t {
   silent,
-  reply,              ///< the encoder sends a valid reply to the request of the command `as` of the clause
+  reply,              ///< the encoder sends a valid reply to the request of the command `as`; to `ask` if that is empty
   refusal,            ///< the encoder sends a valid reply that reports the request as wrong
-  refusal_or_silent,  ///< the document permits a refusal and silence
+  refusal_or_silent,  ///< the document permits either a refusal or silence
 };
 
-/// A demand of the document on an encoder. Its test passes only if the case occurred. Depending on the demand, this
-/// means: the requests were sent, valid replies were received, a wrong bit in them would have been detected, a value
-/// that must change was different before. The engine (client/conform) derives these conditions from `demand` alone.
+/// A demand of the document on an encoder. Its test passes only with evidence that depends on the demand, for example
+/// that a wrong bit in a valid reply would have been detected.
 struct Clause {
   std::string_view id;         ///< identifier, unique in its unit: "crc"
   std::string_view paragraph;  ///< paragraph of the unit's document
@@ -106,7 +106,7 @@ struct Clause {
   Ask ask{};                             ///< Request that the test sends, for demands that name `ask`.
   Reaction reaction = Reaction::silent;  ///< demand reacts: required reaction of the encoder to `ask`
   std::string_view as{};       ///< command whose reply is demanded as reaction to `ask`; "": a reply to `ask` itself
-  std::string_view option{};   ///< option that the test sets to `value` before it reads; "": the user's options stay
+  std::string_view option{};   ///< demands whole, checked, as_drawn: option set to `value` for the readings; "": none
   std::int64_t value = 0;      ///< value of `option`, or the number that the demand names `value`
   std::uint32_t page = 0;      ///< Page of the memory byte that the clause is about.
   std::uint32_t address = 0;   ///< Address of the memory byte that the clause is about.
@@ -114,7 +114,7 @@ struct Clause {
   std::string_view field{};    ///< field of the command that reads `setting`, with its value
   std::int64_t other = 0;      ///< Second page, or second value of `setting`, for demands that name `other`.
   Verb verb = Verb::run;       ///< Demand reset: verb of the command that resets.
-  std::string_view command{};  ///< Name of the command that demands name `command`.
+  std::string_view command{};  ///< Name of the command, for demands that name `command`.
   std::string_view stop{};     ///< Command that ends the unsolicited frames of `command`; empty: none.
   /// Options of a virtual encoder that shows the case, if its defaults do not: "resolution=20&multiturn_bits=0".
   std::string_view shown_with{};
@@ -138,7 +138,7 @@ struct HostStep {
   /// Name of the command whose one request is sent, without the other steps of its procedure; or bytes to send: "1a
   /// 1a".
   std::string_view what{};
-  std::span<const std::int64_t> arguments{};  ///< arguments of the command; empty: each argument has its minimum
+  std::span<const std::int64_t> arguments{};  ///< arguments; empty: required ones are 1, or their minimum if greater
   unsigned times = 1;                         ///< how often the request is sent, each time after `pause`
 };
 /// The steps of a scripted host that ignores replies, in order: requests with the pauses before them.
@@ -150,20 +150,18 @@ struct HostClause {
   std::string_view paragraph;  ///< Paragraph of the document.
   std::string_view words;      ///< Demand of the document, in words.
   HostDemand demand;           ///< Kind of the clause, which selects its test.
-  /// Name of the rule that the virtual encoder checks, or the test's controller for `spi_mode_rule`; the clause is
-  /// untested until this rule has been checked.
+  /// Name of the rule that the virtual encoder checks, or os::SpiDevice for `spi_mode_rule`; the clause is untested
+  /// until this rule has been checked.
   std::string_view rule{};
-  // Test hosts for this clause, if the hosts that all tests use do not break it: those stop after missing or damaged
-  // replies, send two commands in a row, leave pauses out, or clock too fast, too slowly, too early, too few bits or in
-  // another mode.
-  std::array<HostScript, 2> breaks{};  ///< scripted hosts that break this clause and no other; empty: none
-  HostScript keeps{};                  ///< a host that does what `breaks` do and keeps this clause; empty: none
-  /// Options of the virtual encoder for the hosts `breaks` and `keeps`: "acquisition_us=20000".
+  // Test hosts for this clause, if the hosts that the tests use for every clause do not break it.
+  std::array<HostScript, 2> breaks{};  ///< scripted hosts that break this clause, or it and "asks"; empty: none
+  HostScript keeps{};                  ///< requests like those of `breaks` that keep this clause; empty: none
+  /// Options of the virtual encoder in the tests of all host clauses of the unit: "acquisition_us=20000".
   std::string_view options{};
 };
 
 /// Name of the rule that an SPI controller clocks and samples at the right edges. The virtual encoder cannot see the
-/// edges, so the test's controller checks the rule.
+/// edges, so os::SpiDevice checks the rule.
 inline constexpr std::string_view spi_mode_rule = "clock or sampling in another SPI mode than the encoder's";
 
 /// The clauses of a unit. They are not in its descriptor, because firmware links the descriptor and tests nothing.

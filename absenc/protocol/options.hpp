@@ -68,7 +68,7 @@ inline constexpr std::string_view word_option_name = "word";
 /// The values of all options of a unit, by the index of the option.
 struct Options {
   std::array<std::int64_t, maximum_options> values{};  ///< Values in the order of the unit's options.
-  const Model* model = nullptr;  ///< model that the user named, or that no setting contradicts; null: none
+  const Model* model = nullptr;  ///< model that the user named, or the first that no setting contradicts; null: none
   WordFormat word{};  ///< word format, which replaces the options that describe a word; empty: those options apply
 
   /// Returns whether the user gave a word format.

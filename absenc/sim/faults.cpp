@@ -36,7 +36,7 @@ void FaultyDevice::feed(const Event<std::uint8_t>& event) {
   using Kind = Event<std::uint8_t>::Kind;
   switch (event.kind) {
     case Kind::received:
-      // A request that began while the device ignored the line is ignored until it ends.
+      // A request that began while the device ignored the line is ignored up to a pause of more than two gaps.
       if (ignores_line_ || event.at - last_ignored_at_ <= 2 * device_gap_) {
         last_ignored_at_ = event.at;
       } else {
@@ -120,7 +120,7 @@ bool FaultyDevice::damage(Step<std::uint8_t>& reply, Time now) {
   if (strikes(FaultKind::silence)) reply_.clear();
   if (!reply_.empty()) {
     if (strikes(FaultKind::repeat)) reply_.insert(reply_.end(), reply.out.begin(), reply.out.end());
-    // corrupt, truncate and drop hit only bytes that the host clocks out: damage behind them would have no effect.
+    // On a clocked link corrupt, truncate and drop hit only bytes that the host clocks out.
     const auto taken = [&] { return reply.bits == 0 ? reply_.size() : std::min(reply_.size(), (reply.bits + 7) / 8); };
     if (strikes(FaultKind::corrupt)) flip_bits(std::span(reply_).first(taken()));
     if (taken() > 1 && strikes(FaultKind::truncate)) reply_.resize(1 + random_.below(taken() - 1));

@@ -34,7 +34,7 @@ inline constexpr std::array<std::string_view, 9> fault_names{"drop",    "corrupt
 /// Number of injected faults, indexed by FaultKind.
 using FaultCounts = std::array<std::uint64_t, fault_names.size()>;
 
-/// Probability of each fault, 0 to 1 per reply; `request_corrupt` per byte (CAN: per frame) received.
+/// Probabilities of the faults per reply, of `request_corrupt` per byte (CAN: per frame) received, and the `delay`.
 struct FaultRates {
   /// Probability of each fault, 0 to 1, indexed by FaultKind.
   std::array<double, fault_names.size()> rates{};
@@ -60,9 +60,9 @@ struct FaultRate {
 /// the same faults.
 ///
 /// On character links whole replies are damaged, on clocked links the bits that the device drives. A reply that a fault
-/// makes longer or later does not follow the device's own timing. Until such a reply, or the reply to a damaged
-/// request, is sent, the device receives nothing (like a real one), so it does not report a protocol violation by the
-/// host.
+/// makes longer or later does not follow the device's own timing. While such a reply, or the reply to a damaged
+/// request, is pending or being sent, the device receives no bytes, so it does not report a protocol violation by the
+/// host. A request that begins meanwhile is ignored as a whole.
 class FaultyDevice final : public Machine<std::uint8_t> {
  public:
   /// Injects faults between `device` and its line. The same seed gives the same faults.
@@ -98,8 +98,8 @@ class FaultyDevice final : public Machine<std::uint8_t> {
   std::vector<std::uint8_t> reply_;
   std::vector<std::uint8_t> received_;  // bytes of the last received event as passed on to the device
   bool request_damaged_ = false;        // the request was damaged, so the device may answer while the host still sends
-  // The device receives nothing while a reply that a fault stretched, or a reply to a damaged request, is pending or
-  // being sent.
+  // The device receives no bytes while a reply that a fault made longer or later, or a reply to a damaged request, is
+  // pending or being sent.
   bool ignores_line_ = false;
   Time last_ignored_at_ = -std::chrono::hours(1);  // time of the last byte that was ignored
   Time device_gap_{};                              // longest `gap` that the device has requested so far

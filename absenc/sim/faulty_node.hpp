@@ -27,7 +27,7 @@ class FaultyNode final : public Machine<CanFrame> {
   void set_rates(const FaultRates& rates) { rates_ = rates; }
   /// Returns the number of injected faults of each kind, indexed by FaultKind.
   [[nodiscard]] const FaultCounts& counts() const { return counts_; }
-  /// Returns the number of transfers, of one or more frames, with at least one fault.
+  /// Returns the number of transfers, of one or more frames, with at least one fault; `request_corrupt` does not count.
   [[nodiscard]] std::uint64_t damaged_frames() const { return damaged_; }
 
  private:

@@ -67,7 +67,7 @@ class LatePort final : public Port<Item> {
     }
   }
 
-  /// Advances the time of the port to `until`; items received meanwhile are delivered later.
+  /// Advances the time of the port to `until`; items received meanwhile are delivered later or lost.
   void rest(Time until) {
     while (time_ < until) {
       const Event<Item> event = inner_->wait({.at = until});

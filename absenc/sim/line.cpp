@@ -208,8 +208,8 @@ void Line<Item>::serve(Node node) {
   state.due = never;  // the machine is done: no later event wakes it
 }
 
-// Accepts a transfer or pulse of a node. Unless it is a selected device's transfer, it begins at its time `at`, or now
-// if that time has passed.
+// Accepts a transfer or pulse of a node. Unless it is a device's transfer on an SPI or clocked link, it begins at its
+// time `at`, or now if that time has passed.
 template <class Item>
 void Line<Item>::accept_step(Node node, const Step<Item>& step) {
   State& state = *nodes_[node];
@@ -232,7 +232,7 @@ void Line<Item>::accept_step(Node node, const Step<Item>& step) {
   state.hold_low = step.hold_low;
   state.accepted_at = now_;
   ++state.begin_generation;
-  // The beginning is scheduled, so that every node served or attached at this time is handled first, in any order.
+  // The beginning is scheduled, so that a node that is attached next, at the same time, takes part.
   if (!driven) schedule(ScheduledEvent::Kind::begin, step.at, node);
 }
 
@@ -251,7 +251,7 @@ void Line<Item>::deadline(Node node) {
     feed(node, {.kind = Event<Item>::Kind::timer, .at = now_});
     return;
   }
-  // No silence is reported while another node sends: the end of its character starts the limit again.
+  // No silence is reported while another node sends characters to this one: their end starts the limit again.
   if (busy_towards(state)) {
     state.due = std::min(now_ + state.settings.byte_time(), state.timer_due);
     return;

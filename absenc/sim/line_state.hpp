@@ -51,8 +51,8 @@ struct Line<Item>::State {
   Time lead{};                         ///< spi: time from chip select to the first clock
   ExtraWire pulse_wire{};              ///< wire of the pulse
   Time start{};                        ///< start of the transfer, or of its present frame
-  std::size_t index = 0;               ///< index of the item of `out` that is on the wire
-  std::size_t on_wire = 0;  ///< characters: number of items of the frame of `out` that is on the wire; 0: none
+  std::size_t index = 0;               ///< index of the item of `out` that is being sent, or is sent next
+  std::size_t on_wire = 0;  ///< characters: number of items of the present or last frame of `out`; 0: none
   Time each{};              ///< duration of one byte
 
   /// Returns whether a transfer of this node has begun and has items left to send.
@@ -60,7 +60,7 @@ struct Line<Item>::State {
     return active_step == Step<Item>::Kind::transfer && begun && index < out.size();
   }
 
-  /// Returns `item` combined with all characters of this node that overlap [from, to).
+  /// Returns `item` combined with the characters of this node's present or last frame that overlap [from, to).
   [[nodiscard]] Item overlaid(Item item, Time from, Time to) const {
     if (each.count() == 0) return item;
     const auto first = static_cast<std::size_t>(std::max<std::int64_t>(0, (from - start) / each));

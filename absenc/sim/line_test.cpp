@@ -169,8 +169,8 @@ class CanPuppet final : public Machine<CanFrame> {
 struct CanLine : testing::Test {
   Line<CanFrame> line{LinkKind::can, {.rate = 1'000'000}};
   CanPuppet host{0, microseconds(1'000'000), false};
-  // Returns the end, in ns, of a frame that began `after` us after the start, and its identifier, as `CanPuppet::log`
-  // has them.
+  // Returns the time, in ns, at which a frame that began `after` us after the start is received, and its identifier, as
+  // `CanPuppet::log` has them.
   static std::string seen(std::uint32_t id, std::size_t after) {
     return std::to_string((after + length(id)) * 1000) + ' ' + std::to_string(id) + ' ';
   }

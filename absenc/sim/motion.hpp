@@ -12,8 +12,8 @@
 
 namespace absenc::sim {
 
-/// The motion of a shaft, as a value: copies move alike and independently. Positions are in 2^-32 revolution and have
-/// no error that grows with time. After 2^31 revolutions the position wraps.
+/// The motion of a shaft, as a value: copies move alike and independently. Positions are in 2^-32 revolution. Only the
+/// rounding of speed and frequency causes an error that grows with time. After 2^31 revolutions the position wraps.
 class Motion final : public Shaft {
  public:
   /// A point of a path: position of the shaft at `time`, relative to the start position.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Conversion of a shaft position to the counts of a reading, and comparison of readings with a position.
+// Conversion of a shaft position to the counts of a reading, and comparison of readings with it and with each other.
 #pragma once
 
 #include <optional>

@@ -124,7 +124,7 @@ Event<Item> RoughLine<Item>::wait(const Step<Item>& step) {
   for (;;) {
     Time quiet = silence_.due(step.answer, step.gap);
     const Time arrival = front_ != back_ ? in_transit_[front_].at : never;
-    // an item is being received, so the line is not silent
+    // an item arrives by then, so the line is not silent
     if (arrival != never && in_transit_[front_].first <= quiet) quiet = never;
     const Time mine = std::min(timer, quiet);
     const Time next = due();

@@ -56,7 +56,7 @@ class RoughLine final : public Port<Item> {
   /// Discards frames that have arrived but were not reported, like a host that reads only the newest frame.
   void drop();
 
-  /// Marks all frames that the device has sent so far as old.
+  /// Marks all frames that the device began to send before now as old.
   void mark();
   /// Returns the send time of each old frame that was reported to the host since `mark`.
   [[nodiscard]] std::span<const Time> old_frames() const { return old_; }

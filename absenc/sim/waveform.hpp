@@ -17,8 +17,8 @@
 namespace absenc::sim {
 
 /// A drawing of the wires of a line, as logic levels (an idle line and a mark are 1), from items that are passed to it
-/// or observed on a Line. It passes changes to its sink in the order of time, and stores only those that a later item
-/// may still precede, because characters of two pairs overlap.
+/// or observed on a Line. It passes changes to its sink in the order of time, and stores those that a later item may
+/// still precede, because characters of two pairs overlap.
 ///
 /// - half duplex: `line`; full duplex: `host` and `device`, named by the sender that drives the pair
 /// - additional wires after the first pulse: `trigger`, `clear`, which a pulse pulls to 0

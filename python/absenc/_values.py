@@ -11,7 +11,7 @@ from .errors import UsageError
 #: Value of an option; an iterable gives the option several times.
 Value = Union[str, int, float, bool, None, Iterable[str]]
 
-#: A number, a text, bytes, or the names of flags; None: not reported, or invalid.
+#: A number, a truth value, a text, bytes, or the names of flags; None: not reported, or invalid.
 Field = Union[None, bool, int, float, str, bytes, tuple[str, ...]]
 
 

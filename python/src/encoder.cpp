@@ -63,7 +63,7 @@ class PyEncoder {
   PyEncoder(const PyEncoder&) = delete;
   PyEncoder& operator=(const PyEncoder&) = delete;
 
-  /// Throws the exception that a Python signal handler raised during the wait for samples or a recording.
+  /// Throws the exception that a Python signal handler raised during a wait, if any.
   void check() { watch_.rethrow(); }
 
   void close() {

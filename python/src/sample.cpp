@@ -30,7 +30,7 @@ void each_member(Reading& reading, const Act& act) {
   act(reading.alarms_reported);
 }
 
-// Returns the state of a reading for `pickle`: name of the unit, members, times.
+// Returns the state of a reading for `pickle`: id of the unit, members, times.
 py::tuple state_of(const PyReading& one) {
   py::list state;
   state.append(std::string(one.unit->id));

@@ -13,7 +13,7 @@ import tty
 import absenc
 import pytest
 
-PATIENCE_MS = 500  # timeout of replies, long because a busy machine may delay them
+PATIENCE_MS = 500  # latency, long because a busy machine may delay replies
 
 
 def test_error_has_sent_and_received_bytes_and_advice(absenc_emulate):

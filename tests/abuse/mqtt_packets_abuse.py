@@ -60,7 +60,7 @@ def bad_packet(random_, kind, number):
         return bytes((kind << 4,)) + size + good
     if way == 5:  # a packet with random flags, mostly wrong
         return packet(kind, good, random_.randrange(16))
-    if way == 6:  # a packet repeated many times
+    if way == 6:  # a packet sent 2 to 1999 times
         return packet(kind, good) * random_.randrange(2, 2000)
     mutated = bytearray(packet(kind, good + random_.choice((b"", properties(random_)))))
     for _ in range(random_.randrange(1, 4)):

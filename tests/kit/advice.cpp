@@ -98,7 +98,7 @@ std::string unquoted(std::string_view text) {
 constexpr auto circular_phrases =
     std::to_array<std::string_view>({"read the alarms", "look at the alarms", "the other alarms", "see the alarms"});
 
-/// Checks the wording of one advice. `what` names the alarm or error that has this advice.
+/// Checks the wording of one advice. `what` names what has this advice, such as an alarm or error.
 void check_words(const Unit& unit, const std::string& what, std::string_view advice, Findings& findings) {
   const auto require = [&](bool holds, std::string_view text) {
     findings.require(holds, [&] { return what + " is advised \"" + std::string(advice) + "\": " + std::string(text); });
@@ -165,8 +165,8 @@ bool reports_more(const ReportedFields& result, const ReportedFields& reading) {
 }
 
 /// Runs the commands that the advice of alarm `bit` names, in order. Returns whether the alarm has ended; false also if
-/// the encoder does not exist or does not show the alarm. Adds a finding if the commands have no effect and no
-/// explanation.
+/// the encoder does not exist or does not show the alarm. Adds a finding if the alarm remains and none of the commands
+/// explains its failure or reports a further field.
 template <class Item>
 bool follow_advice(const Unit& unit, const Configuration& configuration, std::size_t bit, Findings& findings) {
   const FlagInfo& flag = unit.alarms->flags[bit];
@@ -254,8 +254,8 @@ void check_message(const Unit& unit, const std::string& what, const Command& com
   }
 }
 
-/// Calls `use(name, spoil)` for no problem and for each problem that an encoder or line can have: all alarms,
-/// conditions and faults of the line. `spoil(world)` causes the problem.
+/// Calls `use(name, spoil)` for no problem, all alarms together, the least and greatest value of each condition, and
+/// each fault of the line. `spoil(world)` causes the problem.
 template <class Item, class Use>
 void for_each_problem(const Unit& unit, Use use) {
   use(std::string("nothing"), [](World<Item>&) {});

@@ -47,8 +47,8 @@ namespace absenc::kit {
   return memory_arguments(command, area, address, static_cast<std::uint8_t>(random.below(256)));
 }
 
-/// Applies the new value of a setting to the host's options too, if the host needs the setting (such as a baud rate or
-/// an address) to reach the encoder.
+/// Applies the new value of a setting to the host's options too, if the command declares such an option
+/// (`changes_option`), for example the address.
 template <class Item>
 void apply_to_host(World<Item>& world, const Unit& unit, const Command& setter, Arguments arguments) {
   if (setter.changes_option.empty()) return;
@@ -92,8 +92,8 @@ ReportedFields read_setting(World<Item>& world, const Unit& unit, const Command&
   });
 }
 
-/// Returns a text that names the promise which the successful command broke, or an empty text if the encoder is in the
-/// promised state. The line must have no faults.
+/// Returns a text that names the promise which the successful command broke, or an empty text if no broken promise is
+/// found. The line must have no faults.
 template <class Item>
 std::string broken_promise(World<Item>& world, const Unit& unit, const Command& command, Values values,
                            const ReportedFields& written) {

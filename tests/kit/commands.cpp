@@ -9,7 +9,7 @@
 namespace absenc::kit {
 namespace {
 
-/// Returns whether the kit requires that every model of a unit supports this command.
+/// Returns whether the kit requires that this command succeeds with each model, unless `is_refused`.
 bool is_plain(const Command& command) {
   return command.verb == Verb::read || command.verb == Verb::read_part || command.verb == Verb::info ||
          command.verb == Verb::temperature || command.verb == Verb::config_get;

@@ -25,7 +25,7 @@ class ConditionedEncoder {
 
   [[nodiscard]] bool made() const { return world_.made(); }
   void move() { world_.move(world_.place() + some_turns); }
-  // Switches the encoder off, turns the shaft by `some_turns`, and switches the encoder on.
+  // Switches the encoder off, turns the shaft by `some_turns`, switches the encoder on, and waits 1 ms.
   void lose_power() {
     world_.device().power_off(now());
     move();
@@ -52,8 +52,8 @@ std::uint32_t all_alarms(const Unit& unit) {
   return bits;
 }
 
-// Returns whether any command that changes nothing, except a scan, reports different results for two encoders that are
-// treated equally: at once, after a power cycle, with all alarms raised, and after resets.
+// Returns whether any reset, or any command that changes nothing, except a scan, reports different results for two
+// encoders that are treated equally: at once, after a power cycle, with all alarms raised, and after resets.
 template <class Item>
 bool reports_differ(const Unit& unit, ConditionedEncoder<Item>&& one, ConditionedEncoder<Item>&& other) {
   if (!one.made()) return false;

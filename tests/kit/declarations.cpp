@@ -84,7 +84,7 @@ void declared_settings(const Unit& unit, Findings& findings) {
   }
 }
 
-// Checks that no two members of a list have the same role: a search by role finds only the first.
+// Checks that no two members of a list have the same role, except Role::other: a search by role finds only the first.
 template <class Named>
 void declared_once(std::span<const Named> all, std::string_view whose, Findings& findings) {
   for (const Named& one : all) {

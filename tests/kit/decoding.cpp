@@ -41,7 +41,8 @@ class Decoding {
       close("reply", reply, vector_.open_reply, is_as_stated);
   }
 
-  // Checks that a request without a reply is no evidence against the options of the vector it comes from.
+  // Checks that a request without a reply is no evidence against the options of the vector it comes from, unless it is
+  // with its reply too.
   void unanswered() {
     if (unit_.probe == nullptr) return;
     struct Against final : EvidenceSink {
@@ -63,7 +64,7 @@ class Decoding {
             [&] { return "its request alone speaks against its options: " + std::string(why); });
   }
 
-  // Checks that the decoder refuses a truncated or extended request and reports no field of it.
+  // Checks that the decoder refuses an incomplete or extended request of bytes and reports no field of it.
   void good_request() {
     if (request_.empty() || request_.can || unit_.link == LinkKind::clocked) return;
     const auto unknown = [&](const OwnedFrame& request, std::string_view what) {
@@ -142,7 +143,7 @@ class Decoding {
     findings_.require(holds, [&] { return std::string(vector_.id) + " " + text(); });
   }
 
-  // Decodes the frame, and checks that the decoder of many frames gives the same.
+  // Decodes the frame, and checks that the decoder of many frames, if there is one, gives the same.
   Error decode(const OwnedFrame& reply, ReportedFields& seen) {
     const Error error = unit_.decode(options_, request_.frame(), reply.frame(), seen);
     if (decoder_ == nullptr) return error;
@@ -183,8 +184,8 @@ class Decoding {
     }
   }
 
-  // Checks that the decoder refuses CAN frames with another identifier, extended frames and remote frames. Other
-  // identifiers are tried only for vectors with a request, which determines the identifier of its reply.
+  // Checks that the decoder refuses the frame if it is extended, remote, or has one bit of its identifier flipped. Bits
+  // are flipped only in vectors with a request, which determines the identifier of its reply.
   void other_frames() {
     for (unsigned bit = 0; bit < 11 && !request_.empty(); ++bit) {
       OwnedFrame other = reply_;

@@ -15,8 +15,8 @@ namespace absenc::kit {
 namespace {
 
 constexpr unsigned places = 8;
-constexpr std::uint64_t exchanges_per_encoder = 4000;  // number of exchanges with each virtual encoder
-// Number of runs of each changing command, with each virtual encoder.
+constexpr std::uint64_t exchanges_per_encoder = 4000;  // greatest number of exchanges with each virtual encoder
+// Greatest number of runs of each changing command, with each virtual encoder.
 constexpr unsigned runs_per_change = 2;
 
 bool is_repeatable(const Command& command) {
@@ -31,9 +31,9 @@ struct Tally {
   std::uint64_t conversations = 0;
   std::uint64_t accepted = 0;
   std::uint64_t damaged = 0;                // number of faults that changed bytes
-  std::uint64_t wrong = 0;                  // number of wrong results from conversations with damaged bytes
+  std::uint64_t wrong = 0;                  // number of wrong results of commands whose replies have a check
   std::uint64_t rule_violations = 0;        // number of times that the host violated a rule of the protocol
-  std::uint64_t damaged_request_bytes = 0;  // number of damaged bytes in requests
+  std::uint64_t damaged_request_bytes = 0;  // number of damaged bytes (CAN: frames) in requests
   std::uint64_t changes = 0;                // number of conversations with a command that changes the encoder
   std::uint64_t changed = 0;                // number of changes that the host reported as successful
   // Number of changes that the host reported as successful and the encoder did not make.
@@ -44,9 +44,9 @@ struct Tally {
   struct Command {
     std::optional<UndetectedDamage> undetected{};
     std::uint64_t damaged_reply_count = 0;  // number of damaged replies
-    std::uint64_t wrong_positions = 0;      // number of accepted replies with a wrong position
-    std::uint64_t wrong_values = 0;         // number of accepted replies with a right position and another wrong value
-    std::uint64_t cost = 0;                 // number of exchanges in a conversation of the command
+    std::uint64_t wrong_positions = 0;      // part of `wrong` with a wrong position
+    std::uint64_t wrong_values = 0;         // part of `wrong` with a right position and another wrong value
+    std::uint64_t cost = 0;                 // greatest number of exchanges in a conversation of its last Query
     std::optional<bool> unchecked;          // true if a reply of the command has no check; empty if not yet determined
   };
   std::map<std::string, Command> commands{};
@@ -93,7 +93,7 @@ class Campaign {
     const Command* command;
     Values arguments;
     std::array<std::optional<ReportedFields>, places> truth{};
-    std::uint64_t cost = 0;              // number of exchanges in a conversation of the command
+    std::uint64_t cost = 0;              // greatest number of exchanges in a recorded conversation of the command
     std::vector<std::string> varying{};  // names of fields whose values differ between two runs at the same position
   };
 
@@ -104,7 +104,7 @@ class Campaign {
     if (unit.link == LinkKind::spi) rates = {};
     rates[FaultKind::corrupt] = unit.link == LinkKind::can ? 0 : 0.1;  // CAN's own checksum detects damaged frames
     if (test.requests_too) rates[FaultKind::request_corrupt] = 0.02;
-    // With odd seeds, unless requests are damaged too, replies are delayed beyond the host's timeout. CAN and encoders
+    // With odd seeds, unless requests are damaged too, delayed replies come after the host's timeout. CAN and encoders
     // with unsolicited frames are excluded, because a host cannot determine the age of such a frame.
     const bool unsolicited = unit.link == LinkKind::can || (unit.streams != nullptr && unit.streams(options));
     if (test.seed % 2 == 1 && !test.requests_too && !unsolicited) rates.delay = unit.timing.turnaround_limit * 3 / 2;
@@ -173,7 +173,7 @@ class Campaign {
   void run_conversation() {
     const bool reads = !reads_.empty() && random_.chance(0.95);
     Query* chosen = &queries_[reads ? reads_[random_.below(reads_.size())] : random_.below(queries_.size())];
-    // The more exchanges a command has, the less often it is chosen.
+    // The more exchanges above four a command has, the less often it is chosen.
     if (chosen->cost > 4 && !reads_.empty() && !random_.chance(4.0 / static_cast<double>(chosen->cost))) {
       chosen = &queries_[reads_[random_.below(reads_.size())]];
     }
@@ -427,7 +427,7 @@ void exchange(const Unit& unit, const ExchangeTest& test, Tally& tally, Findings
       findings.add("too few exchanges per round");
       break;
     }
-    // Every even round uses a model, every odd round any configuration.
+    // Every even round uses a model, or the defaults if the unit has none, every odd round any configuration.
     const Configuration& configuration = round % 2 == 0
                                              ? setups[round / 2 % std::max<std::size_t>(1, unit.models.size())]
                                              : setups[round / 2 % setups.size()];

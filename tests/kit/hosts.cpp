@@ -327,7 +327,8 @@ void feed_vector(const Unit& unit, const Vector& vector, const Options& options,
   }
 }
 
-// Returns how long the unit's `read` command waits for the first byte of a reply, or no value if it sends no request.
+// Returns how long the unit's `read` command waits for the first byte of a reply, or no value if it sends no request or
+// does not wait after it.
 template <class Item>
 std::optional<Time> wait_for_reply(const Unit& unit, const Options& options) {
   using Kind = typename Step<Item>::Kind;

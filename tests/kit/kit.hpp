@@ -21,13 +21,15 @@ namespace absenc::kit {
 [[nodiscard]] Findings check_places(const Unit& unit);
 
 /// Feeds every vector's reply to the commands that send its request, as far as the link permits: whole, byte by byte,
-/// cut after each byte, with each checked bit flipped, with garbage before and after it, and twice. It is a finding if
+/// cut after each byte, with each checked bit flipped, with garbage before and after it, and twice. Leaves out scans,
+/// the commands that change the encoder, and on CAN all commands but those that read the position. It is a finding if
 /// no command reads the position of any vector, or if `encode` refuses a command in every configuration, other than as
 /// unsupported.
 [[nodiscard]] Findings check_hosts(const Unit& unit);
 
-/// Checks that every command, a scan too, ends with `timeout` if no encoder answers; a command that expects no reply
-/// may succeed. Does not apply where the host clocks the line, because such a line is never silent.
+/// Checks that every command that sends a request, a scan too, ends with `timeout` if no encoder answers; a command
+/// that expects no reply may succeed. Does not apply where the host clocks the line, because such a line is never
+/// silent.
 [[nodiscard]] Findings check_silence(const Unit& unit);
 
 /// Encodes every command with random arguments and decodes the request: its fields must contain each of these arguments
@@ -57,8 +59,8 @@ namespace absenc::kit {
 
 /// Runs every command that changes nothing, except scans, with each alarm raised and not raised in the virtual encoder.
 /// A reading, live or decoded from the captured reply, must report the alarm correctly or not at all. Raised bits must
-/// be reported, and so must flags that the reply carries. A part of a position may be valid only if the whole reading
-/// says so too.
+/// be reported, and so must flags that the reply carries. A part of a position must not be valid if the whole reading
+/// is invalid.
 [[nodiscard]] Findings check_states(const Unit& unit);
 
 /// Checks that the zero command is refused with a reason, and leaves the encoder unchanged, while an alarm or a
@@ -71,13 +73,13 @@ namespace absenc::kit {
 [[nodiscard]] Findings check_advice(const Unit& unit);
 
 /// Runs each command that changes nothing, in each configuration, on an undamaged line. Positions must equal that of
-/// the shaft. With the options of a model, commands such as `read` and `info` must succeed, and the host must break no
-/// rule.
+/// the shaft. With the options of a model `read` must succeed, commands such as `info` must succeed or be refused, and
+/// the host must break no rule.
 [[nodiscard]] Findings check_commands(const Unit& unit);
 
-/// Settings of `check_exchanges`, which runs a host against a virtual encoder in virtual time over a line with faults.
-/// Wrong results are findings if no byte of the conversation was damaged. With damaged bytes they may be no more
-/// frequent than the frame's check allows.
+/// Settings of `check_exchanges`, which runs hosts against virtual encoders in virtual time over a line with faults.
+/// Wrong results of commands whose replies have a check are findings if no byte of the conversation was damaged. With
+/// damaged bytes they may be no more frequent than the check allows.
 struct ExchangeTest {
   std::uint64_t count = 100'000;
   std::uint64_t seed = 0;

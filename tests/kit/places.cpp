@@ -82,7 +82,7 @@ class Places final : public FieldSink {
   std::set<Role> placed_;
 };
 
-// Checks the replies of all vectors, and each such reply with one bit flipped if it is still valid.
+// Checks the valid replies of the vectors, and each of them with one bit flipped if it is still valid.
 void check_vectors(const Unit& unit, Places& places) {
   for (const Vector& vector : unit.vectors) {
     const std::optional<Options> options = options_of(unit, vector.options);

@@ -29,8 +29,8 @@ struct DamageCount {
   }
 };
 
-/// Rates of undetected damage: how often a damaged reply decodes to another position, and how often to another value of
-/// any other field.
+/// Rates of undetected damage: how often a damaged reply decodes to another position, and how often to the right
+/// position with another value of another field.
 struct UndetectedDamage {
   DamageCount position{};
   DamageCount others{};

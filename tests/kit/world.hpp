@@ -88,7 +88,7 @@ class World {
     line_->run(node_, line_->now());
   }
 
-  /// Runs one conversation to its end, or a streaming conversation up to its first result.
+  /// Runs one conversation to its end, or a streaming conversation up to its first result, for at most `limit`.
   ConversationResult run(const Command& command, Arguments arguments, Time limit = std::chrono::seconds(100)) {
     return run_in(host_storage_, command, arguments, limit);
   }

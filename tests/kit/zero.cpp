@@ -15,8 +15,8 @@ std::optional<Reading> read_position(World<Item>& world, const Unit& unit) {
   return world.run(read, least_arguments(read)).seen.reading;
 }
 
-/// Runs the zero command while the position is invalid, and checks that it is refused. `spoil` makes the position
-/// invalid, `mend` makes it valid again.
+/// Checks that the zero command is refused if the position is invalid after `spoil`, and leaves the position unchanged.
+/// `mend` reverses `spoil`.
 template <class Item, class Spoil, class Mend>
 void try_zero(const Unit& unit, const Configuration& configuration, const std::string& what, Spoil spoil, Mend mend,
               Findings& findings) {

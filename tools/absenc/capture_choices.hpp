@@ -10,8 +10,8 @@
 
 namespace absenc::tool {
 
-/// Returns the values of the options --channel, --raw-channels, --rate, --baud and --parity. Throws UsageError if one
-/// is invalid, or if --raw-channels is given without --rate.
+/// Returns `path` and the values of the options --channel, --raw-channels, --rate, --baud and --parity. Throws
+/// UsageError if one is invalid, or if --raw-channels is given without --rate.
 [[nodiscard]] CaptureChoices capture_choices(const Invocation& invocation, std::string_view path);
 
 }  // namespace absenc::tool

@@ -9,7 +9,7 @@ namespace absenc::tool {
 using namespace client;  // the command uses the library's names without a prefix
 
 inline constexpr int exit_good = 0;
-inline constexpr int exit_failed = 1;  // exit status: the encoder, the line or the system failed
+inline constexpr int exit_failed = 1;  // exit status, for example if the encoder, the line or the system failed
 inline constexpr int exit_usage = 2;
 inline constexpr int exit_nothing_judged = 3;  // exit status: nothing was observed that a verdict could be based on
 

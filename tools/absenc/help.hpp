@@ -49,7 +49,7 @@ inline constexpr std::array<std::string_view, 4> exit_statuses{
     "good", "the encoder or the line failed", "wrong usage",
     "nothing was seen that could be judged (conform, conform-host)"};
 
-/// Returns the help text of the whole command.
+/// Returns the help text of the whole command, or of a verb.
 [[nodiscard]] std::string help();
 [[nodiscard]] std::string help(const Subcommand& subcommand);
 /// Returns the help text of the verbs whose first word is `first_word_of_two`.
@@ -60,7 +60,7 @@ inline constexpr std::array<std::string_view, 4> exit_statuses{
 
 /// Returns a parameter as help shows it: "<encoder>", "--count N".
 [[nodiscard]] std::string title(const Parameter& parameter);
-/// Returns a parameter's meaning, how often the parameter may be given, and its default.
+/// Returns a parameter's meaning, its default, and whether an option may be given more than once.
 [[nodiscard]] std::string words(const Parameter& parameter);
 
 }  // namespace absenc::tool

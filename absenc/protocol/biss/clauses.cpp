@@ -62,7 +62,7 @@ constexpr auto clauses = with_registers(std::array<Clause, 3>{{
      .shown_with = "life_counter=true"},
 }});
 
-/// Requirements on a BiSS Safety encoder: a control word and a safety word, each with its own check.
+/// Requirements on a BiSS Safety encoder, which sends a control word and a safety word.
 constexpr auto safety_clauses = with_registers(std::array<Clause, 4>{{
     {"crc", "BiSS Safety, CPW and SPW", "CRC-6 over the control word, CRC-16 over the safety word, both inverted",
      Demand::checked},

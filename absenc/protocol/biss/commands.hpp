@@ -16,12 +16,12 @@ namespace absenc::biss {
 inline constexpr Argument address_argument{"address", "of the register", 0, registers::end - 1, 0, true, Role::address};
 /// Argument: bank that addresses 0 to 63 belong to.
 inline constexpr Argument bank_argument{"bank", "of addresses 0 to 63", 0, 255, 0, false, Role::page};
-/// Arguments of commands that read registers.
+/// Arguments of `memory-read`.
 inline constexpr std::array<Argument, 3> read_arguments{
     {address_argument,
      bank_argument,
      {"count", "registers from the address on", 1, control_most, 1, false, Role::count}}};
-/// Arguments of commands that write registers.
+/// Arguments of `memory-write`.
 inline constexpr std::array<Argument, 4> write_arguments{
     {address_argument,
      {"value", "the byte", 0, 255, 0, true, Role::value},
@@ -49,7 +49,7 @@ inline constexpr std::array<NamedRegister, 6> named_registers{{
     {"manufacturer", registers::manufacturer, "manufacturer of the encoder"},
 }};
 
-/// Returns the request of a clocked link, which is empty.
+/// Returns the empty request of a clocked link.
 template <class F>
 constexpr author::NoRequest no_request(const F&, Arguments) {
   return {};
@@ -90,7 +90,7 @@ template <auto member>
 inline constexpr auto line_delay_option = author::option<member>("line_delay_ns",
                                                                  "virtual encoder: delay of the line, there and back",
                                                                  0, 100'000);
-/// Option: byte order of a number that several registers hold.
+/// Option: byte order of the registers that hold a number, such as profile and serial number.
 template <auto member>
 inline constexpr auto register_order_option = author::option<member>(
     "register_byte_order", "of profile and serial number: some makers have the low byte first", register_order_choices);

@@ -12,7 +12,7 @@
 
 namespace absenc::biss {
 
-/// A word and its check, compiled. `Entry` and `rows`: as in BitCrc.
+/// A word and its check, compiled. `Entry` and `rows` are those of BitCrc.
 template <class Entry = std::uint16_t, std::size_t rows = 16>
 class CompiledChannel {
  public:
@@ -22,7 +22,7 @@ class CompiledChannel {
     return format.word.bits() + (format.check.life_counter ? life_counter_bits : 0);
   }
 
-  /// Compiles the members `word` and `check` of `format`.
+  /// Compiles the members `word` and `check` of `format`, if `is_possible()`.
   template <class Described>
   constexpr explicit CompiledChannel(const Described& format)
       : covered_(covered_bits(format)), width_(format.check.width), life_counter_(format.check.life_counter) {
@@ -31,7 +31,7 @@ class CompiledChannel {
     crc_ = BitCrc<Entry, rows>(parameters_of(format.check), covered_);
   }
 
-  /// Returns whether word and life counter fit into one number, so that `load` may be called.
+  /// Returns whether word and life counter together have 1 to 64 bits, so that `load` may be called.
   [[nodiscard]] constexpr bool is_possible() const { return covered_ >= 1 && covered_ <= CompiledWord::maximum_bits; }
   /// Returns the number of bits of word, life counter and CRC.
   [[nodiscard]] constexpr unsigned bits() const { return covered_ + width_; }

@@ -7,8 +7,7 @@
 
 namespace absenc::biss {
 
-/// A format with its word and check compiled, for many frames: it takes about 1 KiB of memory, and as much time to make
-/// as some four frames to decode without it.
+/// A format with its word and check compiled, for many frames.
 class CompiledFormat {
  public:
   /// Compiles `format`, which is copied.
@@ -16,7 +15,7 @@ class CompiledFormat {
   /// Returns the format.
   constexpr operator const Format&() const { return format_; }
 
-  /// Decodes a frame, as `decode`.
+  /// Decodes a frame with the same result as biss::decode by the format.
   [[nodiscard]] constexpr Result<Reply> decode(const BitView& samples, Cds cds) const {
     if (!channel_.is_possible()) return decode_otherwise(samples, cds);
     return detail::decode_compiled<Word>(channel_, samples, cds, [&] { return decode_otherwise(samples, cds); });
@@ -50,7 +49,7 @@ class CompiledSafetyFormat {
   /// Returns the format.
   constexpr operator const SafetyFormat&() const { return format_; }
 
-  /// Decodes a frame, as `decode`.
+  /// Decodes a frame with the same result as biss::decode by the format.
   [[nodiscard]] constexpr Result<SafetyReply> decode(const BitView& samples, Cds cds) const {
     detail::Head head;
     if (!is_possible_ || !detail::find_data(samples, cpw_.bits() + spw_.bits(), cds, head)) {
@@ -74,7 +73,7 @@ class CompiledSafetyFormat {
   [[nodiscard]] static constexpr ChannelData data_of(const CompiledChannel<>& channel, const Bits& sent) {
     return {channel.values_of<Word>(sent), channel.life_counter_of(sent), sent.crc};
   }
-  // Zeros alone are no word: see take_channel.
+  // Zeros alone are no word where words have a CRC: see take_channel.
   [[nodiscard]] static constexpr bool is_sent(const CompiledChannel<>& channel, const Bits& bits) {
     return !channel.has_crc() || (bits.covered | bits.crc) != 0;
   }

@@ -155,7 +155,8 @@ TEST(BissCompiledSafetyFormat, EqualsFormatForRandomFormatsAndFrames) {
   EXPECT_GT(good, 5'000u);
 }
 
-// A CRC that is not inverted is right for zeros, which a slave without process data sends.
+// A CRC that begins with 0 and is not inverted is right for zeros, but a word of zeros is refused: a slave whose
+// process data are switched off sends it.
 TEST(BissCompiledSafetyFormat, RefusesZerosInPlaceOfEitherWord) {
   constexpr Check plain{.width = 8, .poly = 0x07, .init = 0, .inverted = false};
   constexpr SafetyFormat format{.cpw = {.word = "position:16"_word, .check = plain},

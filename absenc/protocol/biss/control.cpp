@@ -111,7 +111,7 @@ bool ControlMaster::direction(bool cds) {
         state_ = State::start;
         return true;
       }
-      // If a write is not answered, the lock bits show whether a slave with this ID exists and refuses the write.
+      // The lock bits show whether a slave with this ID exists and refuses the access.
       return end(frame_.request.slave < frame_.slaves ? Error::request_rejected : Error::timeout);
   }
 }
@@ -252,8 +252,8 @@ bool ControlSlaves::direction(bool cdm, ControlTarget& target) {
   }
 }
 
-// Begins a data byte at the host's start bit, which the host repeats while the encoder is not ready. For a read,
-// `bits_` are the bits to send.
+// Begins a data byte as soon as the encoder is ready, a first written byte at once. For a read, `bits_` are then the
+// bits to send.
 bool ControlSlaves::begin_byte(ControlTarget& target) {
   const bool write = request_.operation == Operation::write;
   const bool may_wait = !write || bytes_ > 0;
@@ -277,7 +277,8 @@ bool ControlSlaves::next_allowed(const ControlTarget& target) const {
          target.allows(request_.slave, next, request_.operation == Operation::write);
 }
 
-// Sends a data byte to the host. The host's CDM is examined only in the frame of P.
+// Returns the next bit of a data byte and its CRC, then P. After P, begins the next byte if the host sends a start bit
+// and that register may be read.
 bool ControlSlaves::read(bool cdm, ControlTarget& target) {
   const unsigned at = at_++;
   if (at < byte_bits) return (bits_ >> (byte_bits - 1 - at) & 1) != 0;
@@ -288,7 +289,7 @@ bool ControlSlaves::read(bool cdm, ControlTarget& target) {
   return begin_byte(target);
 }
 
-// Receives a data byte. A byte with a wrong CRC is returned to the host as received, but not stored.
+// Receives the next bit of a data byte and its CRC, and returns it. A byte with a wrong CRC is not stored.
 bool ControlSlaves::write(bool cdm, ControlTarget& target) {
   const unsigned at = at_++;
   if (at < byte_bits) {

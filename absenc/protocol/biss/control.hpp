@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// BiSS control communication: the content of a control frame, and both sides of it. Each position frame carries one bit
-// of the host (CDM, after the frame) and one of the encoders (CDS, in the next frame). README.md draws it. Source: BiSS
-// C Protocol Description rev D2.
+// BiSS control communication: the content of a control frame, and both sides of it. The host sends one bit (CDM) after
+// each position frame, and the encoders send one bit (CDS) in each position frame. README.md draws it. Source: BiSS C
+// Protocol Description rev D2.
 #pragma once
 
 #include <array>
@@ -80,7 +80,7 @@ inline constexpr unsigned header_bits = 15;  ///< Number of header bits after th
 struct ControlFrame {
   ControlRequest request{};       ///< Request of the host.
   std::uint8_t slaves = 0;        ///< Number of slaves with an ID, from the lock bits.
-  bool more_slaves = false;       ///< Whether more slaves without an ID are on the line.
+  bool more_slaves = false;       ///< Whether there are also slaves without an ID on the line.
   ByteBuffer<control_most> data;  ///< Values of the registers that were read or written.
   /// For each byte of `data`, the number of frames by which the encoder delayed it.
   Buffer<std::uint16_t, control_most> start_delay;
@@ -90,13 +90,14 @@ struct ControlFrame {
   bool executed = false;          ///< Whether the host let the slaves execute the command (bit EX).
 };
 
-/// Decodes a control frame from the bits of CDM and CDS, one of each per position frame. The start bit may be the
-/// first bit, or follow zeros. Without CDS bits only the request is decoded: written data is taken from CDM, and
-/// repeated start bits are separated from data by the CRC. Errors: wrong_length (no bits, or more than 64 data bytes),
-/// bad_framing (no start bit, too few zeros before it, neither read nor write, a command without start bit S, or a
-/// delayed first written byte), truncated, bad_checksum (header or a byte), timeout (no slave has this ID, the slave
-/// does not answer, or the host sends no start bit S), unexpected_reply (written data is returned with another value, a
-/// write is answered as a read, or a slave acknowledges a command that is not for it), request_rejected.
+/// Decodes a control frame from the bits of CDM and CDS, one of each per position frame. The start bit is the first
+/// bit, or follows at least 14 zeros. Without CDS bits only the request is decoded: written data is taken from CDM, and
+/// repeated start bits are separated from data by the CRC. Errors: wrong_length (no CDM bits, or more than 64 data
+/// bytes), bad_framing (no start bit, too few zeros before it, neither read nor write, a command without start bit S,
+/// or a delayed first written byte), truncated, bad_checksum (header or a byte), timeout (no slave has this ID, the
+/// slave does not answer, or the host sends no start bit S for an access), unexpected_reply (written data is returned
+/// with another value, a write is answered as a read, or a slave acknowledges a command that is not for it),
+/// request_rejected.
 [[nodiscard]] Result<ControlFrame> decode_control(BitView cdm, BitView cds);
 
 /// The host's side of control frames. It owns no line: the caller passes the CDS of each position frame to `next` and
@@ -109,22 +110,21 @@ class ControlMaster {
 
   /// Begins to read `count` registers (1 to 64) of `slave` from `address` on.
   void read(unsigned slave, unsigned address, std::size_t count);
-  /// Begins to write `bytes` to the registers of `slave` from `address` on.
+  /// Begins to write `bytes`, 1 to 64, to the registers of `slave` from `address` on.
   void write(unsigned slave, unsigned address, Bytes bytes);
   /// Begins to send a command to the slaves in the mask `slaves`; 0: to all slaves.
   void command(std::uint8_t slaves, unsigned command);
-  /// Begins to count the slaves on the line; the result will be `frame().slaves`.
+  /// Begins to count the slaves with an ID on the line; the result will be `frame().slaves`.
   void count_slaves();
 
   /// Processes the CDS of a received frame and returns the CDM to send after that frame.
   bool next(bool cds);
-  /// Ends the control frame with `error`: a position frame and its CDS were lost, or the encoder's start bit is too
-  /// late.
+  /// Ends the control frame with `error`, for example because a position frame was lost.
   void fail(Error error);
 
-  /// Returns whether the control frame has ended.
+  /// Returns whether no control frame is in progress.
   [[nodiscard]] bool is_over() const { return over_; }
-  /// Returns whether the host waits for a start bit of the encoder, which may take 20 ms.
+  /// Returns whether the host waits for the encoder's start bit of a data byte.
   [[nodiscard]] bool is_waiting() const { return !over_ && state_ == State::start; }
   /// Returns the error that ended the control frame; `none` while it runs or after success.
   [[nodiscard]] Error error() const { return error_; }
@@ -177,10 +177,10 @@ struct ControlTarget {
   [[nodiscard]] virtual bool stop_bit(bool next_allowed) const { return !next_allowed; }
   /// Returns whether the next data byte can begin now: its value is available, or the encoder can accept a new one.
   [[nodiscard]] virtual bool is_ready() const = 0;
-  /// Returns whether `slave` takes part in register accesses and acknowledges commands. Command 1 switches this off for
-  /// the slaves that it addresses. Sent to all slaves, it switches this on again; slaves that are off execute it.
+  /// Returns whether control communication of `slave` is on: it takes part in register accesses and may acknowledge
+  /// commands. BiSS command 1 switches it off in the slaves that are addressed, and on again if sent to all slaves.
   [[nodiscard]] virtual bool listens(unsigned) const { return true; }
-  /// Returns whether `slave` executes the command with number `command`.
+  /// Returns whether `slave` acknowledges the command with number `command`.
   [[nodiscard]] virtual bool obeys(unsigned slave, unsigned command) const = 0;
   /// Executes a command on all slaves whose bit is set in `slaves`; 0: on all slaves.
   virtual void execute(std::uint8_t slaves, unsigned command) = 0;
@@ -200,7 +200,7 @@ class ControlSlaves {
   void take(bool cdm, ControlTarget& target);
   /// Returns the CDS that the slaves send in the next frame.
   [[nodiscard]] bool cds() const { return cds_; }
-  /// Resets the slaves to their state after power on.
+  /// Resets control communication to its state after power on.
   void reset() { *this = ControlSlaves(count_); }
 
  private:
@@ -223,7 +223,7 @@ class ControlSlaves {
   ControlRequest request_{};
   std::uint16_t bits_ = 0;
   unsigned at_ = 0;
-  unsigned bytes_ = 0;  // Number of data bytes transferred in this control frame.
+  unsigned bytes_ = 0;  // Number of data bytes before the present one in this control frame.
   unsigned zeros_ = 0;
   bool cds_ = false;
 };

@@ -10,7 +10,7 @@ using namespace control_bits;
 
 namespace {
 
-// A view of the bits of one control frame: index 0 is its start bit, and bits beyond the end are 0.
+// A view of the bits of one control frame: index 0 is its start bit, and `[]` returns 0 beyond the end.
 struct ControlBits {
   BitView bits;
   std::size_t start;
@@ -28,7 +28,7 @@ void decode_lock_bits(ControlFrame& frame, const ControlBits& cds) {
   frame.more_slaves = cds[more_slaves_at];
 }
 
-// Decodes the bytes of a register access. For a read, `cdm` only shows how many bytes there are.
+// Decodes the bytes of a register access. For a read, their values are taken from `cds` alone.
 Error decode_bytes(const ControlBits& cdm, const ControlBits& cds, bool write, ControlFrame& frame) {
   bool refused = false;  // P refused the next register; some encoders send it all the same
   for (unsigned due = direction_at + 3;; due += byte_bits + 2) {

@@ -17,7 +17,7 @@ namespace absenc::biss {
 /// A list of numbers as text, separated by spaces.
 class NumberList {
  public:
-  /// Appends a number to the list.
+  /// Appends a number, at most 99999, to the list.
   constexpr void add(unsigned number) {
     if (!empty()) text_.push_back(' ');
     std::array<char, 5> digits{};

@@ -26,8 +26,7 @@ Result<ControlFrame> decoded(std::string_view cdm, std::string_view cds) {
   return decode_control(BitText(cdm).bits.view(), BitText(cds).bits.view());
 }
 
-// The bits of a register read from a table of Texas Instruments (TI); the other frames follow the rules of the
-// protocol description.
+// CDM and CDS bits of a register read, from a table of Texas Instruments (TI).
 constexpr std::string_view read_44 = "0000000000000011000100010011011010000000000000000";
 constexpr std::string_view read_44_answer = "0000000000000001000000000000000101000010100010000";
 
@@ -49,8 +48,7 @@ std::string cdm_of(const ControlMaster& master) {
   return text;
 }
 
-// Compares CDM bits with those of the protocol description and of TI's table. After the drawn bits only zeros may
-// follow.
+// Compares CDM bits with drawn ones up to their last 1. At least 14 zeros, and no 1, must follow.
 TEST(BissControl, EncodesRequestsOfTheDocument) {
   const auto expect = [](const ControlMaster& master, std::string_view drawn) {
     const std::string cdm = cdm_of(master);
@@ -145,8 +143,8 @@ struct Transcript {
   std::string cds;
 };
 
-/// Runs host and encoders until the control frame ends. `flip`: index of a CDS bit that is received wrong; the checks
-/// of the position do not detect that.
+/// Runs host and encoders until the control frame ends, for at most 2000 position frames. `flip`: index of a CDS bit
+/// that the host receives wrong.
 Transcript run(ControlMaster& master, ControlSlaves& slaves, Target& target, std::size_t flip = ~std::size_t{0}) {
   Transcript transcript;
   for (unsigned i = 0; !master.is_over() && i < 2'000; ++i) {
@@ -188,7 +186,7 @@ TEST(BissControl, DecodesHostThatContinuesAfterStopBit) {
   EXPECT_EQ((run(master, slaves, target), master.error()), Error::request_rejected);
   EXPECT_EQ(master.frame().data.size(), 1u);
   EXPECT_EQ(master.frame().data[0], 10);
-  // LENZ's host ignores the bit P after a register that it has read.
+  // A host that ignores P, as LENZ's does, reads the next register.
   BitBuffer<256> cdm;
   BitBuffer<256> cds;
   slaves.reset();
@@ -245,7 +243,7 @@ TEST(BissControl, RandomAccessesEndWithExpectedResult) {
     }
     const std::string quiet(14, '0');
     const Result<ControlFrame> seen = decoded(quiet + transcript.cdm + quiet, quiet + transcript.cds + quiet);
-    // The decoder cannot know that the host wanted more registers than the encoder has.
+    // The decoder cannot know that the host wanted more registers than the encoder permits.
     const std::size_t size = master.frame().data.size();
     ASSERT_EQ(seen.error(), size > 0 ? Error::none : expected) << transcript.cdm << '\n' << transcript.cds;
     if (!seen) continue;

@@ -31,8 +31,7 @@ void LineDelay::apply(const Behaviour& behaviour, Time period, Samples& samples)
 // ---- Registers
 
 namespace {
-// Layout of the memory of each slave: its banks, then the registers outside the banks. Bank select is lost at power
-// off.
+// Index of the registers outside the banks in the memory of a slave; the banks come before them.
 constexpr std::size_t direct = VirtualRegisters::banks * registers::bank_size;
 
 // Initial content of the registers device ID (6 bytes) and manufacturer (2 bytes).
@@ -69,7 +68,8 @@ std::size_t VirtualRegisters::place(unsigned slave, unsigned address) const {
   return first + direct + (address - registers::bank_size);
 }
 
-// Refuses banks that do not exist, and writes to registers that identify the encoder.
+// Refuses registers of banks that do not exist. Outside the banks, only bank select and the registers from `device` to
+// before `device_id` may be written.
 bool VirtualRegisters::allows(unsigned slave, unsigned address, bool write) const {
   if (address < registers::bank_size) return bank_[slave] < banks;
   if (!write || address == registers::bank_select) return true;

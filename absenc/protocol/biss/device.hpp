@@ -16,8 +16,8 @@ struct Behaviour {
   Time latency = 10us;  ///< Time that the encoder needs for a position, from the second rising edge of MA.
   /// Delay of the line, there and back. The host samples SLO one period of MA after the edge that drives it.
   Time line_delay{};
-  Time edge_noise = 20ns;       ///< A sample this close to a delayed edge reads the old bit or the new bit, at random.
-  Time register_delay{};        ///< Time from the request for a register to the encoder's start bit.
+  Time edge_noise = 20ns;       ///< A sample closer than this to a delayed edge reads the old or new bit, at random.
+  Time register_delay{};        ///< Time from the request for a register until it is ready.
   bool start_sequence = false;  ///< Whether SLO stays idle after power on until the start sequence.
 };
 
@@ -57,7 +57,7 @@ class EncoderOf {
     reply.ack_bits = head_bits(format_, behaviour_.latency, period);
     reply.cds = cds;
     show(format_, shaft_->at(at), alarms_, life_counter_, reply);
-    if (!encode(format_, reply, samples, data_off_)) {  // the ACK would need more clocks than a frame can have
+    if (!encode(format_, reply, samples, data_off_)) {  // the frame does not fit
       samples.clear();
       samples.append(low_mask(idle_bits), idle_bits);
       while (samples.size() < Samples::capacity()) samples.append(0, 1);
@@ -78,11 +78,11 @@ class EncoderOf {
   [[nodiscard]] Word word(Time at) const { return word_of(format_.word, shaft_->at(at), alarms_); }
   /// Returns whether the encoder is switched on.
   [[nodiscard]] bool is_powered() const { return powered_; }
-  /// Switches the encoder on or off.
+  /// Sets whether the encoder is switched on; `sample` does not check that.
   void set_power(bool on) { powered_ = on; }
   /// Sets which alarms are raised, one bit each.
   void set_alarms(std::uint32_t alarms) { alarms_ = alarms; }
-  /// Switches off the process data of the slaves whose bit is set in `slaves`.
+  /// Sets the slaves whose process data are switched off: bit n is slave n.
   void set_silent(std::uint8_t slaves) { data_off_ = slaves; }
 
  private:
@@ -108,7 +108,7 @@ class VirtualRegisters final : public ControlTarget {
 
   /// Creates the registers of `slaves` slaves, 1 to `most_slaves`.
   VirtualRegisters(unsigned slaves, RegisterOrder order, StopBit stop_bit);
-  /// Restores the values that registers and switches have after power on.
+  /// Selects bank 0, and switches on process data and control communication of all slaves.
   void power_on();
   /// Sets the present time to `at`; a register that is requested now is ready `delay` later.
   void set_time(Time at, Time delay);
@@ -128,7 +128,7 @@ class VirtualRegisters final : public ControlTarget {
   [[nodiscard]] bool is_ready() const override;
   [[nodiscard]] bool listens(unsigned slave) const override { return (control_off_ >> slave & 1) == 0; }
   [[nodiscard]] bool obeys(unsigned slave, unsigned command) const override;
-  /// Executes a command on all slaves whose bit is set in `slaves`; 0: on all slaves.
+  /// Executes command 0 or 1 on all slaves whose bit is set in `slaves`; 0: on all slaves. Ignores other commands.
   void execute(std::uint8_t slaves, unsigned command) override;
 
  private:
@@ -224,8 +224,8 @@ class VirtualEncoderOf final : public author::ClockedDevice {
   VirtualRegisters registers_;
   unsigned needed_ = 0;  // clocks that the present frame needs; 0: no frame was sent
   Time timeout_{};       // BiSS timeout after the present frame
-  Time period_{};        // period of MA
-  Time free_at_{};       // earliest time of the next frame: the BiSS timeout after the last clock
+  Time period_{};
+  Time free_at_{};  // earliest time of the next frame: the BiSS timeout after the last clock
   bool clocked_before_ = false;
   bool start_sequence_received_ = false;  // whether the host has sent the start sequence since power on
 };

@@ -60,8 +60,8 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
   ~ControlDialog() = default;
 
  private:
-  // Returns sequence_mismatch if the life counter did not advance by one since the last frame. This check is possible
-  // because the dialog reads every frame.
+  // Returns sequence_mismatch if the life counter of this frame does not follow that of the frame before, if both are
+  // known.
   [[nodiscard]] Error check_life_counter(const Reply& reply) {
     const int now = life_counter_of(this->format(), reply);
     const int before = std::exchange(life_counter_, now);
@@ -83,7 +83,8 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
     if (last_) {
       const unsigned head = last_->delay_bits + last_->ack_bits;
       const unsigned expected = head_bits(this->format(), this->format().latency, this->format().period());
-      // Called for every valid frame, because a late frame must be confirmed by the valid frame right before it.
+      // Called for every frame that decodes, because a late frame is confirmed by the delay of the one decoded before
+      // it.
       const bool again = late_.is_again(head);
       if (head > expected && !again) last_ = Error::truncated;
     }

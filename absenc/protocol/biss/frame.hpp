@@ -61,7 +61,7 @@ class Timeout {
 
  private:
   static constexpr std::uint8_t is_adaptive = 1;
-  // 32 bits suffice: the longest period is 100 us.
+  // 32 bits suffice: with the lowest `ma_khz` a period is 100 us.
   static constexpr std::uint32_t one_and_a_half(Time period) {
     const auto clock = static_cast<std::uint32_t>(period.count());
     return clock + clock / 2;
@@ -110,7 +110,7 @@ struct Format {
   [[nodiscard]] constexpr Time period() const { return Time((1'000'000u + ma_khz / 2u) / ma_khz); }
 };
 
-/// Returns a word format with the fields turns, position, nError and nWarning.
+/// Returns the format of a word with the position and turns of `bits`, followed by nError and nWarning.
 [[nodiscard]] constexpr WordFormat word_with_status(const PositionBits& bits) {
   WordFormat word = word_format(bits);
   word.add({"error", Meaning::error, 1, true});
@@ -185,7 +185,8 @@ constexpr Error take_data(const Source& source, const Bits& bits, std::size_t fi
   return absenc::detail::take_word(source, bits, first, data.word);
 }
 
-// Decodes the bits before the data: sets `first` to the index after the CDS bit, and ACK, delay and CDS in `head`.
+// Decodes the bits before the data, and checks that `size` bits follow. Sets `first` to the index after the CDS bit,
+// and ACK, delay and CDS in `head`.
 template <class ReplyType>
 constexpr Error take_head(const BitView& samples, std::size_t size, Cds cds, ReplyType& head, std::size_t& first) {
   if (samples.size == 0) return Error::wrong_length;
@@ -253,7 +254,7 @@ struct Head {
 }
 
 // Decodes a usual frame without errors by a compiled word and check; calls `otherwise` for any other frame. The reply
-// is constructed in place: it is as large as all that is computed for it.
+// is constructed in place.
 template <class Values, class Channel, class Otherwise>
 [[nodiscard, gnu::always_inline]] constexpr Result<ReplyWith<Values>> decode_compiled(const Channel& channel,
                                                                                       const BitView& samples, Cds cds,
@@ -315,9 +316,8 @@ constexpr bool append_head(const ReplyType& head, std::size_t size, BitBuffer<Ca
   return detail::decode_by(Given<Format>{format, format.word}, samples, cds);
 }
 
-/// Decodes a frame whose format is known at compile time, as fast as code written for this format by hand. The errors
-/// are those of `decode` with a format as an argument. The array `values` of the word is empty if the format has no
-/// fields with Meaning::value.
+/// Decodes a frame whose format is known at compile time. The errors are those of `decode` with a format as an
+/// argument. The array `values` of the word is empty if the format has no fields with Meaning::value.
 template <const Format& format>
 [[nodiscard]] constexpr Result<ReplyTo<format>> decode(const BitView& samples, Cds cds = Cds::zero) {
   // A small processor has no use for two ways: its numbers of 64 bits are no faster, and its memory is small.
@@ -329,8 +329,8 @@ template <const Format& format>
   }
 }
 
-/// Appends idle bits, ACK, start bit, CDS, word and check to `out`; `reply.crc` is ignored. `silent`: bit n is set if
-/// the process data of slave n are switched off. Returns false if `out` is too small.
+/// Appends idle bits, ACK, start bit, CDS, word and check to `out`; `reply.crc` is ignored. If bit 0 of `silent` is
+/// set, the process data are switched off: word and check are left out. Returns false if `out` is too small.
 template <std::size_t Capacity>
 constexpr bool encode(const Format& format, const Reply& reply, BitBuffer<Capacity>& out, std::uint8_t silent = 0) {
   if (!detail::append_head(reply, data_bits(format), out)) return false;
@@ -377,8 +377,8 @@ template <const Format& format>
   return to_reading(contents, reply.word, format.scale);
 }
 
-/// Returns whether only zeros follow the CDS bit, as when process data are switched off. Stores ACK, delay and CDS in
-/// `head`.
+/// Returns whether zeros, at least one, and nothing else follow the CDS bit, as when process data are switched off.
+/// Stores ACK, delay and CDS in `head`.
 template <class ReplyType>
 [[nodiscard]] constexpr bool is_empty_frame(BitView samples, ReplyType& head) {
   std::size_t first = 0;

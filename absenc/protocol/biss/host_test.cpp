@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of the host's conversations against the virtual encoder in virtual time.
+// Tests of the host's conversations, against the virtual encoder in virtual time or with given frames.
 #include "absenc/protocol/biss/host.hpp"
 
 #include <gtest/gtest.h>
@@ -209,7 +209,7 @@ TEST(BissHost, AssumesLatencyOfTenMicroseconds) {
   expect_ten_microseconds<ChainFormat>();
 }
 
-// The first frame is stuck: the host pauses 40 us, sends two pulses, pauses 40 us, and clocks a frame again.
+// If FindPosition reads a stuck first frame, it pauses 40 us, sends two pulses, pauses 40 us, and clocks a frame again.
 TEST(BissHost, SendsStartSequenceWhenFirstFrameIsStuck) {
   Format format = turns_19;
   format.start_sequence = true;

@@ -22,14 +22,15 @@ inline constexpr Time start_limit = 20ms;
 /// Greatest number of attempts of a control frame that may be repeated.
 inline constexpr unsigned control_attempts = 4;
 
-/// Detail of an error that means that the encoder has no registers.
+/// Detail of the error of a control frame that no encoder answers.
 inline constexpr std::string_view no_registers =
     "no encoder answers: it has no registers (or a line that only goes one way), or another ID (slave)";
-/// Detail of an error that means that the encoder refused a control frame.
+/// Detail of an error that means that the encoder refused the access to a register.
 inline constexpr std::string_view refused =
     "the encoder refuses this register: it does not have it, or it is read only";
 
-/// Exchanges one control frame to its end and returns its error; busy if the encoder's start bit is too late.
+/// Exchanges the control frame that `master` has begun, until it ends or a position frame fails, and returns its error;
+/// busy if the encoder's start bit is too late.
 template <class F>
 Part<Error> run_control_frame(ControlDialog<F>& dialog, ControlMaster& master) {
   Time waits_since{};
@@ -65,17 +66,18 @@ Part<Error> run_control_frame(ControlDialog<F>& dialog, ControlMaster& master) {
   return error != Error::request_rejected && error != Error::busy && error != Error::invalid_argument;
 }
 
-/// Returns whether a data byte of the control frame was late: the encoder delayed it, or a start bit was lost. No CRC
-/// covers CDS; the bits after a lost start bit are shifted, which the four bits of a byte's CRC may miss.
+/// Returns whether a data byte of the control frame was late: the encoder delayed it, or a start bit was lost. The CRC
+/// of the position does not cover CDS; the bits after a lost start bit are shifted, which the four bits of a byte's CRC
+/// may miss.
 [[nodiscard]] constexpr bool was_late(const ControlFrame& frame) {
   const auto delays = frame.start_delay.view();
   return std::any_of(delays.begin(), delays.end(), [](std::uint16_t delay) { return delay != 0; });
 }
 
-/// Reads `count` registers, 64 at most, appends their values to `bytes` and returns the error. Late bytes are read
-/// again until a control frame is not late or brings the data of the late one before it; after `control_attempts`:
-/// cross_check_failed.
-/// If P refuses the next register, a separate control frame reads it: some encoders send P = 1 after every register.
+/// Reads `count` registers, 64 at most, appends their values to `bytes` and returns the error. Makes up to
+/// `control_attempts` attempts if an error `is_repeatable`, or if bytes are late and not equal to those of a late
+/// attempt before (cross_check_failed). If P refuses the next register, a separate control frame reads it: some
+/// encoders send P = 1 after every register.
 template <class F>
 Part<Error> read_registers(ControlDialog<F>& dialog, ControlMaster& master, ByteBuffer<control_most>& bytes,
                            unsigned first, std::size_t count) {
@@ -132,7 +134,7 @@ Part<Error> change_register(ControlDialog<F>& dialog, ControlMaster& master, uns
 }
 
 /// Selects `bank` and returns the error. Writes nothing if `address` belongs to no bank, `bank` is selected already, or
-/// `bank` is 0 and the encoder refuses to read its bank select register.
+/// the bank select register cannot be read; that the encoder refuses to read it is no error if `bank` is 0.
 template <class F>
 Part<Error> select_bank(ControlDialog<F>& dialog, ControlMaster& master, unsigned bank, unsigned address) {
   if (address >= registers::bank_size) co_return Error::none;

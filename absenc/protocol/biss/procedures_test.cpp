@@ -47,8 +47,8 @@ TEST(BissProcedures, WaitsFortyMillisecondsForStartBit) {
   asked(42'000, Error::busy);
 }
 
-// Checks that registers are read and written whatever P is. Some encoders send P = 1 after each register; LENZ's host
-// treats P = 1 after bank select as a fault.
+// Registers are read and written whatever P is: some encoders send P = 1 after each register. Registers of a bank that
+// does not exist are refused.
 TEST(BissProcedures, ReadsOnAfterStopBit) {
   for (const StopBit stop_bit : {StopBit::next, StopBit::zero, StopBit::one}) {
     Format format = testing::bits_24;

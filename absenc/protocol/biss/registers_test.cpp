@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests a host that reads positions and registers from the same frames of a virtual encoder, in virtual time: without
-// faults, and with faults over a million frames (50 000 with the address sanitizer). ABSENC_FRAMES sets the number of
-// frames.
+// Tests of positions and registers that are read from the same frames of a virtual encoder, in virtual time, with and
+// without faults. ABSENC_FRAMES sets the number of frames that `frames_wanted` returns.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -158,9 +157,8 @@ void expect_all_of_the_bank(const HostRecord& record) {
   }
 }
 
-/// Returns the share of damaged frames that the decoder accepts with a wrong position, over random positions. `damage`
-/// changes the bytes of a frame. Most accepted frames had an error in their ACK, so that they begin early, or lost
-/// their end, and the CRC of the remaining bits is valid by chance.
+/// Returns the share of damaged frames that the decoder accepts with a wrong position and without an error bit, over
+/// random positions. `damage` changes the bytes of a frame.
 template <class Damage>
 double accepted_share(const Format& format, const Damage& damage) {
   constexpr unsigned frames = 400'000;
@@ -221,7 +219,7 @@ TEST(BissRegisters, FaultsCauseNoWrongRegisterByte) {
   const HostRecord& record = host.machine.found();
   EXPECT_GT(seen.damaged, seen.frames / 500);
   EXPECT_EQ(seen.positions + seen.bad_frames, seen.frames);
-  EXPECT_LE(seen.bad_frames, seen.damaged);  // no undamaged frame is rejected
+  EXPECT_LE(seen.bad_frames, seen.damaged);  // not more frames are rejected than were damaged
   EXPECT_EQ(seen.gaps, 0u);
   const auto times = [&seen](sim::FaultKind kind) {
     return static_cast<double>(seen.faults[static_cast<std::size_t>(kind)]);
@@ -263,7 +261,7 @@ TEST(BissRegisters, ReadsEachNamedRegister) {
   EXPECT_FALSE(found.missing);
 }
 
-// The encoder refuses the registers of a bank that does not exist, like registers that it does not have.
+// A refused register is reported as missing; a register of a slave that does not answer is not.
 TEST(BissRegisters, ReportsRefusedRegisterAsMissing) {
   ProcedureBench one;
   one.ask<write_bank<Format>>({200});

@@ -73,8 +73,8 @@ struct SafetyReply {
 
 namespace detail {
 
-// SLO is low after the last word of a frame. Zeros are therefore not a word, although a CRC that is not inverted would
-// be valid for them; as a word, they would be position zero with nE and nW both active.
+// SLO is low after the last word of a frame. Zeros alone are therefore not a word with a CRC, although a CRC that
+// begins with 0 and is not inverted is valid for them.
 constexpr Error take_channel(const Channel& channel, BitView samples, std::size_t first, ChannelData& data) {
   const std::size_t end = first + data_bits(channel);
   if (channel.check.width != 0 && !samples[first] && samples.end_of_run(first) >= end) return Error::line_stuck;

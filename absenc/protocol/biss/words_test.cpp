@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of frames with several words: usable formats, frames that do not fit, and the comparison of BiSS Safety.
+// Tests of BiSS frames with one or several words.
 #include <gtest/gtest.h>
 
 #include "absenc/protocol/biss/bench_test.hpp"

@@ -84,7 +84,7 @@ class TamperedInterface final : public Machine<std::uint8_t> {
   Device<std::uint8_t>& device_;
   std::vector<TextReply> pending_texts_;
   TextReply out_;
-  unsigned rest_ = 0;  // remaining bytes of the command that is being received
+  unsigned rest_ = 0;  // remaining bytes of a command `M` that is being received
   bool is_tampered_ = false;
   bool busy_ = false;          // whether a transmission is in progress
   bool sending_text_ = false;  // whether the transmission in progress is a text of `tamper`

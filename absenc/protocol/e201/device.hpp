@@ -34,7 +34,7 @@ class VirtualInterface final : public author::Responder {
   // encoder behind the interface; if it is an SSI encoder, only the supply of this object is used
   biss::Encoder encoder_;
   unsigned clock_ = 4;  // number of the MA clock, 1 to 8; 4 is 280 kHz
-  unsigned width_;      // number of bits of the number that `?` returns
+  unsigned width_;      // width of the position in bits, which `b` returns
   std::uint64_t zero_ = 0;
 };
 

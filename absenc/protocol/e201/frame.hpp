@@ -172,7 +172,8 @@ inline constexpr unsigned widest = 64;  ///< Greatest width of a position in bit
 }
 
 /// Decodes a reply that is a line of text. Errors: wrong_length (no complete line, a blank one, more than one, or one
-/// that is too long for `Text`), bad_framing (the text is no reply to the command `asked`).
+/// that is too long for `Text`), bad_framing (characters that are not printable, or no number that the command `asked`
+/// requires).
 [[nodiscard]] constexpr Result<Reply> decode_line(std::uint8_t asked, Bytes bytes) {
   const std::size_t end = end_of_first_line(bytes);
   const Bytes text = trimmed(bytes.first(end));

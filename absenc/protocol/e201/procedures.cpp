@@ -111,7 +111,7 @@ bool is_near(const Dialog& dialog, std::int64_t counts, std::int64_t other) {
 }  // namespace
 
 Procedure set_zero(Dialog& dialog, InterfaceResults& found) {
-  // `?` does not report errors, so `4` is read too. An interface that lacks `4` cannot report errors.
+  // `?` does not report errors of the encoder, so `4` is read too. They stay unknown if `4` has no valid reply.
   const Result<Reply> samples = co_await dialog.attempt({letter::samples});
   if (samples) {
     const Reading look = Protocol::reading(dialog.format(), {letter::samples}, *samples);

@@ -61,9 +61,9 @@ struct InterfaceResults {
   [[nodiscard]] unsigned recommended() const;
 };
 
-/// Reads a position with `4`. If the reply is missing or has a wrong length, reads the firmware version: before 1.16
-/// the error is unsupported, otherwise `4` is sent once more. `4` is not repeated if it had no reply and the version no
-/// valid one, or if the line is never silent.
+/// Reads a position with `4`. If the reply is missing or has a wrong length, and the line is not busy without end,
+/// reads the firmware version: before 1.16 the error is unsupported, otherwise `4` is sent once more, unless it had no
+/// reply and the version no valid one.
 author::Procedure read(Dialog& dialog, InterfaceResults& found);
 /// Reads version, serial number, supply and clock. A missing or invalid reply is an error only if it is that of the
 /// version, or if the line is never silent.
@@ -81,7 +81,7 @@ author::Procedure set_zero(Dialog& dialog, InterfaceResults& found);
 /// error and after `abort`.
 author::Procedure sweep_clocks(Dialog& dialog, InterfaceResults& found, Arguments arguments);
 
-/// Advice if the line is never silent: the interface may stream.
+/// Advice if the line is never silent or a reply has a wrong length: the interface may stream.
 inline constexpr std::string_view check_stream =
     "check that it is an E201-9S and does not stream (`absenc run ... stream-off` ends it)";
 

@@ -173,7 +173,8 @@ TEST(E201Set, ReadsClockBack) {
   EXPECT_EQ(bench.run_tampered(answering('m', {}), "set-clock", {2}).error, "timeout");
 }
 
-// Checks that the host waits 10 ms for the reply of a command that may have none, and for the end of that reply.
+// Checks that the host waits 10 ms for the reply of a command that may have none, and 20 ms more for the end of a
+// reply.
 TEST(E201Set, WaitsBrieflyForOptionalReply) {
   Bench bench;
   const auto tell = [&](Time after) {

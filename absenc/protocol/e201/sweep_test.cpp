@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of clock-sweep: its counts of valid frames, its errors, and that it restores the clock.
+// Tests of clock-sweep.
 #include <gtest/gtest.h>
 
 #include "absenc/protocol/e201/bench_test.hpp"
@@ -48,8 +48,8 @@ TEST(E201Sweep, CountsRecommendsAndRestores) {
 }
 
 TEST(E201Sweep, LineDelayMovesTheRecommendation) {
-  // The line is three whole bits late at 4400 kHz and one at 2200 kHz; its delay of 905 ns is about one period at 1100
-  // kHz: no fast clock is stable.
+  // The delay of 905 ns is about one period at 1100 kHz, two at 2200 kHz and four at 4400 kHz: these clocks are not
+  // stable.
   Bench bench("singleturn_bits=19 latency_us=0 line_delay_ns=905");
   const Fields fields = bench.run("clock-sweep", {20}).fields;
   EXPECT_LT(fields.at("valid_1100_khz"), 20);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests that read and write registers of the virtual AksIM-2 through channels 2 and 3, on UART and SPI.
+// Tests that read and write registers of the virtual AksIM-2 through channels 2 and 3.
 #include "absenc/protocol/encolink/procedures.hpp"
 
 #include "absenc/protocol/author/dialog.hpp"

@@ -15,9 +15,9 @@
 
 namespace absenc::encolink {
 
-/// Combines captured frames to cycles of channel 2 and to register accesses. A cycle begins with the frame after a
-/// reset of the channels (AA, BB). Without a reset, or after lost frames, a cycle is found by its checksum and by its
-/// position, which equals that of the first frame of the cycle.
+/// Combines captured frames to cycles of channel 2 and to register accesses. A cycle begins with the first position
+/// frame after a reset of the channels (AA, BB). Without a reset, or after lost frames, a cycle is found by its
+/// checksum and by its position, which equals that of the first frame of the cycle.
 class ChannelFollower final : public Follower {
  public:
   /// Creates a follower for encoders with this format.
@@ -36,7 +36,7 @@ class ChannelFollower final : public Follower {
   void take_request(std::uint64_t number, std::uint8_t byte);
 
   Format format_;
-  // State of channel 2: positions and channel 2 bytes of the latest frames.
+  // State of channel 2.
   bool in_step_ = false;
   Buffer<Position, longest_cycle> frames_;
   std::uint64_t first_ = 0;  // exchange number of the oldest frame in `frames_`

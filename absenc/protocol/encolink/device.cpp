@@ -31,7 +31,7 @@ constexpr auto at_shipping = [] {
   return values;
 }();
 
-// Registers that the command `save` stores, in the order of their bytes in the memory.
+// Indices of the values that the command `save` stores, in the order of their bytes in the memory.
 constexpr std::array<std::size_t, 9> stored_registers{position_offset, multiturn_preset,      write_lock,
                                                       turns_taken,     position_filter,       position_filter_speed,
                                                       velocity_filter, velocity_filter_speed, calibration_range};

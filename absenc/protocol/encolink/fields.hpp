@@ -70,7 +70,7 @@ inline constexpr std::array<FlagInfo, 4> calibration_flags{{
      "mount the ring again, then `absenc run ... self-calibrate` again"},
 }};
 
-/// Values of a frame or of a register access. Only members with a value are reported.
+/// Values of a frame, a request or a register access. Only members with a value are reported.
 struct Values {
   /// A value that may be absent.
   template <class T>
@@ -107,7 +107,7 @@ constexpr std::optional<author::AsciiText> part_number_of(const Values& values) 
 }
 }  // namespace detail
 
-/// Fields of position frames, channel 2 cycles, identities and requests.
+/// Fields in which Values are reported.
 inline constexpr auto frame_fields = [] {
   using author::field;
   using detail::of;

@@ -43,7 +43,7 @@ inline constexpr Time busy_limit = 2s;   ///< Longest time for which the host wa
 inline constexpr Time calibration_time = 1s;     ///< Duration of the virtual encoder's self-calibration.
 inline constexpr Time calibration_limit = 15s;   ///< Timeout of a self-calibration; the vendor allows the shaft 10 s.
 inline constexpr Time calibration_poll = 100ms;  ///< Time between two polls of a running self-calibration.
-/// Longest time without a valid frame or a loss of alignment while the host receives a stream.
+/// Time without a valid frame and without a loss of alignment after which the host stops receiving a stream.
 inline constexpr Time listen_limit = 500ms;
 
 // ---- Frames
@@ -90,7 +90,7 @@ enum class OffsetUnit : std::uint8_t { counts, turn_fraction };
 /// Generation of the encoder, on which its registers depend.
 enum class Generation : std::uint8_t { aksim2, aksim4 };
 
-/// Layout of an encoder's frames. Unknown members are read from the encoder's identity.
+/// Layout of an encoder's frames. What is unknown follows from the encoder's identity.
 struct Format {
   unsigned resolution = 0;                      ///< Number of bits of the position in a turn, 1 to 22; 0: unknown.
   int multiturn_bits = -1;                      ///< Number of bits of the turn counter, 0 to 16; -1: unknown.
@@ -304,8 +304,8 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return known;
 }
 
-/// Returns `format` with its unknown members taken from `identity`. Error: unexpected_reply (a known member contradicts
-/// the identity: another resolution, or turns in only one of the two).
+/// Returns `as_identified(format, identity)`. Error: unexpected_reply (a known member of `format` contradicts the
+/// identity: another resolution, or turns in only one of the two).
 [[nodiscard]] constexpr Result<Format> complete(const Format& format, const Identity& identity) {
   const Format known = as_identified(format, identity);
   const bool other_turns = format.multiturn_bits >= 0 && known.multiturn_bits != format.multiturn_bits;

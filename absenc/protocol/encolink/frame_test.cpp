@@ -61,7 +61,8 @@ TEST(EncolinkFrame, ReadingValidityFollowsStatus) {
   EXPECT_FALSE(to_reading(single, {}).multiturn_valid);
 }
 
-// A position frame has only two status bits and no named alarms; a cycle of channel 2 has named alarms.
+// A position frame reports the alarms of a kind only while its bit for that kind is clear; a cycle of channel 2 reports
+// all alarms.
 TEST(EncolinkFrame, StatusBitsReportOnlyClearAlarms) {
   EXPECT_EQ(to_reading(multi, {}).status_reported, general::error | general::warning);
   EXPECT_EQ(to_reading(multi, {}).alarms_reported, 0xFFFFu);

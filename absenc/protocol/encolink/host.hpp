@@ -29,7 +29,8 @@ struct Frames {
     Ask ask = Ask::position;  ///< Purpose of the request.
     std::uint8_t ra = 0;      ///< One byte of a register access.
   };
-  /// Type of replies; empty for an identity, which is decoded from the bytes of the reply instead.
+  /// Type of replies; empty for the requests `identify` and `identity`. The identity is decoded from the bytes of the
+  /// reply.
   using Reply = Position;
   /// Number of bytes of the longest reply, an identity; one more byte may follow it.
   static constexpr std::size_t longest_reply = identity_bytes;
@@ -54,8 +55,8 @@ struct Frames {
   static constexpr Time pause(const Format& format) { return format.interface == Interface::spi ? spi_pause : Time{}; }
 };
 
-/// The content of successive frames: the position, and cycles of channel 2. A cycle takes one byte of each frame, from
-/// a reset of the channels until a frame is lost or a cycle has an error.
+/// The content of successive frames: the position, and cycles of channel 2. Each frame carries one byte of a cycle,
+/// from a reset of the channels until a frame is lost or a cycle has an error.
 struct Channels {
   Reading reading{};                      ///< Reading from the last valid frame; empty before the first.
   std::optional<std::uint16_t> status{};  ///< Detailed status in the last valid cycle; no value before it.

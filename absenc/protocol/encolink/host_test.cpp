@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of positions, the identity, channel 2 and listening with the virtual AksIM-2, on UART and SPI.
+// Tests of positions, the identity, channel 2 and listening with the virtual AksIM-2.
 #include "absenc/protocol/encolink/host.hpp"
 
 #include "absenc/core/hex.hpp"
@@ -302,8 +302,8 @@ TEST_P(EncolinkHost, ZerosWithWrongChannel2AreReady) {
   }
 }
 
-// At 10 000 rpm a position of 20 bits advances by 175 counts per microsecond, so `latched` must be the time at which
-// the encoder took the position.
+// At 10 000 rpm a position of 20 bits advances by about 175 counts per microsecond, so `latched` must be the time at
+// which the encoder took the position.
 TEST_P(EncolinkHost, LatchedIsTimeOfPosition) {
   for (const std::string_view told : {testing::multi, std::string_view("")}) {
     Bench bench(testing::multi, interface);
@@ -338,7 +338,7 @@ constexpr std::string_view streaming = "resolution=20 multiturn_bits=16 stream_r
 TEST(EncolinkListen, FindsFramesByChecksum) {
   Bench bench("resolution=20 multiturn_bits=16 stream_rate=5000");
   bench.shaft.spin(60, bench.line.now());
-  bench.pass(1ms + 95us);  // starts to listen in the middle of a frame
+  bench.pass(1ms + 95us);  // starts to listen while the encoder sends
   Listen listen(testing::multi_format);
   std::vector<std::uint64_t> seen;
   bench.listen(listen, [&] {

@@ -21,10 +21,11 @@ enum class AccessOutcome : std::uint8_t {
   good,     ///< The encoder executed the access.
   refused,  ///< The encoder refused the access, or was busy with it for longer than `busy_limit`.
   lost,     ///< Frames arrive, but no valid answer; `was_sent` tells whether the encoder may have executed the access.
-  gone,     ///< No frames arrive; `was_sent` tells whether the encoder may have executed the access.
+  gone,     ///< No valid frames arrive; `was_sent` tells whether the encoder may have executed the access.
 };
 
-/// State of a procedure together with its results. If it has no other result, the position is reported.
+/// State of a procedure together with its results. If it has neither `identity` nor `address`, the position is
+/// reported.
 struct ProcedureState : Channels {
   /// Value of a register of the table.
   struct Value {
@@ -48,9 +49,9 @@ struct ProcedureState : Channels {
   /// Whether all `ra` bytes were sent, so that the encoder may have executed the access.
   bool was_sent = false;
   bool changed = false;                ///< Whether a register was written and read back.
-  std::uint16_t length = 0;            ///< Number of bytes that the present register access reads.
+  std::uint16_t length = 0;            ///< Number of data bytes of the present register access.
   ByteBuffer<access_capacity> data{};  ///< Bytes that the present register access has read.
-  author::Outcome why{};               ///< Error and explanation of a register access that failed.
+  author::Outcome why{};               ///< Error and explanation of the last attempt of a register access.
   bool again = false;                  ///< Whether repeating the register access can help and does no harm.
 
   /// Stores `request` as the present register access.
@@ -99,8 +100,8 @@ author::Procedure read_register(Dialog& dialog, ProcedureState& found, std::size
 /// invalid_argument (the length is unknown).
 author::Procedure read_memory(Dialog& dialog, ProcedureState& found, Arguments arguments);
 
-/// Writes register `index` of the table. Errors: those of `read_register`, and cross_check_failed (reading the register
-/// back gave another value).
+/// Writes register `index` of the table. Errors: those of `read_register`, invalid_argument (the value does not fit),
+/// and cross_check_failed (reading the register back gave another value).
 author::Procedure write_register(Dialog& dialog, ProcedureState& found, std::size_t index, Arguments arguments);
 /// Writes a register. Arguments: address, value, size (0: from the table). Error besides those of `write_register`:
 /// invalid_argument (the size is unknown or above 8, the value does not fit, or the address is that of the command
@@ -123,8 +124,8 @@ author::Procedure preset_multiturn(Dialog& dialog, ProcedureState& found, Argume
 /// why), timeout (the self-calibration does not end).
 author::Procedure self_calibrate(Dialog& dialog, ProcedureState& found);
 
-/// Returns the number of bytes of the register at `address`: `wanted`, or if that is 0 the size in the table; 0 if the
-/// table lacks the register.
+/// Returns the number of bytes of the register at `address`: `wanted`; if that is 0, the size in the table; if the
+/// table lacks the register, 0.
 [[nodiscard]] std::uint16_t register_size(std::uint32_t address, std::int64_t wanted);
 
 }  // namespace absenc::encolink

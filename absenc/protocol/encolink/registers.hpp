@@ -212,8 +212,8 @@ using AccessBytes = ByteBuffer<access_header + access_capacity + 1>;
   return bytes;
 }
 
-/// Returns whether `request` is all `ra` bytes of a register access. On SPI, zeros are clocked after the two bytes of a
-/// request; an access is longer than two bytes and its keys are not zeros.
+/// Returns whether `request` has bytes other than zero after its first two, as the `ra` bytes of a register access
+/// have. On SPI, zeros are clocked after a request of two bytes.
 [[nodiscard]] constexpr bool is_access(Bytes request) {
   if (request.size() <= request_bytes) return false;
   const Bytes behind = request.subspan(request_bytes);

@@ -33,7 +33,7 @@ inline Result<std::size_t> unknown_id(const Options& values, MutableBytes reques
 }
 }  // namespace request
 
-/// Alarms that command C clears, in both channels (mask of Reading::alarms). The other alarms need more (Table 8).
+/// Alarms that command C alone clears, in both channels (mask of Reading::alarms).
 constexpr std::int64_t cleared_by_c = alarms::xc_error | alarms::xc_error << 8;
 
 /// Clauses of the ESL document for encoders.

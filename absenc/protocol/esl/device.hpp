@@ -163,9 +163,9 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     }
     return false;
   }
-  // The parity bit is ignored here, because a wrong one is reported in the reply. Within the first bytes of a request
-  // for another address, and after a wrong CRC, the search for a request continues: "Else, it will continue to search
-  // for the next available logic of low state."
+  // The parity bit is ignored here, because a wrong one may be reported in the reply. Within the first bytes of a
+  // request for another address, and after a wrong CRC, the search for a request continues: "Else, it will continue to
+  // search for the next available logic of low state."
   [[nodiscard]] std::size_t request_size(Bytes begin) const override {
     const std::optional<DataId> id = data_id(begin[0]);
     if (!id) return 0;

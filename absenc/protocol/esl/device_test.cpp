@@ -153,7 +153,6 @@ TEST(EslDevice, AnyPauseEndsReplyOfAbsentEncoder) {
   EXPECT_EQ(alone.encoder.next(10us).kind, waits);
 }
 
-// After a bad request the count of reset requests begins again.
 TEST(EslDevice, BadRequestRestartsTheCount) {
   for (const auto kind : {Alone::LinkEvent::received, Alone::LinkEvent::line_error}) {
     Alone alone;

@@ -109,7 +109,7 @@ constexpr auto in(const Shown& all) {
 constexpr std::optional<std::uint16_t> turns_in(const Shown& all) {
   return all.has_turns ? in<Channel::one, part::multiturn, &Reply::multiturn>(all) : std::nullopt;
 }
-// Returns the bits `mask` of ENID, shifted right by `shift`. ENID is the same in both channels.
+// Returns ENID, shifted right by `shift` and masked with `mask`. ENID is the same in both channels.
 template <unsigned shift, unsigned mask>
 constexpr std::optional<unsigned> of_encoder_id(const Shown& all) {
   const auto id = in<Channel::one, part::encoder_id, &ChannelReply::encoder_id>(all);

@@ -50,7 +50,7 @@ inline constexpr std::uint8_t over_voltage = 0x80;      ///< alarm: the inner su
 inline constexpr std::uint8_t voltage = under_voltage | over_voltage;  ///< mask of the voltage alarms
 /// Mask of the alarms that make the turns invalid.
 inline constexpr std::uint8_t turns_wrong = xc_error | multiturn_error;
-/// Mask of the alarms that make the position within the turn unsafe, so that it is not used.
+/// Mask of the alarms that can make the position within the turn unsafe.
 inline constexpr std::uint8_t unsafe = led_or_lissajous_error | memory_error | singleturn_error | voltage;
 }  // namespace alarms
 
@@ -150,7 +150,7 @@ inline constexpr unsigned zero_sequence = 0x0080;
 inline constexpr unsigned redundant_sequence = 0x0100;
 /// Part: redundant position in two bytes, RS0 and RS1, in replies to ID C.
 inline constexpr unsigned redundant_alone = 0x0200;
-/// Part: redundant position in two bytes, RS0 and RS1, in replies to ID 6.
+/// Part: redundant position in two bytes, in replies to ID 6.
 inline constexpr unsigned redundant_calibration = 0x0400;
 inline constexpr unsigned memory_address = 0x0800;  ///< Part: memory address and busy bit (ADF).
 inline constexpr unsigned value = 0x1000;           ///< Part: value of the memory byte (EDF).
@@ -311,7 +311,7 @@ struct Request {
   std::uint8_t value = 0;            ///< data ID write_memory: byte to be written
 };
 
-/// The values that each channel of a reply has for itself; those that the data ID does not carry are 0.
+/// The values that each channel of a reply has for itself.
 struct ChannelReply {
   std::uint8_t status = 0;      ///< status (SF): bits of the namespace `status`, in the order of the document
   std::uint8_t alarms = 0;      ///< Alarms of the channel (ALM): bits of the namespace `alarms`.

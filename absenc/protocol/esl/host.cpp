@@ -75,7 +75,7 @@ Procedure read_safely(Dialog& dialog, SafePositionResult& found) {
 
 namespace {
 
-// Appends the names of the alarms that remain after an ID C, and what clears them (Table 8). Returns the text.
+// Appends the names of the alarms that remain after an ID C, and advice for most of them (Table 8). Returns the text.
 std::string_view what_remains(Sentence& words, unsigned remaining) {
   constexpr unsigned until_power_off =
       alarms::led_or_lissajous_error | alarms::overspeed | alarms::memory_error | alarms::singleturn_error;
@@ -141,8 +141,9 @@ constexpr Time busy_limit = 2 * page_time;
 
 constexpr std::string_view unknown_area = "Table 11 lists no such page and address; nothing was sent";
 
-// Repeats a memory request until the encoder executes it, and returns the reply or the error. `after_busy`: the reply
-// must follow a busy one, because the temporary register may hold a byte that another host requested.
+// Repeats a memory request while the memory is busy, within `busy_limit`, and returns the reply or the error.
+// `after_busy`: the reply must follow a busy one, because the temporary register may hold a byte that another host
+// requested.
 author::Part<Result<Reply>> when_ready(Dialog& dialog, const Request& request, bool after_busy = false) {
   const bool writes = request.id == DataId::write_memory && !selects_page(request);
   return author::until_ready<Protocol>(dialog, request,

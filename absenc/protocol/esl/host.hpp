@@ -16,7 +16,7 @@ using Dialog = author::DialogOf<Protocol>;
 
 /// Result of an ESL procedure: the values of its fields, its reading, and the data to which they refer.
 struct ProcedureResult : Shown {
-  Reading reading{};                     ///< Position and turns of the last reply that had them.
+  Reading reading{};                     ///< Reading of the last reply; empty in procedures that read no position.
   ByteBuffer<last_address + 1> bytes{};  ///< memory bytes to which the field `data` refers
   Sentence words{};                      ///< text of the error's detail
 };

@@ -241,8 +241,8 @@ TEST(EslHost, DoesNotExplainDamagedReplies) {
 TEST(EslHost, NamesProfileThatFits) {
   const Profile plain;
   struct Row {
-    Profile host;     // profile of the host
-    Profile encoder;  // profile of the encoder
+    Profile host;
+    Profile encoder;
     const char* command;
     const char* sentence;
   };

@@ -108,7 +108,7 @@ Progress progress_of(const Profile& profile, std::span<const Capture> captures) 
 }
 
 // For each value of an option: how far the best profile with this value explains the captures. Reached has a
-// ReachedByValue for each option.
+// ReachedByValue for each option that the document leaves open.
 using ReachedByValue = std::array<Progress, most_choices>;
 using Reached = std::array<ReachedByValue, open_options>;
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Safe positions: those that passed every check that a reader of IDs 1 and 2 can make. This is not a certified safety
-// function: README.md lists what the checks cannot detect.
+// Safe positions: those that passed every check of SafetyMonitor, which judges replies to IDs 1 and 2. This is not a
+// certified safety function: README.md lists what the checks cannot detect.
 #pragma once
 
 #include <optional>

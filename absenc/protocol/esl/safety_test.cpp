@@ -371,7 +371,7 @@ TEST(EslSafetyCampaign, ReplaysAndDelays) {
   }
 }
 
-// Random bytes of the right length pass both CRCs once in 2^32 times.
+// Random bytes of the right length pass both CRCs once in 2^32 times, so none of these replies may be accepted.
 TEST(EslSafetyCampaign, NoiseOfTheRightLength) {
   sim::Random random(1);
   Monitored pair;

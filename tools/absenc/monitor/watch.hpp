@@ -20,7 +20,7 @@ using namespace client;
 /// The state of a watched encoder at one moment.
 struct Snapshot {
   enum class State : std::uint8_t {
-    opening,  // the port could not be opened yet
+    opening,  // the port is not open yet
     live,     // the last reading is good, and not older than the longer of three periods and 0.5 s
     silent,   // the last reading is good, but older than the longer of three periods and 0.5 s
     failing,  // the last attempt to read failed
@@ -34,7 +34,7 @@ struct Snapshot {
   bool has_reading = false;
   Sample last{};          // last reading; valid if `has_reading`, and the present position only in the state `live`
   std::string message{};  // reason of the states failing, lost, opening and ended
-  std::string notice{};   // message to the user, as the result of the last command, or that the command still runs
+  std::string notice{};   // message to the user: the result of the last command, or that the command still runs
   host::Counters counters{};
   std::uint64_t readings = 0;
   std::uint64_t losses = 0;
@@ -70,7 +70,7 @@ class Watch {
 
   [[nodiscard]] Snapshot snapshot(bool details) const;
   void pause(bool paused);
-  /// Runs a command without arguments between two readings; Snapshot::notice then contains its result.
+  /// Lets the thread run a command without arguments between two readings; Snapshot::notice then contains its result.
   void run(const Command& command);
   /// Sets Snapshot::notice to `text`.
   void notify(std::string text);
@@ -102,7 +102,7 @@ class Watch {
   bool paused_ = false;
   std::optional<Command> command_;
 
-  // The following members are used by the thread only.
+  // The members `next_summary_` to `command_runs_` are used by the thread only.
   Time next_summary_{};
   Time next_line_{};
   std::uint32_t alarms_ = 0;

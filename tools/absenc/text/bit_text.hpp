@@ -23,7 +23,7 @@ class FieldPlaces {
   FieldPlaces(const Unit& unit, const Options& options, const Frame& request, const Frame& reply,
               const capture::Contents& contents);
 
-  /// Returns the fields with their bits as "singleturn 16-32, multiturn 48-63"; "" if the unit declares no bits.
+  /// Returns the fields with their bits as "singleturn 16-32, multiturn 48-63"; "" if no field has declared bits.
   [[nodiscard]] std::string text() const;
   /// Returns the fields with their bits as {"singleturn":[{"first":16,"count":17}]}, the least significant range of a
   /// field first; an inverted range has "inverted":true.

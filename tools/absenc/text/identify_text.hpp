@@ -22,9 +22,9 @@ using namespace client;
 /// Returns the command line that decodes frames of a candidate: absenc decode tformat --option model=23-bit.
 [[nodiscard]] std::string decode_command(const Candidate& candidate);
 
-/// Prints the candidates of a search: as JSON all, as text the likeliest eight. Prints the next command, which
-/// `command` returns, for each encoder that was found. Returns the verb's exit status, which is exit_good only if
-/// chance cannot explain the first candidate.
+/// Prints the candidates of a search: as JSON all, each with its next command, which `command` returns; as text the
+/// likeliest eight, and the next command for each encoder that was found. Returns the verb's exit status, which is
+/// exit_good only if chance cannot explain the first candidate.
 int show_candidates(std::span<const Candidate> candidates, const std::function<std::string(const Candidate&)>& command,
                     bool json);
 

@@ -239,7 +239,8 @@ int emulate_bytes(const Unit& unit, const Options& options, const Invocation& in
   });
 }
 
-// Emulates the encoder behind a slcan adapter, which is a pseudo-terminal; returns notes about the line.
+// Emulates the encoder behind an slcan adapter, which is a pseudo-terminal and, with --tcp, a TCP port too; returns
+// notes about the line.
 Notes serve_adapter(Machine<CanFrame>& machine, const LineSettings& line, const Invocation& invocation, Time end) {
   const auto bytes = std::make_shared<os::EmulatorPort>(std::string(invocation.text("--pty")), tcp_port(invocation));
   bytes->set_end(end);

@@ -110,7 +110,7 @@ class CardRows final : public FieldSink {
 /// Reads identity, settings and state of the encoder, and collects them as rows of text and as JSON.
 class Survey {
  public:
-  /// `all`: collect every field and setting as rows; otherwise only those of CardRows.
+  /// `all`: collect every field and setting as rows; otherwise only those of CardRows. Both include the position.
   Survey(const EncoderAddress& uri, bool all)
       : encoder_(open_connection(uri)), resolution_(uri.unit->resolution(uri.options)), all_(all) {}
 
@@ -164,7 +164,7 @@ class Survey {
     if (is_doubtful) add_line("  no two readings in a row agree as well as the fastest shaft allows");
   }
 
-  /// Returns the resolution in the encoder's replies; before the first reply, the resolution according to the options.
+  /// Returns the resolution of the encoder's first reading; before it, the resolution according to the options.
   [[nodiscard]] const Resolution& resolution() const { return resolution_; }
 
   Json answers = Json::object();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The verbs `memory read` and `memory write`, for bytes at single addresses.
+// The verbs `memory read` and `memory write`, for bytes from an address on, and for registers.
 #include <fmt/format.h>
 
 #include <array>
@@ -45,7 +45,8 @@ std::string hex_dump(const Unit& unit, const MemoryImage& image) {
 }
 
 // Returns the address of a register that the user gave by name or address. An address that the unit's table does not
-// contain is returned too and sent to the encoder. Throws UsageError for an unknown name.
+// contain is returned too and sent to the encoder. Throws UsageError for another name, or for that of a register which
+// cannot be read or, `for_writing`, written.
 std::int64_t register_address(const Invocation& invocation, const Unit& unit, bool for_writing) {
   const std::string_view written = invocation.text("address");
   const Result<std::int64_t> number = parse_number(written);

@@ -90,7 +90,8 @@ void VirtualNode::receive(const CanFrame& frame, Time at) {
   const bool for_all = function == Function::configuration;
   if (!for_all && (function != Function::command || node_of(frame) != node())) return;
   const bool sets = for_all && info != nullptr && info->answer == Answer::error;
-  // Other nodes answer settings on 7E5, the identifier of settings: their answers without an error code are ignored.
+  // Other nodes answer settings on 7E5, the identifier of settings: outside configuration mode, their answers without
+  // an error code are ignored.
   if (sets && is_zero_from(frame, 1) && !configuring_) return;
   if (!rules_.expect(!frame.remote && frame.size == frame_size, "a frame without its 8 bytes of data", at)) return;
   if (!for_all && !rules_.expect(frame.data[1] == node(), "the second byte is not the node's number", at)) return;

@@ -102,7 +102,8 @@ struct Format {
   bool listens = false;       ///< Host: whether to read the positions that the node sends without a request.
   std::uint8_t positive = 0;  ///< Value of order 22 for counting up; the document does not state it.
   std::uint8_t negative = 1;  ///< Value of order 22 for counting down; the document does not state it.
-  /// Virtual encoder: positions per second that the node sends without a request after power on; 0: none.
+  /// Virtual encoder: positions per second that the node sends without a request after power on or the order `start`.
+  /// 0: none.
   std::uint8_t cyclic = 10;
   bool answers_on_7e4 = false;  ///< Virtual encoder: whether it answers settings on 7E4 instead of 7E5.
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of invalid and unexpected frames.
+// Tests of invalid, unexpected and too many frames.
 #include "absenc/protocol/raa38/can/frame.hpp"
 
 #include <gtest/gtest.h>
