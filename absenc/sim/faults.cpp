@@ -73,7 +73,7 @@ void FaultyDevice::receive(const Event<std::uint8_t>& event) {
   for (std::uint8_t& byte : received_) {
     if (request_.size() < longest_request) request_.push_back(byte);
     if (strikes(FaultKind::request_corrupt)) {
-      flip_bits({&byte, 1});
+      flip_bits({&byte, 1}, random_);
       request_damaged_ = true;
     }
   }
@@ -122,7 +122,7 @@ bool FaultyDevice::damage(Step<std::uint8_t>& reply, Time now) {
     if (strikes(FaultKind::repeat)) reply_.insert(reply_.end(), reply.out.begin(), reply.out.end());
     // On a clocked link corrupt, truncate and drop hit only bytes that the host clocks out.
     const auto taken = [&] { return reply.bits == 0 ? reply_.size() : std::min(reply_.size(), (reply.bits + 7) / 8); };
-    if (strikes(FaultKind::corrupt)) flip_bits(std::span(reply_).first(taken()));
+    if (strikes(FaultKind::corrupt)) flip_bits(std::span(reply_).first(taken()), random_);
     if (taken() > 1 && strikes(FaultKind::truncate)) reply_.resize(1 + random_.below(taken() - 1));
     if (strikes(FaultKind::drop)) reply_.erase(reply_.begin() + static_cast<std::ptrdiff_t>(random_.below(taken())));
     if (strikes(FaultKind::garbage)) {
@@ -143,12 +143,11 @@ bool FaultyDevice::damage(Step<std::uint8_t>& reply, Time now) {
   return !reply_.empty();
 }
 
-// Flips 1 to 3 different bits of `bytes`.
-void FaultyDevice::flip_bits(std::span<std::uint8_t> bytes) {
+void flip_bits(std::span<std::uint8_t> bytes, Random& random) {
   std::array<std::uint64_t, 3> flipped{};
-  const std::uint64_t count = 1 + random_.below(flipped.size());
+  const std::uint64_t count = 1 + random.below(flipped.size());
   for (std::uint64_t i = 0; i < count;) {
-    const std::uint64_t bit = random_.below(bytes.size() * 8);
+    const std::uint64_t bit = random.below(bytes.size() * 8);
     if (std::find(flipped.begin(), flipped.begin() + static_cast<std::ptrdiff_t>(i), bit) !=
         flipped.begin() + static_cast<std::ptrdiff_t>(i)) {
       continue;

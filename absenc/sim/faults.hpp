@@ -56,6 +56,9 @@ struct FaultRate {
 /// allowed range.
 [[nodiscard]] FaultRate parse_fault(std::string_view text);
 
+/// Flips 1 to 3 different bits of `bytes`, which are drawn from `random`. `bytes` must not be empty.
+void flip_bits(std::span<std::uint8_t> bytes, Random& random);
+
 /// A machine between a line and a device machine that injects faults. The device must outlive it. The same seed gives
 /// the same faults.
 ///
@@ -85,7 +88,6 @@ class FaultyDevice final : public Machine<std::uint8_t> {
  private:
   bool strikes(FaultKind kind);
   bool damage(Step<std::uint8_t>& reply, Time now);
-  void flip_bits(std::span<std::uint8_t> bytes);
   void receive(const Event<std::uint8_t>& event);
 
   Machine<std::uint8_t>& device_;

@@ -20,7 +20,8 @@ void FaultyNode::feed(const Event<CanFrame>& event) {
   has_received_ = true;
   std::vector<CanFrame> damaged(event.items.begin(), event.items.end());
   for (CanFrame& frame : damaged) {
-    if (frame.size > 0 && strikes(FaultKind::request_corrupt)) flip_bits(frame);
+    if (frame.size > 0 && strikes(FaultKind::request_corrupt))
+      flip_bits(std::span(frame.data).first(frame.size), random_);
   }
   Event<CanFrame> changed = event;
   changed.items = damaged;
@@ -46,7 +47,7 @@ Step<CanFrame> FaultyNode::next(Time now) {
 void FaultyNode::damage(const CanFrame& frame) {
   if (strikes(FaultKind::silence)) return;
   CanFrame sent = frame;
-  if (sent.size > 0 && strikes(FaultKind::corrupt)) flip_bits(sent);
+  if (sent.size > 0 && strikes(FaultKind::corrupt)) flip_bits(std::span(sent.data).first(sent.size), random_);
   if (sent.size > 0 && strikes(FaultKind::drop)) --sent.size;
   if (sent.size > 0 && strikes(FaultKind::truncate)) sent.size = static_cast<std::uint8_t>(random_.below(sent.size));
   std::fill(sent.data.begin() + sent.size, sent.data.end(), std::uint8_t{0});
@@ -58,14 +59,6 @@ void FaultyNode::damage(const CanFrame& frame) {
   if (has_received_ && strikes(FaultKind::echo)) out_.push_back(last_received_);
   out_.push_back(sent);
   if (strikes(FaultKind::repeat)) out_.push_back(sent);
-}
-
-// Draws 1 to 3 random bits of `frame` and flips each; a bit that is drawn twice is flipped back.
-void FaultyNode::flip_bits(CanFrame& frame) {
-  for (std::uint64_t more = 1 + random_.below(3); more > 0; --more) {
-    const std::uint64_t bit = random_.below(std::uint64_t{8} * frame.size);
-    frame.data[bit / 8] = static_cast<std::uint8_t>(frame.data[bit / 8] ^ 1u << bit % 8);
-  }
 }
 
 }  // namespace absenc::sim

@@ -33,7 +33,6 @@ class FaultyNode final : public Machine<CanFrame> {
  private:
   bool strikes(FaultKind kind);
   void damage(const CanFrame& frame);
-  void flip_bits(CanFrame& frame);
 
   Machine<CanFrame>& device_;
   FaultRates rates_;

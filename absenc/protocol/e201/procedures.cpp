@@ -111,12 +111,14 @@ bool is_near(const Dialog& dialog, std::int64_t counts, std::int64_t other) {
 }  // namespace
 
 Procedure set_zero(Dialog& dialog, InterfaceResults& found) {
-  // `?` does not report errors of the encoder, so `4` is read too. They stay unknown if `4` has no valid reply.
+  // `?` does not report errors of the encoder, so `4` is read too. Firmware before 1.16 does not answer it.
   const Result<Reply> samples = co_await dialog.attempt({letter::samples});
   if (samples) {
     const Reading look = Protocol::reading(dialog.format(), {letter::samples}, *samples);
     const Outcome why_not = author::objection_to_zero(look, look);
     if (why_not.error != Error::none) co_return why_not;
+  } else if (samples.error() != Error::timeout) {
+    co_return {samples.error(), "the encoder sends no valid word, so nothing was changed"};
   }
   const Reply first = co_await dialog.ask({letter::decimal});
   const Reply second = co_await dialog.ask({letter::decimal}).after(author::between_looks);

@@ -270,5 +270,16 @@ TEST(E201Zero, RefusesInvalidPosition) {
   EXPECT_EQ(bench.answering.asked(), "4");
 }
 
+// Checks that no zero is set if `4` shows no valid word, as of an encoder without supply; but that it is set if `4` is
+// not answered, as by firmware before 1.16.
+TEST(E201Zero, RefusesEncoderWithoutValidWord) {
+  Bench bench;
+  const CommandResult stuck = bench.run_tampered(answering('4', {{"0000000000000000\r"}}), "set-zero");
+  EXPECT_EQ(stuck.error, "line_stuck");
+  EXPECT_TRUE(says(stuck.detail, "nothing was changed")) << stuck.detail;
+  EXPECT_EQ(bench.answering.asked().find('z'), std::string::npos);
+  EXPECT_EQ(bench.run_tampered(answering('4', {}), "set-zero").error, "none");
+}
+
 }  // namespace
 }  // namespace absenc::e201
