@@ -68,7 +68,7 @@ class Emulation {
   [[nodiscard]] std::string address() const;
   /// Returns the unit that is emulated.
   [[nodiscard]] const Unit& unit() const;
-  /// Returns the options of the virtual encoder.
+  /// Returns the options with which the virtual encoder was started.
   [[nodiscard]] const Options& options() const;
 
   /// Switches the virtual encoder off: it sends no replies until `power_on`.
@@ -92,7 +92,7 @@ class Emulation {
   /// Returns how often this fault was injected, into replies or, for "request_corrupt", into requests. Throws
   /// UsageError for an unknown fault.
   [[nodiscard]] std::uint64_t fault_count(std::string_view kind) const;
-  /// Returns the number of requests that the encoder answered.
+  /// Returns how many answers the encoder has given. Unsolicited frames, and requests that get no reply, may count too.
   [[nodiscard]] std::uint64_t answer_count() const;
   /// Returns how often the host broke a rule of the document.
   [[nodiscard]] std::uint32_t violations() const;

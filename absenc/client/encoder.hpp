@@ -45,15 +45,15 @@ struct Sample {
     reading,
     failed,  ///< the attempt failed because of the encoder or the line
     lost,    ///< the port was lost during this attempt
-    absent,  ///< the port is still lost
+    absent,  ///< the port is not open and could not be opened
     back,    ///< the port is open again; nothing was read yet
   };
 
   Kind kind = Kind::absent;  ///< Whether this sample holds a reading, a failure or an event.
   Time at{};                 ///< `latched` of the reading, or the time of the failure or of the event.
   Reading reading{};         ///< The reading; default-constructed if `kind` is not `reading`.
-  /// Whether a second reading confirmed the position, because the shaft can have moved from one to the other in the
-  /// time between them.
+  /// Whether a second reading confirmed the position: the shaft can have moved from one to the other in the time
+  /// between them.
   bool confirmed = false;
   /// Whether the encoder was ready and the position valid, but no second reading confirmed it. `reading` then marks the
   /// position as unknown.
@@ -121,24 +121,24 @@ class Encoder {
   /// until the port is opened again.
   [[nodiscard]] bool connected() const;
 
-  /// Returns a reading of the position with all alarms that the encoder can report. If no second reading confirmed the
-  /// position, its validity is marked as unknown. Opens a lost port again. Throws EncoderFailure, Failure, UsageError,
-  /// os::Failure, os::Interrupted, Cancelled. Throws DeadlinePassed if there is no reading at `deadline` (a time of
-  /// os::now), up to 20 ms and the duration of one exchange later.
+  /// Returns a reading of the position. If no second reading confirmed the position, its validity is marked as unknown.
+  /// Opens a lost port again. Throws EncoderFailure, Failure, UsageError, os::Failure, os::Interrupted, Cancelled.
+  /// Throws DeadlinePassed if there is no reading at `deadline` (a time of os::now), up to 20 ms and the duration of
+  /// one exchange later.
   [[nodiscard]] Reading read(Time deadline = never);
-  /// Returns a reading with the alarms: by the command that reads each alarm by name if the unit has one that its
-  /// options allow, otherwise from a reading of the position, confirmed or not.
+  /// Returns a reading with the alarms: by the command that reads all alarms if the unit has one that its options
+  /// allow, otherwise from a reading of the position, confirmed or not.
   [[nodiscard]] Reading read_alarms();
   /// Returns samples for a loop, which continues after a lost port is back. The loop ends after `count` samples, at the
   /// deadline, with `cancel`, or once the function of `end_when` returns true.
   [[nodiscard]] Samples samples(const SampleChoices& choices = {});
-  /// Takes one sample and returns it: reads once, or, while the port is lost, waits up to a quarter of a second and
-  /// tries to open the port again. Throws os::Interrupted, UsageError, Failure, Cancelled.
+  /// Takes one sample and returns it: reads once, or, while the port is not open, waits up to a quarter of a second and
+  /// tries to open it. Throws os::Interrupted, UsageError, Failure, Cancelled.
   Sample next();
 
   /// Runs a command of the unit by name and returns the fields of its result. Arguments that are left out have their
-  /// defaults. Does not ask the user for confirmation, even if the command changes the encoder, but reads back written
-  /// values. Throws EncoderFailure, Failure, os::Failure, os::Interrupted, UsageError, Cancelled.
+  /// defaults. Does not ask the user for confirmation, even if the command changes the encoder. Throws EncoderFailure,
+  /// Failure, os::Failure, os::Interrupted, UsageError, Cancelled.
   Answer run(std::string_view command, std::span<const std::int64_t> arguments = {});
   /// Runs a command of the unit by name, with arguments in the order of the command.
   Answer run(std::string_view command, std::initializer_list<std::int64_t> arguments) {
@@ -183,7 +183,7 @@ class Encoder {
   [[nodiscard]] const std::vector<std::string>& notes() const;
   /// Returns the counts of all conversations: good ones, errors by kind, repeated attempts.
   [[nodiscard]] const host::Counters& counters() const;
-  /// Returns the latencies of all good exchanges, from the end of a request to the end of its reply.
+  /// Returns the latencies of all good conversations, each from the end of its last request to the end of the reply.
   [[nodiscard]] const host::Latencies& latencies() const;
   /// Returns the stored bad exchanges, the newest first, with times of os::now.
   [[nodiscard]] std::vector<BadExchangeText> bad_exchanges() const;
@@ -211,8 +211,8 @@ class Encoder {
 /// UsageError, which names the wrong part and, for an unknown name, a similar one if there is one.
 [[nodiscard]] Encoder open(std::string_view text, std::span<const std::string> settings = {});
 
-/// An input range of samples. With a rate they are at equal distances in time, without drift, and samples whose time
-/// has passed are left out; without one they follow as fast as possible.
+/// An input range of samples. With a rate they are due at equal distances in time, without drift; if several are
+/// overdue, all but the last are left out. Without a rate they follow as fast as possible.
 class Samples {
  public:
   /// Type of the values in the range.
@@ -234,7 +234,7 @@ class Samples {
   [[nodiscard]] static Iterator::End end() { return {}; }
   /// Returns the present sample, or null at the end of the range. The sample is valid until `advance`.
   [[nodiscard]] const Sample* current() const;
-  /// Waits for the next sample and takes it.
+  /// Waits for the next sample and takes it, or ends the range.
   void advance();
 
  private:
@@ -243,8 +243,8 @@ class Samples {
   std::unique_ptr<Parts> parts_;
 };
 
-/// Returns a word for the sample: "" for a reading ("restarted" if its position starts again) and while the port is
-/// still lost, "lost" or "back" for the other events of the port, and the name of the error for a failed attempt.
+/// Returns a word for the sample: "" for a reading ("restarted" if its position starts again) and if the kind is
+/// `absent`, "lost" or "back" for the other events of the port, and the name of the error for a failed attempt.
 [[nodiscard]] std::string_view event_name(const Sample& sample);
 
 /// Returns the unit of the speed: "rpm", or "mm/s" for a linear encoder.

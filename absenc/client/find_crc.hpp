@@ -28,7 +28,7 @@ struct FoundCheck {
   CrcParameters parameters{};
   bool low_first = false;  ///< Whether the low byte of a check of more than 8 bits comes first.
   bool padded = false;     ///< Whether the check also covers a byte 00 appended to the data.
-  /// Whether other values of init fit with a matching xorout, because all frames have the same length.
+  /// True if all frames have the same length and no usual init and xorout fit: each init then fits with some xorout.
   bool init_open = false;
   /// Possible positions of the first byte or bit that the check covers; the covered part ends at the check.
   std::vector<std::size_t> first{};
@@ -53,9 +53,8 @@ struct CheckFindings {
   std::string advice{};
 };
 
-/// Returns the checks of 3 to 16 bits that explain every frame: all of them, unless `is_open`. Throws UsageError for
-/// fewer than two frames, for bytes and bits together, and for frames that are too short or longer than 64 bytes or 128
-/// bits.
+/// Returns checks of 3 to 16 bits that explain every frame. Throws UsageError for fewer than two frames, for bytes and
+/// bits together, and for frames that are too short or longer than 64 bytes or 128 bits.
 [[nodiscard]] CheckFindings find_crc(std::span<const CheckedFrame> frames);
 
 /// A unit with options that configure it for a found check.

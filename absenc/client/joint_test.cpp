@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compares angles of joint and motor with the motion of virtual encoders, over several turns.
+// Tests the angles of joint and motor, with virtual encoders, and the settings for them.
 #include "absenc/client/joint.hpp"
 
 #include <gtest/gtest.h>
@@ -47,7 +47,8 @@ TEST(Joint, ElectricalAngleIsFrom0ToBelow360) {
   EXPECT_DOUBLE_EQ(electrical_degrees(linear, 5 + 24 * 1000), 0);
 }
 
-/// Compares the joint and motor angles of samples with angles that are computed from the encoder's continued position.
+/// Compares the joint and motor angles of samples, and the joint speed if it is known, with values that are computed
+/// from the encoder's continued position and speed. The shaft must turn more than three times.
 void expect_angles(const std::string& address, double direction, double offset, double gear, double pole_pairs) {
   Encoder encoder = open(address);
   double first = 0;

@@ -92,8 +92,8 @@ class Memory {
   /// Returns the unit of the encoder.
   [[nodiscard]] const Unit& unit() const;
 
-  /// Reads the position once, which fails if the reply does not fit the configured model. The memory itself does not
-  /// show a wrong model and would accept the bytes. Does nothing if the unit cannot read positions.
+  /// Reads the position, which fails if the reply does not fit the configured model. The memory itself does not show a
+  /// wrong model and would accept the bytes. Does nothing if the unit cannot read positions.
   void check_model();
 
   /// Reads the bytes at the addresses of `image` and returns them. Throws UsageError for addresses that cannot be read.
@@ -117,7 +117,7 @@ class MemoryChange {
   /// Prepares the change without sending anything. Throws UsageError for addresses that cannot be written.
   MemoryChange(Memory memory, MemoryImage wanted, MemoryAccess access);
 
-  /// Reads the bytes that are stored at the wanted addresses.
+  /// Checks the model and reads the bytes that are stored at the wanted addresses.
   void look(const MemoryProgress& progress = {});
   /// Writes the bytes that differ, one by one, and reads each back.
   void write(const MemoryProgress& progress = {});

@@ -19,8 +19,8 @@ class ReadingColumns {
   /// Returns the columns, in the order in which `fill` writes their values.
   [[nodiscard]] std::span<const Column> columns() const { return columns_; }
   /// Writes the reading into `values`, one value for each column. A value that the reading does not have becomes empty.
-  /// A position in degrees, millimetres or micrometres becomes `Invalid` unless it is known to be valid; flags become
-  /// `Unknown` if none is raised and not all were reported.
+  /// A position in degrees, millimetres or micrometres becomes `Invalid` unless it is known to be valid; flags and
+  /// validity become values as `value_of` returns them.
   void fill(const Reading& reading, std::span<Value> values) const;
 
  private:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes long recordings: files with a header and a row for each reading, failure and gap. Each line of text is written
-// by one system call, so that a killed process loses none; HDF5 rows are written within a second.
+// Writes long recordings: files with a header and rows for readings, failures, events of the port and gaps. Each line
+// of text is written by one system call, so that a killed process loses none; HDF5 rows are written within a second.
 #pragma once
 
 #include <cstdint>
@@ -56,7 +56,7 @@ class Recording {
   [[nodiscard]] Time start() const;
   /// Returns the path of the file, or the paths of the parts so far, in their order.
   [[nodiscard]] std::vector<std::string> paths() const;
-  /// Returns the names of the files as text: "log.csv", or "log-0001.csv to log-0003.csv".
+  /// Returns the paths of the files as text: "log.csv", or "log-0001.csv to log-0003.csv".
   [[nodiscard]] std::string names() const;
 
  private:

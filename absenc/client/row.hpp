@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rows of named and typed values: the result of a command, or one exchange of a capture.
+// Rows of named and typed values, such as the result of a command or one exchange of a capture.
 #pragma once
 
 #include <cstdint>
@@ -48,8 +48,7 @@ struct Invalid {
   friend bool operator==(const Invalid&, const Invalid&) = default;
 };
 
-/// Alternative of `Value` for a value that no reply has reported so far, such as alarms that a reply does not carry, or
-/// a position whose validity is unknown.
+/// Alternative of `Value` for a value that no reply has reported so far, such as alarms that a reply does not carry.
 struct Unknown {
   /// Returns true, because all unknown values are equal.
   friend bool operator==(const Unknown&, const Unknown&) = default;
@@ -118,7 +117,7 @@ struct Answer {
 /// is stored.
 class AnswerSink final : public FieldSink {
  public:
-  /// Adds the field as a column with its value.
+  /// Adds the field as a column with its value, or replaces the value if the column exists.
   void put(const FieldValue& value) override;
   void put_reading(const Reading& reading) override;
 

@@ -19,7 +19,7 @@ struct Setting {
   const Command* setter;  ///< Command that writes the setting; null: the setting can only be read.
   const Command* getter;  ///< Command that reads the setting; null: the setting can only be written.
 
-  /// Returns the name of the setting, which is the name of its command.
+  /// Returns the name of the setting: that of the command that reads it, or of the one that writes it if there is none.
   [[nodiscard]] std::string_view name() const { return getter != nullptr ? getter->name : setter->name; }
 };
 
@@ -59,10 +59,10 @@ class Settings {
 
   /// Reads the setting `name` and returns its value.
   [[nodiscard]] Answer get(std::string_view name);
-  /// Writes the setting `name` without asking the user for confirmation, reads it back, compares all values, and
-  /// returns the result. If the setting changes how the encoder is reached, the connection uses the new value from then
-  /// on. Throws Failure if the setting reads back differently. If the port is lost after a write, throws a Failure
-  /// that lists the values with which the encoder may be left, or the os::Failure if the command reports none.
+  /// Writes the setting `name` without asking the user for confirmation, reads it back if it can be read, and returns
+  /// the result. If the setting changes how the encoder is reached, the connection uses the new value from then on.
+  /// Throws Failure if the setting reads back differently. If the port is lost in the command after its write, throws a
+  /// Failure that lists the values with which the encoder may be left, or the os::Failure if the command reports none.
   SettingChange set(std::string_view name, std::span<const std::int64_t> arguments);
 
  private:

@@ -19,16 +19,17 @@ struct TapChoices {
   std::string protocol{};  ///< Identifier of the protocol's unit; "": the protocol is detected from the received bytes.
   std::string model{};     ///< Name of a model of the unit; empty: the default model.
   std::vector<std::string> options{};  ///< Options of the unit, as "name=value".
-  Time duration{};  ///< Time after which the tap ends; 0: it ends at `cancel`, or at the end of the input.
+  Time duration{};                     ///< Time after which the tap ends; 0: no limit.
   /// File to which all received frames are written, in a format that `decode` reads; "": no file.
   std::string record{};
   bool replaces = false;  ///< Whether an existing file `record` may be replaced.
 };
 
-/// An input range of rows with the columns of `Decoded`, one for each exchange on the line. Rows are ordered by the end
-/// of their frames and available as soon as their last frame is complete; an unanswered request may follow later rows.
-/// Up to 64 MiB of bytes that arrive while the caller is busy are stored. `time_s` is the time of arrival at this
-/// computer since the first byte. It is too coarse for the latency of an encoder, so `turnaround_us` is empty.
+/// An input range of rows with the columns of `Decoded`, one for each exchange on the line, or for other bytes. Rows
+/// are ordered by the end of their frames and available as soon as their last frame is complete; an unanswered request
+/// may follow later rows. Up to 64 MiB of bytes that arrive while the caller is busy are stored. `time_s` is the time
+/// of arrival at this computer since the first byte. It is too coarse for the latency of an encoder, so `turnaround_us`
+/// is empty.
 class Tap {
  public:
   /// Type of the values in the range.

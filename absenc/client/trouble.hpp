@@ -16,7 +16,7 @@ namespace absenc::client {
 struct Trouble {
   Error error = Error::none;  ///< Kind of the error.
   std::string message{};      ///< What happened, and what the received bytes are taken for, as a sentence.
-  std::string exchange{};     ///< Request and reply with their times, as text for people.
+  std::string exchange{};     ///< Request and reply, as text for people.
   std::string advice{};       ///< What the user can try; "": no advice.
   std::string sent{};         ///< Bytes or frames that were sent, as text.
   std::string received{};     ///< Bytes or frames that were received, as text; "": none were received.

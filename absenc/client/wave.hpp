@@ -23,8 +23,7 @@ struct WaveChoices {
   /// Number of samples per second in .sr files, up to 1e9; 0: 16 samples per bit of the line.
   std::uint64_t samples_per_second = 0;
   bool replaces = false;  ///< Whether an existing file of this name may be replaced.
-  /// Called from time to time with the present step of the work. An exception of the callback ends the drawing and
-  /// leaves no file.
+  /// Called from time to time with the present step of the work. An exception of the callback ends the drawing.
   std::function<void(const std::string& what)> progress{};
 };
 

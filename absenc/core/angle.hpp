@@ -35,7 +35,7 @@ struct Reading {
   /// false: no reply so far reports whether `singleturn` is valid, so it must not be used.
   bool singleturn_known = true;
   bool multiturn_known = true;  ///< false: no reply so far reports whether `multiturn` is valid
-  /// The encoder counts turns below zero: `multiturn` is a two's complement number of `multiturn_bits` bits.
+  /// true: the encoder counts turns below zero, and `multiturn` is a two's complement number of `multiturn_bits` bits.
   bool multiturn_signed = false;
   double unit_um = 0;                 ///< linear encoders: micrometres per count of `singleturn`; 0: rotary encoder
   bool ready = true;                  ///< false while the encoder reports that it is starting
@@ -45,7 +45,7 @@ struct Reading {
   std::uint32_t alarms_reported = 0;  ///< bits of `alarms` that the encoder reported; the others are unknown, not clear
   /// Time for which the position holds: when the encoder sampled it, or the time that the protocol assumes for that.
   Time latched{};
-  Time received{};                    ///< time at which the last byte of the reply arrived
+  Time received{};  ///< time at which the last byte of the reply arrived
 
   /// Returns whether all bits of the single-turn position can be trusted.
   [[nodiscard]] constexpr bool singleturn_valid() const {
@@ -74,7 +74,7 @@ struct Reading {
 /// Returns the angle in degrees, 0 to below 360, of a position of 1 to 64 bits. A revolution has 2^bits counts, not
 /// 2^bits - 1.
 [[nodiscard]] constexpr double degrees(std::uint64_t counts, unsigned bits) {
-  if (bits > 48) return degrees(counts >> (bits - 48), 48);  // more than 48 bits could be rounded up to 360
+  if (bits > 48) return degrees(counts >> (bits - 48), 48);  // the result for many bits could be rounded up to 360
   return 180.0 * static_cast<double>(counts) / static_cast<double>(std::uint64_t{1} << (bits - 1));
 }
 

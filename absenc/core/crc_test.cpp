@@ -35,8 +35,8 @@ static_assert(checks<CrcParameters{16, 0x5935, 0x0000, false, false, 0x00}>(0x5D
 static_assert(checks<CrcParameters{16, 0x5935, 0xFFFF, false, false, 0x00}>(0x772B), "ESL channel 2 (msb)");
 static_assert(checks<modbus>(0x4B37), "Modbus RTU");
 
-// CRCs from the public catalogue of parametrised CRC algorithms, not of a supported encoder. Among them are widths that
-// are no multiple of 8, an xorout that is not 0, and a refin that differs from refout.
+// CRCs from the public catalogue of parametrised CRC algorithms. Among them are widths that are no multiple of 8, an
+// xorout that is not 0, and a refin that differs from refout.
 static_assert(checks<CrcParameters{3, 0x3, 0x0, false, false, 0x7}>(0x4), "CRC-3/GSM");
 static_assert(checks<CrcParameters{3, 0x3, 0x7, true, true, 0x0}>(0x6), "CRC-3/ROHC");
 static_assert(checks<CrcParameters{5, 0x05, 0x1F, true, true, 0x1F}>(0x19), "CRC-5/USB");
@@ -61,7 +61,7 @@ constexpr auto noise = [] {
   return bytes;
 }();
 
-// Sample 0 is the smallest polynomial, x^width + 1. Other samples have a pseudo-random polynomial; init and xorout are
+// Sample 0 has the polynomial x^width + 1. Other samples have a pseudo-random polynomial; init and xorout are
 // pseudo-random in every sample.
 constexpr CrcParameters sampled(unsigned width, std::uint64_t sample, bool refin, bool refout) {
   const std::uint64_t bits = mixed(width * 64 + sample);

@@ -13,7 +13,7 @@
 
 namespace absenc {
 
-/// A time since a start that all times of a program share, or a duration, in nanoseconds.
+/// A time since the start of a clock, or a duration, in nanoseconds.
 using Time = std::chrono::nanoseconds;
 
 inline constexpr Time never = Time::max();  ///< A time that is never reached.

@@ -25,8 +25,8 @@ class Apart {
   explicit constexpr Apart(Times times) : times_(times) {}
 
   /// Returns the longest time that can lie between the last added reading and a reading with the time `latched`. With
-  /// Times::arrived: readings that arrive together may have been latched anywhere in the wait before them, so the time
-  /// is at least that wait until as much time again has passed.
+  /// Times::arrived: readings that arrive together may have been latched anywhere in the wait before them, so the
+  /// result is at least that wait until as much time again has passed.
   [[nodiscard]] constexpr Time since_last(Time latched) const { return has_waited(latched) ? latched - last_ : wait_; }
 
   /// Adds a reading with the time `latched`.

@@ -18,8 +18,7 @@ struct LatchTime {
   [[nodiscard]] constexpr Time width() const { return latest - earliest; }
 };
 
-/// Returns the latch interval that the times of `reading` alone allow: the position was latched before its reply was
-/// received.
+/// Returns the latch interval by the times of `reading` alone: from `latched` until the reply was received.
 [[nodiscard]] constexpr LatchTime latch_time(const Reading& reading) {
   return {reading.latched, reading.received > reading.latched ? reading.received : reading.latched};
 }

@@ -38,7 +38,7 @@ std::size_t printed(Bytes bytes) {
   return static_cast<std::size_t>(std::count_if(bytes.begin(), bytes.end(), is_printed));
 }
 
-// Returns whether the unit's own replies are text.
+// Returns whether at least 90 % of the bytes of the unit's good example replies are text.
 bool speaks_text(const Unit& unit) {
   std::size_t all = 0;
   std::size_t text = 0;
@@ -50,7 +50,8 @@ bool speaks_text(const Unit& unit) {
   return all != 0 && text * 10 >= all * 9;
 }
 
-// Returns the bytes from `at` on as quoted text, up to the end of the line and at most 32: "$GPGGA,120000".
+// Returns at most 32 bytes from `at` to the end of the line as quoted text, "$GPGGA,120000". Quotation marks and bytes
+// that cannot be printed become dots.
 std::string quoted(Bytes bytes, std::size_t at) {
   constexpr std::size_t most = 32;
   std::string text = "\"";
@@ -61,11 +62,11 @@ std::string quoted(Bytes bytes, std::size_t at) {
   return text + "\"";
 }
 
-// Returns the checksums that explain these frames; none if there are too few frames.
+// Returns the checksums that explain these frames; none if `find_crc` refuses the frames.
 CheckFindings checks_of(const std::vector<CheckedFrame>& frames) {
   try {
     return find_crc(frames);
-  } catch (const UsageError&) {  // there are too few frames, or frames in which no checksum is searched
+  } catch (const UsageError&) {  // for example, there are too few frames
     return {};
   }
 }
@@ -75,7 +76,7 @@ bool is_same_kind(const FoundCheck& one, const FoundCheck& other) {
                                                           one.parameters.poly == other.parameters.poly));
 }
 
-// Returns whether the unit's own frames have this kind of checksum; for a CRC, of the same width and polynomial.
+// Returns whether this kind of checksum, for a CRC with this width and polynomial, explains the unit's example replies.
 bool is_of_unit(const FoundCheck& check, const Unit& unit) {
   std::vector<CheckedFrame> frames;
   for (const Vector& vector : unit.vectors) {

@@ -17,11 +17,11 @@ namespace absenc::client {
 
 namespace {
 
-constexpr double quiet_share = 1e-4;  // fraction of a turn (1e-4, 0.04 degrees) by which a position at rest may vary
+constexpr double quiet_share = 1e-4;  // fraction of a turn by which a position at rest may vary: 0.036 degrees
 constexpr std::int64_t quiet_counts = 4;
 constexpr std::uint32_t hand_rpm = 600;
 
-/// The positions of consecutive readings, and the movement between them.
+/// The positions of the readings in which they are valid, and the movement between them.
 struct Walk {
   unsigned bits = 0;
   double unit_um = 0;
@@ -31,9 +31,9 @@ struct Walk {
   std::int64_t lowest = 0;  // lowest position relative to the first, in counts, continued past the end of the counter
   std::int64_t highest = 0;
   std::int64_t end = 0;
-  std::set<std::int64_t> turns{};  // all numbers of turns that were reported as valid
+  std::set<std::int64_t> turns{};  // the valid numbers of turns of these readings
   std::size_t zero_crossings = 0;
-  Time time{};  // time from the first to the last reading
+  Time time{};  // time from the first to the last of these readings
 
   [[nodiscard]] std::int64_t span() const { return highest - lowest; }
 };
@@ -138,8 +138,8 @@ void judge_turning(const Walk& walk, std::vector<Finding>& findings) {
   }
 }
 
-// Finds bits that never change although the position moved in uneven steps by at least eight times their value. With
-// even steps a bit may always have the same value.
+// Finds bits, below the highest three, that never change although the position moved in uneven steps by at least eight
+// times their value. With even steps a bit may always have the same value.
 void judge_bits(const Walk& walk, std::vector<Finding>& findings) {
   constexpr std::size_t enough = 64;
   constexpr std::size_t uneven = 8;

@@ -26,7 +26,8 @@ struct RaisedFlag {
   std::set<std::string_view> channels{};  // names of the fields, one for each channel, that report the flag
   const Reading* last = nullptr;          // the last reading that has the flag raised
   std::size_t readings = 0;
-  std::size_t invalid = 0;  // number of readings with this flag raised in which the position or the turns are invalid
+  // number of readings with this flag raised in which the position or the turns are invalid; 0 if they may be damage
+  std::size_t invalid = 0;
 };
 
 bool is_invalid(const Reading& reading) {

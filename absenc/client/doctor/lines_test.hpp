@@ -22,10 +22,10 @@ class ScriptedPort final : public Port<Item> {
  public:
   using List = std::vector<Item>;
   std::function<List(const List& request)> answer = [](const List&) { return List{}; };
-  List babble{};  // bytes that another device sends every millisecond; empty: no other device
+  List babble{};  // bytes or frames that another device sends every millisecond; empty: no other device
   Time after = 100us;
   Time latency{};
-  bool destroys = false;  // whether every frame that is sent is destroyed, as on a CAN bus without acknowledgement
+  bool destroys = false;  // whether a line error follows each request, as on a CAN bus without acknowledgement
 
   Time now() override { return now_; }
   void begin(const Step<Item>& step) override {

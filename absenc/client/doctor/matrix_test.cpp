@@ -168,7 +168,7 @@ const Ids& causes_of(const Unit& unit, sim::FaultKind kind) {
        {"requests_damaged", "sometimes_silent", "no_answer", "refused", "damaged_bits", "damaged_bursts",
         "sometimes_damaged", "always_damaged", "bytes_missing", "contradictory", "position_jumps"}},
   };
-  // On a clocked line the host always receives bits, so every fault appears as damage, or as a level that never
+  // On a clocked line the host always receives bits, so a missing reply appears as damage, or as a level that never
   // changes.
   static const Ids clocked = [] {
     Ids all = damage;
@@ -199,8 +199,8 @@ class Matrix : public ::testing::TestWithParam<const Unit*> {
   const Unit& unit() const { return *GetParam(); }
 };
 
-/// Returns the settings with which a virtual encoder can be read; of settings with the same bytes on the wire only the
-/// first.
+/// Returns the settings of `modes_of` with which a virtual encoder can be read; of settings with the same bytes on the
+/// wire only the first.
 std::vector<std::string> readable_modes(const Unit& unit) {
   std::vector<std::string> modes;
   std::set<std::string> known;
@@ -232,8 +232,8 @@ TEST_P(Matrix, AHealthyEncoderIsGoodAndItsVerdictSaysWhatWasLookedAt) {
   }
 }
 
-/// Returns each alarm that replies can report, and each condition at both ends of its range except its normal value, as
-/// settings of a virtual encoder.
+/// Returns each alarm that replies can report with the default options, and each condition at both ends of its range
+/// except its normal value, as settings of a virtual encoder.
 std::vector<std::string> states_of(const Unit& unit) {
   std::vector<std::string> states;
   const Options options = parse_address("sim:" + std::string(unit.id)).options;
@@ -309,7 +309,7 @@ TEST_P(Matrix, DamageIsNeverGoodAndNamedAsWhatItIs) {
         const Watched one = examined(address);
         const Examination& examination = one.examination;
         const bool all_good = examination.good == examination.tried;
-        // Skips faults without an effect on the host, such as a delay within the timeout.
+        // Skips faults that did not occur, or without an effect on the host, such as a delay within the timeout.
         if (one.injected() == 0 || (all_good && examination.findings.empty())) continue;
         EXPECT_FALSE(examination.healthy()) << sentences(examination);
         EXPECT_EQ(differences(ids_of(examination), causes_of(unit(), static_cast<sim::FaultKind>(kind))), "")
@@ -350,8 +350,8 @@ std::string fault_table() {
   return table;
 }
 
-/// Returns the table with a row for each alarm, and each condition at its ends, with the first finding and its
-/// evidence.
+/// Returns the table with a row for each state of `states_of` that the default options allow, with the first finding
+/// and its evidence.
 std::string state_table() {
   std::string table = "| protocol | state of the encoder | first finding | evidence |\n|---|---|---|---|\n";
   for (const Unit* unit : all_units()) {
@@ -377,7 +377,7 @@ std::vector<std::string> lines_of(const std::string& text) {
   return lines;
 }
 
-/// Returns the protocol of a row, which is its first cell.
+/// Returns the first cell of a row, which names the protocol, with the bar before it.
 std::string protocol_of(const std::string& row) { return row.substr(0, row.find('|', 1)); }
 
 /// Replaces the table of the document between the marks `<!-- name -->` and `<!-- end -->`. Expects of the former table

@@ -12,8 +12,8 @@
 
 namespace absenc::client {
 
-/// Returns each setting that may change how the unit is read: "" for the default options, each model, and each value of
-/// each option with named or boolean values except the rate.
+/// Returns settings that may change how the unit is read: "" for the default options, each model, and each value of
+/// each option with named values except the rate.
 [[nodiscard]] inline std::vector<std::string> modes_of(const Unit& unit) {
   std::vector<std::string> modes{""};
   for (const Model& model : unit.models) modes.push_back(fmt::format("model={}", model.name));

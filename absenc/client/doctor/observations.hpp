@@ -43,10 +43,10 @@ struct Observations {
   PortKind place = PortKind::serial;
   std::string port{};  // path of the serial port; "": the port is of another kind
   os::PortFacts facts{};
-  // errors that the UART counted during the examination; nothing: the driver does not count them
+  // errors that the UART counted during the examination; nothing: not known
   std::optional<os::LineCounts> damage{};
   std::optional<Refusal> refusal{};
-  std::vector<std::uint8_t> unsolicited{};  // bytes received before the first request
+  std::vector<std::uint8_t> unsolicited{};  // bytes received before the first request, about the first 4096
   Time listened{};
   bool never_silent = false;  // whether bytes came in 4 or all of 5 periods of listening
   std::vector<Attempted> readings{};
@@ -56,7 +56,7 @@ struct Observations {
   std::vector<Attempted> damaged_frames{};  // damaged frames of a stream, cut at the pauses between frames
   std::size_t doubled = 0;                  // number of frames of a stream that arrived twice
   bool is_stream = false;                   // whether the encoder sends frames without requests
-  std::vector<Attempted> turned{};          // readings that were taken while the user turned the shaft by hand
+  std::vector<Attempted> turned{};          // readings during which the user was to turn the shaft by hand
   std::uint64_t line_errors = 0;            // number of line errors that the port reported; on CAN, of error frames
   std::uint64_t late = 0;      // number of replies that began after their timeout or answered an older request
   Time lateness{};             // greatest time from a request to its late reply; 0: no reply was late

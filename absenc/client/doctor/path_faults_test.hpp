@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Each fault of an adapter, of the line or of another device at the other end, and each state of an encoder, with the
-// expected findings, for tests of doctor.
+// Faults of an adapter, of the line or of another device at the other end, and states of an encoder, with the expected
+// findings, for tests of doctor.
 #pragma once
 
 #include <set>
@@ -57,8 +57,7 @@ inline std::vector<std::string> positions_with(const Unit& unit, const Options& 
   return all;
 }
 
-/// Returns whether the unit's checksum accepts more than 5 % of damaged replies, so that a change of bytes cannot be
-/// recognised.
+/// Returns whether the unit accepts more than 5 % of random replies, so that a change of bytes cannot be recognised.
 inline bool has_weak_check(const Pair& pair) {
   Opener opener(pair.far);
   const EncoderAddress asked = parse_address(pair.asked);
@@ -66,9 +65,9 @@ inline bool has_weak_check(const Pair& pair) {
   return capture::acceptance(*asked.unit, asked.options, one.exchange, 1u << 10) > 0.05;
 }
 
-/// Returns a fault that changes these byte values in replies. The shaft swings a little about a position at which the
-/// change affects at least half of the replies. Units without such a position, or with a weak checksum, cannot have the
-/// fault.
+/// Returns a fault in which an adapter makes `change` of each reply. The shaft swings a little about a position that
+/// contains one of these byte values, and with which at least half of the replies change. Units without such a
+/// position, or with a weak checksum, cannot have the fault.
 inline PathFault of_bytes(const std::string& name, const std::vector<std::uint64_t>& values, const Change& change,
                           Ids causes = {}) {
   causes.insert(name);
@@ -280,8 +279,8 @@ inline std::vector<PathFault> all_path_faults() {
   return all;
 }
 
-/// Returns the table with a row for each unit and a column for each fault. A cell has the first finding; "-" if the
-/// unit cannot have the fault.
+/// Returns the table with a row for each unit of a line of characters and a column for each fault. A cell has the first
+/// finding, or "good"; "-" if the unit cannot have the fault, or if the fault has no effect.
 inline std::string path_fault_table() {
   const std::vector<PathFault> faults = all_path_faults();
   std::string table = "| protocol |";

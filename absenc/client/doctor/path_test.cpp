@@ -38,7 +38,8 @@ TEST_P(DoctorWays, FaultOfLineIsNamed) { examine_each(faults_of_line()); }
 TEST_P(DoctorWays, OtherEncoderIsNamed) { examine_each(faults_of_others()); }
 TEST_P(DoctorWays, StateIsNamed) { examine_each(faults_of_state()); }
 
-/// Checks each model that the user may set against each model that may be connected.
+/// Checks that doctor names wrong settings if another model is connected than the user set and a reading fails. Skips
+/// units with a weak checksum.
 TEST_P(DoctorWays, OtherModelIsNamedInBothDirections) {
   const Unit& unit = *GetParam();
   const std::string mode = asked_mode(unit);
@@ -58,8 +59,7 @@ TEST_P(DoctorWays, OtherModelIsNamedInBothDirections) {
   }
 }
 
-/// If a single reading fails, the finding that `read` names must be doctor's first one, or one that names no cause,
-/// such as no_answer.
+/// If the first reading fails, the finding for it must be doctor's first one or one of `open`.
 TEST_P(DoctorWays, ReadSaysTheSameOrLeavesItOpen) {
   static const Ids open{"no_answer", "always_damaged", "extra_bytes", "bytes_missing", "sometimes_damaged"};
   const Unit& unit = *GetParam();

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Adapters, drivers and other devices between host and virtual encoder in virtual time, for tests of doctor. Every unit
-// on a line of characters is tested on its own.
+// Adapters and other devices between host and virtual encoder in virtual time, for tests of doctor.
 #pragma once
 
 #include <fmt/format.h>
@@ -68,7 +67,7 @@ class Adapter final : public Machine<std::uint8_t> {
   std::size_t changed_ = 0;
 };
 
-/// A device that sends the same text periodically, or after each request.
+/// A device that sends the same text periodically, or when it receives bytes.
 class Talker final : public Machine<std::uint8_t> {
  public:
   Talker(ByteList text, Time period, bool answers) : text_(std::move(text)), period_(period), answers_(answers) {}
@@ -135,7 +134,7 @@ class Opener {
     ends_.push_back(end);
     return link_to(end, host_rate);
   }
-  /// Returns the number of replies that the adapter changed.
+  /// Returns the number of replies that the adapters changed or dropped.
   [[nodiscard]] std::size_t changed() const {
     std::size_t sum = 0;
     for (const auto& end : ends_) {
@@ -195,7 +194,7 @@ struct Choices {
   os::PortFacts facts{};
 };
 
-/// Takes one reading of the address, as the command `read` does.
+/// Takes one reading of the address.
 inline Attempted read_once(const EncoderAddress& address, Opener& opener, bool* was_late = nullptr) {
   const Link link = opener.open(address);
   Runner<std::uint8_t> runner(address);

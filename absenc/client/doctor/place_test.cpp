@@ -15,7 +15,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-/// Ids of findings that result only from facts that the system reports about a serial port.
+/// Ids of findings that only a serial port can have: they need facts that the system reports about such a port.
 const std::set<std::string_view> of_serial_ports{"port_is_modem", "latency_timer", "direction_unswitched"};
 
 std::string advice_of(FindingKind finding_kind, PortKind place) {
@@ -31,7 +31,7 @@ TEST(DoctorAdvice, NamesNothingThatThePlaceHasNot) {
       const std::string_view id = id_of(finding_kind);
       if (of_serial_ports.contains(id)) continue;
       if (place == PortKind::sim && (id.starts_with("port_") || id == "modem_answers"))
-        continue;  // the simulated port can always be opened
+        continue;  // a simulated port can always be opened, and no modem answers there
       const std::string advice = advice_of(finding_kind, place);
       for (const char* word : {"USB", "latency timer", "ModemManager", "/dev/serial"}) {
         EXPECT_THAT(advice, Not(HasSubstr(word))) << id << " at " << port_kind_names[static_cast<std::size_t>(place)];
@@ -40,7 +40,8 @@ TEST(DoctorAdvice, NamesNothingThatThePlaceHasNot) {
   }
 }
 
-/// Advice for virtual encoders and SPI must not name the setting `latency`, which they do not have.
+/// Advice about late or missing replies names the setting `latency` for serial ports and TCP, but not for virtual
+/// encoders and SPI, which do not have it.
 TEST(DoctorAdvice, ProposesALatencyOnlyWhereItCanBeSet) {
   for (const FindingKind finding_kind :
        {FindingKind::reply_late, FindingKind::sometimes_late, FindingKind::sometimes_silent}) {

@@ -43,7 +43,7 @@ std::vector<PausedBytes> pieces_of(const StreamBytes& stream, Time pause) {
   return pieces;
 }
 
-// Returns the share of the pieces that have the most frequent length; 0 if there are too few pieces, or if they are
+// Returns the share of the pieces that have the most frequent length; 0 if there are too few pieces, or if most are
 // single bytes.
 double evenness(const std::vector<PausedBytes>& pieces) {
   if (pieces.size() < enough) return 0;
@@ -117,7 +117,7 @@ void insert_missing_frames(std::vector<Attempted>& readings, const std::vector<T
   const std::vector<Time> distances = distances_of(arrivals);
   const Time period = period_of(distances);
   if (period == Time{}) return;
-  // missing[i]: the number of frames that did not come before reading i.
+  // missing[i]: the number of frames that did not come between readings i - 1 and i.
   std::vector<std::size_t> missing(readings.size(), 0);
   for (std::size_t i = 1; i < readings.size(); ++i) {
     const double periods = static_cast<double>(distances[i - 1].count()) / static_cast<double>(period.count());

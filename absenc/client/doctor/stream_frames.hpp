@@ -21,13 +21,14 @@ struct StreamBytes {
   std::vector<Mark> marks{};
   std::vector<Time> arrivals{};  // for each reading, the time at which its last byte arrived, or that of the one before
 
-  /// Appends the bytes received during one reading, and its arrival. Bytes beyond the first MiB are left out.
+  /// Appends the bytes received during one reading, and its arrival. Leaves out bytes with which there would be more
+  /// than 1 MiB.
   void append(const LineExchange<std::uint8_t>& line);
 };
 
 /// Returns the stream's bytes between two pauses, good or damaged, as replies without a request. The least pause that
-/// ends a frame is estimated from the bytes: it is one with which most pieces are equally long. Returns nothing if
-/// there is none.
+/// ends a frame is estimated from the bytes: it is one with which at least half of the pieces are equally long. Returns
+/// nothing if there is none.
 [[nodiscard]] std::vector<Attempted> frames_between_pauses(const Unit& unit, const Options& options,
                                                            const StreamBytes& stream);
 

@@ -12,7 +12,8 @@
 namespace absenc::client::path_faults {
 namespace {
 
-// Returns the units with the setting that makes their encoder send without requests; "" if the default does.
+// Returns the units of lines of characters whose encoders can send without requests, each with the first setting that
+// makes its encoder do so; "" if the default does.
 std::vector<std::pair<const Unit*, std::string>> streaming_units() {
   std::vector<std::pair<const Unit*, std::string>> all;
   for (const Unit* unit : character_units()) {

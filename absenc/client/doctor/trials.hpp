@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lists the settings to try if hardly any reading is good: rates, SPI clocks, SPI modes, echo, models, addresses.
+// Lists settings to try if hardly any reading is good: rates, SPI clocks, SPI modes, echo, models, options, addresses.
 #pragma once
 
 #include <cstddef>
@@ -25,9 +25,10 @@ struct Other {
 /// other rates if the port has a rate (`has_rate`).
 [[nodiscard]] std::vector<Other> other_lines(const EncoderAddress& address, bool has_rate);
 
-/// Returns up to 32 settings to try: each other model, and on lines of characters each other choice of an option.
-/// Leaves out those whose requests could change an encoder of another protocol on the line, unless the user's own
-/// request could as well. Returns none on CAN, and for a virtual encoder, which always has the given options.
+/// Returns up to 32 settings to try: other models, and on lines of characters other choices of an option, except of the
+/// rate and the address. Leaves out those whose requests could change an encoder of another protocol on the line,
+/// unless the user's own request could as well. Returns none on CAN, and for a virtual encoder, which always has the
+/// given options.
 [[nodiscard]] std::vector<Other> other_models(const EncoderAddress& address);
 
 /// Returns each other address on the line as a setting to try, the lowest first. Leaves out addresses as `other_models`

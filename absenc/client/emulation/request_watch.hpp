@@ -23,7 +23,7 @@ namespace absenc::client {
 template <class Item>
 class RequestWatch final : public Machine<Item> {
  public:
-  /// Takes the virtual encoder and its address, which must outlive the object.
+  /// Takes the virtual encoder and its address; both must outlive the object.
   RequestWatch(Machine<Item>& device, const EncoderAddress& address)
       : device_(device),
         unit_(*address.unit),
@@ -43,7 +43,7 @@ class RequestWatch final : public Machine<Item> {
 
  private:
   using Kind = typename Event<Item>::Kind;
-  static constexpr int most_in_reply = 24;  // limit that no half-duplex reply exceeds, in characters
+  static constexpr int most_in_reply = 24;  // assumed greatest length of a half-duplex reply, in characters
 
   void look(const Event<Item>& event) {
     if (unit_.link == LinkKind::clocked) {
@@ -83,12 +83,12 @@ class RequestWatch final : public Machine<Item> {
     note_bad(to_hex(bytes));
   }
 
-  // Counts requests in received bytes. Skips bytes that collide with a reply and arrive damaged: the host's fault is
-  // then the collision, not a wrong request.
+  // Counts requests in received bytes. Skips bytes that collide with a reply on a half-duplex line, and those after
+  // them up to a pause: they may be damaged by the collision.
   void look_at_bytes(Bytes bytes, Time at, Time late) {
     const Time pause = at - character_ * static_cast<std::int64_t>(bytes.size()) - heard_at_;
     heard_at_ = at;
-    // A request that this program noticed late is no violation: in time, the reply might have been sent before it.
+    // A request that this program noticed so late is no violation: in time, the reply might have been sent before it.
     const bool may_have_waited = late > unit_.timing.turnaround + most_in_reply * character_;
     if (pause > 2 * character_ || may_have_waited) skipping_ = waits_ = false;
     if (sending_ && unit_.link == LinkKind::half_duplex) skipping_ = true;

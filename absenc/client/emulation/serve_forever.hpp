@@ -47,10 +47,10 @@ class Movable final : public Machine<Item> {
   std::uint32_t rate_ = 0;
 };
 
-/// Serves the encoder and returns only by an exception: an os::Failure if the port cannot be opened for the first time
-/// or does not support the encoder's rate, and every other exception of `open`, the port or `wait`. `open()` opens the
-/// port. When the port is lost (another os::Failure), calls `wait(time)` and `open()` again. Calls `told(what, why)`
-/// for each change of the port.
+/// Serves the encoder and returns only by an exception: an os::Failure if the port cannot be opened for the first time,
+/// or if it is open and does not support a rate that the encoder sets, and every exception of `wait`. `open()` opens
+/// the port. When the port is lost (another os::Failure), calls `wait(time)` and `open()` again. Calls
+/// `told(what, why)` for each change of the port.
 template <class Item, class Open, class Wait, class Told>
 [[noreturn]] void serve_forever(Machine<Item>& machine, const Open& open, const Wait& wait, const Told& told) {
   constexpr Time time_between_tries = std::chrono::milliseconds(250);
@@ -70,7 +70,7 @@ template <class Item, class Open, class Wait, class Told>
       is_open = was_open = true;
       host::drive(movable, *port, [] { return true; });
     } catch (const os::Failure& failure) {
-      // Ends if the encoder set a rate that the port does not support, because it will not be supported later.
+      // Ends if the open port does not support a rate that the encoder set, because it will not support it later.
       const bool unable = is_open && failure.kind() == os::Failure::Kind::unsupported;
       if (!was_open || unable) throw;
       if (is_open) told(PortEvent::away, failure.what());

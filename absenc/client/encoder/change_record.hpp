@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes a change of an encoder into the journal, with the old value, which is read before the change is sent.
+// Writes a change of an encoder into the journal, with the old value if it is known or was read before the change.
 #pragma once
 
 #include <cstdint>
@@ -21,8 +21,8 @@ class ChangeRecord {
   /// and there is a journal; not if the value is `known`. Throws the exceptions of the port.
   ChangeRecord(Connection& connection, const Command& command, Arguments arguments, std::optional<std::int64_t> known);
 
-  /// Appends the change to the journal if its request was sent. `way` is the encoder's address before the change.
-  /// Returns "", or the reason why the journal lacks the change.
+  /// Appends the change to the journal if there is one and the request of the change was sent. `way` is the encoder's
+  /// address before the change. Returns "", or the reason why the change could not be written.
   [[nodiscard]] std::string keep(const EncoderAddress& way, const Change& change);
 
  private:

@@ -217,7 +217,7 @@ class ConnectionOn final : public Connection {
     return trouble;
   }
 
-  // A virtual encoder has exact latch times: requests are not delayed on its simulated line.
+  // A requested reading of a virtual encoder has an exact latch time: requests are not delayed on its simulated line.
   void keep_latch_time(const Reading& reading, bool was_asked) {
     if (!was_asked) {
       arrivals_.add(reading.received, port_.nothing_until);
@@ -296,7 +296,7 @@ class ConnectionOn final : public Connection {
         std::chrono::ceil<std::chrono::milliseconds>(lateness * 3 / 2).count());
   }
 
-  // Returns the finding that `absenc doctor` would report.
+  // Returns the most likely finding of doctor for this failure alone, as "no_answer: CAUSE".
   [[nodiscard]] std::string finding_text(const Outcome& outcome) const {
     Attempted last{.error = outcome.error, .detail = std::string(outcome.detail)};
     runner_.keep_exchange(last);

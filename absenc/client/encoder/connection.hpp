@@ -48,13 +48,12 @@ class Connection {
   // `read`, `run`, `trouble`, `lend` and `now` require an open connection. `read` and `run` throw the
   // exceptions of the port, and UsageError if the unit cannot run the command with these options.
 
-  /// Reads the position with all alarms that the unit reports, or runs the command that the address names instead.
-  /// `take` selects which frame is used if the encoder sends positions unsolicited. Throws UsageError if the unit has
-  /// no command that reads the position.
+  /// Reads the position, or runs the command that the address names instead. `take` selects which frame is used if the
+  /// encoder sends positions unsolicited. Throws UsageError if the unit has no command that reads the position.
   virtual Outcome read(host::Take take = host::Take::newest) = 0;
   /// Runs a command and returns its outcome. Calls `on_emit` for each result but the last; during the call, `report`
-  /// passes on the fields of that result. If the command sets a value by which the encoder is reached, the connection
-  /// uses the new value from then on.
+  /// passes on the fields of that result. If the command succeeds in setting a value by which the encoder is reached,
+  /// the connection uses the new value from then on.
   virtual Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit = {}) = 0;
   /// Passes the value that the next changing command overwrites to the journal, so that the journal need not read it.
   void know_before(std::int64_t value) { known_before_ = value; }

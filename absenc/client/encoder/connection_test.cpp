@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that life counters are compared from one live reading to the next, for each unit that has them, with an
-// encoder that repeats frames.
+// Checks that life counters are compared from one live reading to the next, for each clocked unit that has them, with
+// an encoder that repeats frames.
 #include "absenc/client/encoder/connection.hpp"
 
 #include <gtest/gtest.h>
@@ -61,7 +61,7 @@ struct Counting {
         })) {
     encoder.power_on(Time{});
     connection->connect();
-    // Frames 0 and 1 are the reply to the first reading, without a start sequence or a repetition.
+    // Frames 0 and 1 are those of the first reading.
     first = connection->read();
     connection->report(seen);
   }
@@ -103,7 +103,7 @@ TEST_P(LifeCounters, OneThatStandsStillIsAnError) {
 TEST_P(LifeCounters, OneThatHasComeRoundIsReadAgain) {
   Counting line(*GetParam());
   for (int i = 0; i < 2; ++i) EXPECT_EQ(line.connection->read().error, Error::none);
-  // the frames of the second reading are first as if another host had read 62 frames in between
+  // the second reading gets the same frames as the first, as if the counter had wrapped, and is repeated with others
   line.recorder.play({0, 1, 0, 1, 2, 3, 0, 1});
   for (int i = 0; i < 3; ++i) EXPECT_EQ(line.connection->read().error, Error::none);
   EXPECT_EQ(line.recorder.left(), 0u);

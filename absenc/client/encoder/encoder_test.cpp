@@ -115,8 +115,7 @@ TEST(ClientEncoder, GoesOnWithTheAddressThatItWasSetTo) {
   EXPECT_TRUE(encoder.read().singleturn_valid());
 }
 
-// After a change of its rate the encoder is read at the new rate, and its address has the new rate, with which a lost
-// port is opened again.
+// After a change of its rate the encoder is read at the new rate, and the address of its connection has the new rate.
 TEST(ClientEncoder, GoesOnAtTheRateThatItWasSetTo) {
   for (const bool by_name : {true, false}) {
     Encoder encoder = open("sim:raa38-modbus");
@@ -131,8 +130,8 @@ TEST(ClientEncoder, GoesOnAtTheRateThatItWasSetTo) {
   }
 }
 
-// Aborts a change of the rate at different points. Afterwards the port must have a known rate: the encoder is read
-// exactly if it has the rate of its connection.
+// Aborts a change of the rate at different points. Afterwards the encoder must be read if, and only if, it has the rate
+// of its connection's address.
 TEST(ClientEncoder, IsReadAtItsRateWhenAChangeOfItsRateWasBrokenOff) {
   unsigned whole = 0;
   unsigned there = 0;
@@ -256,7 +255,7 @@ TEST(ClientSamples, AreRowsOfNamedValues) {
 }
 
 // Two wrong bits at the same place of two bytes pass the checksum of T-Format, an exclusive OR of the bytes. Checks
-// that the host refuses positions with such errors and continues the true position.
+// that the host refuses positions with such errors: the continued position neither restarts nor is a turn away.
 TEST(ClientEncoder, APositionThatNoShaftReachesIsReadAgain) {
   Encoder encoder = open("sim:tformat?singleturn=1000&fault=corrupt=0.6");
   const std::uint64_t& refused = encoder.counters().errors[static_cast<std::size_t>(Error::cross_check_failed)];

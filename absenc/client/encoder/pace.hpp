@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Equally spaced times that do not drift; times that have passed are skipped.
+// Equally spaced times that do not drift; times that are overdue by a period or more are skipped.
 #pragma once
 
 #include <algorithm>

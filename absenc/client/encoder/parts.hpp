@@ -29,7 +29,7 @@ struct Encoder::Parts {
 
   void connect();
   void disconnect();
-  /// Takes one sample; while the port is lost, tries to open it again.
+  /// Takes one sample; while the port is not open, waits for the time of the next try and tries to open it.
   Sample next();
   /// Waits until `time`. Throws Cancelled, os::Interrupted, os::Failure.
   void wait_until(Time time) const;

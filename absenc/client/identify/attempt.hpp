@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One attempt to find encoders of a unit on a line, at given port settings, with each set of options that changes the
-// request.
+// One attempt to find encoders of a unit on a line, at given port settings, with several sets of options.
 #pragma once
 
 #include <fmt/format.h>
@@ -166,7 +165,7 @@ class Attempt {
     bool understood = false;  // whether a good reply has arrived in this conversation
   };
 
-  // Checks each step of the conversation; throws TryEnd to abort it.
+  // Checks each step of the conversation and extends its timeout if replies were late; throws TryEnd to abort it.
   void look_at(Step<Item>& step, Time now, Talk& talk) {
     using Kind = typename Step<Item>::Kind;
     if (step.kind == Kind::pulse && step.wire == ExtraWire::clear) throw TryEnd::harmful;
@@ -200,7 +199,7 @@ class Attempt {
   };
 
   // Runs one conversation and stores its exchanges in `exchanges`. If a reply was late, which can happen only on lines
-  // of characters, repeats the conversation with a longer timeout.
+  // of characters, repeats the conversation with a longer timeout, until the timeout is extended by `most_allowance`.
   Conversed converse(const Command& command, const Options& options, std::vector<ObservedExchange>& exchanges,
                      FieldSink* sink = nullptr) {
     for (;;) {

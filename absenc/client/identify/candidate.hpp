@@ -18,7 +18,7 @@ struct Candidate {
   std::vector<std::string> link_settings{};  // port settings such as "baud=9600", including those of the user
   bool unsolicited = false;                  // whether the encoder sends frames unsolicited
   std::string line{};                        // the line in words, "RS-485 half duplex, 2.5 Mbit/s"
-  // setting that selects the encoder among several on the line, "address=3"; "": it is the only one
+  // setting with the address of the encoder, "address=3"; "": its address was not found or it has none
   std::string encoder{};
   Answer identity{};  // identity that the encoder on a line reports: type, serial number; empty for captures
 };

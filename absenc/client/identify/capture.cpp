@@ -37,7 +37,7 @@ struct Collector final : capture::AnnotationSink {
   void put(const capture::Annotation& annotation) override {
     using Kind = capture::Annotation::Kind;
     if (os::interrupted()) throw os::Interrupted{};
-    // Skips frames that are composed of several exchanges, which are already counted.
+    // Skips cut frames, and frames that are composed of several exchanges, which are already counted.
     if (annotation.remark == capture::Remark::cut || annotation.composed) return;
     if (annotation.kind == Kind::noise) {
       for (const std::uint8_t byte : annotation.reply.bytes) exchanges.push_back({.reply = {.bytes = {byte}}});

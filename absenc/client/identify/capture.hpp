@@ -17,8 +17,9 @@ struct CaptureFindings {
   std::vector<std::string> refusals{};  // reasons why protocols could not be tried, each once
 };
 
-/// Decodes the capture with each protocol until the evidence suffices, and returns the candidates, the damage of the
-/// capture and the reasons why protocols could not be tried. Throws os::Interrupted and the exceptions of `progress`.
+/// Decodes the capture with each protocol, only as much of it as needed for evidence, and returns the candidates, the
+/// damage of the capture and the reasons why protocols could not be tried. Throws os::Interrupted and the exceptions of
+/// `progress`.
 [[nodiscard]] CaptureFindings search_capture(const CaptureChoices& choices,
                                              const std::function<void(const std::string&)>& progress);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds the encoders on an unknown line: sends requests that change nothing (readings, scans and identities) of every
-// protocol that fits.
+// Finds the encoders on an unknown line: sends requests that change nothing (readings, scans and identities) of the
+// protocols that fit.
 #pragma once
 
 #include <cstdint>

@@ -38,7 +38,8 @@ class Patience {
     if (step.kind == Kind::transfer) asked_ = answered_ = false;
     due_ = step.kind == Kind::wait ? due(step, now) : never;
   }
-  /// Returns whether the limit of time without a good reply is reached.
+  /// Returns whether the time since the first call has reached `quiet`, if nothing was received yet, or `nonsense`. The
+  /// caller must know that no good reply arrived.
   [[nodiscard]] bool is_over(Time now) {
     if (begun_ == never) begun_ = now;
     return now - begun_ - missed_ >= (heard_ == 0 ? limits_.quiet : limits_.nonsense);

@@ -19,7 +19,7 @@ namespace {
 constexpr std::string_view checksum_name = "checksum: ";
 constexpr std::string_view edited = "edited";
 
-/// The checksum of a dump: the CRC-16/IBM-3740 of the lines that are not ignored, each with one line feed.
+/// The checksum of a dump: the CRC-16/IBM-3740 of the lines before it that are not ignored, each with one line feed.
 class Checksum {
  public:
   void add(std::string_view line) {

@@ -23,7 +23,7 @@ std::string replaced(std::string text, std::string_view from, std::string_view t
   return text.replace(at, from.size(), to);
 }
 
-/// Returns the text of the error for a dump that must be refused.
+/// Returns the text of the error with which a dump is refused; "nothing" if it is accepted.
 std::string refusal(std::string_view text, MemoryAccess access = MemoryAccess::write) {
   try {
     static_cast<void>(parse_dump("file", text, unit, options_of("TS5700N8500"), access));

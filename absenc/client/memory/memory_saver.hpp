@@ -25,7 +25,8 @@ class MemorySaver final : public Machine<Item> {
     return step;
   }
 
-  /// Saves the memory and waits until it is on the disk. Throws Failure.
+  /// Saves the memory if it changed since this function last saved it, and waits until it is on the disk. Throws
+  /// Failure.
   void finish() {
     if (finished_ != device_->memory_version()) save(os::Durable::yes);
     finished_ = saved_;

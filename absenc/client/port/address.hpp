@@ -26,7 +26,7 @@ inline constexpr std::array<std::string_view, 6> port_kind_names{"serial", "tcp"
 /// Name of the setting for the rate of an asynchronous line.
 inline constexpr std::string_view rate_setting = "baud";
 
-/// A setting of the port or the line, besides the options of the protocol.
+/// A setting of an address besides the options of the protocol: of the port, the line, the drive or a virtual encoder.
 struct LinkParameter {
   std::string_view name;
   std::string_view value;

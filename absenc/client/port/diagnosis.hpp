@@ -31,8 +31,8 @@ enum class Subject : std::uint8_t { request, reply };
 [[nodiscard]] std::string describe(LinkKind link, Subject subject, Error error, std::string_view detail = {},
                                    const Diagnosis& diagnosis = {});
 
-/// Returns a sentence that explains a bad or missing reply, with the document's explanation of the error and with
-/// advice.
+/// Returns a sentence that explains a bad or missing reply, with the unit's explanation of the error and with advice if
+/// there are any.
 [[nodiscard]] std::string sentence_for(const Unit& unit, const Options& options, Error error, const Frame& request,
                                        const Frame& reply);
 

@@ -142,7 +142,8 @@ std::string said_of(const Unit& unit, const Options& options, const WireFrame& r
   return error == Error::wrong_length ? sentence_for(unit, options, error, request.frame(), reply.frame()) : "";
 }
 
-// Tests requests and replies of the unit's vectors without their last byte or bit.
+// Shortens the reply of each good vector by a byte or a bit, or the request of a vector without a reply. A message
+// about a wrong length must ascribe it to this frame.
 TEST(FrameWords, WrongLengthIsSaidOfTheFrameThatHasIt) {
   std::set<LinkKind> links;
   for (const Unit* const unit : all_units()) {

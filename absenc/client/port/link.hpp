@@ -28,7 +28,7 @@ struct Link {
 /// Opens a serial port for receiving only, or a TCP connection, and returns it with `bytes` set. Throws os::Failure,
 /// UsageError.
 [[nodiscard]] Link open_receiving(const EncoderAddress& uri);
-/// A function that replaces open_link, used by tests.
+/// Type of open_link, and of functions that tests use instead.
 using OpenLink = std::function<Link(const EncoderAddress&)>;
 
 }  // namespace absenc::client

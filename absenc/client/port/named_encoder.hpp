@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Resolves the names of absenc.toml and checks the whole file.
+// Resolves the names of encoders in absenc.toml and checks the sections that describe encoders.
 #pragma once
 
 #include <string>
@@ -25,9 +25,10 @@ struct NamedEncoder {
 /// The encoders of an absenc.toml that was checked, and is read only once for all encoders.
 class NamedEncoders {
  public:
-  /// Takes the content of a file and checks all names of settings, protocols and buses, used or not, so that a misspelt
-  /// name is always reported. Values are checked when they are used, because they may depend on more than the file: the
-  /// model behind `?`, a motion file. Throws UsageError, which names the position in the file.
+  /// Takes the content of a file and checks the names of settings, protocols and buses in all sections but
+  /// [serve.NAME], used or not, so that a misspelt name is reported. Other values are checked when they are used,
+  /// because they may depend on more than the file: the model behind `?`, a motion file. Throws UsageError, which names
+  /// the position in the file.
   explicit NamedEncoders(SettingsFile file);
   NamedEncoders(NamedEncoders&&) noexcept = default;
   NamedEncoders& operator=(NamedEncoders&&) noexcept = default;

@@ -128,7 +128,7 @@ TEST(Runner, AReplyThatBeginsAfterItsLimitIsLate) {
   EXPECT_LT(bench.runner.lateness(), 21ms);
 }
 
-// The host waits for a quiet line before it repeats a request, and receives the late reply in that time.
+// The host waits for a quiet line before its next request, and receives the late reply in that time.
 TEST(Runner, CountsALateReplyThatComesBeforeTheNextRequest) {
   Bench bench(delayed(120us));
   for (int i = 0; i < 10; ++i) EXPECT_EQ(bench.once().error, Error::timeout);
@@ -213,7 +213,7 @@ TEST_P(Streams, AGoodOneHasNoDamage) {
 }
 
 // Synchronisation with the stream needs two adjacent good frames; a single good frame is discarded with the damaged
-// ones.
+// ones. So the runner may count up to four times as many frames as were damaged.
 TEST_P(Streams, EachDamagedFrameIsCounted) {
   for (const char* const fault : {"corrupt=0.02", "corrupt=0.3", "truncate=0.1", "drop=0.1"}) {
     Bench bench(with_faults(address, {fault}));

@@ -39,8 +39,8 @@ struct SettingsFile {
 /// sections. Throws UsageError, whose text begins with the position in the file.
 [[nodiscard]] SettingsFile parse_settings_file(std::string_view text, const std::string& path);
 
-/// Returns the paths where absenc.toml is searched, in order of priority: only the file of ABSENC_CONFIG if that is
-/// set; otherwise the working directory and the user's configuration directory.
+/// Returns the paths where absenc.toml is searched, in order of priority: only the file of ABSENC_CONFIG if that is set
+/// and not empty; otherwise the working directory and the user's configuration directory, if that is known.
 [[nodiscard]] std::vector<std::string> settings_file_paths();
 
 /// Reads the first absenc.toml that exists; returns nothing if there is none. Throws UsageError, also if the file of

@@ -55,7 +55,7 @@ struct Opened {
   std::weak_ptr<SharedLink> link;
 };
 
-/// All open links of this process, with their addresses.
+/// The links that `connect_link` has opened, with their addresses.
 struct Registry {
   std::mutex mutex;
   std::vector<Opened> opened;

@@ -43,7 +43,7 @@ class Turns {
 };
 
 /// An open port that several encoders share: only one conversation uses the line at a time. Each encoder has its own
-/// thread, session and statistics, and a silent encoder delays the others only by its timeout.
+/// session and statistics, and a silent encoder delays the others only by its own conversation.
 class SharedLink {
  public:
   explicit SharedLink(Link link) : link_(std::move(link)) {}

@@ -30,7 +30,7 @@ struct DeviceSettings {
   bool real_power_on = false;  // whether power-on takes the start-up time of the document
 };
 
-/// Parses a fault such as `corrupt=0.01`. Throws UsageError, which names the kinds of faults and the range of a rate.
+/// Parses a fault such as `corrupt=0.01`. Throws UsageError.
 [[nodiscard]] sim::FaultRate require_fault(std::string_view text);
 
 /// A virtual encoder, which is switched off until `power_on`.

@@ -36,7 +36,7 @@ struct VirtualPort {
   std::uint32_t rate = 0;         // rate of the host's end in bits per second; 0: that of the encoder
 };
 
-/// A port that delays requests by a random time, except on SPI and clocked lines and inside a procedure.
+/// A port that delays a transfer by a random time of up to 0.4 ms, unless its step names a later time.
 template <class Item>
 class UnevenPort final : public Port<Item> {
  public:
@@ -44,8 +44,7 @@ class UnevenPort final : public Port<Item> {
   Time now() override { return port_->now(); }
   void begin(const Step<Item>& step) override {
     Step<Item> later = step;
-    // Delays no transfers of SPI and clocked lines, and no requests inside a procedure, because pauses have a meaning
-    // there.
+    // Keeps a time that the step names, because the pause before it may have a meaning, as inside a procedure.
     if (step.kind == Step<Item>::Kind::transfer && step.at <= port_->now()) {
       later.at = port_->now() + Time(std::uniform_int_distribution<std::int64_t>(0, 400'000)(random_));
     }

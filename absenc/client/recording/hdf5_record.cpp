@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Records rows as HDF5. Rows wait up to a quarter of a second and are written by a thread of their own, so that neither
-// the HDF5 library nor the disk delays a reading.
+// Records rows as HDF5. A thread of its own writes the waiting rows about four times a second, so that neither the HDF5
+// library nor the disk delays a reading.
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>

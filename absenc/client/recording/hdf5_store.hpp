@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Stores an HDF5 file so that it can be opened after a crash at any point. The store collects the writes of the HDF5
-// library; `commit` writes them in an order in which the file is consistent after every single write.
+// Stores an HDF5 file so that it can be opened if the process crashes at any point after the first commit. The store
+// collects the writes of the HDF5 library; `commit` writes them in an order in which the file is consistent after every
+// single write.
 #pragma once
 
 #include <hdf5.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes rows as an HDF5 file with one dataset for each column, which h5py, MATLAB and h5dump read.
+// Writes rows as an HDF5 file with one dataset for each column that is no detail, which h5py, MATLAB and h5dump read.
 #pragma once
 
 #include <cstdint>

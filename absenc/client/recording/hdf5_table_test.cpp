@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// If the process is killed between any two writes, the file must open and hold the rows committed before.
+// Checks that the file opens and holds the rows committed before if the process is killed between two writes, or if the
+// disk is full.
 #include "absenc/client/recording/hdf5_table.hpp"
 
 #include <gtest/gtest.h>
@@ -83,7 +84,8 @@ std::int64_t whole_rows(const fs::path& path, const char* name, hid_t type, T (*
   return found;
 }
 
-// The rows fill 96 chunks, too many for one B-tree node, so nodes are split and the tree gets another level.
+// Applies the writes of each commit one by one; after each of them the file must open and hold the rows committed
+// before. The rows fill 96 chunks, too many for one B-tree node, so nodes are split and the tree gets another level.
 TEST(Hdf5Table, EveryBeginningOfACommitIsAWholeFile) {
   Bench bench("prefix");
   Hdf5Table table(bench.disk(), columns, {{"encoder", std::string("elbow")}, {"rate_hz", 100.0}});

@@ -21,7 +21,7 @@ class RequestRates final : public capture::AnnotationSink {
     std::string name{};                 // name of the command that sends such requests; "": no command of the unit does
     std::vector<std::uint8_t> first{};  // bytes of the first request of this kind
     std::uint64_t count = 0;
-    std::uint64_t errors = 0;  // number of requests without a good reply
+    std::uint64_t errors = 0;  // number of requests whose annotation has an error
     capture::Tick begin = 0;   // tick of the first request
     capture::Tick last = 0;    // tick of the last request
 
@@ -56,8 +56,8 @@ class RequestRates final : public capture::AnnotationSink {
     kind.errors += annotation.error != Error::none ? 1 : 0;
   }
 
-  /// Returns the kinds of requests, the most frequent first. A damaged request is a kind of its own as long as there
-  /// are fewer than `most_kinds`.
+  /// Returns the kinds of requests, the most frequent first. A request that no command sends is a kind of its own as
+  /// long as there are fewer than `most_kinds`.
   [[nodiscard]] std::vector<RequestKind> kinds() const {
     std::vector<RequestKind> all = kinds_;
     std::stable_sort(all.begin(), all.end(),

@@ -148,7 +148,7 @@ std::vector<TapRun::LineToTry> TapRun::lines_to_try() {
                               one.settings.stop_bits == address.line.stop_bits);
       });
       if (!known) lines.push_back({address.line, std::move(address)});
-    } catch (const UsageError& error) {  // skips units whose rate the port cannot have
+    } catch (const UsageError& error) {  // skips units that do not fit the port or the settings
       if (!refusal) refusal = error;
     }
   }

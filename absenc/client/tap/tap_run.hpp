@@ -52,7 +52,7 @@ class TapRun {
   void cancel();
 
   [[nodiscard]] bool is_protocol_given() const { return !choices_.protocol.empty(); }
-  /// Returns the unit of the protocol; valid after `settle`.
+  /// Returns the unit of the protocol; only after `settle` returned true.
   [[nodiscard]] const Unit& unit() const { return *unit_; }
   [[nodiscard]] const Options& options() const { return options_; }
   [[nodiscard]] const Receiver& receiver() const { return *receiver_; }

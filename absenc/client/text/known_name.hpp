@@ -17,8 +17,8 @@ struct KnownName {
   bool is_model = false;
   std::vector<const Unit*> units;
 
-  /// Returns a sentence about the name: "AksIM-2 is a model of encolink and encolink-spi" or "RLS: the protocols are
-  /// encolink, e201 and biss".
+  /// Returns a sentence about the name: "AksIM-2 is a model of encolink and encolink-spi", or for a maker or a family
+  /// "NAME: the protocols are A, B and C".
   [[nodiscard]] std::string sentence() const;
 };
 

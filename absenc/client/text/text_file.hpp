@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads text files that people may edit: lines of "name: value" and lines of bytes. Lines that begin with # are
-// ignored.
+// Reads text files and their lines, and checks paths before files are written.
 #pragma once
 
 #include <cstddef>

@@ -64,7 +64,7 @@ struct RoleArgument {
 /// Returns the unit's condition of this name; null if the virtual encoder has no such condition.
 [[nodiscard]] const Condition* find_condition(const Unit& unit, std::string_view name);
 /// Returns the unit's condition of this name. If there is none, throws UsageError, which suggests a similar name or
-/// lists all.
+/// lists all if the unit has any.
 [[nodiscard]] const Condition& require_condition(const Unit& unit, std::string_view name);
 /// Parses a value of the condition. Throws UsageError if it is not a number within the condition's range.
 [[nodiscard]] std::int64_t require_value(const Condition& condition, std::string_view written);
@@ -118,7 +118,7 @@ struct RoleArgument {
 [[nodiscard]] std::string_view name_of(Role role);
 
 /// Returns the validity of a field that depends on position or turns, from the reading of the same frame. Other fields,
-/// and fields whose value the reading does not have, are `valid`. Output of fields uses this rule.
+/// and fields whose value the reading does not have, are `valid`.
 [[nodiscard]] Validity validity_of(const FieldInfo& field, const Reading& reading);
 [[nodiscard]] bool holds(const FieldInfo& field, const Reading& reading);
 /// Returns `value`, the text of a field, marked by its validity: "74565 counts", "unknown (74565 counts)" or "INVALID
