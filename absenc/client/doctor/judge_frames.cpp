@@ -249,6 +249,13 @@ All heard(const std::vector<Attempted>& attempts) {
 
 bool is_silent(const Attempted& one) { return one.error != Error::none && !one.heard; }
 
+// Returns whether the reply is shorter than each good one: this computer may have read its rest too late.
+bool is_cut(const Observations& seen, const Attempted& attempt) {
+  return std::ranges::none_of(seen.readings, [&](const Attempted& one) {
+    return one.error == Error::none && one.exchange.reply.bytes.size() <= attempt.exchange.reply.bytes.size();
+  });
+}
+
 // Returns the number of silent attempts in `readings`. Consecutive missing frames of a stream count as one if this
 // computer was late by as long: an emulator that it stops sends none of them.
 std::size_t silences(const Observations& seen) {
@@ -432,7 +439,8 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
   } else if (!all.empty() || !repeated.empty()) {
     All both = all;
     both.insert(both.end(), repeated.begin(), repeated.end());
-    if (!all.empty() || !may_be_the_computer(one.seen, repeated.size())) findings.push_back(some_damage(one, both));
+    const bool are_cut = std::ranges::all_of(all, [&](const Attempted* attempt) { return is_cut(one.seen, *attempt); });
+    if (!are_cut || !may_be_the_computer(one.seen, both.size())) findings.push_back(some_damage(one, both));
   }
   const std::size_t late = one.unit.link == LinkKind::can ? 0 : one.seen.late;
   // A late reply may make the next reading fail as well, so silent readings are compared with twice the late replies.

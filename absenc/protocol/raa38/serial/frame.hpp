@@ -69,7 +69,7 @@ inline constexpr Time zero_poll = 10ms;    ///< Time between two polls of the po
 // Times of the virtual encoder; options may set another period and another T3.
 inline constexpr Time virtual_period = 10ms;        ///< Time between the virtual encoder's frames: refresh rate 100 Hz.
 inline constexpr Time virtual_acquisition = 100us;  ///< Time T3 of the virtual encoder.
-inline constexpr Time most_backlog = 50ms;          ///< Delay above which a stream of the virtual encoder drops frames.
+inline constexpr Time most_backlog = 2s;            ///< Delay above which a stream of the virtual encoder drops frames.
 /// Silence after which the virtual encoder drops an incomplete request.
 inline constexpr Time request_gap = 2ms;
 
