@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The descriptor of one protocol unit: all properties of the protocol as data and functions, for the layers and
-// commands that know no protocol.
+// The descriptor of one protocol unit: properties of the protocol as data and functions, for the layers and commands
+// that know no protocol.
 #pragma once
 
 #include <cstddef>
@@ -149,7 +149,7 @@ struct OpenBytes {
 struct Vector {
   std::string_view id;                 ///< Identifier of the vector, unique within the unit.
   std::string_view meaning;            ///< The case that the vector shows, as a phrase.
-  std::string_view source;             ///< Document and paragraph of the frame.
+  std::string_view source;             ///< Where the frame is from, such as document and paragraph.
   std::string_view options;            ///< Options of the encoder, as `name=value` separated by blanks.
   Bytes request;                       ///< Bytes of the request; empty: none.
   Bytes reply;                         ///< Bytes of the reply; empty: none.
@@ -288,7 +288,7 @@ struct LineTiming {
   Time turnaround_limit = std::chrono::milliseconds(100);  ///< longest time that hosts wait for a reply to begin
 };
 
-/// Descriptor of a protocol. All layers above know a protocol only by its Unit.
+/// Descriptor of a protocol, for the layers that know no protocol.
 struct Unit {
   std::string_view id;        ///< Identifier: the part of an address before the colon.
   std::string_view name;      ///< names of maker and protocol, for people
@@ -307,7 +307,7 @@ struct Unit {
   /// Registers that the commands memory_read and memory_write access, for encoders that have registers instead of
   /// memory.
   std::span<const RegisterInfo> registers{};
-  /// Test vectors: frames from documents, or derived from them, with their decoded fields.
+  /// Test vectors: frames with the fields or the error that decoding must give.
   std::span<const Vector> vectors;
   const FieldInfo* status;  ///< field that describes the flags of Reading::status; null: the unit has no status
   const FieldInfo* alarms;  ///< Field that describes the flags of Reading::alarms; null: the unit has no alarms.
@@ -361,8 +361,8 @@ struct Unit {
   /// determined for each frame; the kit (tests of every unit) cuts the bits out of valid frames and compares them with
   /// the field.
   BitRanges (*bits)(const Options& options, Frame request, Frame reply, const FieldInfo& field) = nullptr;
-  /// Returns the document's explanation of a reply that `decode` refuses with `error`. Null: the document explains
-  /// none.
+  /// Returns the unit's explanation of `error`: of a missing reply, or of a frame that `decode` refuses. Null: the unit
+  /// explains none.
   Explanation (*explain)(const Options& options, Error error, Frame request, Frame reply) = nullptr;
   /// Returns the settings of the line with these options. Null: they are always `line`. Silences measured in characters
   /// follow the rate of these settings, and a conversation that changes the rate must know the old one.
@@ -371,8 +371,8 @@ struct Unit {
   const Unit* over_spi = nullptr;
   /// Puts the evidence about the values of those options that frames can show into `sink`. Returns whether some
   /// combination of values explains all captures, which are in the order of time. If so, stores these values in
-  /// `options`; where the captures leave a value open, a default is stored, or the given value stays. All other values
-  /// in `options` must be set before. Null: frames do not show option values.
+  /// `options`; where the captures leave a value open, a possible value is stored, or the given value stays. All other
+  /// values in `options` must be set before. Null: frames do not show option values.
   bool (*probe)(Options& options, std::span<const Capture> captures, EvidenceSink& sink) = nullptr;
   /// Returns the wires beside the data line that an encoder with these options needs. It is called before a port is
   /// opened, because the user must name the wire, and a pseudo-terminal has none. Null: none.

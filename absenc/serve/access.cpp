@@ -57,7 +57,7 @@ std::string_view authority_of(std::string_view origin) {
   return origin.substr(std::min(origin.find("//") + 2, origin.size()));
 }
 
-// Returns the origin of a URL in the form that browsers send.
+// Returns the origin of a URL in the form that browsers send; "" for "". Throws UsageError if the URL is invalid.
 std::string origin_of(std::string_view url) {
   if (url.empty()) return {};
   const std::size_t host = url.starts_with("https://") ? 8 : url.starts_with("http://") ? 7 : 0;
@@ -102,8 +102,9 @@ std::uint64_t Access::wrong_tokens() const {
   return wrong_tokens_;
 }
 
-// Counts a wrong token and returns whether the address may try again. However many guesses arrive from an address in a
-// minute, at most two of them add an event to the history: the first one, and the one that exceeds the limit.
+// Counts a wrong token and returns whether the address may try again; false also if too many addresses are counted.
+// Until the count of an address ends, at most two of its guesses add an event to the history: the first one, and the
+// one that exceeds the limit.
 bool Access::may_try_again(const std::string& peer) const {
   const Time now = os::now();
   const std::lock_guard lock(mutex_);
@@ -145,7 +146,7 @@ bool Access::names_this_server(std::string_view host) const {
 
 bool Access::is_from_own_page(const Request& request) const {
   if (!request.fetch_site.empty() && request.fetch_site != "same-origin" && request.fetch_site != "none") return false;
-  if (request.origin.empty()) return true;  // only browsers send Origin
+  if (request.origin.empty()) return true;  // neither header names another site
   return equals_ignoring_case(request.origin, "http://" + request.host) ||
          equals_ignoring_case(request.origin, "https://" + request.host) ||
          (!public_origin_.empty() && equals_ignoring_case(request.origin, public_origin_));

@@ -42,7 +42,7 @@ class Access {
   /// the constructor; the previous tokens then stay valid.
   void reload();
 
-  /// Returns the response that refuses the request; nothing if the request is allowed.
+  /// Returns the response that refuses the request, and counts a wrong token; nothing if the request is allowed.
   [[nodiscard]] std::optional<Response> refusal(const Request& request, Right right) const;
   /// Returns the address of the client. With a `public_url`, for a request through a proxy on this computer, it is the
   /// address that the proxy reports.
@@ -71,7 +71,7 @@ class Access {
   ServerEvents* server_events_;
   mutable std::mutex mutex_;  // mutex that guards all members below
   std::vector<Secret> tokens_;
-  mutable std::map<std::string, Guesses> guesses_;  // wrong tokens within the last minute, by the address of the client
+  mutable std::map<std::string, Guesses> guesses_;  // counts of wrong tokens, by the address of the client
   mutable std::uint64_t wrong_tokens_ = 0;
 };
 

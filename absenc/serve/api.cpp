@@ -300,7 +300,7 @@ void Api::give(Watch& watch, Order order, const Request& request, const Reply& r
       reply.send(done.good ? json_response(done.json) : error_response(502, done.text));
     };
   }
-  // The history records who changed what, so the command is stored there before the client gets its response.
+  // The history records who changed what, so the response waits until the command is stored there, or cannot be stored.
   if (chronicler_ != nullptr && order.kind == Order::Kind::command) {
     order.done = [chronicler = chronicler_, server_events = server_events_,
                   answer = std::move(order.done)](const OrderResult& done) {
@@ -334,7 +334,7 @@ void Api::past_as_csv(const std::string& encoder, const Request& request, const 
     std::weak_ptr<Stream> stream{};
   };
   const auto rest = std::make_shared<Rest>(Rest{encoder, range_in(request)});
-  // Sends the next page of rows each time the client has received the previous one.
+  // Queues the next page of rows; runs each time the queue of the stream is empty.
   const auto next = [reader = &chronicler_->reader(), rest] {
     const std::shared_ptr<Stream> stream = rest->stream.lock();
     if (stream == nullptr || stream->over()) return;

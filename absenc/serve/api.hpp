@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// HTTP API of `absenc serve`: answers each path with data of the encoders, or carries out an order.
+// HTTP API of `absenc serve`, and the files of its page.
 #pragma once
 
 #include <memory>

@@ -21,11 +21,11 @@ namespace absenc::serve {
 /// A detector of jumps of the calendar clock.
 class ClockWatch {
  public:
-  // Smallest change of the calendar clock that counts as a jump, in milliseconds; NTP adjusts the clock by less.
+  // Smallest change of the calendar clock that counts as a jump, in milliseconds.
   static constexpr std::int64_t smallest_jump_ms = 10'000;
 
-  /// Returns the jump of the calendar clock since the last call, in milliseconds; 0 without one. `now` is a time of
-  /// os::now.
+  /// Returns the jump of the calendar clock since the last call, in milliseconds; 0 without one, and at the first call.
+  /// `now` is a time of os::now.
   std::int64_t check(std::int64_t calendar_ms, Time now);
 
  private:
@@ -66,7 +66,7 @@ class Chronicler {
   const Fleet* fleet_;
   ServerEvents* server_events_;
   ClockWatch clock_;
-  mutable std::mutex mutex_;  // mutex that guards all members below
+  mutable std::mutex mutex_;  // mutex that guards all members below except `thread_`
   std::condition_variable_any changed_;
   std::vector<ServerEvent> unwritten_events_;
   std::uint64_t added_ = 0;  // number of events since the start, including those in `unwritten_events_`

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Selects the HTTP connection to close when too many are open: one address cannot shut out others, and of its
-// connections the one that is idle for longest is closed first.
+// Selects the HTTP connection to close when too many are open, so that one address cannot shut out others.
 #pragma once
 
 #include <cstddef>
@@ -16,10 +15,10 @@ namespace absenc::serve {
 class Connections {
  public:
   static constexpr std::size_t most = 480;  // greatest number of connections that may carry any request
-  // Greatest number of connections of one address, so that one client or proxy leaves room for others.
+  // The same for one address, so that one client or proxy leaves room for others.
   static constexpr std::size_t most_of_address = 384;
   static constexpr std::size_t reserve = 32;  // number of additional connections, which carry vital requests only
-  // Time limit for receiving a whole request, even if bytes still arrive.
+  // Time limit for waiting for a request and receiving it whole, even if bytes still arrive.
   static constexpr Time request_time = std::chrono::seconds(10);
 
   using Id = const void*;
@@ -28,7 +27,7 @@ class Connections {
 
   /// Adds a connection. If the address of `peer` exceeds its limit, closes its connection that is idle for longest; if
   /// all together exceed theirs, closes that of the address with the most idle ones. If none is idle, this connection
-  /// belongs to the reserve. If the reserve is then too large, closes its longest idle connection, else this one.
+  /// belongs to the reserve. If that is too large, closes its longest idle connection, or this one if none is idle.
   void add(Id id, int socket, std::string peer, Time now);
   void remove(Id id) { open_.erase(id); }
   /// Records that a whole request was received: the connection is not idle until `await_request`.

@@ -23,7 +23,7 @@ class FieldWriter {
   std::string bytes_;
 };
 
-/// A reader of serialized fields with all checks needed for untrusted input: a truncated field throws client::Failure.
+/// A reader of serialized fields; a truncated field throws client::Failure.
 class FieldReader {
  public:
   explicit FieldReader(std::string bytes) : bytes_(std::move(bytes)) {}

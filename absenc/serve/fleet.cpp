@@ -51,7 +51,7 @@ Fleet::~Fleet() { end(); }
 
 void Fleet::end() {
   const Watches watches = all();
-  // All threads are requested to stop first; then each one is waited for.
+  // All threads are requested to stop before the first one is waited for, so that they end at the same time.
   for (const auto& watch : watches) watch->request_stop();
   for (const auto& watch : watches) watch->wait();
 }

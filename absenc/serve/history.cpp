@@ -201,8 +201,8 @@ void HistoryWriter::trim() {
   }
 }
 
-// Returns whether one encoder has rows in 24 different hours since `at_s`. A wrong clock that lasts less than that
-// deletes nothing, even if the server is started meanwhile.
+// Returns whether one encoder has rows in 24 different hours since `at_s`: a clock that is far ahead for a few hours
+// must not delete the whole history.
 bool HistoryWriter::has_day_of_rows_since(std::int64_t at_s) {
   constexpr std::int64_t hours = 24;
   Statement encoders(file_->sqlite(), "SELECT id FROM encoder");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The history, one SQLite file: the minimum, mean and maximum of each second of every encoder, and all events.
+// The history, one SQLite file: the minimum, mean and maximum of each second of every encoder, and the events.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ namespace absenc::serve {
 
 struct HistoryLimits {
   std::int64_t seconds = 30LL * 24 * 3600;    // age in seconds above which rows are deleted
-  std::int64_t bytes = 1024LL * 1024 * 1024;  // file size above which the oldest rows are deleted
+  std::int64_t bytes = 1024LL * 1024 * 1024;  // used bytes of the file above which the oldest rows are deleted
 };
 
 /// A range of calendar times in seconds, both ends included.
@@ -64,8 +64,8 @@ class HistoryReader {
   std::string refused_;
 };
 
-/// The writer of the history, used by one thread. After kill -9 only the last second is missing. After a power failure
-/// the rows that the system had not yet written to the disk are missing too (SQLite with synchronous = NORMAL).
+/// The writer of the history, used by one thread. After a power failure, but not after kill -9, the rows that the
+/// system had not yet written to the disk are missing (SQLite with synchronous = NORMAL).
 class HistoryWriter {
  public:
   /// Throws HistoryInUse when another server writes to the history file. Any other error is stored in `trouble`, and
@@ -83,7 +83,7 @@ class HistoryWriter {
   /// was moved, removed, truncated or damaged, and renames a truncated or damaged one. Continues in a file that has
   /// replaced the old one.
   void write(const std::vector<Entry>& seconds, const std::vector<ServerEvent>& server_events);
-  /// Deletes rows beyond the limits of age and file size; fast when no row is beyond them. Age alone deletes rows only
+  /// Deletes rows beyond the limit of age, and the oldest tenth if the file is too large. Age alone deletes rows only
   /// after a day of newer rows was recorded, because the clock may be wrong.
   void trim();
 

@@ -111,8 +111,8 @@ HistoryFile::State HistoryFile::check() const {
   if (!owned_file_->has_its_name()) {
     return os::identity_of(path_).number == 0 ? State::gone : State::replaced;
   }
-  // A different modification time means that SQLite in another program has changed the file, and may have written the
-  // log of this server into it, or that `cp` has overwritten it, which mixes the log into the new content.
+  // A different modification time can mean that SQLite in another program has changed the file, and may have written
+  // the log of this server into it, or that `cp` has overwritten it, which mixes the log into the new content.
   const bool is_changed = owned_file_->state().modified_ns != modified_ns_;
   if (!is_changed && !is_truncated()) return State::whole;
   if (!passes_quick_check()) return State::damaged;

@@ -35,7 +35,7 @@ class HistoryFile {
   /// Returns how the file at the path differs from its state at the last `note_written`.
   [[nodiscard]] State check() const;
   /// Stores the modification time of the history file. Call it after each transaction: a different time later means
-  /// that another program wrote.
+  /// that another program changed the file.
   void note_written();
 
   /// Closes a history file in state `changed`, and changes neither the file nor its log.

@@ -56,7 +56,8 @@ std::size_t seconds_in(HistoryWriter& writer, const std::string& encoder) {
   return static_cast<std::size_t>(std::count(rows.begin(), rows.end(), '\n'));
 }
 
-// Simulates a server start during a minute in which the clock is 400 days ahead, so that all older rows seem too old.
+// Checks that after a start while the clock is 400 days ahead no older rows are deleted, but after a day of such rows
+// they are.
 TEST(History, DeletesOldRowsOnlyAfterADayOfNewerRows) {
   const std::string path = new_path();
   {
@@ -79,7 +80,7 @@ TEST(History, DeletesOldRowsOnlyAfterADayOfNewerRows) {
   remove_history(path);
 }
 
-// One row is years ahead, as after a wrong clock.
+// Checks that the oldest tenth is deleted although one row is years ahead, as after a wrong clock.
 TEST(History, DeletesOldestTenthOfRowsBeyondSizeLimit) {
   const std::string path = new_path();
   HistoryLimits limits;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// HTTP server without knowledge of encoders: one thread for all connections, responses from any thread, and a limit for
-// each resource that a client can use. Only http.cpp uses libmicrohttpd.
+// HTTP server without knowledge of encoders: one thread for all connections, responses from any thread, and limits for
+// the resources that a client can use. Only http.cpp uses libmicrohttpd.
 #pragma once
 
 #include <cstdint>
@@ -42,9 +42,8 @@ struct Response {
   std::vector<std::pair<std::string, std::string>> headers{};
 };
 
-/// The body of a response, which is produced while it is sent. Texts wait in a bounded queue until the client has
-/// received the earlier ones. A slow client delays no thread: the oldest queued texts are dropped, but the first one
-/// stays, because a part of it may be sent.
+/// The body of a response, which is produced while it is sent. Texts wait in a bounded queue until the earlier ones are
+/// sent. A slow client delays no thread: a full queue drops its second text, because a part of the first may be sent.
 class Stream {
  public:
   using Text = std::shared_ptr<const std::string>;
@@ -64,8 +63,7 @@ class Stream {
   /// Returns whether the connection of the stream has ended.
   [[nodiscard]] bool over() const;
   [[nodiscard]] std::uint64_t dropped() const;
-  /// Returns when the connection last asked for data of this stream, which it does when the client has received the
-  /// earlier data; before that, when the stream was made.
+  /// Returns when the connection last asked for data of this stream; before that, when the stream was made.
   [[nodiscard]] Time taken_at() const;
 
  private:
@@ -92,15 +90,15 @@ class HttpServer {
  public:
   using Handler = std::function<void(const Request&, Reply)>;
 
-  /// `handler` is called in the connection thread for each request and must return quickly. `vital`: paths that are
-  /// answered even when too many connections are open. Throws client::Failure.
+  /// `handler` is called in the connection thread for each request that the server does not refuse itself; it must
+  /// return quickly. `vital`: paths that are answered even when too many connections are open. Throws client::Failure.
   HttpServer(os::Listener listener, Handler handler, std::vector<std::string> vital);
   /// Aborts responses that are still being sent. Threads that write to a Stream must have ended before.
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;
 
-  /// Closes connections whose request stays incomplete. Call it about once a second.
+  /// Closes connections that have waited too long for a complete request. Call it about once a second.
   void end_incomplete_requests();
 
  private:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sends readings, events and states to an MQTT broker through a spool on disk. Two threads, so that neither an
-// unreachable broker nor a slow name lookup delays writing to the spool, and neither thread delays a reading.
+// Sends readings and events to an MQTT broker through a spool on disk. Two threads, so that neither an unreachable
+// broker nor a slow name lookup delays writing to the spool, and neither thread delays a reading.
 #pragma once
 
 #include <cstdint>
@@ -32,7 +32,7 @@ struct MqttHealth {
   std::map<std::string, std::uint64_t> taken{};
 
   /// Returns the state of MQTT: "none" without a broker, "good", "away" while the broker is not connected (messages
-  /// then wait in the spool), or "failing" while readings are dropped or the spool cannot be written.
+  /// then wait in the spool), or "failing" while `failing` is true.
   [[nodiscard]] std::string_view state() const;
   [[nodiscard]] client::Json json() const;
   /// Returns the metrics of MQTT in the text format of Prometheus.

@@ -48,10 +48,10 @@ class MqttClient {
   MqttClient& operator=(const MqttClient&) = delete;
 
   enum class State : std::uint8_t { connecting, connected, lost };
-  /// Starts to connect to `host`, the broker's name or one of its addresses. `try_all`: tries all addresses of the name
-  /// one after the other until one accepts the connection.
+  /// Queues the request to connect to `host`, the broker's name or one of its addresses. `try_all`: all addresses of
+  /// the name are tried one after the other until one accepts the connection.
   void connect(const std::string& host, bool try_all);
-  /// Sends and receives for at most `longest`. Returns the state of the connection.
+  /// Waits at most `longest`, then sends and receives. Returns the state of the connection.
   State work(Time longest);
   /// Returns why the connection to the broker is lost; "" if it is not.
   [[nodiscard]] const std::string& trouble() const { return trouble_; }

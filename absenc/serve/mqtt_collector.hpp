@@ -46,16 +46,16 @@ class MqttCollector {
   const Fleet* fleet_;
   ServerEvents* server_events_;
 
-  // The members below are used by the collector thread only.
+  // The members from here to `mutex_` are used by one thread at a time: the collector thread, then the destructor.
   std::int64_t next_id_;
   std::map<std::string, std::uint64_t> next_numbers_;  // next number of a reading, by encoder
   // By encoder: number of its last spooled reading. It goes to `Figures::taken` when no message waits in memory.
   std::map<std::string, std::uint64_t> not_on_disk_;
-  Spool::Counts unreported_{};  // dropped messages that no event has reported yet
+  Spool::Counts unreported_{};  // dropped messages and readings that no event has reported yet
   std::string unreported_reason_;
   Time next_report_{};
 
-  mutable std::mutex mutex_;  // mutex that guards all members below
+  mutable std::mutex mutex_;  // mutex that guards all members below except `thread_`
   std::condition_variable_any changed_;
   std::vector<ServerEvent> waiting_;
   Figures figures_;

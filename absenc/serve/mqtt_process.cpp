@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// MQTT client process. Only this file includes libmosquitto's header.
+// MQTT client process. Only this file includes libmosquitto's headers.
 #include "absenc/serve/mqtt_process.hpp"
 
 #include <fmt/format.h>
@@ -37,7 +37,7 @@ constexpr const char* system_certificates = "/etc/ssl/certs";
 // Greatest memory of the process in bytes; an MQTT packet may have 256 MB, but none so large is expected.
 constexpr std::size_t most_memory = 128'000'000;
 constexpr std::size_t most_frame = 256'000'000;  // greatest size in bytes of a frame from the parent
-// Bytes for the parent above which nothing is read from the broker until the parent has received them.
+// Number of bytes waiting for the parent at which reading from the broker pauses.
 constexpr std::size_t outgoing_limit = 100'000;
 constexpr Time sign_of_life_interval = 1s;
 

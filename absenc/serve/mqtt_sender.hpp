@@ -70,7 +70,7 @@ class MqttSender {
   const Fleet* fleet_;
   ServerEvents* server_events_;
 
-  // The members below are used by the sender thread only.
+  // The members from here to `mutex_` are used by one thread at a time: the constructor, then the sender thread.
   MqttVersion version_ = MqttVersion::v5;
   std::unordered_map<int, Outstanding> outstanding_;  // messages without acknowledgement, by their number at MqttClient
   std::set<std::int64_t> messages_out_;               // ids of the spooled messages in `outstanding_`
@@ -87,7 +87,7 @@ class MqttSender {
   // Reasons of lost connections that were reported since the last reported connection.
   std::set<std::string> reported_losses_;
 
-  mutable std::mutex mutex_;  // mutex that guards all members below
+  mutable std::mutex mutex_;  // mutex that guards all members below except `thread_`
   std::condition_variable_any changed_;
   Figures figures_;
   std::jthread thread_;  // last member, because the thread uses all others

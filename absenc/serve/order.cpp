@@ -19,7 +19,7 @@ using namespace client;
 
 namespace {
 
-constexpr std::size_t most_bytes = 4096;  // greatest number of memory bytes in one response
+constexpr std::size_t most_bytes = 4096;  // greatest number of memory addresses in one response
 
 using Between = std::function<void()>;
 
@@ -28,7 +28,7 @@ OrderResult success(const Command& command, const Answer& answer, const std::str
           change};
 }
 
-// Runs a command. A command that writes a setting is followed by reading the setting back and comparing it.
+// Runs a command. A setting that it writes is read back and compared, if the setting can be read.
 OrderResult run_command(Encoder& encoder, const Order& order) {
   const Command& command = *order.command;
   if (command.verb != Verb::config_set) {
@@ -40,8 +40,8 @@ OrderResult run_command(Encoder& encoder, const Order& order) {
   return success(command, change.now, change.was_so ? "it had this value already" : change.note, change.state);
 }
 
-// Reads settings or registers, one request after the other. A request that the encoder refuses, or that its options
-// exclude, is reported with its reason; `done` returns the first reason if no request was answered.
+// Reads settings or registers, one request after the other, and continues after a request that fails or that the
+// options exclude; `done` returns the first reason if no request was answered.
 class OptionalReads {
  public:
   OptionalReads(Encoder& encoder, const Between& between) : encoder_(&encoder), between_(&between) {}

@@ -15,7 +15,7 @@ namespace absenc::serve {
 
 struct MqttSettings {
   Broker broker{};
-  std::string prefix{};          // beginning of all topics of this server
+  std::string prefix{};          // beginning of the topics, except those of discovery
   std::string spool{};           // path of the folder of the spool
   std::int64_t spool_bytes = 0;  // greatest size of the spool in bytes
   Time batch{};                  // an encoder's readings within this time share messages of up to 250

@@ -28,7 +28,7 @@ class Sending {
   [[nodiscard]] MqttHealth mqtt_health() const;
   /// Returns the health of MQTT as JSON; null if MQTT is off.
   [[nodiscard]] client::Json json() const;
-  /// Returns the metrics of MQTT in the text format of Prometheus.
+  /// Returns the metrics of MQTT in the text format of Prometheus; "" if MQTT is off.
   [[nodiscard]] std::string metrics() const;
 
  private:

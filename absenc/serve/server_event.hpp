@@ -61,7 +61,8 @@ class ServerEvents {
     return added_;
   }
 
-  /// Takes all events since the last call, oldest first. Sets `added` to the number of events since the start.
+  /// Takes the queued events, oldest first, and if events were dropped, one more that tells how many. Sets `added` to
+  /// the number of events added since the start.
   [[nodiscard]] std::vector<ServerEvent> take(std::uint64_t& added) {
     const std::lock_guard lock(mutex_);
     added = added_;

@@ -74,7 +74,7 @@ class Spool {
   };
   /// Returns how many messages were dropped since the last call, and why.
   [[nodiscard]] Dropped take_dropped();
-  /// Returns sentences about changes of the spool's files since the last call, for events.
+  /// Returns sentences about the spool's files and disk errors since the last call, for events.
   [[nodiscard]] std::vector<std::string> take_notes();
 
  private:

@@ -19,7 +19,7 @@ class Streams {
  public:
   static constexpr std::size_t most = 300;
   static constexpr std::size_t most_of_address = 200;
-  // A client that received nothing for this time may lose its stream to a new client.
+  // A stream whose connection asked for no data for this time may be closed for a new one.
   static constexpr Time stall_time = std::chrono::seconds(5);
 
   /// Opens an event stream. `trace`: the encoder whose plot points the stream sends; "": none. `peer`: IP address of

@@ -37,7 +37,7 @@ struct Second {
   std::uint64_t errors = 0;
   Spread place{};
   Spread speed{};  // measured speeds of the second, without their uncertainties
-  // Last position of the second; needed because a mean is wrong across the end of a turn.
+  // Last valid position of the second.
   std::optional<double> last_place{};
 };
 
@@ -53,7 +53,8 @@ class TimeSeries {
   [[nodiscard]] std::vector<Point> take_points();
   /// Returns the points of the last 20 seconds with readings, at least 10 ms apart, oldest first.
   [[nodiscard]] std::vector<Point> recent_points() const { return {recent_.begin(), recent_.end()}; }
-  /// Takes the seconds before `now_s` that were not taken yet, at most the newest 120.
+  /// Ends the current second if it is before `now_s`, and takes the completed seconds that were not taken yet, at most
+  /// the newest 120.
   [[nodiscard]] std::vector<Second> take_seconds(std::int64_t now_s);
   /// Returns the last 60 completed seconds with readings, oldest first. For a lost encoder these seconds are from
   /// before the loss.

@@ -33,8 +33,8 @@ void set_acknowledged(Json& json, const std::vector<RaisedAlarm>& raised, const 
   json.set("acknowledged", acknowledged);
 }
 
-// Returns the raised alarms; null if none is raised but the replies do not report all alarms. `known`: raised alarms
-// with their acknowledgements; null omits these.
+// Returns the raised alarms; null if none is raised but the replies do not report all alarms, or if the unit has no
+// alarms. `known`: raised alarms with their acknowledgements; null omits these.
 Json alarms_json(const Unit& unit, const Reading& reading, const std::vector<RaisedAlarm>* known = nullptr) {
   Json all = Json::array();
   const std::vector<Flags> channels = alarms_of(unit, reading);
@@ -161,8 +161,8 @@ Json bad_json(const Details& details) {
   });
 }
 
-// Sets the number of positions per turn or along the scale; null if only a reply reports that number and no reply was
-// received, or if it has more than 62 bits.
+// Sets the number of positions per turn or along the scale, the length of the scale, and whether there are turns. The
+// number is null if only a reply reports it and no reply was received, or if it has more than 62 bits.
 void set_scale(Json& json, const Watch& watch, const Snapshot& snapshot) {
   Resolution known = watch.address().unit->resolution(watch.address().options);
   const Reading& reading = snapshot.last.reading;

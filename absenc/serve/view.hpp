@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// State of encoders and server, as JSON and for Prometheus. Values of an encoder that is not live are never shown as
-// current.
+// State of encoders and server, as JSON and for Prometheus. Position, speed and alarms of an encoder that is not live
+// are not shown as current.
 #pragma once
 
 #include <span>
@@ -27,7 +27,7 @@ namespace absenc::serve {
 /// Returns whether the encoder of `watch` is linear: its positions are in mm instead of degrees.
 [[nodiscard]] bool is_linear(const Watch& watch);
 
-/// Returns the overview of an encoder, its counters, latencies, last bad exchanges, the fields of the last reply, which
+/// Returns the overview of an encoder, its counters, latencies, last bad exchanges, the fields of a recent reply, which
 /// settings and memory can be read, and its commands with their arguments.
 [[nodiscard]] client::Json details(const Watch& watch);
 

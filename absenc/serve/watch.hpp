@@ -24,11 +24,11 @@
 namespace absenc::serve {
 
 enum class State : std::uint8_t {
-  opening,   // the port has not been available yet
+  opening,   // no attempt to read yet; the port may be missing
   live,      // the last reading is recent
   silent,    // no reading was received for a while
   failing,   // the last attempt to read failed
-  lost,      // the port has disappeared
+  lost,      // the port was lost
   ended,     // the encoder cannot be read: `message` reports why; the thread tries again every few seconds
   examined,  // an examination uses the port: `message` reports its current step
 };
@@ -72,7 +72,7 @@ struct Snapshot {
   bool has_reading = false;
   std::optional<double> place{};  // last valid position, as in `Point`
   client::Sample last{};          // last reading; current only in state `live`
-  std::string message{};          // reason why the encoder is not live; "" if it is, or in state `silent`
+  std::string message{};          // reason why the encoder is not live; "" if it is, or if none is known
   host::Counters counters{};
   std::uint64_t readings = 0;
   std::uint64_t losses = 0;
@@ -99,8 +99,7 @@ class Watch {
   Watch(const Watch&) = delete;
   Watch& operator=(const Watch&) = delete;
 
-  /// Requests the reading thread to end, which happens within the time of one reading, or when a running command has
-  /// ended.
+  /// Requests the reading thread to end, and does not wait for it.
   void request_stop() { thread_.request_stop(); }
   /// Waits until the reading thread has ended. The destructor calls `request_stop` and `wait`.
   void wait();
@@ -124,7 +123,7 @@ class Watch {
   /// runs, or the thread has ended.
   [[nodiscard]] std::string_view give(Order order);
 
-  /// Acknowledges the alarm of this name, in all channels, until it is cleared; `who` is stored in the history. Returns
+  /// Acknowledges the alarm of this name, in all channels, until it is cleared; `who` is named in the event. Returns
   /// "", or the reason of the refusal if the alarm is not raised.
   [[nodiscard]] std::string acknowledge(std::string_view alarm, const std::string& token, const std::string& who);
 
@@ -166,7 +165,7 @@ class Watch {
   TimeSeries series_;
   std::array<Outbox, 2> outboxes_;  // queues of readings for other systems, by Outlet
 
-  // The members below are used by the reading thread only.
+  // The members from here to `thread_` are used by the reading thread only.
   Time next_summary_{};
   Time next_failure_report_{};  // time from which the next failure may be reported
   std::uint32_t alarms_ = 0;

@@ -38,8 +38,8 @@ void Bus::feed(const ByteEvent& event) {
   }
 }
 
-// Reports `sent` to the devices whose bytes were sent. The other devices receive the bytes, and those without a pending
-// transfer `silence` at once, without waiting for their limits: the line is idle behind a transfer.
+// Reports `sent` to the devices whose bytes were sent. The others that have not ended receive the bytes, and those
+// without a pending transfer `silence` at once, without waiting for their limits: the line is idle behind a transfer.
 void Bus::report_sent(const ByteEvent& event) {
   sending_ = false;
   for (Node& node : nodes_) {

@@ -62,7 +62,7 @@ struct Responder final : Machine<std::uint8_t> {
   bool idle = true;
 };
 
-/// A host that sends one request byte after the other, each when the line has been idle long enough for all devices.
+/// A host that sends one request byte after the other, each further one after a silence.
 struct Requester final : Machine<std::uint8_t> {
   explicit Requester(const Wire& all) : requests(all.begin(), all.end()) {}
 

@@ -7,7 +7,7 @@
 namespace absenc::raa38 {
 namespace {
 
-/// Requirements of the document that an encoder on RS-485 must fulfil.
+/// Requirements of the document that an encoder on a serial line must fulfil.
 constexpr auto serial_clauses = std::array{
     Clause{.id = "frames",
            .paragraph = "3.1.3, 3.1.5",

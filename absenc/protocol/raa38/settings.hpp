@@ -32,7 +32,7 @@ class Settings {
 
   /// Returns the bytes of the memory.
   [[nodiscard]] MutableBytes memory() { return memory_; }
-  /// Returns a number that changes with each write of the memory.
+  /// Returns a number that each `write` increments.
   [[nodiscard]] std::uint32_t version() const { return version_; }
   /// Returns the number of the encoder on its line: address or node number.
   [[nodiscard]] std::uint8_t number() const { return memory_[number_at]; }

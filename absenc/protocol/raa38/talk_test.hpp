@@ -39,7 +39,7 @@ struct CommandResult {
   Error error = Error::none;
   std::string words{};   // detail and advice of the error
   std::string fields{};  // "name=value name=value ", without real numbers
-  std::string left{};    // like `fields`, for the fields that report_left reports of an interrupted command
+  std::string left{};    // like `fields`, for the fields that report_left reports
   std::optional<Reading> reading{};
   Time took{};
 
@@ -81,7 +81,7 @@ struct Bench {
   }
   Encoder& encoder() { return encoders.front(); }
 
-  /// Runs a host until it ends, or until `on_emit` returns false.
+  /// Runs a host until it ends, or until `on_emit` returns false, but for at most 60 s.
   template <class Machine>
   Machine& run(Machine& machine, const std::function<bool()>& on_emit = {}) {
     const Time start = line.now();
@@ -123,7 +123,7 @@ struct Bench {
   Time took{};
 };
 
-/// Returns how long a conversation takes if another sender never pauses from the first request of the conversation on;
+/// Returns how long a conversation continues after its first request if another sender never pauses from then on;
 /// `never` if the conversation does not end.
 inline Time time_with_noise(Conversation<std::uint8_t>& conversation) {
   using Kind = Step<std::uint8_t>::Kind;

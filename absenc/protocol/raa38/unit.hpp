@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The RAA38S6 as units for the list of units: one for each kind of line.
+// The RAA38S6 as units for the list of units, one for each of its three protocols here, and their clauses.
 #pragma once
 
 #include "absenc/protocol/clause.hpp"
@@ -9,7 +9,7 @@ namespace absenc::raa38 {
 extern constinit const Unit serial_unit;   ///< RAA38S6 on RS-485, RS-232 or RS-422.
 extern constinit const Unit modbus_unit;   ///< RAA38S6 with Modbus RTU.
 extern constinit const Unit can_unit;      ///< RAA38S6 on CAN.
-extern const Clauses serial_unit_clauses;  ///< Demands on an RAA38S6 on RS-485 and on its host.
+extern const Clauses serial_unit_clauses;  ///< Demands on an RAA38S6 on a serial line and its host.
 extern const Clauses modbus_unit_clauses;  ///< Demands on an RAA38S6 with Modbus RTU and on its host.
 extern const Clauses can_unit_clauses;     ///< Demands on an RAA38S6 on CAN and on its host.
 

@@ -29,7 +29,8 @@ class CompiledFormat {
   }
 
  private:
-  // Decodes long words, readings with bits after the word or of a wrong length, and words with an error.
+  // Decodes long words, readings with bits after the word or of a wrong length, and words whose
+  // parity or padding is wrong.
   [[nodiscard, gnu::noinline]] constexpr Result<Word> decode_otherwise(const BitView& bits) const {
     return ssi::decode(format_, bits);
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual SSI encoder: a shift register that loads a new word when the pause is over.
+// A virtual SSI encoder: a shift register that loads a new word when the monoflop time is over.
 #pragma once
 
 #include <algorithm>

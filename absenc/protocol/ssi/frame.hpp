@@ -35,8 +35,8 @@ struct Format {
   using Compiled = CompiledFormat;           ///< The format compiled (compiled_format.hpp), to decode many words.
   WordFormat word = "position:12"_word;      ///< Layout of the position word: its fields in the order of the line.
   AfterWord after_word = AfterWord::repeat;  ///< What the encoder sends after its word.
-  /// Number of clocks after the word, whose bits are compared with `after_word`; with as many as the word has bits, the
-  /// word is read twice.
+  /// Number of clocks after the word, whose bits are compared with `after_word`. With `repeat` and as many as the word
+  /// has bits, the word is read twice.
   unsigned extra_clocks = 0;
   Scale scale{};  ///< Whether the encoder is linear, and the length of a count.
   /// Whether the last bit is a parity bit that the encoder inverts if its position is wrong.
@@ -145,8 +145,8 @@ constexpr Result<typename Source::Word> decode_by(const Source& source, BitView 
   return detail::decode_by(Given<Format>{format, format.word}, bits);
 }
 
-/// Decodes a word whose format is known at compile time, as fast as code written for this format by hand. The array
-/// `values` of the result is empty if the format has no fields with Meaning::value.
+/// Decodes a word whose format is known at compile time. The array `values` of the result is empty if the format has no
+/// fields with Meaning::value.
 template <const Format& format>
 [[nodiscard]] constexpr Result<typename Known<format>::Word> decode(BitView bits) {
   return detail::decode_by(Known<format>{}, bits);
@@ -192,15 +192,15 @@ enum class ErrorBit : std::uint8_t { none, active_high, active_low };
   return word;
 }
 
-/// Appends to the counts in `word` the usual further bits: an error bit, and a parity bit over all bits before it.
-/// `gray`: the counts are Gray-coded. Returns the format.
+/// Appends to the counts in `word` the further bits that are chosen: an error bit, and a parity bit over all bits
+/// before it. `gray`: the counts are Gray-coded. Returns the format.
 [[nodiscard]] constexpr WordFormat word_with(WordFormat word, bool gray, ErrorBit error, Parity parity) {
   if (gray) word.set_gray();
   if (error != ErrorBit::none) word.add({"error", Meaning::error, 1, error == ErrorBit::active_low});
   if (parity != Parity::none) word.add({"parity", Meaning::parity, 1, parity == Parity::odd});
   return word;
 }
-/// Returns the format of a word with position, turns, error bit and parity bit.
+/// Returns the format of a word with the counts of `bits` and, if they are chosen, an error bit and a parity bit.
 [[nodiscard]] constexpr WordFormat word_with(const PositionBits& bits, bool gray, ErrorBit error, Parity parity) {
   return word_with(word_format(bits), gray, error, parity);
 }

@@ -18,8 +18,8 @@ BitBuffer<256> bits(std::string_view text) {
 
 Result<Word> decode(const Format& format, std::string_view text) { return ssi::decode(format, bits(text).view()); }
 
-// Paragraph 3.5: 8 clocks of 12 bits, converted with the formula for 12, are at most 22.4121 degrees. They must give no
-// position.
+// Checks that fewer than 12 clocks of 12 bits give no position. Paragraph 3.5: 8 of them, converted with the formula
+// for 12, are at most 22.4121 degrees.
 TEST(SsiFrame, RejectsTooFewClocks) {
   EXPECT_NEAR(degrees(255, 12), 22.4121, 0.0001);
   for (std::size_t size = 0; size < 12; ++size) {
@@ -27,8 +27,8 @@ TEST(SsiFrame, RejectsTooFewClocks) {
   }
 }
 
-// Paragraph 3.5: 14 clocks of 12 bits, read as one number, can be thousands of degrees. A number that could be a
-// position has the wrong length.
+// Checks the error of 14 clocks of 12 bits: out_of_range if their number exceeds any position (paragraph 3.5: it can be
+// thousands of degrees), otherwise wrong_length.
 TEST(SsiFrame, RejectsTooManyClocks) {
   for (std::uint64_t position = 0; position < 4096; ++position) {
     BitBuffer<64> read;
@@ -86,8 +86,8 @@ TEST(SsiFrame, EncodeFailsWithoutRoom) {
   EXPECT_EQ(room.size(), 64u);
 }
 
-// Decodes valid, damaged and cut words: a format known at compile time must give the same results as one known at run
-// time.
+// Decodes valid and damaged words, and words of wrong lengths: a format known at compile time must give the same
+// results as one known at run time.
 template <const Format& format>
 void agree() {
   sim::Random random(1);

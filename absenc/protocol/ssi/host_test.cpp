@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of the host's conversations with the virtual encoder in virtual time.
+// Tests of the SSI host and of the virtual encoder.
 #include "absenc/protocol/ssi/host.hpp"
 
 #include <gmock/gmock-matchers.h>

@@ -39,7 +39,7 @@ inline Tamper refuse(unsigned from, unsigned to, std::uint8_t alarm) {
 
 struct Bench : author::testing::UnitBench<17> {
   explicit Bench(Tamper tamper = {}) : UnitBench(tformat::unit, "") { tampered.replies(std::move(tamper)); }
-  /// Runs the conversation of a command to its end and returns it.
+  /// Runs `host` to its end and returns it.
   template <std::derived_from<Machine<std::uint8_t>> Host>
   Host& run(Host& host) {
     EXPECT_TRUE(line.converse(host));

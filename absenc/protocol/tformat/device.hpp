@@ -113,7 +113,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   }
 
  private:
-  // Typical voltage in mV at or below which battery_error is raised while the power is off (5.4, 6.5).
+  // Typical voltages in mV at or below which battery_error (while the power is off) and battery_alarm are raised (5.4,
+  // 6.5).
   static constexpr std::int32_t battery_error_voltage = 2750;
   static constexpr std::int32_t battery_alarm_voltage = 3100;
   // Speed in 1/1000 rpm at or above which switching on sets full_absolute_status (5.4.1).
@@ -240,12 +241,12 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     if (battery_now() <= battery_alarm_voltage) bits |= alarms::battery_alarm;
     return static_cast<std::uint8_t>(bits);
   }
-  // Updates all state that changes with time: the pending zero, full_absolute_status, counter_overflow and over_heat.
+  // Updates state that changes with time: the pending zero, full_absolute_status, counter_overflow and over_heat.
   void update(Time now) {
     if (zero_pending_ && now >= written_at()) write_zero();
     if (magnitude(shaft_->at(now).speed_millirpm) < full_absolute_speed) full_absolute_ = false;
 
-    // A whole lap of the counter between two requests is not detected if it is undone before the next request.
+    // A whole lap of the counter between two updates is not detected if it is undone before the second one.
     const std::int64_t lap_now = lap(now);
     if (lap_now != counter_lap_ && counts_turns()) latches_ |= alarms::counter_overflow;
     counter_lap_ = lap_now;
@@ -270,8 +271,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   void watch_battery() { battery_lost_ = battery_lost_ || !has_battery(); }
 
   void started(Time at) override { full_absolute_ = magnitude(shaft_->at(at).speed_millirpm) >= full_absolute_speed; }
-  // Counts the turns while only the battery supplies the counter (5.4.2): checks the motion every 10 ms, and less often
-  // in a pause of more than 100 s, at about 10 000 points.
+  // Raises over_speed if speed or acceleration of the shaft exceeded its limit while only the battery supplied the turn
+  // counter (5.4.2). Checks them every 10 ms; in a pause of more than 100 s less often, at about 10 000 points.
   void count_on_battery(Time from, Time now) {
     if (!counts_turns()) return;
     const Time step = std::max(Time(10ms), (now - from) / 10'000);
@@ -296,7 +297,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
 
   std::optional<Time> off_since_{};  // time of the last power off; empty before the first one
   bool off_ = true;
-  bool battery_lost_ = false;  // whether the battery failed since the last power off
+  bool battery_lost_ = false;  // whether the battery failed while the power is off
 
   std::int64_t turn_offset_ = 0;  // subtracted from the turns of the shaft
   std::int64_t counter_lap_ = 0;  // how often the turn counter had overflowed at the last update

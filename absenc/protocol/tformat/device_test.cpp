@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of the virtual Smart-Abs against the paragraphs of its specification, with requests written as bytes.
+// Tests of the virtual Smart-Abs against the paragraphs of its specification.
 #include "absenc/protocol/tformat/device.hpp"
 
 #include <gtest/gtest.h>
@@ -62,14 +62,14 @@ TEST(TformatDevice, AnswersAbnormalRequestsLikeId3) {
   EXPECT_EQ(memory_write(bench, 127, 6), plain);  // page 6 is closed
   EXPECT_EQ(memory_write(bench, 127, 7), wire(hex<"327F074A">));
   bench.pass(memory_time);
-  EXPECT_EQ(memory_read(bench, 3), plain);  // page 7 is closed except for addresses 4 and 5
+  EXPECT_EQ(memory_read(bench, 3), plain);  // address 3 of page 7 is closed
   EXPECT_EQ(memory_write(bench, 5, 1), plain);
   EXPECT_EQ(memory_read(bench, 4), wire(hex<"EA04DA34">));
   EXPECT_EQ(memory_read(bench, 5), wire(Reply{.id = DataId::read_memory, .address = 5, .value = 35}));
 }
 
-// Checks that ID D with a wrong parity bit is refused once, when its frame has ended; so are requests with an unknown
-// data ID, and with the busy bit and one byte too many.
+// Checks that ID D with a wrong parity bit is refused once, when its frame has ended; so are a request with an
+// unknown data ID, and one with the busy bit and one byte too many.
 TEST(TformatDevice, AnswersRefusedFrameAfterItsEnd) {
   Bench bench;
   testing::RawHost host({0x6A, 0x05, 0xEF});
@@ -79,7 +79,6 @@ TEST(TformatDevice, AnswersRefusedFrameAfterItsEnd) {
   EXPECT_EQ(bench.encoder.answer_count(), 1u);
   EXPECT_EQ(bench.violations(), 0u);
   for (const Wire& request : {Wire{0xA2, 0x05, 0xEF, 0x01}, Wire{0x32, 0x81, 0x00, 0xB3, 0x00}}) {
-    // The first request has an unknown data ID, the second the busy bit and one byte too many.
     EXPECT_EQ(bench.raw(request), wire(Reply{.encoder_id = 0x11}));
   }
   EXPECT_EQ(bench.violations(), 0u);
@@ -124,7 +123,7 @@ TEST(TformatDevice, IsBusyFor18MillisecondsAfterAWrite) {
   // The write during the busy time was not executed.
   EXPECT_EQ(memory_read(bench, 6), wire(Reply{.id = DataId::read_memory, .address = 6}));
   EXPECT_EQ(bench.encoder.writes(), 1u);
-  EXPECT_EQ(bench.violations(), 0u);  // a host may send read requests while the encoder writes
+  EXPECT_EQ(bench.violations(), 0u);  // no access while the encoder writes is a violation
 }
 
 TEST(TformatDevice, PagesAreSeparateAndChangingThemTakesTime) {

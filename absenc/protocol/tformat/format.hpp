@@ -116,7 +116,7 @@ inline constexpr std::uint8_t shown_in_status = over_heat | multiturn_error | ba
 inline constexpr std::uint8_t turns_lost = over_speed | multiturn_error | battery_error;
 /// Mask of the alarms that stay until a reset; of them, multiturn_error ends with power off as well (6.5).
 inline constexpr std::uint8_t latched = over_speed | counter_overflow | over_heat | multiturn_error | battery_error;
-/// Mask of the alarms that an encoder without a battery always shows, which is no fault (2 (1), 6.5).
+/// Mask of the battery's alarms, which are no fault of an encoder without a battery (2 (1), 6.5).
 inline constexpr std::uint8_t without_battery = battery_error | battery_alarm;
 }  // namespace alarms
 

@@ -147,7 +147,7 @@ struct Reply {
 [[nodiscard]] constexpr Result<Request> decode_request(Bytes bytes) {
   if (bytes.empty()) return Error::wrong_length;
   if (!has_sync_code(bytes[0])) return Error::bad_framing;
-  // The parity is checked first, because the length depends on the data ID.
+  // The parity is checked before the length, because the length depends on the data ID.
   if (bytes[0] != control_field(bytes[0] >> 3)) return Error::bad_checksum;
   const std::optional<DataId> id = data_id(bytes[0]);
   if (!id) return Error::unsupported;
@@ -426,7 +426,7 @@ struct Protocol {
 
   /// Decodes a request. Returns it, or the error of the first failed check.
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return tformat::decode_request(bytes); }
-  /// Returns the length in bytes of the request that begins with the bytes `begin`; 0 if no request does.
+  /// Returns the length in bytes of the request with the control field `begin[0]`; 0 if no request has this field.
   static constexpr std::size_t request_size(const Format&, Bytes begin) {
     const std::optional<DataId> id = data_id(begin[0]);
     return id && begin[0] == control_field(*id) ? request_length(*id) : 0;

@@ -182,8 +182,8 @@ TEST(TformatFrame, StatusReportsPartOfTheAlarms) {
   EXPECT_EQ(to_reading({}, {.id = DataId::read_memory}).status_reported, 0u);
 }
 
-// Checks that in a reply without ALMC the bit `alarm` of SF reports none of its four alarms if there is no battery: the
-// bit is always set then (2 (1)).
+// Checks an encoder without a battery: ALMC reports all alarms but the battery's; in a reply without ALMC, the bit
+// `alarm` of SF reports none of its four alarms, because it is always set (2 (1)).
 TEST(TformatFrame, WithoutBatteryStatusLeavesFourAlarmsUnknown) {
   constexpr Format format{.battery = false};
   const auto whole = [&](std::uint8_t more) {

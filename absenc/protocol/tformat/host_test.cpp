@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of readings and of explained refusals, with the virtual Smart-Abs in virtual time.
+// Tests of readings and of refusals.
 #include "absenc/protocol/tformat/host.hpp"
 
 #include <gtest/gtest.h>

@@ -186,8 +186,7 @@ TEST(TformatProcedures, VerifiesWritesByReadingBackAndNeverRepeatsThem) {
   }
 }
 
-// Checks that a busy encoder is waited for up to 36 ms: a read or write is repeated each millisecond, a page select
-// after 18 ms.
+// Checks that a busy encoder is waited for up to 36 ms: a read is repeated each millisecond, a page select after 18 ms.
 TEST(TformatProcedures, WaitsForABusyEncoder) {
   const auto busy = [](unsigned from, unsigned to) {
     return [=](unsigned index, Wire& reply) {
@@ -268,8 +267,7 @@ TEST(TformatProcedures, SendsNoForbiddenReset) {
   }
 }
 
-// Checks that battery=false removes the battery alarms and the turns from readings and lets clear-alarms run: without a
-// battery the battery alarms are always raised, so clearing them loses nothing.
+// Checks that battery=false removes the battery alarms and the turns from readings and lets clear-alarms run.
 TEST(TformatProcedures, EncoderWithoutBatteryIsDeclared) {
   Bench bench;
   bench.shaft.put(7, 1000);
@@ -295,8 +293,8 @@ TEST(TformatProcedures, EncoderWithoutBatteryIsDeclared) {
   EXPECT_EQ(bench.everything().alarms, alarms::battery_alarm);
 }
 
-// Checks the errors of resets whose verification shows another state. Replies 0 and 1 are positions, 2 to 11 answer the
-// reset, 12 is the verification.
+// Checks which states in the verification make a reset fail. Replies 0 and 1 are positions, 2 to 11 answer the reset,
+// 12 is the verification.
 TEST(TformatProcedures, DetectsResetThatFailed) {
   struct Row {
     std::string_view name;

@@ -11,7 +11,7 @@ namespace absenc::tformat {
 
 using author::VectorText;
 
-/// Test vectors of the T-format, from the document or derived from it.
+/// Test vectors of the T-format.
 inline constexpr std::array vectors{
     VectorText{"tformat-001", "request byte Data ID 0", "seed Table 1; public", "", "02", "",
                "data_id=0 control_field=2"},

@@ -56,7 +56,7 @@ function take(event, data) {
   view.take(event, data);
 }
 
-// Returns the decoded text of an address. Invalid percent-encoding is returned unchanged: no encoder has that name, so the page reports it as unknown.
+// Returns the decoded text of an address; a text with invalid percent-encoding is returned unchanged.
 function decoded(text) {
   try {
     return decodeURIComponent(text);

@@ -9,7 +9,7 @@ import {download, pathOf, request, tokenInfo} from "./server.js";
 import {SHAPES, belowFigure, clock, condition, duration, fieldName, fieldText, figure, forPeople, eventKind, lastText, microseconds, numberText, plain, sentence, valueText, faultLines} from "./words.js";
 
 const LIVE_MS = 20000;      // length of the live plot in milliseconds: the server stores the points of this time
-const LOST_SHARE = .15;     // share of a lost encoder's plot that shows the time without readings
+const LOST_SHARE = .15;     // greatest time without readings in a lost encoder's live plot, as a share of LIVE_MS
 const MOST_POINTS = 2500;
 const REFRESH_MS = 1000;
 const WRITTEN_MS = 1500;    // after this time a new event is in the history, in milliseconds

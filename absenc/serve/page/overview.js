@@ -8,7 +8,7 @@ const MANY = 30;           // number of encoders above which the cards are small
 const FEW = 3;
 // Minimum time per encoder between two redraws, in milliseconds, so that the load stays constant with many encoders.
 const DRAW_MS = 5;
-const ORDER_MS = 2000;     // minimum time between two reorderings of the cards, in milliseconds
+const ORDER_MS = 2000;     // minimum time between two automatic reorderings of the cards, in milliseconds
 const MINUTE_S = 60;
 const MOST_WORDS = 2;
 
@@ -133,7 +133,7 @@ class Card {
 
   drawTrace(now, live) {
     const column = sparkColumn(this.points, this.encoder.linear);
-    // Continues the position of a single-turn encoder across the step from 360 to 0 degrees.
+    // Continues a rotary position across steps of more than half a turn, as from 360 to 0 degrees.
     let turns = 0;
     const unwrapped = this.points.map((row, i) => {
       const step = i > 0 ? row[1] - this.points[i - 1][1] : 0;

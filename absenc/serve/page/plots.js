@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Plots of position and speed of one encoder, from live points or the history.
+// Plots of position, speed or errors of one encoder, from live points or the history.
 /* global Dygraph */
 import {eventKind, plain, clock} from "./words.js";
 

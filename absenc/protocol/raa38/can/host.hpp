@@ -16,10 +16,10 @@ using namespace std::chrono_literals;
 // The document gives no reply times; the timeouts below are assumed to be longer than any node needs.
 inline constexpr Time answer_limit = 50ms;  ///< Timeout of a reply on a bus without other frames.
 inline constexpr Time busy_limit = 250ms;   ///< Timeout of a reply on a bus that other nodes keep busy.
-/// Time for which the host listens for unsolicited frames before it sends requests.
+/// Time for which the host listens for unsolicited frames.
 inline constexpr Time listening_time = 1200ms;
 
-/// Types and functions of the protocol that the classes in absenc/protocol/author use: frames, lengths and times.
+/// Types and functions of the protocol that the classes in absenc/protocol/author use.
 struct Protocol {
   /// Type of what the line transmits: CAN frames.
   using Item = CanFrame;
@@ -34,7 +34,8 @@ struct Protocol {
   static constexpr author::Manner manner(const Format&, const CanFrame&) { return {}; }
   /// Returns the timeouts of a reply on a quiet and on a busy bus.
   static constexpr author::CanHostTimes host_times(const Format&) { return {answer_limit, busy_limit}; }
-  /// Returns a frame as text: identifier and data in hexadecimal, such as "220:8020000000000000".
+  /// Returns a frame with an 11-bit identifier as text: identifier and data in hexadecimal, such as
+  /// "220:8020000000000000".
   static constexpr ByteBuffer<4 + 2 * frame_size> encode(const Format&, const CanFrame& frame) {
     constexpr std::string_view digits = "0123456789abcdef";
     ByteBuffer<4 + 2 * frame_size> text;
@@ -49,7 +50,8 @@ struct Protocol {
   }
 };
 
-/// Returns cause and advice for the error of a reply to a request; either may be empty.
+/// Returns cause and advice for the error of `reply`; if it is empty, for a missing reply or an invalid request. Either
+/// text may be empty.
 [[nodiscard]] Explanation explain(const Format& format, Error error, std::span<const CanFrame> request,
                                   std::span<const CanFrame> reply);
 
@@ -101,25 +103,26 @@ author::Procedure set_cyclic(Dialog& dialog, Values& found, Arguments arguments)
 /// positions), timeout (order 22 has neither an answer nor an effect).
 author::Procedure change(Dialog& dialog, Values& found, Order order, Arguments arguments);
 
-/// Reports the number of the node if the node answers. Requests no other number: on a CANopen bus such requests are
-/// process data of other devices. Errors: timeout, bad_framing (frames are destroyed: two nodes may share the number).
+/// Requests a position of the node, and reports the node's number if a frame from it is received. Requests no other
+/// number: on a CANopen bus such requests are process data of other devices. Errors: timeout, bad_framing (frames are
+/// destroyed: two nodes may share the number).
 author::Procedure find_node(Dialog& dialog, Values& found);
 
 // ---- All nodes on the bus
 
-/// Counts of the frames that a scan received from one node number, and the position in the last frame.
+/// Result of a scan for one node number.
 struct NodeFrames {
-  std::uint16_t unsolicited = 0;  ///< Number of frames that the node sent without a request.
-  std::uint16_t per_second = 0;   ///< Those of `unsolicited` in the second from the first received reply on.
-  std::uint8_t answers = 0;       ///< Number of answers to the requests for this node number.
+  std::uint16_t unsolicited = 0;  ///< Number of frames that count as sent without a request.
+  std::uint16_t per_second = 0;   ///< Those of `unsolicited` within one second after the first frame of any node.
+  std::uint8_t answers = 0;       ///< Number of frames that count as answers, at most 255.
   std::uint8_t damaged = 0;       ///< Number of requests during which frames were destroyed.
   bool readable = false;          ///< Whether the last frame is a position that fits the format.
-  std::uint32_t counts = 0;       ///< Position in the last frame, in counts.
+  std::uint32_t counts = 0;       ///< Position in the last frame, in counts; 0 if it is not `readable`.
 
-  /// Returns whether a node with this number was found.
+  /// Returns whether the number is in use: a frame from it was received, or frames were destroyed at two requests.
   [[nodiscard]] constexpr bool is_there() const { return unsolicited != 0 || answers != 0 || damaged > 1; }
-  /// Returns whether two nodes seem to share the number: more than one answer, or destroyed frames each time and no
-  /// answer; and in both cases no frame without a request.
+  /// Returns whether two nodes seem to share the number: more than one answer, or destroyed frames at two requests and
+  /// no answer; and in both cases no frame without a request.
   [[nodiscard]] constexpr bool clash() const {
     return (unsolicited == 0 && answers > 1) || (damaged > 1 && answers == 0 && unsolicited == 0);
   }
@@ -127,15 +130,15 @@ struct NodeFrames {
 
 /// Result of a scan: what was received from each node number.
 struct Nodes {
-  std::array<NodeFrames, 256> at{};  ///< Result of each node number, which is the index.
+  std::array<NodeFrames, 256> at{};  ///< Result of each node number, which is the index; 0 is unused.
 
   /// Returns how many node numbers were found on the bus.
   [[nodiscard]] unsigned count() const;
 };
 
-/// Finds all nodes on the bus. Listens first, because nodes may send without a request after power on, then requests
-/// every number. Errors: timeout (no node is found), bad_framing (frames are destroyed for more than 16 numbers:
-/// wrong bit rate).
+/// Finds the nodes on the bus. Listens first, because nodes may send without a request after power on, then requests
+/// every number from 1 to 255. Errors: timeout (no node is found), bad_framing (frames are destroyed at both requests
+/// for more than 16 numbers: wrong bit rate).
 author::Procedure scan(Dialog& dialog, Nodes& nodes);
 
 /// Result of `configure`: the setting, and the nodes that were found on the bus before it.
@@ -144,12 +147,12 @@ struct ConfigureResult : Values {
   bool verified = false;  ///< Whether the written setting was verified.
 };
 
-/// Changes the node number (order 11) or the bit rate (order 13). The node must answer under the new number and no
-/// longer under the old one; for the bit rate the host switches too, and back if the node does not answer. Both orders
-/// are sent on 7E5, which reaches every node, so only one node may be on the bus. Errors: invalid_argument (other nodes
-/// are on the bus, two nodes share the number, or the document does not have that rate), unexpected_reply (only other
-/// nodes are on the bus), timeout, bad_framing (frames are destroyed), request_rejected, cross_check_failed (the node
-/// answers under its old number or at its old rate).
+/// Changes the node number (order 11) or the bit rate (order 13). The node must answer under the new number and, if it
+/// is another, no longer under the old one; for the bit rate the host switches too, and back if the node does not
+/// answer. Both orders are sent on 7E5, which reaches every node, so only one node may be on the bus. Errors:
+/// invalid_argument (other nodes are on the bus, two nodes share the number, or the document does not have that rate),
+/// unexpected_reply (only other nodes are on the bus), timeout, bad_framing, request_rejected, cross_check_failed (the
+/// node answers under its old number or at its old rate).
 author::Procedure configure(Dialog& dialog, ConfigureResult& found, Order order, Arguments arguments);
 
 }  // namespace absenc::raa38::can

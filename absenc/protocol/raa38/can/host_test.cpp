@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of the host with one node: its position, cyclic positions, zero and direction.
+// Tests of the host commands for one node: position, cyclic positions, zero and direction.
 #include "absenc/protocol/raa38/can/bench_test.hpp"
 
 namespace absenc::raa38::can {
@@ -45,7 +45,7 @@ TEST(Raa38CanRead, TimesOutWithoutNode) {
   Bench bench({.node = 0x21, .cyclic = 0});
   EXPECT_TRUE(ended(bench.run_command(Format{}, "position"), Error::timeout, "scan"));
   EXPECT_TRUE(ended(bench.run_command(Format{}, "listen"), Error::timeout, "by itself"));
-  // Frames of other nodes arrive all the time, so the bus is never silent.
+  // Another node sends 255 positions per second, so the bus is never silent for 50 ms.
   Bench busy({.node = 0x21, .cyclic = 255});
   const CommandResult read = busy.run_command(Format{}, "position");
   EXPECT_TRUE(ended(read, Error::timeout));
@@ -78,7 +78,7 @@ TEST(Raa38CanRead, IgnoresFramesOfOtherNodes) {
     by_hand.receive(other);
     EXPECT_EQ(by_hand.next(), Kind::wait);
     by_hand.tell(Event<CanFrame>::Kind::silence, by_hand.now + 50ms);
-    // The host reports a 29-bit frame if no other frame arrives.
+    // Without a reply, the host reports the 29-bit frame.
     const bool is_long = other.extended;
     EXPECT_EQ(by_hand.talk->error(), is_long ? Error::unexpected_reply : Error::timeout);
     EXPECT_EQ(says(by_hand.talk->detail(), "29 bits"), is_long);
@@ -168,8 +168,8 @@ TEST(Raa38CanZero, RefusesWhileShaftTurns) {
   EXPECT_EQ(bench.encoder().settings().writes(), 0u);
 }
 
-// Checks the errors of a node that does not obey order 20: it answers but its position does not become 0, or it answers
-// neither order 20 nor 22.
+// Checks the errors of a node that answers order 20 but does not set its zero, and of a node that answers neither
+// order 20 nor order 22.
 TEST(Raa38CanZero, FailsWhenPositionDoesNotBecomeZero) {
   // The answer to order 20 is 32 if it is read as a position; at 21 bits that is near 0.
   for (const std::uint32_t counts : {32u << 10, 1'000'000u}) {

@@ -13,13 +13,13 @@ namespace {
 using namespace author;
 using MaybeFrame = std::optional<CanFrame>;
 
-// Least number of frames and least time that measure the send rate to 1 %, although an adapter may delay frames.
+// Least number of frames and least time after which a measurement may end early: an adapter may delay frames.
 constexpr unsigned enough_frames = 4;
 constexpr Time enough_time = 500ms;
 constexpr unsigned most_measurements = 3;  // greatest number of attempts to measure the send rate
 constexpr Time slowest_period = 1s;        // longest period of a node that sends cyclically: TT = 1
-// Time for which answers to an order are received. It is never shortened, because a cyclic position may equal the
-// answer.
+// Time for which answers to order 20, 22 or 31 are received. It is never shortened, because a cyclic position may equal
+// the answer.
 constexpr Time command_window = answer_limit;
 
 /// Measures the rate at which a node sends frames without a request.
@@ -34,7 +34,7 @@ struct SendRate {
   }
   /// Returns the mean time between frames; 0 with fewer than two frames.
   [[nodiscard]] Time period() const { return count < 2 ? Time{} : (last - first) / (count - 1); }
-  /// Returns the frames per second, rounded, 1 to 255; 0 without a frame.
+  /// Returns the frames per second, rounded, 1 to 255; 1 if the period is 0, and 0 without a frame.
   [[nodiscard]] unsigned per_second() const {
     if (count == 0) return 0;
     const Time mean = period();
@@ -48,8 +48,8 @@ struct SendRate {
 
 // ---- Receiving until a time is over
 
-// Measures the send rate of the node until the listening time is over; with `until_enough`, ends as soon as enough
-// frames were received in enough time.
+// Measures the send rate of the node until the listening time is over; with `until_enough`, ends earlier if at least
+// `enough_frames` were received over at least `enough_time`.
 Part<SendRate> count_frames(Dialog& dialog, bool until_enough = false) {
   SendRate cadence;
   for (;;) {
@@ -95,14 +95,14 @@ struct PositionResult {
 Part<PositionResult> read_position(Dialog& dialog, Time pause = {}) {
   const MaybeFrame frame = co_await read(dialog, dialog.format().node, pause);
   const Result<std::uint32_t> counts = frame ? decode_position(dialog.format(), *frame) : dialog.missing();
-  // The exchange is copied, because more frames may follow before the procedure ends.
+  // The error is explained now, because a later request replaces the exchange.
   const Exchange<CanFrame> exchange = dialog.exchange();
   const Explanation words = explain(dialog.format(), counts.error(), exchange.sent, exchange.received);
   co_return PositionResult{counts ? done : only(counts.error(), words.detail, words.advice), *counts};
 }
 
-// ---- Orders whose answer equals a position. The procedures stop the node first and restart it with its old rate
-// afterwards; they accept no position until the time for the answer is over.
+// ---- Orders 20 and 22, whose answers equal positions. The node's cyclic positions are stopped before and restarted
+// with the old rate afterwards; no position is accepted until the time for the answer is over.
 
 Part<SendRate> stop_cyclic_frames(Dialog& dialog) {
   dialog.listen(listening_time);
@@ -128,7 +128,7 @@ Part<Outcome> restore_cyclic_frames(Dialog& dialog, SendRate before, Outcome out
   co_return outcome;
 }
 
-// Reads the position twice; fails if the positions show that the shaft turns.
+// Reads the position twice and returns the second one; fails if one is missing or if they show that the shaft turns.
 Part<PositionResult> read_at_rest(Dialog& dialog) {
   const PositionResult first = co_await read_position(dialog);
   if (first.outcome.error != Error::none) co_return first;
@@ -190,8 +190,8 @@ Part<Outcome> change_quietly(Dialog& dialog, Values& found, Order order, std::ui
                     : check_direction(dialog.format(), found, first.counts, second.counts);
 }
 
-// Accepts a mean send rate within about 25 % of the wanted one, because the adapter may deliver frames in bursts; if 0
-// is wanted, no frame may have arrived.
+// Accepts two or more frames whose mean rate is from 75 % of the wanted one to 1 per second above 125 % of it, because
+// the adapter may deliver frames in bursts; if 0 is wanted, no frame may have arrived.
 Outcome check_cyclic(Dialog& dialog, unsigned wanted, bool answered, const SendRate& heard) {
   if (wanted == 0) {
     if (heard.count == 0) return done;
@@ -215,7 +215,7 @@ Procedure set_cyclic(Dialog& dialog, Values& found, Arguments arguments) {
   dialog.changes();
   found.answered = co_await is_answered(dialog, Order::cyclic, static_cast<std::uint8_t>(wanted));
   Outcome outcome = done;
-  // If the adapter delivers frames late, a repeated measurement corrects the result.
+  // If the adapter delivers frames late, a repeated measurement may correct the result.
   for (unsigned measurements = 0; measurements < most_measurements; ++measurements) {
     dialog.listen(wanted == 0 ? listening_time : std::max(5 * slowest_period / wanted / 2, enough_time) + answer_limit);
     const SendRate heard = co_await count_frames(dialog);
@@ -267,7 +267,8 @@ constexpr std::string_view scan_hint = "`absenc scan` shows which: set node=";
 constexpr unsigned before_requests = 0;
 constexpr unsigned after_requests = 256;
 
-// Counts the frames of all nodes until the listening time is over. `asked`: the last number that was requested.
+// Counts the frames of all nodes until the listening time is over. `asked`: the last number that was requested,
+// or one of the values above.
 Part<bool> count_node_frames(Dialog& dialog, Nodes& nodes, unsigned asked) {
   Time from = never;
   while (const MaybeFrame frame = co_await dialog.heard()) {

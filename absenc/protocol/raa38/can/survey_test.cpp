@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of procedures for all nodes on the bus: the scan, and the settings that reach every node.
+// Tests of the scan, of the command `node`, and of the settings that reach every node on the bus.
 #include "absenc/protocol/raa38/can/bench_test.hpp"
 
 namespace absenc::raa38::can {

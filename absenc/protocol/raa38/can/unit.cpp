@@ -46,7 +46,8 @@ constexpr std::array<Argument, 2> node_arguments{{{"node", "new number", 1, 255}
 constexpr std::array<Argument, 2> rate_arguments{{{"rate", "1000000, 500000 or 250000", 1, 1'000'000}, force}};
 constexpr std::array<Argument, 1> direction_arguments{{{"direction", "0: positive, 1: negative", 0, 1}}};
 
-/// Returns the frame of the order that a command sends; procedures send more frames.
+/// Returns the frame of the order that a command sends, or invalid_argument for a bit rate that the encoder does not
+/// have; procedures send more frames.
 template <Order order>
 constexpr Result<CanFrame> to(const Format& format, Arguments arguments) {
   const auto value = value_of(format, order, arguments.empty() ? 0 : arguments[0]);
@@ -181,12 +182,13 @@ bool is_checked(const Options& values, Frame request, Frame reply, std::size_t b
   const OrderInfo* const asked = request.can != nullptr ? order_of(*request.can) : &info_of(Order::read);
   return (asked != nullptr && asked->answer != Answer::position) || bit >= options.format(values).bits;
 }
-// Returns the bits of a field in the data. The node number is in the identifier, so it has no bits.
+// Returns the bits of the position in the data; none for any other field.
 BitRanges bits_in(const Options& values, Frame, Frame, const FieldInfo& field) {
   if (&field != fields.of<&Values::singleturn>()) return {};
   return author::bits_of(0, 0, options.format(values).bits);
 }
-// Returns whether a request is answered. NMT, SYNC, emergencies and the command that enters configuration mode are not.
+// Returns whether a request is answered: SDO requests are, and frames on 2NN and 7E5, except the order that enters
+// configuration mode.
 bool awaits_answer(const Options&, Frame request) {
   const Function function = function_of(*request.can);
   if (function != Function::command && function != Function::configuration) return function == Function::sdo_request;

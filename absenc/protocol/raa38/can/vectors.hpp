@@ -9,7 +9,7 @@
 namespace absenc::raa38::can {
 
 // clang-format off
-/// Test frames, from documents or derived from them, each with the fields or the error that decoding must give.
+/// Test frames, each with its source and with the fields or the error that decoding must give.
 inline constexpr std::array<author::VectorText, 41> vectors{{
     {"raa38s6-can-001", "seed capture", "seed", "bits=14", "", "1ff:022b000000000000", "node=255 singleturn=11010 angle_deg=241.9189453125"},
     {"raa38s6-can-002", "seed example node 20H 47 26 -> 215.31 deg", "seed", "bits=14", "220:8020000000000000", "120:4726000000000000", "node=32 singleturn=9799 angle_deg=215.31005859375"},

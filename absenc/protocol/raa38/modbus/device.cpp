@@ -11,8 +11,8 @@ using modbus::Exception;
 using modbus::FrameBytes;
 using namespace std::chrono_literals;
 
-// Greatest number of settings within a minute; the virtual encoder reports more as a broken rule. Document: "Do not
-// regularly send in case the internal structure of the device would be damaged".
+// Greatest number of settings in one window of time; the virtual encoder reports the next one as a broken rule.
+// Document: "Do not regularly send in case the internal structure of the device would be damaged".
 constexpr std::uint32_t most_settings = 10;
 constexpr Time settings_window = 1min;
 
@@ -48,7 +48,7 @@ void VirtualEncoder::request(Bytes body, Time at, FrameBytes& reply) {
     case function::set_parameter:
       return set_parameter(body, at, reply);
     default:
-      // Ignores function codes from 80 on, which are refusals, and A0, which is only for address FF.
+      // Ignores the other function codes from 80 on: refusals, and A0, which is only for address FF.
       if (body[1] < modbus::refusal_bit) refuse(reply, address(), body[1], Exception::illegal_function);
   }
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Requests and replies of an RAA38S6 over Modbus RTU (RAA38S6 Operation Manual, 3.1.7): encoding, decoding, all checks.
+// Requests and replies of an RAA38S6 over Modbus RTU (RAA38S6 Operation Manual, 3.1.7): encodes requests, and decodes
+// and checks requests and replies.
 #pragma once
 
 #include <array>
@@ -183,8 +184,8 @@ constexpr std::optional<std::uint8_t> refusal_of(const Request& request, Bytes r
   return modbus::refusal_code(reply, request.function);
 }
 
-// Returns whether the length of a reply to `read` fits its byte count. The reply to a request of two registers has
-// four or three bytes of data, and three may be counted as 03 or 04: 3.1.7 contains all three forms.
+// Returns whether the length of a reply to `read` fits its byte count and the request. The reply to a request of two
+// registers has four or three bytes of data, and three may be counted as 03 or 04: 3.1.7 contains all three forms.
 constexpr bool read_length_is_right(const Request& request, Bytes reply) {
   if (reply.size() < modbus::shortest_frame) return false;
   const std::size_t count = reply[2];
@@ -239,7 +240,7 @@ constexpr bool is_answer(const Request& request, Bytes reply) {
   return reply;
 }
 
-/// Returns the request that a captured reply seems to answer, judged by its function code.
+/// Returns the request that a captured reply seems to answer.
 [[nodiscard]] constexpr Request assumed_request(const Format& format, Bytes reply) {
   Request request = read_request(format);
   if (reply.size() < modbus::shortest_frame) return request;
@@ -251,7 +252,7 @@ constexpr bool is_answer(const Request& request, Bytes reply) {
 }
 
 /// Returns the length of a reply that begins with `begun`, in bytes. A reply with byte count 04 may be one byte
-/// shorter.
+/// shorter; a refusal of A1 is one byte longer.
 [[nodiscard]] constexpr std::size_t reply_length(const Request& request, Bytes begun) {
   if (request.function == function::set_address) return 4;
   if (request.function != function::read) return 5;
@@ -288,7 +289,7 @@ struct Protocol {
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
   /// Decodes a request; returns an error if its bytes are invalid.
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return rtu::decode_request(bytes); }
-  /// Returns the greatest length in bytes of a reply with these first bytes.
+  /// Returns the length in bytes of a reply with these first bytes, with the exceptions of `reply_length`.
   static constexpr std::size_t expected(const Format&, const Request& request, Bytes reply) {
     return reply_length(request, reply);
   }

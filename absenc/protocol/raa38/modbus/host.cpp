@@ -104,7 +104,7 @@ using namespace author;
 using namespace std::chrono_literals;
 
 constexpr unsigned most_damaged_answers = 3;
-constexpr Time memory_time = 20ms;  // time that the encoder needs to store a setting; the document gives none
+constexpr Time memory_time = 20ms;  // assumed time for storing a setting; the document gives none
 constexpr Request address_request{.function = function::read_address, .address = any_address};
 
 constexpr Explanation too_few_registers{"one register has 16 bits, and the position has more",
@@ -115,7 +115,8 @@ constexpr Request setting(const Format& format, std::uint8_t value) {
 }
 
 // Reads the position in up to `attempts` attempts; ends early after a refusal, or if the line is never silent. A
-// reply of doubtful length is confirmed by a second request within the attempt.
+// reply of doubtful length is confirmed by a second request within the attempt. Stops the procedure if one register is
+// requested and the position has more bits.
 Part<Result<Reply>> read_position(Dialog& dialog, std::uint8_t address, unsigned attempts) {
   Request request = read_request(dialog.format());
   request.address = address;

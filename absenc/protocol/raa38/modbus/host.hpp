@@ -27,12 +27,12 @@ struct Values {
   std::optional<std::uint16_t> registers{};       ///< Number of registers that the request reads.
   std::optional<std::uint32_t> singleturn{};      ///< Position within the turn, in counts.
   std::optional<double> angle{};                  ///< Position within the turn, in degrees.
-  std::optional<std::uint16_t> new_address{};     ///< Address that the encoder has after a setting.
+  std::optional<std::uint16_t> new_address{};     ///< Address that function A1 gives to the encoder.
   std::optional<std::uint16_t> parameter{};       ///< Parameter of function CC.
   std::optional<std::string_view> setting{};      ///< Meaning of the parameter in words.
   std::optional<std::string_view> crc_order{};    ///< Byte order of the CRC: low_first or high_first.
   std::optional<std::uint32_t> baud{};            ///< Baud rate at which the encoder answers, in bits per second.
-  std::optional<std::string_view> direction{};    ///< Sentence about the counting direction, which no command reads.
+  std::optional<std::string_view> direction{};    ///< Sentence about the counting direction, which no request reads.
   /// Sentence about the change of the position by a direction setting.
   std::optional<std::string_view> effect{};
   std::optional<bool> written{};                   ///< Whether a setting was sent; false if the encoder has it already.
@@ -51,8 +51,8 @@ struct CommandValues : Values {
 /// Interface by which procedures send requests and await replies.
 using Dialog = author::DialogOf<Protocol>;
 
-// If no encoder answers at the address of the format, the procedures below except `read_address` and `scan` send A0
-// and name the address in the reply in their error text.
+// If no encoder answers at the address of the format before a setting is sent, the procedures below except
+// `read_address` and `scan` send A0. If an encoder with another address answers, their error text names that address.
 
 /// Reads the position once and reports it.
 author::Procedure read_position_once(Dialog& dialog, CommandValues& found);
@@ -60,23 +60,23 @@ author::Procedure read_position_once(Dialog& dialog, CommandValues& found);
 /// Reads the position for the direction command: no request reads the direction, so only the position can be reported.
 author::Procedure read_direction(Dialog& dialog, CommandValues& found);
 
-/// Reads the address with A0. If A0 gets no valid reply, as with several encoders on the line, checks whether the
-/// encoder at the address of the format answers.
+/// Reads the address with A0. If A0 gets no valid reply, as with several encoders on the line, and the line becomes
+/// silent, checks whether the encoder at the address of the format answers.
 author::Procedure read_address(Dialog& dialog, CommandValues& found);
 
 /// Finds the baud rate at which the encoder answers: tries the rate of the format first, then the others. Leaves the
-/// line at its old rate. Errors: timeout, or the error of the reply at the rate of the format, or of a line that is
-/// never silent.
+/// line at its old rate. Errors: invalid_argument (the position has more bits than one requested register), timeout, or
+/// the error of the reply at the rate of the format, or of a line that is never silent.
 author::Procedure find_baud(Dialog& dialog, CommandValues& found);
 
 /// Result of a scan of the slaves on a line. The scan sends A0 first, which a single encoder answers; otherwise it
 /// requests every address from the first argument to the second. If all replies of an address are damaged, two encoders
 /// share it or the line is bad. Errors: timeout if no slave answers, invalid_argument if the last address is before the
-/// first, or the error of a line that is never silent.
+/// first or if the position has more bits than one requested register, or the error of a line that is never silent.
 struct Slaves {
-  /// Result of polling one address: no answer, a valid answer, only damaged answers, or a refusal.
+  /// Result of polling one address: no answer, a valid answer, three damaged answers, or a refusal.
   enum class Kind : std::uint8_t { none, answers, clash, refuses };
-  std::array<Kind, modbus::last_address + 1> at{};  ///< Result of each address; the index is the address.
+  std::array<Kind, modbus::last_address + 1> at{};  ///< Result of each address, which is the index; 0 is unused.
 };
 /// Scans the line for slaves.
 author::Procedure scan(Dialog& dialog, Slaves& found, Arguments arguments);

@@ -14,8 +14,8 @@ const Wire position_of_1 = framed({1, 3, 2, 0, 9});
 
 // ---- Reading
 
-// Checks that at each baud rate the positions per second are more than 95 % of the limit that the silences on the line
-// set.
+// Checks that at each baud rate the positions per second are more than 95 % of the limit that characters, silences and
+// the encoder's answer time set.
 TEST(Raa38ModbusHost, ReadsAsFastAsSilencesAllow) {
   for (std::size_t baud = 0; baud < bauds.size(); ++baud) {
     Bench bench({.baud = baud});

@@ -112,8 +112,8 @@ FrameEnd frame_end(const Options& values, Direction way, Bytes bytes) {
 
 // ---- Evidence of captured frames for options; their address does not matter
 
-/// Content of a valid capture, or the error that it has with any options. `reply` is empty if the capture has none, or
-/// a refusal.
+/// Content of a valid capture, or the error that it has with any options. `reply` has no value if the capture has no
+/// reply, a refusal, or an error.
 struct CaptureContent {
   Request request{};
   std::optional<Reply> reply{};

@@ -9,7 +9,7 @@
 namespace absenc::raa38::rtu {
 
 // clang-format off
-/// Test frames, from documents or derived from them, each with the fields or the error that decoding must give.
+/// Test frames, each with its source and with the fields or the error that decoding must give.
 inline constexpr std::array<author::VectorText, 31> vectors{{
     {"raa38-modbus-001", "request of one register", "seed 3.1.7 (5)", "", "010300000001840a", "", "address=1 function=3 first_register=0 registers=1 crc_order=low_first"},
     {"raa38-modbus-002", "request of two registers", "seed 3.1.7 (5)", "", "010300000002c40b", "", "address=1 function=3 first_register=0 registers=2 crc_order=low_first"},

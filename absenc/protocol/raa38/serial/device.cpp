@@ -63,12 +63,12 @@ void VirtualEncoder::triggered(const ByteEvent& event) {
   transmit(encode_position(format(), position(event.at)), event.at + Protocol::device_times(format()).answer_time);
 }
 
-// Reports a request that arrives during a transmission. Two encoders with one number send at the same time, so only a
-// whole request with the number of this encoder breaks the rule, not other bytes.
+// Reports a request `BC AA Bx` that arrives during a transmission. Two encoders with one number send at the same time,
+// so only a whole request with the number of this encoder breaks the rule, not other bytes.
 void VirtualEncoder::check_during_transmission(const ByteEvent& event) {
   const std::uint32_t own = 0xBCAA00u | number_mark | format().unit;
-  // If this program was scheduled late, the frame should have been sent before the request arrived, so the request
-  // breaks no rule.
+  // This program may have been scheduled so late that the frame should have been sent before the request arrived; then
+  // the request breaks no rule.
   const bool may_have_waited = event.late > Protocol::device_times(format()).answer_time + format().transmission;
   for (const std::uint8_t byte : event.items) {
     last_characters_ = (last_characters_ << 8 | byte) & 0xFFFFFF;

@@ -40,9 +40,9 @@ enum class Zeroing : std::uint8_t {
 inline constexpr std::uint8_t header = 0xFF;  ///< First byte of each frame.
 /// Second byte of a frame that does not contain the encoder's number.
 inline constexpr std::uint8_t fixed_second_byte = 0x81;
-inline constexpr std::uint8_t number_mark = 0xB0;  ///< Third byte Bx of a request: read unit x.
-inline constexpr std::uint8_t clear_mark = 0xC0;   ///< Third byte Cx of a request: set the zero of unit x.
-inline constexpr unsigned unit_count = 16;         ///< Number of units on a bus: x is one hexadecimal digit.
+inline constexpr std::uint8_t number_mark = 0xB0;  ///< High digit of the third byte Bx of a request: read unit x.
+inline constexpr std::uint8_t clear_mark = 0xC0;   ///< High digit of the third byte Cx: set the zero of unit x.
+inline constexpr unsigned unit_count = 16;         ///< Most units on a bus: x is one hexadecimal digit.
 inline constexpr unsigned least_bits = 10;         ///< Lowest number of bits of the position that can be ordered.
 /// Highest number of bits of the position that can be ordered.
 inline constexpr unsigned most_bits = 21;
@@ -54,17 +54,17 @@ inline constexpr std::size_t frame_capacity = 6;  ///< Length of the longest fra
 inline constexpr Time trigger_width = 10us;  ///< Time T2: shortest pulse on CLK (3.1.3).
 inline constexpr Time clear_width = 1ms;     ///< Width of the pulse on CLR.
 
-// Times of the host. `answer_limit` and `gap_limit` are for encoders whose ordered times the options do not state.
+// Times of the host. `answer_limit` is for encoders whose T3 the options do not state.
 /// Timeout of a reply: longest T3, or longest time from a request to its reply.
 inline constexpr Time answer_limit = 100ms;
 inline constexpr Time answer_slack = 5ms;  ///< Time added to a T3 from the options to get the timeout.
-inline constexpr Time gap_limit = 10ms;    ///< Timeout between two characters of a frame; suits 1200 baud.
+inline constexpr Time gap_limit = 10ms;    ///< Least timeout between two characters of a frame; suits 1200 baud.
 inline constexpr Time patience = 1s;  ///< Timeout on a line that is never silent; two frames at 1200 baud take 100 ms.
-inline constexpr Time listen_limit = 1s;  ///< Timeout of a stream without a valid frame.
+inline constexpr Time listen_limit = 1s;  ///< Least timeout of a stream without a valid frame.
 /// Time for which the host listens before a scan; longer than the period of most refresh rates.
 inline constexpr Time scan_silence = 200ms;
 inline constexpr Time zero_limit = 500ms;  ///< Time within which the position must become zero after zero clearing.
-inline constexpr Time zero_poll = 10ms;    ///< Time between two polls of the position after zero clearing.
+inline constexpr Time zero_poll = 10ms;    ///< Pause before each poll of the position after zero clearing.
 
 // Times of the virtual encoder; options may set another period and another T3.
 inline constexpr Time virtual_period = 10ms;        ///< Time between the virtual encoder's frames: refresh rate 100 Hz.
@@ -140,8 +140,7 @@ using RequestBytes = ByteBuffer<request_bytes>;
   return bytes;
 }
 
-/// Value of `unit` with which decoding accepts a frame of any unit. Used without a request, where the frame itself
-/// shows its unit.
+/// Value of `unit` with which decoding accepts a frame of any unit, because no request names one.
 inline constexpr int any_unit = -1;
 
 /// Returns whether `second_byte` is valid in a frame of `unit`.
@@ -203,7 +202,7 @@ struct Values {
   std::optional<bool> clash{};
   std::optional<std::uint32_t> before{};      ///< Position before the zero was set, in counts.
   std::optional<std::uint32_t> singleturn{};  ///< Position within the turn, in counts.
-  /// Second byte of the frame: 81, or on a bus Bx with the encoder's number.
+  /// Second byte of the frame: 81, or Bx with the encoder's number.
   std::optional<std::uint8_t> second_byte{};
   std::optional<double> angle{};              ///< Position within the turn, in degrees.
   std::optional<std::string_view> command{};  ///< Name of the request: read or zero_clear.
@@ -249,7 +248,7 @@ struct Protocol {
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
   /// Decodes a request; returns an error if its bytes are invalid.
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return serial::decode_request(bytes); }
-  /// Returns the length of the request that begins with `begin`, in bytes; 0 if that is no request.
+  /// Returns the length of a request in bytes; 0 if the first byte, or the second one, is not that of a request.
   static constexpr std::size_t request_size(const Format&, Bytes begin) {
     const RequestBytes request = encode_request({});
     return begin[0] == request[0] && (begin.size() < 2 || begin[1] == request[1]) ? request_bytes : 0;
@@ -286,7 +285,7 @@ struct Protocol {
   }
 };
 
-/// Returns the request on which this encoder sends a position: bytes on a bus, otherwise a pulse.
+/// Returns the request on which an encoder sends a position: bytes in bus mode, a pulse in handshake mode.
 [[nodiscard]] constexpr Request position_request(const Format& format) {
   return {format.mode == Mode::bus ? Request::Kind::read : Request::Kind::trigger, format.unit};
 }

@@ -25,7 +25,7 @@ TEST(Raa38SerialFrame, FirstFailingCheckGivesError) {
 }
 
 // Checks for each position of several numbers of bits that the repeated frame of an encoder at standstill, decoded from
-// another byte on, never gives another position, so that a search cannot align wrongly.
+// any other FF 81 on, never gives another position, so that a search cannot align wrongly.
 TEST(Raa38SerialFrame, RepeatedFrameHasNoOtherAlignment) {
   for (const unsigned bits : {10u, 14u, 16u, 17u, 21u}) {
     const Format format{.bits = bits};

@@ -11,7 +11,7 @@ namespace absenc::raa38::serial {
 
 namespace {
 
-// Returns whether the rules of a bus apply: a bus request proves this, whatever the option mode is.
+// Returns whether the rules of a bus apply: in bus mode, and in any mode if the request is a bus request.
 bool is_on_bus(const Format& format, Bytes request) {
   return format.mode == Mode::bus || decode_request(request).has_value();
 }

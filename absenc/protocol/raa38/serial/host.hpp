@@ -27,8 +27,9 @@ inline constexpr auto fields = author::fields_of<Values>(
 /// explains why no reply was received, or what is wrong with the request.
 [[nodiscard]] Explanation explain(const Format& format, Error error, Bytes request, Bytes reply);
 
-/// Receives the frames of a streaming encoder and sends nothing. Emits every valid frame, and every loss of frames with
-/// its error. Ends when no valid frame arrives any more: timeout, bad_framing, out_of_range.
+/// Receives the frames of a streaming encoder and sends nothing. Emits the results of the StreamDecoder: valid frames,
+/// and losses of alignment with their error. Ends if it has emitted nothing for some time: timeout, bad_framing,
+/// out_of_range.
 class Listen final : public Conversation<std::uint8_t> {
  public:
   /// Creates a conversation that receives an encoder of this format.
@@ -44,15 +45,15 @@ class Listen final : public Conversation<std::uint8_t> {
   [[nodiscard]] std::string_view advice() const override { return words_.advice; }
   [[nodiscard]] const Reading* reading() const override;
   void report(FieldSink& sink) const override;
-  /// Returns the last received frame, valid or damaged, and its time, with an empty request; no bytes after the stream
-  /// has ended.
+  /// Returns the frame of the last emitted result, valid or damaged, with an empty request; no bytes after a damaged
+  /// character, and after the stream has ended. The times are those of the last received bytes.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const override;
 
   /// Returns the decoder that finds the frames in the stream.
   [[nodiscard]] const StreamDecoder& decoder() const { return decoder_; }
 
  private:
-  // Greatest number of frames in the bytes that a port delivers at once.
+  // Room for the results in the bytes that a port delivers at once.
   static constexpr std::size_t most_waiting = 1024;
 
   void take(const StreamFrame& found);
@@ -65,12 +66,12 @@ class Listen final : public Conversation<std::uint8_t> {
   Buffer<StreamFrame, most_waiting> waiting_;
   std::size_t taken_ = 0;  // number of results in `waiting_` that were emitted already
   bool done_ = false;
-  bool received_anything_ = false;  // whether bytes or damaged characters were received since the last valid frame
+  bool received_anything_ = false;  // whether anything was received since the last valid frame was emitted
   bool restart_timeout_ = true;     // whether the timeout must be restarted
   Time deadline_{};
   Time received_at_{};             // time at which the bytes that are being processed were received
   Time received_before_{};         // time at which the bytes before those of `received_at_` were received
-  std::uint64_t valid_count_ = 0;  // number of valid frames received so far
+  std::uint64_t valid_count_ = 0;  // number of valid frames emitted so far
   StreamCounts counts_{};
   Reading reading_{};
   FrameBytes frame_;
@@ -88,8 +89,8 @@ author::Procedure set_zero(Dialog& dialog, Values& found);
 
 /// Result of a scan of the units on a bus; the index is the unit number. The scan listens for encoders that transmit
 /// without a request, then requests every number, whatever the option mode is. If all replies of a number are damaged,
-/// two encoders share it or the line is bad. Errors: timeout if no unit answers, unexpected_reply if an encoder
-/// transmits without a request, or the error of a line that is never silent.
+/// two encoders share it or the line is bad. Errors: timeout if no unit answers, unexpected_reply if bytes are received
+/// without a request, or the error of a line that is never silent.
 using Units = std::array<Values, unit_count>;
 /// Scans the bus for units.
 author::Procedure scan(Dialog& dialog, Units& found);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of the host's conversations with the virtual encoder in virtual time, and of the rules that the virtual encoder
-// checks.
+// Tests of the host's requests, its commands `zero` and `scan`, and the virtual encoder.
 #include "absenc/protocol/raa38/serial/bench_test.hpp"
 
 namespace absenc::raa38::serial {

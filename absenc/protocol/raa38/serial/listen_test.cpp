@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of the stream of a virtual encoder in virtual time, received directly and by a Session.
+// Tests of the reception of a stream, directly and by a Session.
 #include "absenc/host/session.hpp"
 #include "absenc/protocol/raa38/serial/bench_test.hpp"
 #include "absenc/sim/sim_port.hpp"

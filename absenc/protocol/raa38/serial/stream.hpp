@@ -21,10 +21,10 @@ struct StreamFrame {
   Time at{};                     ///< Time at which the last byte of the valid frame was received.
 };
 
-/// Finds frames in received bytes. While aligned, a frame is accepted where the previous one ended. A frame with an FF
-/// inside is accepted only when another header follows, which may take a period. Without alignment, two valid frames
-/// must follow each other; both are then reported. A disturbance therefore costs the frames that it hits, and one valid
-/// frame more if no two valid frames are left together.
+/// Finds frames in received bytes. While aligned, a frame is accepted where the previous one ended; one with an FF
+/// after its second byte is accepted only when another header follows, which may take a period. Without alignment, two
+/// valid frames must follow each other; both are then reported. A disturbance therefore usually costs the frames that
+/// it hits, and one valid frame more if no two valid frames are left together.
 class StreamDecoder {
  public:
   /// Creates a decoder for a streaming encoder of this format.

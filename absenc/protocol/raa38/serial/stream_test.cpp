@@ -189,7 +189,7 @@ TEST(Raa38SerialStream, AlignsWhenPiecesEndInsideFrames) {
 struct Tally {
   std::uint64_t sent = 0;
   std::uint64_t lost = 0;   // frames that were not received, although no disturbance hit them
-  std::uint64_t wrong = 0;  // positions that were received, but never sent
+  std::uint64_t wrong = 0;  // received positions that none of the next sent ones equals
   std::uint64_t disturbances = 0;
 };
 

@@ -9,7 +9,7 @@
 namespace absenc::raa38::serial {
 
 // clang-format off
-/// Test frames, from documents or derived from them, each with the fields or the error that decoding must give.
+/// Test frames, each with its source and with the fields or the error that decoding must give.
 inline constexpr std::array<author::VectorText, 24> vectors{{
     {"raa38s6-serial-001", "383 of 14 bits", "seed 3.1.1", "bits=14", "", "ff81017f00", "singleturn=383 second_byte=129 angle_deg=8.41552734375"},
     {"raa38s6-serial-002", "17 bits: three data bytes", "derived", "bits=17", "", "ff8101abcdf9", "singleturn=109517 second_byte=129 angle_deg=300.79742431640625"},
