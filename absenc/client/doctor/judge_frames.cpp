@@ -256,29 +256,6 @@ bool is_cut(const Observations& seen, const Attempted& attempt) {
   });
 }
 
-// Returns the number of silent attempts in `readings`. Consecutive missing frames of a stream count as one if this
-// computer was late by as long: an emulator that it stops sends none of them.
-std::size_t silences(const Observations& seen) {
-  std::size_t count = 0;
-  std::size_t run = 0;
-  Time missing{};
-  const auto end_run = [&] {
-    count += seen.is_stream && missing <= seen.computer_late ? std::min<std::size_t>(run, 1) : run;
-    run = 0;
-    missing = {};
-  };
-  for (const Attempted& one : seen.readings) {
-    if (!is_silent(one)) {
-      end_run();
-      continue;
-    }
-    ++run;
-    missing += one.limit;
-  }
-  end_run();
-  return count;
-}
-
 // Returns the damaged replies to requests that were repeated, without good replies beside other bytes, and without
 // replies in which the encoder refuses a request. Returns none if as many or more requests were not answered: a late
 // reply may collide with the reply to the next request.
@@ -417,10 +394,9 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
     findings.push_back(contradiction(one, all));
     all.clear();
   }
-  const auto silent_requests =
-      stuck.size() + static_cast<std::size_t>(std::ranges::count_if(one.seen.repeated, is_silent));
   const std::size_t silent =
-      silent_requests + static_cast<std::size_t>(std::ranges::count_if(one.seen.readings, is_silent));
+      stuck.size() + static_cast<std::size_t>(std::ranges::count_if(one.seen.readings, is_silent) +
+                                              std::ranges::count_if(one.seen.repeated, is_silent));
   if (std::optional<Finding> two = two_frames(one, all); two && all.size() * 4 > one.seen.readings.size()) {
     findings.push_back(std::move(*two));
   } else if (one.seen.overfull * 4 > one.seen.readings.size()) {
@@ -444,7 +420,7 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
   }
   const std::size_t late = one.unit.link == LinkKind::can ? 0 : one.seen.late;
   // A late reply may make the next reading fail as well, so silent readings are compared with twice the late replies.
-  if (silent > 2 * late && !may_be_the_computer(one.seen, silent_requests + silences(one.seen))) {
+  if (silent > 2 * late && !may_be_the_computer(one.seen, silent)) {
     findings.push_back(some_silence(one.seen, silent, one.seen.readings.size() + one.seen.repeated.size()));
   }
 }
