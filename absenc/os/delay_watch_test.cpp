@@ -15,7 +15,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Stops a process with a DelayWatch for 50 ms. Returns 0 if the process then measured at least as much, else 1.
+// Stops a process with a DelayWatch for at least 60 ms. Returns 0 if that process then measured 50 ms or more within
+// 10 s, else 1.
 int measured_while_stopped(bool terminals) {
   const pid_t child = ::fork();
   if (child == 0) {
