@@ -114,11 +114,14 @@ class RefusedMessages(BrokerCase):
 
     def serve(self, answer):
         broker = self.fake(answer)
-        path = self.file("absenc.toml", "".join(f'[encoder.{name}]\nprotocol = "tformat"\nport = "sim"\n'
-                                                for name in ("bad", "good")))
+        path = self.configure("bad", "good")
         server = self.without_history("--mqtt", broker.url, "--mqtt-prefix", "plant", "--mqtt-spool",
                                       os.path.join(self.directory, "spool"), ABSENC_CONFIG=path)
         return broker, server
+
+    def configure(self, *names):
+        return self.file("absenc.toml", "".join(f'[encoder.{name}]\nprotocol = "tformat"\nport = "sim"\n'
+                                                for name in names))
 
     def check(self, broker, server, connections, how):
         good, bad = (lambda: numbers(broker.all(self.GOOD), "good")), (lambda: numbers(broker.taken(self.BAD), "bad"))
@@ -165,9 +168,9 @@ class RefusedMessages(BrokerCase):
         self.check(broker, server, 6, "closes the connection")
 
     def test_refused_states(self):
-        def answer(_broker, _connection, kind, flags, body, usual):
+        def answer(broker, _connection, kind, flags, body, usual):
             topic, number, _ = published(flags, body) if kind == PUBLISH else ("", 0, b"")
-            if topic != "plant/bad/state":
+            if topic != "plant/bad/state" or getattr(broker, "permits", False):
                 return usual
             return packet(PUBACK, number.to_bytes(2, "big") + bytes((NOT_AUTHORIZED,)))
         broker, server = self.serve(answer)
@@ -175,6 +178,13 @@ class RefusedMessages(BrokerCase):
         self.assertEqual(broker.connections, 1)
         self.assertEqual(len([one for one in self.events(broker) if "plant/bad/state" in one]), 1)
         self.assertIn("(plant/bad/state)", self.mqtt(server)["trouble"])
+        # The state of an encoder that is removed meanwhile must be cleared when the broker accepts it.
+        self.configure("good")
+        server.process.send_signal(signal.SIGHUP)
+        wait_until(lambda: len(server.json("/api/encoders")["encoders"]) == 1, "it is no longer served")
+        self.assertNotIn(None, broker.all("plant/bad/state"))
+        broker.permits = True
+        wait_until(lambda: None in broker.all("plant/bad/state"), "its state is cleared")
 
 
 class ClientProcess(BrokerCase):

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 #include <vector>
 
@@ -215,23 +216,27 @@ void MqttSender::send_states(MqttClient& client) {
   }
 }
 
-// Clears the retained messages of encoders that are no longer served; otherwise the broker would keep them.
+// Clears the retained messages of encoders that are no longer served; otherwise the broker would keep them. An encoder
+// with a topic that the broker refuses stays in `served_` and is tried again.
 void MqttSender::clear_unserved(MqttClient& client, const Fleet::Watches& watches) {
   std::set<std::string> now;
   for (const auto& watch : watches) now.insert(watch->name());
+  std::set<std::string> refused;
   for (const std::string& name : served_) {
     if (now.contains(name)) continue;
-    send_retained(client, {topic_of(settings_->prefix, name, "state"), "", ""});
-    retained_.erase(topic_of(settings_->prefix, name, "state"));
-    if (!settings_->home_assistant.empty()) {
-      for (const std::string& topic : home_assistant_topics(*settings_, name)) {
-        send_retained(client, {topic, "", ""});
-        retained_.erase(topic);
-      }
+    std::vector<std::string> topics{topic_of(settings_->prefix, name, "state")};
+    if (!settings_->home_assistant.empty())
+      std::ranges::move(home_assistant_topics(*settings_, name), std::back_inserter(topics));
+    const auto clear = [&](const std::string& topic) { return send_retained(client, {topic, "", ""}); };
+    if (std::ranges::count_if(topics, clear) == std::ssize(topics)) {
+      for (const std::string& topic : topics) retained_.erase(topic);
+      spool_->forget(name);
+    } else {
+      refused.insert(name);
     }
-    spool_->forget(name);
   }
-  served_ = now;
+  served_ = std::move(now);
+  served_.merge(refused);
 }
 
 void MqttSender::send_values(MqttClient& client) {
@@ -243,13 +248,15 @@ void MqttSender::send_values(MqttClient& client) {
   }
 }
 
-void MqttSender::send_retained(MqttClient& client, const Retained& retained) {
+// Returns whether the message is sent, or was before.
+bool MqttSender::send_retained(MqttClient& client, const Retained& retained) {
   const auto known = retained_.find(retained.topic);
-  if (known != retained_.end() && known->second == retained.condition) return;
-  if (refusals_.verdict(retained.topic, outstanding_.size(), os::now()) != MqttRefusals::Verdict::send) return;
+  if (known != retained_.end() && known->second == retained.condition) return true;
+  if (refusals_.verdict(retained.topic, outstanding_.size(), os::now()) != MqttRefusals::Verdict::send) return false;
   retained_[retained.topic] = retained.condition;
   outstanding_[client.publish(retained.topic, retained.payload, 1, true)] = {0, retained.topic};
   refusals_.sent(retained.topic);
+  return true;
 }
 
 void MqttSender::send_messages(MqttClient& client) {

@@ -52,7 +52,7 @@ class MqttSender {
   void step(MqttClient& client);
   void send_states(MqttClient& client);
   void send_values(MqttClient& client);
-  void send_retained(MqttClient& client, const Retained& retained);
+  bool send_retained(MqttClient& client, const Retained& retained);
   void clear_unserved(MqttClient& client, const Fleet::Watches& watches);
   void send_messages(MqttClient& client);
   void settle(MqttClient& client);
