@@ -39,7 +39,7 @@ PROXIED = [
     ("NMEA", faults.Nmea, "modem_answers never_silent"),
     ("chatter", faults.Chatter, "never_silent"),
     ("always late", faults.AlwaysLate, "reply_late"),
-    # sometimes_silent: if the next reply arrives before the late one, nothing shows that a reply was late.
+    # sometimes_silent: a late reply may come after the host has ended to listen for it.
     ("randomly late", faults.SometimesLate, "sometimes_late reply_late sometimes_silent"),
     ("loose contact", faults.LooseContact, "comes_and_goes sometimes_silent"),
     ("starting", faults.Starting, "good starting"),

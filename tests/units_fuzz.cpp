@@ -96,8 +96,8 @@ std::vector<Item> items_of(const Unit& unit, Bytes bytes) {
   }
 }
 
-// Runs a conversation whose reply is the input, in pieces of `piece` items. The conversation is aborted at step 300. It
-// must end within 30000 steps, and report nothing together with an error.
+// Runs a conversation whose reply is the input, in pieces of `piece` items. At step 300 the conversation is asked to
+// end early. It must end within 30000 steps, and report nothing together with an error.
 template <class Item>
 void converse(const Unit& unit, const Options& options, const Command& command, Bytes input, std::size_t piece) {
   using Kind = typename Event<Item>::Kind;
@@ -120,8 +120,8 @@ void converse(const Unit& unit, const Options& options, const Command& command, 
       require(conversation->error() == Error::none || fields.count == 0);
       return;
     }
-    if (step.kind == Wanted::emit || step.kind == Wanted::configure) continue;
     if (steps == 300) conversation->abort();
+    if (step.kind == Wanted::emit || step.kind == Wanted::configure) continue;
     now = std::max(now + std::chrono::milliseconds(1), step.kind == Wanted::wait ? Time{} : step.at);
     if (step.kind != Wanted::wait) {
       conversation->feed({.kind = Kind::sent, .at = now});

@@ -57,7 +57,8 @@ std::string_view authority_of(std::string_view origin) {
   return origin.substr(std::min(origin.find("//") + 2, origin.size()));
 }
 
-// Returns the origin of a URL in the form that browsers send; "" for "". Throws UsageError if the URL is invalid.
+// Returns the origin of a URL without a usual port; "" for "". Throws UsageError for other URLs than
+// "http(s)://host[:port][/path]".
 std::string origin_of(std::string_view url) {
   if (url.empty()) return {};
   const std::size_t host = url.starts_with("https://") ? 8 : url.starts_with("http://") ? 7 : 0;

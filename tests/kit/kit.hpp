@@ -32,7 +32,7 @@ namespace absenc::kit {
 /// silent.
 [[nodiscard]] Findings check_silence(const Unit& unit);
 
-/// Encodes every command with random arguments and decodes the request: its fields must contain each of these arguments
+/// Encodes every command with random arguments and decodes the request: its fields must contain the required arguments
 /// that it has a field for. Arguments outside their ranges must be refused.
 [[nodiscard]] Findings check_requests(const Unit& unit, std::uint64_t seed);
 

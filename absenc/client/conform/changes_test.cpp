@@ -273,8 +273,8 @@ std::vector<Spoil<Item>> spoils_of(const EncoderAddress& address, const Clause& 
       });
     }
   }
-  // Adds encoders that ignore a window of consecutive requests, because the memory of some encoders does not contain
-  // the setting.
+  // For clauses that change the encoder, adds encoders that ignore a window of consecutive requests: spoiling a byte of
+  // the memory breaks no clause about a setting that the memory does not contain.
   const unsigned step = address.unit->link == LinkKind::clocked ? 20 : 5;
   for (const unsigned window : {30u, 1000u}) {
     for (unsigned from = 1; clause.demand >= Demand::set && from <= requests; from += step) {

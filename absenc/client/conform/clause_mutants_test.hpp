@@ -139,8 +139,8 @@ ReplyChanges<Item> frame_mutants(const EncoderAddress& address, const Clause& cl
   return all;
 }
 
-/// Returns mutants with each condition of the encoder at both ends of its range and 5 above normal, mutants that always
-/// flip the same bit of their replies, and mutants that flip the same bit of each request.
+/// Returns mutants with a condition of the encoder at an end of its range or 5 above normal, where its range has such a
+/// value, mutants that always flip the same bit of their replies, and mutants that flip the same bit of each request.
 template <class Item>
 ReplyChanges<Item> command_mutants(const EncoderAddress& address) {
   ReplyChanges<Item> all;

@@ -153,7 +153,7 @@ const Ids& causes_of(const Unit& unit, sim::FaultKind kind) {
   static const Ids damage{"damaged_bits",   "damaged_bursts", "sometimes_damaged", "always_damaged", "bytes_missing",
                           "position_jumps", "position_noise", "stuck_bits",        "can_errors"};
   static const std::map<sim::FaultKind, Ids> others{
-      // If the next reply arrives before the late reply, nothing shows that a reply was late.
+      // sometimes_silent: a late reply may come after the host has ended to listen for it.
       {delay, {"reply_late", "sometimes_late", "sometimes_silent"}},
       {echo, {"wrong_echo", "two_answer", "extra_bytes"}},
       // Random bytes on a bus may look like two encoders that send at the same time.

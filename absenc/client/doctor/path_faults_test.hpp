@@ -168,7 +168,7 @@ inline std::vector<PathFault> faults_of_line() {
   faults.push_back(of_encoder_fault("lost 10 %", "fault=silence=0.1", {"sometimes_silent"}));
   faults.push_back(of_encoder_fault("corrupt 2 %", "fault=corrupt=0.02", damage));
   faults.push_back(of_encoder_fault("always late", "fault=delay=1", {"reply_late"}));
-  // If the next reply arrives before the late reply, nothing shows that a reply was late.
+  // sometimes_silent: a late reply may come after the host has ended to listen for it.
   faults.push_back(
       of_encoder_fault("randomly late", "fault=delay=0.2", {"reply_late", "sometimes_late", "sometimes_silent"}));
   faults.push_back({"line low", [](const Unit& unit, const std::string& mode, const std::string& rate) {

@@ -146,7 +146,7 @@ TEST(EslSafety, OtherRepliesAreCountedAsTheProfileSays) {
 
 // ---- The campaign
 
-// Counts the accepted replies while one channel is wrong, and their largest error.
+// Returns the number of accepted replies while one channel is wrong, and raises `off` to their largest error.
 unsigned accepted_with(condition::Index index, std::int64_t value, unsigned exchanges, std::int64_t& off) {
   Monitored pair;
   pair.trust();
