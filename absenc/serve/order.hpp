@@ -35,7 +35,7 @@ struct Order {
   std::vector<std::int64_t> arguments{};
   client::MemoryImage addresses{};
   std::string who{};
-  // called once: in the encoder's thread after the order's event, or where a waiting order is given up
+  // called once if Watch::give accepts the order: when the order has ended, or is given up
   std::function<void(const OrderResult&)> done{};
 
   /// Returns the name of the order for messages: "zero", "doctor".

@@ -414,8 +414,8 @@ void Watch::carry_out(Encoder& live, const Order& order, const std::function<voi
   finish();
 }
 
-// Examines the encoder of this object. The examination opens the port itself, and tries other settings if no encoder
-// replies. Opening a virtual encoder again would create a new one, so its open port is used.
+// Examines the encoder of this object. The examination opens the port itself. Opening a virtual encoder again
+// would create a new one, so its open port is used.
 OrderResult Watch::examine(Encoder& live, const std::stop_token& stop) {
   const std::string words = "the encoder is being examined, readings continue afterwards";
   set_state(State::examined, words);

@@ -64,7 +64,7 @@ void AsyncDecoder::restart(Start start) {
 
 // Visits the candidates from the falling edge with index `start` on, as long as `needed` ticks of a candidate lie
 // before `limit`. `visit` returns false to stop before the candidate passed to it. Returns the index of the falling
-// edge at which to continue, which may be that of the next edge, not known yet. `edges_` ends with `never`.
+// edge at which to continue; that edge may not be known yet. `edges_` ends with `never`.
 template <class Visit>
 std::size_t AsyncDecoder::walk(std::size_t start, Tick limit, Tick needed, Visit&& visit) const {
   const Tick* const edges = edges_.data();

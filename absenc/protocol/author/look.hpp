@@ -26,7 +26,7 @@ namespace absenc::author {
   return reading;
 }
 
-/// Result of `look`: the exchange that read a position. The `Found` of a procedure that calls `look` is this struct,
+/// Where `look` stores the exchange that read a position. The `Found` of a procedure that calls `look` is this struct,
 /// or derives from it.
 template <class P>
 struct Looked {

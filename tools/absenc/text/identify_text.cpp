@@ -75,7 +75,7 @@ bool same_encoder(const Candidate& one, const Candidate& other) {
   return one.unit != other.unit || one.encoder == other.encoder || one.encoder.empty() || other.encoder.empty();
 }
 
-// Returns the likeliest candidate of each encoder that was found; encoders of one protocol differ by their address.
+// Returns the likeliest found candidate, and the likeliest of its protocol with each other address.
 std::vector<const Candidate*> encoders(std::span<const Candidate> candidates) {
   std::vector<const Candidate*> all;
   for (const Candidate& one : candidates) {
