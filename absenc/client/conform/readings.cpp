@@ -97,12 +97,13 @@ void judge_time(const Unit& unit, const Options& options, const Readings& readin
                          unit.check(options, one.exchange.request.frame(), one.exchange.reply.frame()) == Error::none;
     if (!is_good) continue;
     ++timed;
-    if (worst == nullptr || one.answered_after > worst->answered_after) worst = &one;
+    const auto excess = [](const Attempted& reply) { return reply.answered_after - reply.limit; };
+    if (worst == nullptr || excess(one) > excess(*worst)) worst = &one;
   }
   result.evidence = "no good reply to a request came";
   if (worst == nullptr) return;
   const auto us = [](Time time) { return std::chrono::duration<double, std::micro>(time).count(); };
-  std::string seen = fmt::format("{} good replies, after at most {:.1f} us, of {:.1f} us that a host waits", timed,
+  std::string seen = fmt::format("{} good replies, the latest after {:.1f} us, of {:.1f} us that a host waits", timed,
                                  us(worst->answered_after), us(worst->limit));
   if (latency > Time{}) seen += fmt::format("; this port tells it to within {:.1f} us", us(latency));
   conclude(result, worst->answered_after <= worst->limit, std::move(seen));

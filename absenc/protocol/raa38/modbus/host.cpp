@@ -296,7 +296,10 @@ Procedure set_address(Dialog& dialog, CommandValues& found, Arguments arguments)
   co_await read_own_position(dialog, found, 3);
   if (address == format.address && arguments[1] == 0) co_return done;
   if (address != format.address) {
-    const Result<Reply> other = co_await read_position(dialog, address, 3);
+    Result<Reply> other = Error::timeout;
+    for (unsigned i = 0; i < 3 && !other && other.error() == Error::timeout; ++i) {
+      other = co_await read_position(dialog, address, 1);
+    }
     const bool is_free = !other && other.error() == Error::timeout;
     if (!is_free) {
       co_return {Error::invalid_argument,
