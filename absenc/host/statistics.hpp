@@ -143,11 +143,12 @@ class Statistics {
   /// Greatest number of stored failed exchanges; only the last ones are stored.
   static constexpr std::size_t most_stored = 8;
 
-  /// Adds the result of a conversation: its latency, or after an error its exchange.
+  /// Adds the result of a conversation: its latency, or after an error its exchange. A conversation that only listened
+  /// has no latency: its exchange has the same time twice.
   void add(const Conversation<Item>& conversation) {
     const Exchange<Item> exchange = conversation.exchange();
     if (conversation.error() == Error::none) {
-      latencies_.add(exchange.received_at - exchange.sent_at);
+      if (exchange.received_at > exchange.sent_at) latencies_.add(exchange.received_at - exchange.sent_at);
     } else {
       add({conversation.error(), exchange});
     }

@@ -143,6 +143,9 @@ TEST(Statistics, CountsGoodConversations) {
   EXPECT_EQ(statistics.latencies().count(), 4u);
   EXPECT_EQ(statistics.latencies().longest(), 90us);
   EXPECT_EQ(statistics.kept(), 1u);
+  ended.sent_at = ended.received_at;  // no request was sent
+  statistics.add(ended);
+  EXPECT_EQ(statistics.latencies().count(), 4u);
 }
 
 }  // namespace

@@ -266,8 +266,10 @@ Sqlite& HistoryReader::database() {
 }
 
 Json HistoryReader::seconds(const std::string& encoder, Range range, std::int64_t most) {
-  const std::int64_t step =
-      std::max<std::int64_t>(1, (range.to_s - range.from_s) / std::max<std::int64_t>(1, most) + 1);
+  // Rows are the multiples of the step, so a range may touch one more than its length suggests.
+  most = std::max<std::int64_t>(1, most);
+  std::int64_t step = std::max<std::int64_t>(1, (range.to_s - range.from_s) / most + 1);
+  while (range.to_s / step - range.from_s / step >= most) ++step;
   const std::lock_guard lock(mutex_);
   Statement rows(database(),
                  "SELECT at / ?1 * ?1, min(least), avg(mean), max(greatest), min(speed_least), avg(speed_mean), "

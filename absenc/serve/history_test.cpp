@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <random>
+#include <regex>
 #include <string>
 
 #include "absenc/client/error.hpp"
@@ -137,6 +138,33 @@ TEST(History, CombinesReadingsOfRepeatedSecond) {
     const std::string found = reader.seconds("one", {1'700'000'000, 1'700'000'000}, 10).line();
     for (const char* part : {"400", "1.0", "5.0", "7.0"}) {
       EXPECT_NE(found.find(part), std::string::npos) << part << " in " << found;
+    }
+  }
+  remove_history(path);
+}
+
+TEST(History, RowsOfARangeReachItsEnd) {
+  const std::string path = new_path();
+  {
+    HistoryWriter writer(path, {});
+    for (std::int64_t at_s = 1'000'001; at_s <= 1'000'004; ++at_s) {
+      Second one;
+      one.at_s = at_s;
+      one.readings = 1;
+      writer.write({{"one", one}}, {});
+    }
+    HistoryReader reader(path);
+    for (std::int64_t most = 1; most <= 5; ++most) {
+      const std::string found = reader.seconds("one", {1'000'001, 1'000'004}, most).line();
+      const std::regex end_of_row(R"((\d+),\d+\])");  // readings and errors
+      std::int64_t rows = 0;
+      int readings = 0;
+      for (std::sregex_iterator at(found.begin(), found.end(), end_of_row); at != std::sregex_iterator(); ++at) {
+        ++rows;
+        readings += std::stoi((*at)[1]);
+      }
+      EXPECT_LE(rows, most) << found;
+      EXPECT_EQ(readings, 4) << found;
     }
   }
   remove_history(path);

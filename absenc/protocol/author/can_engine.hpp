@@ -38,7 +38,10 @@ class CanEngine : public Conversation<CanFrame> {
   [[nodiscard]] std::string_view advice() const override { return outcome_.advice; }
   /// Returns the last request, and the frame that `keep` stored as its answer.
   [[nodiscard]] Exchange<CanFrame> exchange() const final {
-    return {{&request_, has_request_ ? 1u : 0u}, {&relevant_, has_relevant_ ? 1u : 0u}, sent_at_, relevant_at_};
+    return {{&request_, has_request_ ? 1u : 0u},
+            {&relevant_, has_relevant_ ? 1u : 0u},
+            has_request_ ? sent_at_ : relevant_at_,
+            relevant_at_};
   }
 
   /// Returns the time at which the last request was sent completely.

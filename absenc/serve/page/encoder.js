@@ -35,6 +35,9 @@ function latencyRows(buckets) {
     .map(({at_most: limit, count}) => [limit === null ? "longer" : `to ${limitText(limit)}`, count]);
 }
 
+// Returns why no reply has a latency.
+const noLatency = (encoder) => (encoder.readings === 0 ? "no reply yet" : "sent without requests");
+
 export class EncoderPage {
   constructor(main, bar, name, values) {
     this.name = name;
@@ -374,7 +377,7 @@ export class EncoderPage {
       ({field, value, meaning}) => [fieldName(field), element("strong", {}, valueText(value, missing)), forPeople(meaning)], "last reply"));
     const errors = Object.entries(encoder.errors).sort(([, a], [, b]) => b - a).map(([name, count]) => [plain(name), count]);
     const latencies = latencyRows(encoder.latency_us.buckets);
-    setChildren(this.latencies, latencies.length === 0 || encoder.readings === 0 ? element("p", {class: "faint"}, "no reply yet") : histogram(["latency", "replies"], latencies, "replies by latency"));
+    setChildren(this.latencies, latencies.length === 0 || encoder.readings === 0 ? element("p", {class: "faint"}, noLatency(encoder)) : histogram(["latency", "replies"], latencies, "replies by latency"));
     setChildren(this.errors, errors.length === 0 ? element("p", {class: "faint"}, "none") : histogram(["error", "attempts"], errors, "failed attempts by kind"));
     setChildren(this.bad, encoder.bad_exchanges.length === 0 ? element("p", {class: "faint"}, "none") : table(
       ["ago", "what", "sent", "received"], encoder.bad_exchanges,
@@ -387,7 +390,7 @@ export class EncoderPage {
     const live = encoder.state === "live";
     setChildren(this.line, terms([
       ["readings", `${live ? numberText(encoder.rate_hz, encoder.rate_hz < 10 ? 1 : 0) : 0} /s`],
-      ["reply after", encoder.readings === 0 ? "no reply yet" : `${microseconds(latency.p50)}, at most ${microseconds(latency.max)}`],
+      ["reply after", encoder.readings === 0 || latency.max === 0 ? noLatency(encoder) : `${microseconds(latency.p50)}, at most ${microseconds(latency.max)}`],
       ["errors, last minute", numberText(encoder.errors_last_minute)],
       ["failed attempts", `${numberText(Object.values(encoder.errors).reduce((sum, count) => sum + count, 0))} beside ${numberText(encoder.readings)} good readings`],
       ["requests repeated", numberText(encoder.repeated)],

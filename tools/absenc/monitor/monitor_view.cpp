@@ -234,6 +234,10 @@ std::string speed_line(const Snapshot& snapshot) {
 }
 
 std::string statistics_line(const Snapshot& snapshot) {
+  // Only an encoder that sends without requests has readings without latencies.
+  if (snapshot.longest == Time{} && snapshot.readings != 0) {
+    return fmt::format("{:.1f} a second, sent without requests", snapshot.rate);
+  }
   return fmt::format("{:.1f} a second; latency 50 % {}, 99 % {}, longest {}", snapshot.rate, to_text(snapshot.median),
                      to_text(snapshot.percentile_99), to_text(snapshot.longest));
 }
