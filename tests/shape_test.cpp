@@ -313,7 +313,7 @@ TEST(Trigger, RequestsEachFrameWithLongEnoughPulse) {
   EXPECT_EQ(device.log, "0 triggered 10000, 40000 sent, 100000 triggered 9000");
 }
 
-// (g) Another baud rate during the conversation: both ends change it after the last bit of the reply to command 19.
+// (g) Another baud rate during the conversation: the device changes it after the last bit of its reply to command 19.
 struct BaudChange : testing::Test {
   static constexpr LineSettings fast{.rate = 2'000'000};
   sim::Line<Byte> line{LinkKind::half_duplex, {.rate = 1'000'000}};
@@ -365,8 +365,8 @@ TEST_F(BaudChange, ReportsLineErrorsIfHostDoesNotFollow) {
   EXPECT_EQ(device.log, "10000 received 19, 25000 sent, 40000 error");
 }
 
-// (h) Two nodes reply at once: the wire carries the AND of their bits. A transceiver that cannot mute its receiver
-// receives its own bytes first.
+// (h) Collisions: the wire carries the AND of the bits of all senders. A host whose transceiver cannot mute its
+// receiver receives its own bytes, too.
 struct Collision : testing::Test {
   sim::Line<Byte> line{LinkKind::half_duplex, {.rate = 1'000'000}};
   static ByteToy::React answer(std::vector<Byte> bytes, Time delay) {

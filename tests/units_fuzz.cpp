@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fuzz target that feeds arbitrary bytes to every unit: as request and reply to its decoder, as captures to its probe,
-// as a frame whose end is sought, as received bytes to its conversations, and as requests to its virtual encoder. The
-// first three bytes of an input select the unit, its options and the command.
+// Fuzz target that feeds arbitrary bytes to a unit: as request and reply to its decoder, as captures to its probe, as a
+// frame whose end is sought, as received bytes to a conversation, and as requests to its virtual encoder unless the
+// host clocks the line. The first three bytes of an input select the unit, its options and the command.
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -96,8 +96,8 @@ std::vector<Item> items_of(const Unit& unit, Bytes bytes) {
   }
 }
 
-// Runs a conversation whose reply is the input, in pieces of `piece` items. At step 300 the conversation is asked to
-// end early. It must end within 30000 steps, and report nothing together with an error.
+// Runs a conversation in which each reply is the input, in pieces of `piece` items. At step 300 the conversation is
+// asked to end early. It must end within 30000 steps, and report nothing together with an error.
 template <class Item>
 void converse(const Unit& unit, const Options& options, const Command& command, Bytes input, std::size_t piece) {
   using Kind = typename Event<Item>::Kind;
@@ -144,8 +144,8 @@ void converse(const Unit& unit, const Options& options, const Command& command, 
 }
 
 // Feeds the input to the virtual encoder, with a pause before each byte from F0 on, and before each CAN frame whose
-// index is that of such a byte. After each item the encoder must wait again within 100 steps, and it must not send an
-// empty frame.
+// index is that of such a byte. After each item the encoder must wait again, or send an unsolicited frame, within 100
+// steps, and it must not send an empty frame.
 template <class Item>
 void ask_device(const Unit& unit, const Options& options, Bytes input) {
   using Kind = typename Event<Item>::Kind;

@@ -29,12 +29,11 @@ enum class ChangeState : std::uint8_t {
 /// State of a change of the encoder, with advice for the user.
 struct Change {
   ChangeState state = ChangeState::none;  ///< Whether the encoder was changed, as far as it is known.
-  /// For `unknown`, how to find out the state of the encoder; for `confirmed`, the encoder's new address; "": no
-  /// advice.
+  /// For `unknown`, what the user can do; for `confirmed`, the encoder's new address; "": no advice.
   std::string advice{};
   std::string note{};  ///< Reason why the journal has no entry of this change; "": the journal has it, or needs none.
 
-  /// Returns state, advice and note in one sentence, as "sent, result unknown: ADVICE; NOTE"; "" for `none`.
+  /// Returns state, advice and note as text, "sent, result unknown: ADVICE; NOTE"; "" for `none`.
   [[nodiscard]] std::string text() const;
 };
 

@@ -41,8 +41,8 @@ struct DecodeChoices {
 /// fields are empty in a row with an error, of noise, or of a frame that is cut off or undocumented.
 ///
 /// If a reply does not carry the alarms, they come from an earlier reply of the same encoder, until a request is
-/// unanswered or clears alarms. Without such a reply, the fields of the alarms and of the position that depends on them
-/// are `Unknown`, and `angle_deg` is empty.
+/// unanswered, clears alarms or resets the turns. Without such a reply, the fields of the alarms and of the position
+/// that depends on them are `Unknown`, and `angle_deg` is empty.
 class Decoded {
  public:
   /// Type of the values in the range.
@@ -84,8 +84,8 @@ class Decoded {
   const Row* row_ = nullptr;
 };
 
-/// Decodes the file `path` and returns its rows: a sigrok session, a VCD, CSV or binary export of a logic analyser, a
-/// candump log, or bytes as text. Throws UsageError, Failure.
+/// Decodes the capture `path` and returns its rows: a sigrok session, VCD or CSV, a binary export of Saleae Logic 2,
+/// raw samples, a candump log, or bytes as text. Throws UsageError, Failure.
 [[nodiscard]] inline Decoded decode(const std::string& path, std::string_view protocol,
                                     const DecodeChoices& choices = {}) {
   return {path, protocol, choices};

@@ -30,14 +30,13 @@ struct RuleCount {
   std::uint64_t broken = 0;  ///< Number of times that the host broke the rule.
 };
 
-/// Counts of requests, and of what is no request, that the virtual encoder received. CAN frames for other devices are
-/// not counted.
+/// Counts of what the virtual encoder received from hosts. CAN frames that decoding reports as unexpected_reply are not
+/// counted: they belong to other devices on the bus.
 struct RequestCounts {
-  /// Number of requests that comply with the document, including those for other encoders on the line.
+  /// Number of valid requests that `bad` does not count, including those for other encoders on the line.
   std::uint64_t good = 0;
-  /// Number of byte runs or CAN frames that are no request, of requests that do not wait for the reply before, and of
-  /// damaged characters, received after the first good request; while there is no good request, of all that were
-  /// received.
+  /// Number of byte runs or CAN frames that are no request, of requests sent before the reply to the last one, and of
+  /// damaged characters. Counts from the start until the first good request, and from 0 again after it.
   std::uint64_t bad = 0;
   /// Number of byte runs or CAN frames that are no request, and of damaged characters, received before the first good
   /// request; 0 until there is one.
@@ -45,9 +44,8 @@ struct RequestCounts {
   std::string first_bad = {};  ///< Text of the first item counted in `bad`; "" for a damaged character or none.
 };
 
-/// A running virtual encoder, served by its own thread until this object is destroyed. Any thread may call the
-/// functions; a change is effective when the call returns. If serving has failed, functions that change or ask the
-/// encoder throw the exception that ended it.
+/// A running virtual encoder, served by its own thread. Any thread may call the functions; a change is effective when
+/// the call returns. If serving has failed, functions that change or ask the encoder throw the exception that ended it.
 class Emulation {
  public:
   /// Starts the virtual encoder, as `emulate` does.
@@ -58,8 +56,8 @@ class Emulation {
   Emulation& operator=(Emulation&&) noexcept;
   ~Emulation();
 
-  /// Returns the path of the pseudo-terminal or of the link to it; for an encoder on a CAN bus, that of the slcan
-  /// adapter or the name of the network interface.
+  /// Returns the path of the link to the pseudo-terminal, or of the pseudo-terminal if there is no link; for an encoder
+  /// on a CAN interface, the name of the interface.
   [[nodiscard]] const std::string& path() const;
   /// Returns the TCP port on which the encoder listens; 0 if there is none.
   [[nodiscard]] std::uint16_t tcp_port() const;
@@ -73,12 +71,12 @@ class Emulation {
 
   /// Switches the virtual encoder off: it sends no replies until `power_on`.
   void power_off();
-  /// Switches the virtual encoder on. With `real` it needs the start-up time of the document before it replies.
+  /// Switches the virtual encoder on. With `real` it starts up as slowly as a real one, otherwise at once.
   void power_on(bool real = false);
   /// Raises an alarm by its name in the unit. Throws UsageError for an unknown name, and for an alarm that the encoder
   /// cannot report with its options.
   void raise_alarm(std::string_view name);
-  /// Ends the cause of an alarm. An alarm that the encoder latches stays until a host clears it. Throws UsageError.
+  /// Ends the cause of an alarm; an alarm that the encoder latches stays. Throws UsageError for an unknown name.
   void lower_alarm(std::string_view name);
   /// Sets a condition such as "temperature" or "battery" to a value in the unit of the condition; `absenc list` prints
   /// names and units. Throws UsageError.

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An encoder, opened by name: single readings, long series of samples that survive a lost port and a counter that
-// wraps, and commands.
+// An encoder, opened by its address or its name: readings, series of samples, commands, memory and settings.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +24,7 @@
 
 namespace absenc::client {
 
-/// Whether the position of a sample can be used, or why not. `text_of` returns a sentence for each state.
+/// Whether the single-turn position of a sample can be used, or why not.
 enum class PositionState : std::uint8_t {
   good,
   unconfirmed,  ///< no second reading confirmed the position: `Sample::doubtful` is true
@@ -35,10 +34,11 @@ enum class PositionState : std::uint8_t {
   none,         ///< the sample is not a reading, or its reading has no position
 };
 
-/// Returns a sentence for people that says whether the position of a sample can be used, or why not.
+/// Returns a sentence for people that describes `state`.
 [[nodiscard]] std::string_view text_of(PositionState state);
 
-/// Result of one attempt to read: a reading, a failure, or an event of the port. Times are those of os::now.
+/// Result of one attempt to read or to open the port: a reading, a failure, or an event of the port. Instants are those
+/// of os::now.
 struct Sample {
   /// The kind of a sample.
   enum class Kind : std::uint8_t {
@@ -52,25 +52,23 @@ struct Sample {
   Kind kind = Kind::absent;  ///< Whether this sample holds a reading, a failure or an event.
   Time at{};                 ///< `latched` of the reading, or the time of the failure or of the event.
   Reading reading{};         ///< The reading; default-constructed if `kind` is not `reading`.
-  /// Whether a second reading confirmed the position: the shaft can have moved from one to the other in the time
-  /// between them.
+  /// Whether the position agrees with the one that was read before it (host::FirstReading).
   bool confirmed = false;
-  /// Whether the encoder was ready and the position valid, but no second reading confirmed it. `reading` then marks the
-  /// position as unknown.
+  /// Whether the encoder was ready and its position valid, but not `confirmed`. The validity in `reading` is then
+  /// unknown.
   bool doubtful = false;
   bool position_valid = false;  ///< Whether `position` is valid.
   /// Position in counts, continued past the end of the encoder's counter; see `position_valid`.
   std::int64_t position = 0;
-  /// Whether `position` starts again at this sample, because the position jumped or the distance since the last reading
-  /// is unknown.
+  /// Whether `position` starts again at this sample, because the position jumped or the pause since the last valid
+  /// position was too long to know the distance.
   bool restarted = false;
   /// Whether `speed` is valid: the times of the two positions must determine it closely enough.
   bool speed_valid = false;
-  /// Mean speed between two positions, in rpm (mm/s for linear encoders), at the time `speed_delay` before `at`.
+  /// Mean speed between two positions, in rpm (mm/s for linear encoders); 0 unless `speed_valid`.
   double speed = 0;
-  /// Greatest distance of `speed` from the true mean between the instants at which the two positions were latched, in
-  /// the same unit. It includes the times of requests and replies and one count of each position, but not errors and
-  /// noise of the encoder.
+  /// Greatest difference between `speed` and the true mean speed between the instants at which the two positions were
+  /// latched, in the same unit. Errors and noise of the encoder are not included.
   double speed_uncertainty = 0;
   Time speed_delay{};     ///< Time by which the speed lags behind the position.
   JointAngles angles{};   ///< Angles of joint and motor; empty unless the address has settings of the drive.
@@ -78,7 +76,7 @@ struct Sample {
   std::string message{};  ///< Text of the event: port lost, absent or back, or position restarted; "": no event.
 
   /// Returns whether `reading.singleturn` can be used, or why not. For turns see `reading.multiturn_validity()`; for
-  /// the position past the end of the counter see `position_valid`.
+  /// `position` see `position_valid`.
   [[nodiscard]] PositionState position_state() const;
 
   /// Returns the speed with its uncertainty, in rpm (mm/s for linear encoders); nothing if the speed is invalid.
@@ -101,7 +99,7 @@ struct SampleChoices {
 
 class Samples;
 
-/// An open encoder. One thread at a time may use it; only `cancel` may be called from another thread.
+/// An encoder, connected or not. One thread at a time may use it; `cancel` may be called from any thread.
 class Encoder {
  public:
   /// Connection and state of an encoder; for the library itself only.
@@ -113,31 +111,31 @@ class Encoder {
   Encoder& operator=(Encoder&&) noexcept;
   ~Encoder();
 
-  /// Opens the port again after `disconnect` or after a loss of the port. Throws os::Failure, UsageError.
+  /// Opens the port, or uses the open port of another encoder on the same line. Throws os::Failure, UsageError.
   void connect();
-  /// Closes the port; counters and statistics remain. The next reading or command opens the port again.
+  /// Releases the port; counters and statistics remain. Later calls of `read`, `next` and `run` connect again.
   void disconnect();
-  /// Returns whether the port is open: not after `disconnect`, nor after a sample that reports the loss of the port,
-  /// until the port is opened again.
+  /// Returns whether the encoder has a port: from `connect` until `disconnect`, or until a sample reports the loss of
+  /// the port.
   [[nodiscard]] bool connected() const;
 
-  /// Returns a reading of the position. If no second reading confirmed the position, its validity is marked as unknown.
-  /// Opens a lost port again. Throws EncoderFailure, Failure, UsageError, os::Failure, os::Interrupted, Cancelled.
-  /// Throws DeadlinePassed if there is no reading at `deadline` (a time of os::now), up to 20 ms and the duration of
-  /// one exchange later.
+  /// Returns a reading of the position. If the position is valid, but no second reading confirmed it, its validity is
+  /// marked as unknown. Connects first if `connected` is false. Throws EncoderFailure, Failure, UsageError,
+  /// os::Failure, os::Interrupted, Cancelled. Throws DeadlinePassed if a wait for the encoder reaches `deadline`, a
+  /// time of os::now.
   [[nodiscard]] Reading read(Time deadline = never);
-  /// Returns a reading with the alarms: by the command that reads all alarms if the unit has one that its options
-  /// allow, otherwise from a reading of the position, confirmed or not.
+  /// Returns a reading with the alarms: by the unit's command for alarms if it has one and the options allow it,
+  /// otherwise from a reading of the position, which need not be confirmed.
   [[nodiscard]] Reading read_alarms();
-  /// Returns samples for a loop, which continues after a lost port is back. The loop ends after `count` samples, at the
-  /// deadline, with `cancel`, or once the function of `end_when` returns true.
+  /// Returns a range of samples. A lost port does not end it; `count`, the deadline, `cancel` and the function of
+  /// `end_when` do.
   [[nodiscard]] Samples samples(const SampleChoices& choices = {});
-  /// Takes one sample and returns it: reads once, or, while the port is not open, waits up to a quarter of a second and
-  /// tries to open it. Throws os::Interrupted, UsageError, Failure, Cancelled.
+  /// Takes one sample and returns it: reads or, if `connected` is false, waits up to a quarter of a second and tries to
+  /// open the port. Throws os::Interrupted, UsageError, Failure, Cancelled.
   Sample next();
 
-  /// Runs a command of the unit by name and returns the fields of its result. Arguments that are left out have their
-  /// defaults. Does not ask the user for confirmation, even if the command changes the encoder. Throws EncoderFailure,
+  /// Runs a command of the unit by name and returns the fields of its result. Optional arguments may be left out at the
+  /// end. Does not ask the user for confirmation, even if the command changes the encoder. Throws EncoderFailure,
   /// Failure, os::Failure, os::Interrupted, UsageError, Cancelled.
   Answer run(std::string_view command, std::span<const std::int64_t> arguments = {});
   /// Runs a command of the unit by name, with arguments in the order of the command.
@@ -145,30 +143,28 @@ class Encoder {
     return run(command, std::span(arguments.begin(), arguments.size()));
   }
 
-  /// Returns the memory of the encoder, which must be connected. This Encoder must not be moved while the result is
-  /// used.
+  /// Returns access to the encoder's memory. It needs a connected encoder, and this Encoder must not be moved while it
+  /// is used.
   [[nodiscard]] Memory memory() { return Memory(*this); }
 
-  /// Returns the settings of the encoder, which must be connected. This Encoder must not be moved while the result is
-  /// used.
+  /// Returns access to the encoder's settings. It needs a connected encoder, and this Encoder must not be moved while
+  /// it is used.
   [[nodiscard]] Settings settings() { return Settings(*this); }
 
-  /// Cancels from any thread: every wait, now or later, ends with the exception Cancelled; a loop over samples ends
-  /// without an exception.
+  /// Cancels from any thread: until `resume`, each wait for a reply or for the next sample throws Cancelled. A loop
+  /// over samples ends without an exception.
   void cancel();
   /// Withdraws `cancel`, so that the encoder can be used again.
   void resume();
 
-  /// Sets a function that is polled during every wait, including the wait for the next sample, and returns the previous
-  /// function. Once the function returns true, the wait ends with Cancelled, a loop over samples without an exception.
-  /// Empty: no function.
+  /// Sets a function that is polled during each wait for a reply or for the next sample; empty: none. Once it returns
+  /// true, the wait throws Cancelled; a loop over samples ends without an exception. Returns the previous function.
   std::function<bool()> end_when(std::function<bool()> over);
 
-  /// Returns the state of the last command that changes the encoder. Exceptions of such a command, except UsageError,
-  /// carry the same state (change.hpp).
+  /// Returns the change, with its state, of the last command that changes the encoder and was run; see change.hpp.
   [[nodiscard]] const Change& change() const;
 
-  /// Makes the continued position start again at the next reading; call it after a command that moves the zero.
+  /// Makes the continued position start again at the next valid position; call it after a command that moves the zero.
   void forget_position();
 
   /// Returns protocol and port of the address, without settings: "tformat:/dev/ttyUSB0".
@@ -179,11 +175,11 @@ class Encoder {
   [[nodiscard]] const Options& options() const;
   /// Returns the settings of the address that describe joint and motor.
   [[nodiscard]] const Joint& joint() const;
-  /// Returns a sentence for each setting of the port that could be better; none while it is not connected.
+  /// Returns notes about the port, one sentence each; none while the encoder is not connected.
   [[nodiscard]] const std::vector<std::string>& notes() const;
   /// Returns the counts of all conversations: good ones, errors by kind, repeated attempts.
   [[nodiscard]] const host::Counters& counters() const;
-  /// Returns the latencies of all good conversations, each from the end of its last request to the end of the reply.
+  /// Returns the latencies of the good conversations: the time from the request to the end of the reply.
   [[nodiscard]] const host::Latencies& latencies() const;
   /// Returns the stored bad exchanges, the newest first, with times of os::now.
   [[nodiscard]] std::vector<BadExchangeText> bad_exchanges() const;
@@ -192,12 +188,12 @@ class Encoder {
   /// Returns how often the port was lost since the encoder was opened.
   [[nodiscard]] std::uint64_t losses() const;
   /// Returns how often the continued position started again, after a jump of the position or after a pause too long to
-  /// count the turns.
+  /// know the distance.
   [[nodiscard]] std::uint64_t restarts() const;
-  /// Returns the number of good readings per second: a mean that forgets with a time constant of one second, 0 before
-  /// the second reading.
+  /// Returns the number of readings per second, averaged over about the last second; 0 before the second reading.
   [[nodiscard]] double rate() const;
-  /// Returns a warning if the shaft can turn too fast for the intended rate to follow its turns; otherwise "".
+  /// Returns a warning if the shaft, at its speed limit, turns too fast to follow its turns at the intended rate; "" if
+  /// not, and for a linear encoder.
   [[nodiscard]] std::string rate_note() const;
 
  private:
@@ -207,8 +203,8 @@ class Encoder {
 };
 
 /// Opens and connects an encoder and returns it. `text` is an address, "tformat:/dev/ttyUSB0?model=23-bit" or
-/// "sim:esl", or a name of absenc.toml; `settings` ("name=value") are appended to it. Throws os::Failure. Throws
-/// UsageError, which names the wrong part and, for an unknown name, a similar one if there is one.
+/// "sim:esl", or a name of absenc.toml; `settings` ("name=value") are added to its settings. Throws os::Failure,
+/// UsageError.
 [[nodiscard]] Encoder open(std::string_view text, std::span<const std::string> settings = {});
 
 /// An input range of samples. With a rate they are due at equal distances in time, without drift; if several are
@@ -232,7 +228,7 @@ class Samples {
   [[nodiscard]] Iterator begin();
   /// Returns the end of the range, for comparison with an iterator.
   [[nodiscard]] static Iterator::End end() { return {}; }
-  /// Returns the present sample, or null at the end of the range. The sample is valid until `advance`.
+  /// Returns the sample that was taken last, or null at the end of the range. The sample is valid until `advance`.
   [[nodiscard]] const Sample* current() const;
   /// Waits for the next sample and takes it, or ends the range.
   void advance();
@@ -243,8 +239,8 @@ class Samples {
   std::unique_ptr<Parts> parts_;
 };
 
-/// Returns a word for the sample: "" for a reading ("restarted" if its position starts again) and if the kind is
-/// `absent`, "lost" or "back" for the other events of the port, and the name of the error for a failed attempt.
+/// Returns a word for the sample: "lost" or "back" for these events of the port, "restarted" for a reading at which the
+/// position starts again, the name of the error for a failed attempt, otherwise "".
 [[nodiscard]] std::string_view event_name(const Sample& sample);
 
 /// Returns the unit of the speed: "rpm", or "mm/s" for a linear encoder.

@@ -53,7 +53,7 @@ struct MemoryRun {
 /// Returns all addresses that a dump of the unit's memory contains, each with the value 0.
 [[nodiscard]] MemoryImage dump_addresses(const Unit& unit);
 
-/// Returns the bytes of `wanted`, with their addresses, that are missing or different in `found`.
+/// Returns the bytes or words of `wanted` that are missing or different in `found`.
 [[nodiscard]] MemoryImage differing(const MemoryImage& wanted, const MemoryImage& found);
 
 /// Returns the address in words: "page 2 address 0x05", or "address 0x05" for a memory without pages.
@@ -82,8 +82,8 @@ class Encoder;
 /// Function that is called with the number of finished bytes and the number of all bytes.
 using MemoryProgress = std::function<void(std::size_t done, std::size_t all)>;
 
-/// Access to the memory of an open encoder, from Encoder::memory. Functions throw EncoderFailure if a command fails,
-/// Failure if a reply has another number of bytes than requested, and exceptions of the port.
+/// Access to the memory of a connected encoder. Functions that use the line throw EncoderFailure, Failure, UsageError
+/// and the exceptions of the port.
 class Memory {
  public:
   /// Reads and writes the memory of `encoder`, which must outlive this object.
@@ -92,12 +92,12 @@ class Memory {
   /// Returns the unit of the encoder.
   [[nodiscard]] const Unit& unit() const;
 
-  /// Reads the position, which fails if the reply does not fit the configured model. The memory itself does not show a
-  /// wrong model and would accept the bytes. Does nothing if the unit cannot read positions.
+  /// Reads the position and throws if that fails, as it often does with a wrong model; commands for the memory do not
+  /// detect a wrong model. Does nothing if the unit cannot read positions.
   void check_model();
 
-  /// Reads the bytes at the addresses of `image` and returns them. Throws UsageError for addresses that cannot be read.
-  /// `dump_addresses` returns an image with all addresses that a dump contains.
+  /// Reads the bytes or words at the addresses of `image`, whose values are ignored, and returns them. Throws
+  /// UsageError if one of them cannot be read.
   [[nodiscard]] MemoryImage read(const MemoryImage& image, const MemoryProgress& progress = {});
 
   /// Writes a byte and reads it back. `before` is the byte that is stored now, if it is known.
@@ -109,12 +109,12 @@ class Memory {
   Encoder* encoder_;
 };
 
-/// A change of the memory to a wanted image, in three steps: look, write, verify, which throw the exceptions of Memory.
-/// After an exception the images still state which bytes were written and which were not. If the change is repeated, it
-/// writes only bytes that still differ.
+/// A change of the memory to a wanted image in three steps: look, write, verify. They throw the exceptions of Memory;
+/// the images then state how far the change came.
 class MemoryChange {
  public:
-  /// Prepares the change without sending anything. Throws UsageError for addresses that cannot be written.
+  /// Prepares the change without sending anything. Throws UsageError if a byte of `wanted` cannot be written with this
+  /// access.
   MemoryChange(Memory memory, MemoryImage wanted, MemoryAccess access);
 
   /// Checks the model and reads the bytes that are stored at the wanted addresses.
@@ -124,7 +124,7 @@ class MemoryChange {
   /// Reads all written bytes again, because a later write may have changed an earlier byte. Throws Failure if it
   /// finds a changed byte.
   void verify(const MemoryProgress& progress = {});
-  /// After a failure, reads the byte whose write was interrupted, to find out whether it was written.
+  /// Reads the byte that `unknown` returns, if there is one, to find out whether it was written. Ignores a failed read.
   void settle();
 
   /// Returns the wanted bytes with their addresses.

@@ -26,16 +26,15 @@ struct Setting {
 /// Returns the unit's commands that read identity, temperature and settings and need no arguments, in the order for a
 /// report.
 [[nodiscard]] std::vector<const Command*> questions(const Unit& unit);
-/// Returns those of the unit's commands for identity, temperature and settings that exist with these options.
+/// Returns those commands of `questions(unit)` that exist with these options.
 [[nodiscard]] std::vector<const Command*> questions(const Unit& unit, const Options& options);
 
 /// Returns the commands that read the unit's settings, at least one. Throws UsageError if there are none.
 [[nodiscard]] std::vector<const Command*> readable_settings(const Unit& unit);
-/// Returns the command that reads the setting `name`. Throws UsageError if there is no such setting that can be read;
-/// it suggests a similar name or lists all.
+/// Returns the command that reads the setting `name`. Throws UsageError if there is no such setting that can be read.
 [[nodiscard]] const Command& require_readable_setting(const Unit& unit, std::string_view name);
 /// Returns the setting `name`, which can be written. Throws UsageError if the setting can only be read, or if there is
-/// no setting of this name; in the second case the text suggests a similar name or lists all.
+/// no setting of this name.
 [[nodiscard]] Setting require_setting(const Unit& unit, std::string_view name);
 
 /// Result of writing a setting.

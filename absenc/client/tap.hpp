@@ -39,8 +39,8 @@ class Tap {
 
   /// Opens `place` and waits until protocol and options are known. `place` is a port with its settings
   /// ("/dev/ttyUSB0?baud=115200", "tcp:HOST:PORT"), or "-" for raw bytes from standard input. Writes nothing to a
-  /// serial port. Throws os::Failure, os::Interrupted, UsageError, and Failure if the port is lost or no protocol
-  /// explains the received bytes.
+  /// serial port. Throws os::Failure, os::Interrupted, UsageError, and Failure if the port is lost, if nothing is
+  /// received, or if no protocol explains the received bytes.
   explicit Tap(const std::string& place, const TapChoices& choices = {});
   /// Moves the tap; afterwards the other object may only be destroyed or assigned to.
   Tap(Tap&&) noexcept;

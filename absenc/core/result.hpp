@@ -69,8 +69,6 @@ inline constexpr std::array<ErrorText, 17> error_texts{{
 }};
 
 /// Returns whether `error` means that the received bytes are damaged: they are no whole frame with a right checksum.
-/// The other errors mean no reply, a sound frame with unexpected content, a refusal, a turning shaft, or a mistake of
-/// the caller.
 [[nodiscard]] constexpr bool is_damage(Error error) {
   return (error >= Error::line_stuck && error <= Error::wrong_length) || error == Error::bad_checksum;
 }

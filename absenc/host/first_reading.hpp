@@ -13,9 +13,8 @@ namespace absenc::host {
 
 /// A check that compares each position with the position before: at its highest speed the shaft must be able to move
 /// from one to the other in the time between them. If it can move farther than 15/32 of the counted range in that time,
-/// every position up to 15/32 away is accepted. A shaft that is too fast by a factor of `most_excess` at most is
-/// accepted at its third position, if the distances from the first to the second and from the second to the third are
-/// nearly equal.
+/// every position up to 15/32 away is accepted. A movement that is too fast by a factor of `most_excess` at most is
+/// accepted if the movement before it was too fast as well, and nearly the same.
 class FirstReading {
  public:
   /// Makes a check for a shaft of at most `maximum_rpm` revolutions per minute; 0: unknown, so the default of
@@ -46,9 +45,8 @@ class FirstReading {
   /// Returns whether a position is stored, with which the next one is compared.
   [[nodiscard]] constexpr bool has_last() const { return last_.bits != 0; }
 
-  /// Returns whether the shaft can have moved from the stored position to that of `reading` in the time `between`, or
-  /// moves too fast but evenly (see the class). False if no position is stored, if `reading` has none, or if their
-  /// numbers of bits differ.
+  /// Returns whether the position of `reading` is accepted after the stored one and the time `between`, by the rules of
+  /// the class. False if no position is stored, if `reading` has none, or if their numbers of bits differ.
   [[nodiscard]] constexpr bool is_near(const Reading& reading, Time between) const {
     const Place place = place_of(reading);
     if (!is_like_last(place)) return false;
@@ -66,7 +64,7 @@ class FirstReading {
   }
 
   /// Returns whether even at its highest speed the shaft moves by less than 15/32 of the counted range in the time
-  /// `between`; false if `reading` has no position. If false, a wrong position can hardly be detected.
+  /// `between`; false if `reading` has no position.
   [[nodiscard]] constexpr bool can_judge(const Reading& reading, Time between) const {
     const Place place = place_of(reading);
     return place.bits != 0 && reach(place, between) < most_judged(place.bits);

@@ -53,8 +53,7 @@ Time ReplyGuard<Item>::longest_wait() const {
 
 // ---- Transitions between phases
 
-// Ends the exchange. A last request whose reply may still arrive becomes outstanding if no reply to it was received;
-// while older requests are outstanding, an invalid reply does not count.
+// Ends the exchange. The last request becomes outstanding if its reply may still arrive.
 template <class Item>
 void ReplyGuard<Item>::end_exchange() {
   const bool unmatched = phase_ == Phase::matching || phase_ == Phase::listening;
@@ -77,14 +76,15 @@ void ReplyGuard<Item>::enter_delaying(const Step<Item>& request, Time now) {
   received_.clear();
   outstanding_.remove_older(now - longest_lateness);
   pending_ = {.step = request, .deadline = std::max(now, request.at) + 4 * longest_wait()};
-  // During a pause of more than 1 ms that the request demands the guard waits for late replies. Any other pause is left
-  // to the port, which keeps it more exactly than a timer.
+  // The guard waits for late replies during a pause of more than 1 ms before the request. A shorter pause is left to
+  // the port, which keeps it more exactly than a timer.
   delaying_ = {.until = request.at > now + 1ms ? request.at : now + tick, .received_at = now - request.gap};
-  // If the list is full, all outstanding requests count as lost after this silence, and `send` removes them.
+  // If the list is full, the guard first waits for late replies; `send` then clears a list that is still full.
   if (outstanding_.full()) {
     delaying_.until = std::max(delaying_.until, last_.sent_at + required_silence());
   } else if (const Entry* entry = outstanding_.find(request.out)) {
-    // An encoder that left the same request unanswered twice is absent, if no reply was ever late on this line.
+    // An encoder that left the same request unanswered twice is taken to be absent, if no reply was ever late on this
+    // line.
     const bool absent = expected_lateness_ == Time{} && entry->count() > 1;
     const Time silence = expected_lateness_ == Time{} ? required_silence() / 2 : required_silence();
     if (!absent) delaying_.until = std::max(delaying_.until, entry->newest() + silence);
@@ -142,7 +142,8 @@ Step<Item> ReplyGuard<Item>::next(Time now) {
         return forward(now);
       case Phase::delaying:
         if (now < delaying_.until) return {.at = delaying_.until, .gap = pending_.step.gap};
-        // The request must not collide with items that still arrive; after `noise_limit` it is sent nevertheless.
+        // Bytes of the request must not collide with bytes that still arrive; after `noise_limit` it is sent
+        // nevertheless.
         if (delaying_.noise_end == never) delaying_.noise_end = now + noise_limit;
         if (!is_can && delaying_.received_at + pending_.step.gap > now && now < delaying_.noise_end) {
           delaying_.until = delaying_.received_at + pending_.step.gap;
@@ -155,7 +156,7 @@ Step<Item> ReplyGuard<Item>::next(Time now) {
           const std::size_t due = expected - std::min(expected, received_.size());
           return {.expect = due, .at = matching_.until, .answer = pending_.step.answer, .gap = pending_.step.gap};
         }
-        // The time limit has passed, mostly because items that are no reply still arrive; on CAN other nodes send them.
+        // The time limit for the reply has passed.
         received_.clear();
         matching_.damaged = !is_can;
         conclude_matching(true);
@@ -247,7 +248,7 @@ void ReplyGuard<Item>::feed_forwarding(const Event<Item>& event) {
     exchange.received = exchange.received || outstanding_.may_answer(last_.items, event.items);
   }
   if constexpr (is_can) {
-    // While a conversation only listens, a frame that answers an outstanding request belongs to that earlier request.
+    // While no reply is awaited, a frame that answers an outstanding request is taken for its late reply.
     if (event.kind == Kind::received && !exchange.answerable && !outstanding_.empty()) {
       if (Entry* const entry = outstanding_.find_by_reply(event.items)) return count_late(entry, event.at);
     }
@@ -411,8 +412,8 @@ bool ReplyGuard<Item>::ends_with_reply(Items request, std::size_t expect) const 
   return size != 0 && received_.size() >= size && outstanding_.is_reply(request, received_.view().last(size));
 }
 
-// Drops and counts a late reply, and adapts the end of delaying or listening. `entry`: the outstanding request that the
-// reply answers; null: it is a second reply to the last request.
+// Drops a late reply, and adapts the end of delaying or listening. `entry`: the outstanding request that the reply
+// answers; null: it is a second reply to the last request.
 template <class Item>
 void ReplyGuard<Item>::drop_late_reply(Entry* entry, Time at) {
   received_.clear();
@@ -432,8 +433,8 @@ void ReplyGuard<Item>::count_late(Entry* entry, Time at) {
   Time sent_at = last_.sent_at;
   if (entry != nullptr) {
     sent_at = entry->sent_at.empty() ? entry->lost_last : entry->sent_at[0];
-    // The first late reply may answer any of several equal requests, so the lateness is measured from the newest one;
-    // the next late reply corrects it. This is not done on CAN, where the reply may also have been unsolicited.
+    // The first late reply may answer any of several equal requests, so its lateness is measured from the newest one.
+    // Not on CAN, where the reply may also have been unsolicited.
     if (!is_can && expected_lateness_ == Time{}) sent_at = entry->newest();
   }
   expected_lateness_ = std::max(expected_lateness_, std::min(at - sent_at, longest_lateness));

@@ -50,7 +50,7 @@ struct Filter : Machine<Item> {
 };
 
 /// Selects which reading of an encoder that transmits unsolicited is returned. A caller that reads at its own rate
-/// needs `newest`, because a reading that waited in the port would be taken for the current one.
+/// needs `newest`: `every` may return a reading that has waited in the port.
 enum class Take : std::uint8_t {
   newest,  ///< the first reading that is received after the call
   every,   ///< the reading that follows the last returned one, however long ago it was received
@@ -74,10 +74,10 @@ class Session {
         first_(reach()),
         apart_(times()) {}
 
-  /// Runs one command to its end, a repeatable one up to `attempts` times. `on_emit(conversation)` is called for each
-  /// result but the last and returns whether to continue; a conversation that streams stops at its first result. The
-  /// returned conversation has the result or the error and is valid until the next call; null: the unit cannot run the
-  /// command, or `storage` is too small.
+  /// Runs one command to its end; repeats a repeatable command after most errors, in at most `attempts` attempts.
+  /// `on_emit(conversation)` is called for each result before the end and returns whether to continue; it is not called
+  /// for a conversation that streams, which stops at its first result. The returned conversation is valid until the
+  /// next command; null: the unit cannot run the command, or `storage` is too small.
   template <class OnEmit>
   const Conversation<Item>* run(const Command& command, Arguments arguments, OnEmit&& on_emit) {
     streaming_ = false;
@@ -85,28 +85,26 @@ class Session {
     streaming_ = false;  // `run` always begins anew; only `next` and `read` continue a stream
     return conversation;
   }
-  /// Runs `command` as above and ignores all results but the last. Returns the conversation, or null if the unit cannot
-  /// run the command or `storage` is too small.
+  /// Runs `command` as above and ignores the results before the end. Returns the conversation, or null if the unit
+  /// cannot run the command or `storage` is too small.
   const Conversation<Item>* run(const Command& command, Arguments arguments = {}) {
     return run(command, arguments, [](const Conversation<Item>&) { return true; });
   }
 
-  /// Runs `command` as `run` does, but a conversation that streams and has not ended continues where it stopped, if the
-  /// last call was `next` or `read` with the same `command` and `doubt` was not called since.
+  /// Runs `command` as `run` does, but continues a conversation of the same `command` that streams and was stopped at a
+  /// result by `next` or `read`; `arguments` are then ignored. After `run`, `doubt` or another command it begins anew.
   const Conversation<Item>* next(const Command& command, Arguments arguments = {}) {
     if (command_ != &command) streaming_ = false;
     return attempt(command, arguments, [](const Conversation<Item>&) { return true; });
   }
 
-  /// Reads the position. The position is confirmed if it is near enough to the one before (FirstReading::is_near).
-  /// Without a position before (as after opening or after silence), if it is too far away, or if the time between was
-  /// too long to judge, it is read again until two consecutive positions agree or an error occurs; if none of ten
-  /// further ones agrees, the last one is returned and `confirmed` is false. If those two are near the position before,
-  /// the first one was damaged and counts as an error, cross_check_failed, because no checksum detects all damage; if
-  /// not, the position jumped. A position that the encoder reports as invalid is not read again if a position was
-  /// confirmed since the last timeout or `doubt`. A conversation that streams continues where it stopped, because
-  /// finding its frames again costs two of them; `take` decides whether frames that were received meanwhile are used.
-  /// `on_reading` is called with each reading.
+  /// Reads the position, and reads it again until it is confirmed: near the one read before it (FirstReading::is_near).
+  /// Gives up after an error or ten further readings; `confirmed` is then false. If the first reading is too far from
+  /// the position before the call, but the confirmed one is near it, the first one counts as an error,
+  /// cross_check_failed, because no checksum detects all damage. A position that the encoder reports as invalid is not
+  /// read again if a position was confirmed since the last timeout or `doubt`. A conversation that streams continues
+  /// where it stopped, because finding its frames again costs two of them; `take` decides whether frames that were
+  /// received meanwhile are used. `on_reading` is called with each reading.
   template <class OnReading>
   const Conversation<Item>* read(const Command& command, Take take, OnReading&& on_reading) {
     if (streaming_ && take == Take::newest && !current_->asks()) catch_up(machine(), *port_);
@@ -127,7 +125,8 @@ class Session {
         known_ = true;
         return conversation;
       }
-      // A position that the encoder itself reports as invalid is not read again, unless the encoder may be starting.
+      // A position that the encoder itself reports as invalid is read again only until one was confirmed: the encoder
+      // may be starting.
       if (number == most || (known_ && !FirstReading::has_position(*reading))) return conversation;
     }
   }
@@ -151,10 +150,11 @@ class Session {
     return current_ != nullptr ? current_->change_sent() : ChangeSent::no;
   }
 
-  /// Shares one guard between the sessions of all encoders on a line, because late replies belong to the line. The
-  /// guard must outlive the sessions.
+  /// Uses `guard` in place of a guard of its own. The sessions of all encoders on a line share one, because late
+  /// replies belong to the line. The guard must outlive the sessions.
   void share(ReplyGuard<Item>& guard) { guard_ = &guard; }
-  /// Sets the filter that is used from the next command on; null: none. The filter must outlive the session.
+  /// Sets the filter of later commands; null: none. Not while a stream may continue. The filter must outlive the
+  /// session.
   void set_filter(Filter<Item>* filter) { filter_ = filter; }
   /// Returns ReplyGuard::lateness as of the end of the last command.
   [[nodiscard]] Time lateness() const { return lateness_; }
@@ -164,15 +164,15 @@ class Session {
     options_ = options;
     follow_options();
   }
-  /// Sets the encoder's speed limit from the next reading on. The default is the model's limit, else that of
-  /// SpeedLimit.
+  /// Sets the encoder's speed limit from the next reading on, and forgets the positions before. The default is the
+  /// model's limit, else that of SpeedLimit.
   void set_speed_limit(const SpeedLimit& limit) {
     limit_ = limit;
     follow_options();
   }
 
-  /// Sets the statistics to which every later conversation is added; null: none. They need 5 kB, which firmware may not
-  /// have.
+  /// Sets the statistics to which the results of later attempts are added; null: none. They need 5 kB, which firmware
+  /// may not have.
   void observe(Statistics<Item>* statistics) { statistics_ = statistics; }
 
   /// Requires the next position to be confirmed, because the encoder may be another one now.
@@ -188,7 +188,7 @@ class Session {
     --counters_.good;
     ++counters_.errors[static_cast<std::size_t>(error)];
   }
-  /// Returns whether the position that `read` returned last is confirmed: it agrees with the position before it.
+  /// Returns whether the last `read` returned a position that agrees with the one before it; false after `doubt`.
   [[nodiscard]] bool confirmed() const { return confirmed_; }
   /// Returns the counters of this session.
   [[nodiscard]] const Counters& counters() const { return counters_; }
@@ -204,16 +204,16 @@ class Session {
   [[nodiscard]] Reach reach() const { return Reach::of(limit_, unit_->resolution(options_)); }
   [[nodiscard]] Times times() const { return sends_unsolicited(*unit_, options_) ? Times::arrived : Times::latched; }
 
-  // Returns whether the position of `reading` is not near the last one (FirstReading::is_near); false if there is no
-  // last position, or the time between is too long to judge.
+  // Returns whether the position of `reading` is not near the last one (FirstReading::is_near); false if one of the two
+  // is missing, or the time between is too long to judge.
   [[nodiscard]] bool contradicts(const Reading& reading) const {
     const Time between = apart_.since_last(reading.latched);
     return first_.has_last() && first_.can_judge(reading, between) && !first_.is_near(reading, between);
   }
 
-  // Returns whether the last position confirms that of `reading`, and stores `reading` as the last one. `follows`: it
-  // was read directly after the last one. After a pause that is too long to judge, only a directly following reading
-  // confirms. If even that one takes too long to judge, the speed limit alone decides.
+  // Returns whether the position of `reading` is near the last one, and stores it as the last one. `follows`: it was
+  // read directly after the last one. If it was not, and the time between is too long to judge, returns false, unless
+  // even the shortest time between readings is too long to judge.
   bool confirms(const Reading& reading, bool follows) {
     const Time between = apart_.since_last(reading.latched);
     bool near = first_.is_near(reading, between);
@@ -231,8 +231,7 @@ class Session {
     if (statistics_ != nullptr) statistics_->add(damaged);
   }
 
-  // Repeats whole commands. In a command that is not repeatable (a reset, a write) the engine repeats single requests,
-  // as far as the protocol permits.
+  // Runs the command, or continues its stream, in up to `attempts_` attempts if the command is repeatable.
   template <class OnEmit>
   const Conversation<Item>* attempt(const Command& command, Arguments arguments, OnEmit&& on_emit) {
     const unsigned attempts = command.repeatable ? attempts_ : 1;
@@ -277,7 +276,8 @@ class Session {
   }
 
   // Returns whether the reply guard is used for `command`. On a link whose clock the host drives no reply is late. On a
-  // CAN bus only commands that read the position are guarded: other nodes send too, and a listener receives all frames.
+  // CAN bus only commands with the verbs read and read_part are guarded: other nodes send too, and a listener receives
+  // all frames.
   [[nodiscard]] bool guarded(const Command& command) const {
     if (unit_->link == LinkKind::can) return command.verb == Verb::read || command.verb == Verb::read_part;
     return unit_->link != LinkKind::spi && unit_->link != LinkKind::clocked;
@@ -301,11 +301,12 @@ class Session {
   }
 
   // Runs the conversation and returns whether it came to its end. A conversation that streams stops at its next result
-  // instead.
+  // instead, any other where `on_emit` returns false.
   template <class OnEmit>
   bool drive_one(const Command& command, Conversation<Item>& conversation, OnEmit&& on_emit, bool again) {
     if (!again) guarded_ = guarded(command);
-    // A stream that continues attaches the guard only if it has served another encoder on the line meanwhile.
+    // A stream that continues attaches the guard again only if the guard has served another encoder on the line
+    // meanwhile.
     if (guarded_ && !(again && guard_->serves(conversation))) {
       guard_->attach(conversation, *unit_, options_, !command.changes_encoder);
     }

@@ -17,17 +17,18 @@ namespace absenc::host {
 /// The true mean speed between the two latch times differs from `counts_per_second` by at most `uncertainty`, which
 /// covers unknown latch times and one count of each position, but not the noise and errors of the encoder.
 ///
-/// The time between the two positions is about `window` if that is enough. It is extended, up to `longest_windows`
-/// times, until the latch times leave at most 1/20 of the speed uncertain and the distance is 0, or at least 20 counts.
-/// With the longest time any number of counts is accepted, and 1/4 of the speed may be uncertain. Otherwise no speed is
-/// valid.
+/// The time between the two positions is about `window` if that is enough. Otherwise it is longer, up to about
+/// `longest_windows` windows, so that the latch times leave at most 1/20 of the speed uncertain and the distance is 0,
+/// or at least 20 counts. With the longest time any number of counts is accepted, and 1/4 of the speed may be
+/// uncertain. If that is not enough either, no speed is valid.
 class Velocity {
  public:
   static constexpr std::size_t most_positions = 48;  ///< Greatest number of positions that are stored.
   static constexpr int longest_windows = 20;         ///< Longest window, as a multiple of the shortest one.
 
-  /// `window`: roughly the shortest time over which the speed is measured. If readings are farther apart, it is the
-  /// time between two readings. Until readings span `window`, a shorter time is used if the shaft has moved far enough.
+  /// `window`: roughly the shortest time over which the speed is measured. If readings are farther apart, the shortest
+  /// time is that between two readings. Until readings span `window`, a shorter time is used if the shaft has moved far
+  /// enough.
   explicit constexpr Velocity(Time window = std::chrono::milliseconds(50)) : window_(window) {}
 
   /// Adds a position of `Unwrapper`. A position that was not latched after the one before is ignored, and no speed is

@@ -94,8 +94,8 @@ struct Event {
   Time late{};
 };
 
-/// A protocol's side of a conversation. After each `feed`, call `next` until it returns `wait` or `done`. Call both
-/// from one context: interrupts must queue events.
+/// A protocol's side of a conversation. At the start and after each `feed`, call `next` until it returns `wait` or
+/// `done`. Call both from one context: interrupts must queue events.
 template <class Item>
 struct Machine {
   /// Processes an event that the port reports.

@@ -60,15 +60,15 @@ class Failure : public std::runtime_error {
 // Interrupted and Ended below are std::exceptions, so that a program whose `main` catches std::exception ends in order.
 // Code that catches std::exception and continues must catch these two first.
 
-/// Thrown after SIGINT or SIGTERM by `wait_for` (os/signals.hpp), `Poller::wait`, and all ports and functions that wait
-/// with them.
+/// Thrown after SIGINT or SIGTERM, once `catch_interrupts` (os/signals.hpp) was called, by `wait_for`, `Poller::wait`,
+/// and all ports and functions that wait with them.
 struct Interrupted : std::exception {
   /// Returns the text "interrupted".
   [[nodiscard]] const char* what() const noexcept override { return "interrupted"; }
 };
 
-/// Thrown by a port when the time set by its `set_end` is reached, and by the waits that throw Interrupted when a
-/// CancelCheck returns true.
+/// Thrown by a port when the time set by its `set_end` is reached, and by waits of this folder when a CancelCheck
+/// returns true.
 struct Ended : std::exception {
   /// Returns the text "cancelled".
   [[nodiscard]] const char* what() const noexcept override { return "cancelled"; }

@@ -14,8 +14,8 @@ namespace absenc::os {
 /// A folder that this process owns: it is locked (flock) for the lifetime of the object.
 class OwnedFolder {
  public:
-  /// Creates the folder at `path` if it is missing, but not its parent, and locks it. Throws Failure: `in_use` if
-  /// another process owns it, `not_found` if its parent is missing, `system`.
+  /// Creates the folder at `path` if it is missing, but not its parent, and locks it. Throws Failure: `in_use` if it is
+  /// locked already, `not_found` if its parent is missing, `system`.
   explicit OwnedFolder(const std::string& path);
 
   /// Returns whether the path still leads to this folder: the folder may have been removed, moved or replaced.

@@ -31,8 +31,8 @@ struct PortFacts {
   bool pseudo_terminal = false;  // whether the port is a pseudo-terminal, which has no line and so no rate
 };
 
-/// Returns the properties of the port at `path`. The port is opened to read its direction and counts; they stay unknown
-/// if that fails, for example because a program has locked it. `sys` is a parameter for tests.
+/// Returns the properties of the port at `path`. Direction and counts stay unknown for a pseudo-terminal, and if the
+/// port cannot be opened, for example because a program has locked it. `sys` is a parameter for tests.
 [[nodiscard]] PortFacts port_facts(const std::string& path, const std::filesystem::path& sys = "/sys/class/tty");
 
 /// Returns whether `driver` is known as a driver of mobile modems, whose ports lead to no serial line.

@@ -107,7 +107,7 @@ SerialPort::~SerialPort() {
 // root; TIOCEXCL keeps out all programs except those of root.
 void SerialPort::lock() const {
   if (::flock(descriptor(), LOCK_EX | LOCK_NB) < 0) throw open_failure(path_, errno);
-  // TIOCEXCL lasts until the last descriptor is closed. A virtual encoder keeps its side of the slave open, so the flag
+  // TIOCEXCL lasts until the last descriptor is closed. A virtual encoder keeps the slave open itself, so the flag
   // would outlive this port and lock out the next user.
   if (!pseudo_) ::ioctl(descriptor(), TIOCEXCL);
 }

@@ -33,8 +33,7 @@ enum class SerialUse : std::uint8_t {
 /// Returns whether `path` is a pseudo-terminal, where characters take no time and every rate works.
 [[nodiscard]] bool is_pseudo_terminal(const std::string& path);
 
-/// A serial port in raw mode with up to 8 data bits, locked against other programs. Closing restores the previous
-/// settings.
+/// A serial port in raw mode, locked against other programs. Closing restores the previous settings of the terminal.
 class SerialPort final : public DescriptorPort {
  public:
   /// Discards bytes received before. Throws Failure; `bad_rate` if the rate is 0 or the port's nearest rate differs

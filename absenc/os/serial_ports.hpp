@@ -46,8 +46,7 @@ struct ListedPort {
 [[nodiscard]] ListedPort inspect_port(const std::string& path, const std::filesystem::path& sys = "/sys/class/tty",
                                       const std::filesystem::path& links = "/dev/serial/by-id");
 
-/// Returns a Failure that explains why `path` did not open, with what to try. `error` is the errno of open(2), flock(2)
-/// or ioctl(2).
+/// Returns a Failure that explains why `path` did not open, with what to try. `error`: the value of errno.
 [[nodiscard]] Failure open_failure(const std::string& path, int error);
 
 }  // namespace absenc::os

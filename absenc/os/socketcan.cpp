@@ -30,7 +30,7 @@ using Kind = Failure::Kind;
 
 namespace {
 
-// Time to wait for room in the queue: a working bus empties the queue of a controller within 10 ms.
+// Time to wait for room in the queue: longer than a working bus needs to empty it.
 constexpr Time queue_patience = 500ms;
 constexpr Time queue_pause = 500us;
 constexpr std::size_t most_at_once = 256;

@@ -15,7 +15,7 @@ struct can_frame;
 namespace absenc::os {
 
 /// The system calls of SocketCan; tests override them, because the kernel may have no CAN. Each returns a negative
-/// number and sets errno on failure, like the call that it is named after.
+/// number and sets errno on failure.
 struct CanKernel {
   virtual ~CanKernel() = default;
   /// Calls socket(PF_CAN, SOCK_RAW, CAN_RAW), non-blocking.

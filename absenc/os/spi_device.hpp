@@ -39,7 +39,7 @@ class SpiDevice {
   /// transfers ends a word.
   Time message(std::span<const SpiTransfer> transfers, Time start);
 
-  /// Sets the mode between two messages: until the next message the clock line rests at the idle level of this mode.
+  /// Notes that the clock line rests at the idle level of this mode between two messages.
   void rest(std::uint8_t mode);
 
   /// Returns the time at which `wake` must be called; `never` without a requested timer.

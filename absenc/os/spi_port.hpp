@@ -16,7 +16,7 @@
 namespace absenc::os {
 
 /// The system calls of SpiPort. Build machines rarely have an SPI controller or the right to create a virtual one
-/// (os/cuse), so tests override these calls and see every request to the kernel.
+/// (os/cuse), so tests override these calls.
 struct SpiKernel {
   virtual ~SpiKernel() = default;
   /// Opens `path` like open(2) with O_RDWR: returns a negative number, with errno set, on failure.
@@ -35,10 +35,10 @@ struct SpiChoice {
 /// A port on an SPI controller, locked against other programs that use locks. `begin` and `wait` throw Failure,
 /// Interrupted or Ended (os/signals.hpp).
 ///
-/// A transfer begins at `at`, never earlier, and `begin` blocks until it is over. On an `spi` link the transfer
-/// receives at least `expect` bytes; on a `clocked` link nothing is sent but clocks. A controller clocks whole bytes:
-/// the first `bits` bits after `idle_clocks` are returned, and up to seven more clocks are given. `timer` is reported
-/// as by StreamPort.
+/// A transfer begins at `at` or later, and `begin` blocks until it is over. On an `spi` link the transfer receives at
+/// least `expect` bytes; on a `clocked` link nothing is sent but clocks. A controller clocks whole bytes: the first
+/// `bits` bits after `idle_clocks` are returned, and up to seven more clocks are given. `timer` is reported as by
+/// StreamPort.
 class SpiPort final : public Port<std::uint8_t> {
  public:
   /// Opens the controller at `path`, /dev/spidevB.C; `kind` spi or clocked, otherwise throws invalid_argument. `kernel`

@@ -39,9 +39,8 @@ struct SpidevSettings {
 
 /// A simulated spidev device: implements Documentation/spi/spidev.rst with the limits of the kernel module and of FUSE.
 /// The controller sends words of 8 bits on one wire at every speed, and refuses all mode flags but CPHA, CPOL and
-/// LSB_FIRST. It begins in mode 0, the default without an entry in the device tree. It never reads memory of the
-/// requesting program itself but returns the ranges that it needs, as the kernel requires of CUSE; tests read them by
-/// pointer.
+/// LSB_FIRST. It begins in mode 0, the default without an entry in the device tree. Spidev never reads memory of the
+/// requesting program but returns the ranges that it needs, as the kernel requires of CUSE.
 class Spidev {
  public:
   explicit Spidev(SpiDevice& device);

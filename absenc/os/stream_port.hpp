@@ -19,9 +19,9 @@ namespace absenc::os {
 
 /// Base class of all byte stream ports. `begin` and `wait` throw Failure, Interrupted (os/signals.hpp) or Ended.
 ///
-/// A transfer begins at `at`, earlier only by the send slack; `begin` blocks until then. `timer` is reported when the
-/// `at` of a wait is reached, if `at` is later than the last reported event or call of `now`, or if the wait before
-/// requested the same `at` and another event ended it.
+/// A transfer begins no earlier than the send slack before its `at`; `begin` blocks until then. `timer` is reported
+/// when the `at` of a wait is reached, if `at` is later than the last reported event or call of `now`, or if the wait
+/// before requested the same `at` and another event ended it.
 class StreamPort : public Port<std::uint8_t> {
  public:
   StreamPort(const StreamPort&) = delete;
@@ -55,8 +55,8 @@ class StreamPort : public Port<std::uint8_t> {
   /// Sets the duration of a character. `sent` is computed from it, because tcdrain blocks for milliseconds. Default 0:
   /// a transfer counts as sent when it is written.
   void set_character_time(Time time) { character_time_ = time; }
-  /// With true, `sent` gets the time before the write, because the program at the other end may read and answer the
-  /// bytes before the write returns. Default false: the time after the write.
+  /// With true, the time of a transfer counts from before its write, because the program at the other end may read and
+  /// answer the bytes before the write returns. Default false: it counts from after the write.
   void set_read_at_once(bool yes) { read_at_once_ = yes; }
   [[nodiscard]] Time end() const { return end_; }
   /// Returns the end of the last transfer or pulse.

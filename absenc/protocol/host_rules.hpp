@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Keeps account of the rules of a document that the host of a virtual encoder must keep: stores the breaches, and
-// notifies an observer of each check.
+// Counts the breaches of the rules that the host of a virtual encoder must keep, stores the first ones, and notifies an
+// observer of each check.
 #pragma once
 
 #include <cstdint>

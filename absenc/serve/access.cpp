@@ -103,9 +103,9 @@ std::uint64_t Access::wrong_tokens() const {
   return wrong_tokens_;
 }
 
-// Counts a wrong token and returns whether the address may try again; false also if too many addresses are counted.
-// Until the count of an address ends, at most two of its guesses add an event to the history: the first one, and the
-// one that exceeds the limit.
+// Counts a wrong token and returns whether the address may try again; false also for an address that is not counted
+// because too many are. Until the count of an address ends, at most two of its guesses add an event to the history: the
+// first one, and the one that exceeds the limit.
 bool Access::may_try_again(const std::string& peer) const {
   const Time now = os::now();
   const std::lock_guard lock(mutex_);

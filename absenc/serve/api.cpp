@@ -280,8 +280,8 @@ void Api::acknowledge(Watch& watch, const Request& request, const Reply& reply) 
   chronicler_->when_written(server_events_->added(), answer);
 }
 
-// Starts an examination, unless other encoders are on the same line. It opens the port again with other settings, so
-// other encoders on the same line would lose their port.
+// Starts an examination, unless other encoders are on the same line. The examination opens the port again with other
+// settings, so other encoders on the line would lose their port.
 void Api::doctor(Watch& watch, const Request& request, const Reply& reply) {
   const std::vector<std::string> others = fleet_->others_on_line(watch);
   if (others.empty()) return give(watch, examination_order(), request, reply);
@@ -291,7 +291,8 @@ void Api::doctor(Watch& watch, const Request& request, const Reply& reply) {
                        watch.name(), fmt::join(others, ", "), watch.name())));
 }
 
-// Queues `order` for its encoder. Unless it has its own `done`, the response is the JSON result or {"error":"..."}.
+// Queues `order` for its encoder; the response has status 409 if that refuses it. Without a `done` of its own the order
+// gets one that sends its JSON result or {"error":"..."}.
 void Api::give(Watch& watch, Order order, const Request& request, const Reply& reply) {
   const std::string who = access_->token_name(request);
   order.who = who.empty() ? request.peer : fmt::format("{} from {}", who, request.peer);

@@ -39,8 +39,7 @@ class HistoryReader {
   HistoryReader& operator=(const HistoryReader&) = delete;
 
   /// Returns {"encoder","step_s","rows"}: the history of an encoder in at most `most` rows; each row covers `step_s`
-  /// seconds, as many as this limit requires: [[at_s, least, mean, greatest, speed least, mean, greatest, readings,
-  /// errors],...]
+  /// seconds: [[at_s, least, mean, greatest, speed least, mean, greatest, readings, errors],...]
   [[nodiscard]] client::Json seconds(const std::string& encoder, Range range, std::int64_t most);
   /// Returns at most `most` events of `encoder` in `range`, the newest first; for "" those of all encoders and of the
   /// server.
@@ -52,8 +51,8 @@ class HistoryReader {
 
  private:
   friend class HistoryWriter;
-  /// Closes the history file, so that the writer can change to another file at the path: SQLite could not read that
-  /// file with the old log and index. Until `accept`, each query throws Failure with `why`.
+  /// Closes the history file, because the writer may change to another file at the path. Until `accept`, each query
+  /// throws Failure with `why`.
   void refuse(const std::string& why);
   void accept();
   Sqlite& database();
@@ -79,12 +78,11 @@ class HistoryWriter {
     std::string encoder;
     Second second;
   };
-  /// Writes all rows and events, or none on an error, and counts those that are lost. Starts a new file if the old one
-  /// was moved, removed, truncated or damaged, and renames a truncated or damaged one. Continues in a file that has
-  /// replaced the old one.
+  /// Writes all rows and events, or none on an error, and counts those that are lost. Starts a new file if the file
+  /// that this writer had opened was moved, removed or damaged; a damaged one is renamed.
   void write(const std::vector<Entry>& seconds, const std::vector<ServerEvent>& server_events);
-  /// Deletes rows beyond the limit of age, and the oldest tenth if the file is too large. Age alone deletes rows only
-  /// after a day of newer rows was recorded, because the clock may be wrong.
+  /// Deletes rows and events beyond the limit of age, and the oldest ones if the file is too large. Age deletes nothing
+  /// unless there are newer rows from 24 different hours, because the clock may be wrong.
   void trim();
 
   /// Returns why the constructor, the last `write` or `trim` failed; "" after a successful `write`.

@@ -37,8 +37,8 @@ struct Retained {
   std::string condition;
   std::string payload;
 };
-/// Returns the retained message with the state of an encoder: whether it is live, and its alarms. The message contains
-/// no position, because a retained position would become outdated.
+/// Returns the retained message with the state of an encoder: whether it is live, its alarms and its status flags. The
+/// message contains no position, because a retained position would become outdated.
 [[nodiscard]] Retained encoder_state(const std::string& prefix, const Watch& watch, const Snapshot& snapshot);
 
 /// Returns the discovery messages from which Home Assistant creates an encoder's entities. Their topics begin with the

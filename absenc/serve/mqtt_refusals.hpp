@@ -2,10 +2,9 @@
 // Topics that the broker refuses. Each topic is tried again after a pause that doubles up to a minute; messages of
 // other topics are still sent.
 //
-// An MQTT 5 broker refuses a message with a reason. Other brokers just close the connection, so every topic without an
-// acknowledgement is a suspect. From the second such close in a row on, if it comes soon after the start of the
-// connection, suspects are sent one at a time, until the broker has either acknowledged the topic or closed the
-// connection at it.
+// An MQTT 5 broker refuses a message with a reason. Other brokers just close the connection. From the second close in a
+// row on, if it comes soon after the start of the connection, every topic without an acknowledgement is a suspect.
+// Suspects are sent one at a time, until the broker has either acknowledged the topic or closed the connection at it.
 #pragma once
 
 #include <cstddef>
@@ -37,7 +36,8 @@ class MqttRefusals {
 
   void begin_connection();
   /// Records the end of a connection; messages of the topics `on_their_way` were unacknowledged. `soon`: the end came
-  /// shortly after the start. Returns the topic that is refused from now on; "" if none is new.
+  /// shortly after the start. Returns the topic that the broker refuses, if its refusal or the reason is new; otherwise
+  /// "".
   std::string end_connection(const std::set<std::string>& on_their_way, bool soon, Time now);
 
   /// Returns whether the pause of a refused topic has ended; true only once for each pause.

@@ -83,8 +83,8 @@ void MqttSender::work(const std::stop_token& stop) {
   }
 }
 
-// Handles one connection from its start to its end. Messages without acknowledgement are sent again, in order, by the
-// next connection.
+// Handles one connection from its start to its end. The next connection sends spooled messages without acknowledgement
+// again.
 void MqttSender::run_connection(const std::stop_token& stop) {
   outstanding_.clear();
   messages_out_.clear();
@@ -217,7 +217,7 @@ void MqttSender::send_states(MqttClient& client) {
 }
 
 // Clears the retained messages of encoders that are no longer served; otherwise the broker would keep them. An encoder
-// with a topic that the broker refuses stays in `served_` and is tried again.
+// with a topic that cannot be cleared now stays in `served_` and is tried again.
 void MqttSender::clear_unserved(MqttClient& client, const Fleet::Watches& watches) {
   std::set<std::string> now;
   for (const auto& watch : watches) now.insert(watch->name());

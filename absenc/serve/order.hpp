@@ -53,15 +53,16 @@ struct Order {
 [[nodiscard]] Order examination_order();
 
 /// Carries out any order but an examination and returns its result. `between` is called between two requests of an
-/// order that reads, and may read the position. Throws the exceptions of the encoder and its port.
+/// order that reads, and may read the position. Throws the exceptions of the encoder and its port; a failed request for
+/// a setting or a register does not end the order.
 [[nodiscard]] OrderResult carry_out(client::Encoder& encoder, const Order& order, const std::function<void()>& between);
 
 /// Returns the fields of a reply for people as a list of {"field","value","meaning"}, without the fields that describe
 /// the exchange; an invalid value is null.
 [[nodiscard]] client::Json shown_values(const client::Answer& answer);
 
-/// Returns which settings and memory of an encoder of this unit can be read:
-/// {"settings":[names],"memory":[{"page","pages","first","count","meaning","in_dump"}],"registers":n}
+/// Returns the names of the commands that read the settings and the identification of an encoder of this unit, and its
+/// memory: {"settings":[names],"memory":[{"page","pages","first","count","meaning","in_dump"}],"registers":n}
 [[nodiscard]] client::Json readable_json(const Unit& unit);
 
 }  // namespace absenc::serve

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Queues of good readings for other systems: each encoder stores its readings until they are taken.
+// Bounded queues of an encoder's good readings, from which they are sent to other systems.
 #pragma once
 
 #include <cstddef>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Stores messages on disk until a broker has acknowledged them: kill -9 loses no stored message.
 //
-// The spool is a folder of append-only files (spool_file.hpp). A file whose messages are all acknowledged is deleted,
-// except the newest one, so sending from a full disk needs no free space. While the disk cannot be written, new
-// messages wait in memory, up to a limit, and are sent from there.
+// The spool is a folder of append-only files (spool_file.hpp). Acknowledged messages are marked in place, and a file
+// whose messages are all acknowledged is deleted, except the newest one; so sending needs no free space on the disk.
+// While the disk cannot be written, new messages wait in memory, up to a limit, and are sent from there.
 #pragma once
 
 #include <cstddef>

@@ -361,8 +361,7 @@ void Watch::report_alarms(const Reading& reading) {
   }
 }
 
-// Carries out an order. Commands and examinations are reported by an event; an examination, because it interrupts the
-// readings.
+// Carries out an order. Commands and examinations are also reported by an event.
 void Watch::carry_out(Encoder& live, const Order& order, const std::function<void()>& between,
                       const std::stop_token& stop) {
   const std::string_view name = order.name();
@@ -414,8 +413,8 @@ void Watch::carry_out(Encoder& live, const Order& order, const std::function<voi
   finish();
 }
 
-// Examines the encoder of this object. The examination opens the port itself. Opening a virtual encoder again
-// would create a new one, so its open port is used.
+// Examines the encoder of this object. The examination opens the port itself, with settings that it chooses. Opening a
+// virtual encoder again would create a new one, so its open port is used.
 OrderResult Watch::examine(Encoder& live, const std::stop_token& stop) {
   const std::string words = "the encoder is being examined, readings continue afterwards";
   set_state(State::examined, words);

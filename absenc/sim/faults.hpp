@@ -62,10 +62,10 @@ void flip_bits(std::span<std::uint8_t> bytes, Random& random);
 /// A machine between a line and a device machine that injects faults. The device must outlive it. The same seed gives
 /// the same faults.
 ///
-/// On character links whole replies are damaged, on clocked links the bits that the device drives. A reply that a fault
-/// makes longer or later does not follow the device's own timing. While such a reply, or the reply to a damaged
-/// request, is pending or being sent, the device receives no bytes, so it does not report a protocol violation by the
-/// host. A request that begins meanwhile is ignored as a whole.
+/// The faults strike each transfer of the device: on character links a reply, on clocked links the bits that the device
+/// drives. A reply that a fault makes longer or later does not follow the device's own timing. While such a reply, or
+/// the reply to a damaged request, is pending or being sent, the device receives no bytes, so it does not report a
+/// protocol violation by the host. A request that begins meanwhile is ignored as a whole.
 class FaultyDevice final : public Machine<std::uint8_t> {
  public:
   /// Injects faults between `device` and its line. The same seed gives the same faults.

@@ -20,8 +20,8 @@ struct RoughRates {
   double burst = 0;
   /// One byte or CAN frame arrives twice. On SPI and clocked links one bit arrives twice and the last bit is lost.
   double doubled = 0;
-  /// Another sender sends random bytes during the frame and, except on SPI and clocked links, perhaps beyond its end;
-  /// the host receives the AND of both.
+  /// Another sender sends random bytes during a part of the frame and, except on SPI and clocked links, perhaps beyond
+  /// its end; the host receives the AND of both.
   double talker = 0;
   double late = 0;  ///< the frame is 10 us to 10 s late, each decade equally likely; later frames do not overtake it
 };
@@ -34,9 +34,9 @@ struct RoughCounts {
   std::uint64_t late = 0;      ///< frames that were delayed
 };
 
-/// A line with damage at random. It is simulated faster than Line, which moves single characters; use Line for
-/// collisions or single characters. A frame arrives in one piece at its end; if the ends have different rates it
-/// arrives as a `line_error`. On CAN the controllers check: a frame with flipped bits or another sender is a
+/// A line that damages frames to the host at random. It is simulated faster than Line, which moves single characters;
+/// use Line for collisions or single characters. A frame arrives in one piece at its end; if the ends have different
+/// rates it arrives as a `line_error`. On CAN the controllers check: a frame with flipped bits or another sender is a
 /// `line_error`. Clocked and SPI links have no late frames and only one rate.
 template <class Item>
 class RoughLine final : public Port<Item> {

@@ -27,8 +27,8 @@ SimPort<Item>::SimPort(LinkKind kind, LineSettings settings, Machine<Item>& devi
   if (real_time_.now) start_ = real_time_.now();
 }
 
-// Advances the line to real time: all events up to that time have then happened, whether or not a caller waited for
-// them.
+// With a real-time clock, advances the line to its time: all events up to that time have then happened, whether or not
+// a caller waited for them.
 template <class Item>
 void SimPort<Item>::keep_pace() {
   if (real_time_.now) line_.run_until(real_time_.now() - start_);

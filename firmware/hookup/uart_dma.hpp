@@ -63,8 +63,8 @@ class UartDma {
   void result(bool) {}
 
  private:
-  // Starts receiving `count` bytes, so that the last byte of the reply calls `arrived`; for 0, receiving lasts until
-  // the line is idle or the buffer is full.
+  // Starts receiving up to `count` bytes, 0: as many as the buffer holds. The hardware calls `arrived` when they are
+  // complete, or when the line is idle.
   void arm(std::size_t count) {
     const MutableBytes buffer = buffers_[current_];
     hardware_->receive(count == 0 ? buffer : buffer.first(std::min(count, buffer.size())));

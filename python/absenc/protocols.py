@@ -101,7 +101,7 @@ class Protocols(Mapping[str, Protocol]):
         return len(_absenc.units())
 
 
-#: All protocols: protocol["tformat"]. An unknown name raises UsageError with the most similar name.
+#: All protocols: protocol["tformat"]. An unknown name raises UsageError.
 protocol = Protocols()
 
 

@@ -18,7 +18,7 @@ namespace absenc::python {
 
 namespace {
 
-/// Collects the replies to a scan: each record starts with the field that identifies the encoder.
+/// Collects the replies to a scan: a field with Role::encoder begins a new record.
 struct ScanReplies final : FieldSink {
   void put(const FieldValue& value) override {
     if (value.info->role == Role::encoder || all.empty()) all.emplace_back();

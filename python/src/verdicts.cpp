@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Binds doctor, conform and probe, the ports of this computer, and waveforms to Python. Results are JSON, except
-// that of `wave`, so that their texts are those of the command.
+// Binds doctor, conform and probe, the ports of this computer, and waveforms to Python. Results are JSON with the texts
+// of the command, except that of `wave`.
 #include "absenc/client/captures/probe.hpp"
 #include "absenc/client/conform/conform_text.hpp"
 #include "absenc/client/doctor/examine.hpp"

@@ -94,7 +94,8 @@ std::string unquoted(std::string_view text) {
 
 // ---- Rules for the wording of every advice
 
-/// Phrases that refer the reader to the alarms. The advice explains these alarms, so the phrase would be circular.
+/// Phrases that refer the reader to the alarms. No advice may have them, because that of an alarm would refer to
+/// itself.
 constexpr auto circular_phrases =
     std::to_array<std::string_view>({"read the alarms", "look at the alarms", "the other alarms", "see the alarms"});
 
@@ -165,8 +166,8 @@ bool reports_more(const ReportedFields& result, const ReportedFields& reading) {
 }
 
 /// Runs the commands that the advice of alarm `bit` names, in order. Returns whether the alarm has ended; false also if
-/// the encoder does not exist or does not show the alarm. Adds a finding if the alarm remains and none of the commands
-/// explains its failure or reports a further field.
+/// the encoder does not exist or does not show the alarm. Adds a finding if the advice names commands, but the alarm
+/// remains and none of them explains its failure or reports a further field.
 template <class Item>
 bool follow_advice(const Unit& unit, const Configuration& configuration, std::size_t bit, Findings& findings) {
   const FlagInfo& flag = unit.alarms->flags[bit];

@@ -94,7 +94,7 @@ void declared_once(std::span<const Named> all, std::string_view whose, Findings&
   }
 }
 
-// Checks that each command has the arguments, fields and options that its callers search for by role.
+// Checks that the unit has the arguments, fields and options that callers of its commands search for by role.
 void declared_roles(const Unit& unit, Findings& findings) {
   declared_once(unit.options, unit.id, findings);
   const auto has_field = [&](Role role) { return find_role(unit.fields, role) != nullptr; };

@@ -121,8 +121,7 @@ class Campaign {
     if (!unit_.alarms->flags[bit].name.empty()) world_.device().raise_alarms(1u << bit);
   }
 
-  // Records the results of repeatable commands (`is_repeatable`) on an undamaged line. The true position is that of the
-  // shaft, whatever the encoder reports.
+  // Records what repeatable commands (`is_repeatable`) report on an undamaged line. Long commands are often left out.
   void record_truth() {
     for (std::int64_t& place : places_) place = static_cast<std::int64_t>(random_.next());
     for (const Command& command : unit_.commands) {
@@ -183,7 +182,7 @@ class Campaign {
     if (!query.truth[place_]) {
       world_.set_rates({});
       world_.pass(std::chrono::seconds(1));
-      // This conversation is ignored: the encoder's late replies to previous requests arrive during it.
+      // This conversation is ignored: late replies to previous requests may arrive during it.
       (void)world_.run(*query.command, query.arguments);
       if (!record_truth_at(query, place_)) return;
     }
@@ -200,7 +199,7 @@ class Campaign {
                       [&] { return where(query) + "has a reading before any reply, or with an error"; });
     if (!result.good()) return;
     ++tally_.accepted;
-    // The command `info` sends several requests, and a fault may remove one of the replies: the result may then lack
+    // The command `info` may send several requests, and a fault may remove one of the replies: the result may then lack
     // fields.
     const bool may_miss = query.command->verb == Verb::info && result.faults != 0;
     const Difference wrong = difference(query, result, may_miss);
@@ -216,8 +215,8 @@ class Campaign {
     ++(wrong.position ? command.wrong_positions : command.wrong_values);
   }
 
-  // Returns whether the encoder reports the fields `seen` on a good line too, because a damaged request changed the
-  // encoder. If so, discards the recorded truth of all commands.
+  // Returns whether the encoder reports the fields `seen` on a good line too: an earlier damaged request may have
+  // changed it. If so, discards the recorded truth of all commands.
   bool is_true_now(const Query& query, const ReportedFields& seen) {
     world_.set_rates({});
     const ConversationResult now = world_.run(*query.command, query.arguments);
@@ -230,7 +229,7 @@ class Campaign {
   }
 
   // Runs commands that change the encoder, except those of the unit alone (Verb::run), over the faulty line, and
-  // verifies each reported success over a good line. These runs end the work with this encoder, because they alter it.
+  // verifies each reported success over a good line.
   void change() {
     for (const Command& command : unit_.commands) {
       if (!command.changes_encoder || command.verb == Verb::run) continue;
@@ -286,8 +285,8 @@ class Campaign {
     return {};
   }
 
-  // Returns whether the reading is right but incomplete, because a part of its conversation was lost: it reports fewer
-  // alarms than on a good line, and every flag that it does report is right.
+  // Returns whether `seen` reports only a part of the alarms that `truth` reports, and agrees with it in all alarms and
+  // status flags that both report.
   [[nodiscard]] static bool is_part_of(const Reading& seen, const Reading& truth) {
     const std::uint32_t reported = seen.alarms_reported;
     if (reported == truth.alarms_reported || (reported & ~truth.alarms_reported) != 0) return false;
@@ -301,8 +300,7 @@ class Campaign {
     return std::string(query.command->name) + (configuration_.is_model ? "" : " " + configuration_.text);
   }
 
-  // Counts the damaged replies. Measures once for each command how often its frame check accepts damaged replies, with
-  // the frames that its conversation exchanges.
+  // Counts the damaged replies. Measures once for each `counter_key` how often the frame check accepts damaged replies.
   void measure_check(const Query& query, std::uint64_t damaged) {
     Tally::Command& command = tally_.commands[counter_key(query)];
     command.damaged_reply_count += damaged;
@@ -332,8 +330,8 @@ class Campaign {
 
   [[nodiscard]] std::vector<std::pair<OwnedFrame, OwnedFrame>> frames_of(const Query& query);
 
-  // Counts the rules that the host violated in a conversation with the options of a model. Before the first fault of
-  // the line, any such violation is a finding.
+  // Counts the host's violations of rules in a conversation with the options of a model. One before the first fault of
+  // the line is a finding.
   void judge_rules(const Query& query, bool had_faults, std::uint32_t before) {
     const std::uint32_t new_violations = world_.device().violation_count() - before;
     faultless_ = faultless_ && !had_faults;
@@ -361,8 +359,7 @@ class Campaign {
   std::vector<std::size_t> reads_;  // indexes in `queries_` of the commands that read the position
 };
 
-/// Returns the first requests, at most four, of the command's conversation on a line without faults, each with its
-/// reply.
+/// Returns at most four replies of the command's conversation on a line without faults, each with its request.
 template <class Item>
 std::vector<std::pair<OwnedFrame, OwnedFrame>> Campaign<Item>::frames_of(const Query& query) {
   World<Item> world(unit_, configuration_.options, 1);
@@ -427,7 +424,8 @@ void exchange(const Unit& unit, const ExchangeTest& test, Tally& tally, Findings
       findings.add("too few exchanges per round");
       break;
     }
-    // Every even round uses a model, or the defaults if the unit has none, every odd round any configuration.
+    // Even rounds use only the first configurations, which are those of the models, or the defaults if the unit has
+    // none; odd rounds use all.
     const Configuration& configuration = round % 2 == 0
                                              ? setups[round / 2 % std::max<std::size_t>(1, unit.models.size())]
                                              : setups[round / 2 % setups.size()];
@@ -456,7 +454,7 @@ Findings check_exchanges(const Unit& unit, const ExchangeTest& test) {
   // damaged.
   findings.require(tally.rule_violations <= tally.damaged_request_bytes,
                    [&] { return std::to_string(tally.rule_violations) + " rules broken: " + tally.violated_rule; });
-  // A host reads a written value back, so it reports a false success only after two damaged replies that both look
+  // Where a host reads a written value back, it reports a false success only after two damaged replies that both look
   // good.
   findings.require(tally.failed_changes == 0, [&] {
     return std::to_string(tally.failed_changes) + " changes were not made: " + tally.broken_promise_text;

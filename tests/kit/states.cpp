@@ -133,7 +133,7 @@ class States {
     if (!is_raised) require(!is_shown, "it is reported raised and is not");
   }
 
-  // Returns a mask of the flags of `field` that this encoder lacks because of its options, and of status flags that
+  // Returns a mask of the optional alarms in `field` that `reading` does not report, or of its status flags that
   // summarize such alarms.
   [[nodiscard]] std::uint32_t absent(const FieldInfo& field, const Reading& reading) const {
     std::uint32_t alarms = 0;

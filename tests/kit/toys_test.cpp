@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the kit itself: the kit must report a finding for each toy unit with a mistake, and none for those without.
+// Tests the kit itself with toy units: it must find their mistakes, and report nothing for a correct unit or for one
+// whose check is only weak.
 #include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 

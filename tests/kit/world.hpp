@@ -71,8 +71,8 @@ class World {
   [[nodiscard]] const Options& options() const { return options_; }
   void set_rates(const sim::FaultRates& rates) { faulty_->set_rates(rates); }
   void pass(Time time) { line_->run_until(line_->now() + time); }
-  /// Sets the position of the shaft. Then waits 5 ms on CAN and if the encoder sends unsolicited frames, because frames
-  /// on their way still have the old position.
+  /// Sets the position of the shaft. Then waits 5 ms if the encoder sends unsolicited frames, and on CAN: frames on
+  /// their way still have the old position.
   void move(std::int64_t position) {
     shaft_.position = position;
     const bool unsolicited = is_can || (unit_.streams != nullptr && unit_.streams(options_));

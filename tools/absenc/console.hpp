@@ -24,8 +24,8 @@ class Console {
   /// Returns whether standard input has ended or standard output was closed.
   [[nodiscard]] bool ended() const { return lines_.ended() || unheard_; }
 
-  /// Executes `line` for all encoders, or for one if its number precedes, as in "2:". Returns the new state in words.
-  /// Throws UsageError if a word, a value or the number of the encoder is not possible.
+  /// Executes `line` for all encoders, or for one if its number precedes, as in "2:". Returns the answer in words,
+  /// mostly the new state. Throws UsageError if a word, a value or the number of the encoder is not possible.
   [[nodiscard]] std::string carry_out(std::string_view line, Time now);
 
  private:

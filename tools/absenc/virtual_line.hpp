@@ -20,7 +20,7 @@ using namespace client;
 /// Returns the sim: address of one more encoder on the line, from the value `further` of --also. Throws UsageError.
 [[nodiscard]] EncoderAddress further_encoder(const Unit& unit, const Invocation& invocation, const std::string& further,
                                              const DeviceSettings& settings);
-/// Prints how many requests one device has answered since its `start`, its faults, and the rules that its host broke.
+/// Prints how many answers one device has given, the time since `start`, its faults, and the rules that its host broke.
 void print_summary(const VirtualDevice& device, std::string_view name, Time start);
 
 template <class Item>

@@ -33,11 +33,11 @@ struct CandumpLine {
 ///
 /// An identifier of three digits is a standard one, of eight digits an extended one, or with bit 29 an error frame.
 /// Ticks are nanoseconds from the first frame on; without times all are 0. If a time in the first 64 KiB, other than 0
-/// and less than a day, is not after the time before it, all times are those of -t d: each is the time since the
-/// previous frame. Channels are the interfaces named in the first 64 KiB; frames of other interfaces, and those of CAN
-/// FD and CAN XL, are left out, with a note. A line of another form, or a time before that of the previous line, is a
-/// damage: the lines before it are valid. Blank lines are skipped. Throws OpenError if there is no other line, or
-/// the first of them has another form.
+/// and less than a day, is before the time before it, or equal to it on the same interface, all times are those of -t
+/// d: each is the time since the previous frame. Channels are the interfaces named in the first 64 KiB; frames of other
+/// interfaces, and those of CAN FD and CAN XL, are left out, with a note. A line of another form, or a time before that
+/// of the previous line, is a damage: the lines before it are valid. Blank lines are skipped. Throws OpenError if there
+/// is no other line, or the first of them has another form.
 [[nodiscard]] std::unique_ptr<Reader> read_candump(std::unique_ptr<Source> source, std::string_view name);
 
 }  // namespace absenc::capture

@@ -85,7 +85,8 @@ bool is_column(std::string_view text, Bytes bytes) {
   return trim(text).empty() || is_text_of(trim(text), bytes);
 }
 
-// Parses the rest of a line as bytes, perhaps followed by their text. Returns false if the rest is none or ambiguous.
+// Parses the rest of a line as bytes, perhaps followed by their text. Returns false, with a problem, if the rest is
+// something else or ambiguous.
 bool take_bytes(std::string_view text, HexLine& parsed) {
   constexpr std::string_view between = " \t,;";
   for (;;) {
@@ -357,8 +358,8 @@ class Prefix {
     return false;
   }
 
-  // Handles text in brackets: known items like the same text without brackets, unknown text as a source. Returns true
-  // if the brackets contain the bytes of the line.
+  // Handles text in brackets: at the end of the line the bytes, elsewhere known items or else a source. Returns true
+  // after the bytes.
   bool take_bracket() {
     const char closing = text_[0] == '[' ? ']' : ')';
     const std::size_t end = text_.find(closing);

@@ -47,10 +47,8 @@ struct Occurrences {
   }
 };
 
-/// A reader that does all its work in `claim`, in one thread. Parsing takes 63 to 78 % of the processor time of `decode
-/// --stats` for dumps, 66 to 97 % for CSV; decoding in other threads hides the rest. Several parser threads would have
-/// to pass levels, times and damages from part to part in order; making the parser itself faster gained more than a
-/// second core could.
+/// A reader that does all its work in `claim`, one thread at a time. Several parser threads would have to pass levels,
+/// times and damages from part to part in order.
 class ParsedReader : public Reader {
  public:
   [[nodiscard]] const Layout& layout() const override { return layout_; }

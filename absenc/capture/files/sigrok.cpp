@@ -227,8 +227,9 @@ class SigrokReader final : public Reader {
     return numbers;
   }
 
-  // Leaves a gap in the capture for missing pieces. sigrok writes all pieces but the last with equal length, so the
-  // time of later pieces is known. Returns the number of bytes of samples before the piece `next`.
+  // Leaves a gap in the capture for missing pieces. All pieces but the last have equal length, so each missing piece is
+  // taken to be as long as the last piece before the gap or, if there is none, the piece `next`. Returns the number of
+  // bytes of samples before the piece `next`.
   std::uint64_t leave_gap(ZipArchive& archive, const std::string& name, const std::string& next,
                           std::pair<unsigned, unsigned> missing_numbers, std::uint64_t before) {
     ZipArchive::Entry neighbour;

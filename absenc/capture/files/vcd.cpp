@@ -20,7 +20,8 @@ namespace absenc::capture {
 namespace {
 
 constexpr std::uint64_t block_text = 1 << 20;
-// Limit of the changes in a block, in addition to that of its bytes, because one identifier may drive many channels.
+// Number of changes after which a block ends at the next time, besides the limit of its bytes, because one identifier
+// may drive many channels.
 constexpr std::size_t block_changes = 1 << 20;
 
 enum class Value : std::uint8_t { low, high, unknown, none };
@@ -97,8 +98,8 @@ class VcdReader final : public ParsedReader {
       }
     }
     done_ = true;
-    // The end of the capture is the last time in the file if no changes follow it; otherwise one tick behind that time,
-    // so that the last changes are within the capture.
+    // The end of the capture is the last time in the file, or one tick behind it if values follow it, so that the last
+    // changes are within the capture.
     block.end = std::max(block.first, now_ + (last_changed_ ? 1 : 0));
     unknown_.report(damages_, "values are x or z: taken as the level before");
     return true;

@@ -32,9 +32,9 @@ class ZipArchive {
   /// Returns the names of all entries, in the order of the archive.
   [[nodiscard]] std::vector<std::string> names() const;
 
-  /// Expands a whole deflated entry into `into`, which must have the entry's size, four times as fast as `open` and
-  /// `read`. Returns true only if the entry is deflated, complete and its checksum is right; otherwise `open` and
-  /// `read` return as much as possible and report the error, if there is one.
+  /// Expands a whole deflated entry into `into`, which must have the entry's size, faster than `open` and `read`.
+  /// Returns true only if the entry is deflated, complete and its checksum is right; otherwise `open` and `read` return
+  /// as much as possible and report the error, if there is one.
   [[nodiscard]] bool expand(const Entry& entry, std::span<std::uint8_t> into);
 
   /// Begins to read an entry and closes the previous entry. Returns false on error; `problem` then returns the reason.

@@ -35,7 +35,7 @@ struct AsyncFormat {
 class AsyncDecoder {
  public:
   /// Counts of characters and faults. `ticks` and `bits` are sums over all characters without a fault, from the start
-  /// bit to the character's last change: their quotient is the true bit time, in which rounding errors do not add up.
+  /// bit to the character's last change: their quotient is the bit time, in which rounding errors do not add up.
   struct Statistics {
     std::uint64_t ticks = 0;
     std::uint64_t bits = 0;

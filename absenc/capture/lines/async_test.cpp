@@ -251,8 +251,8 @@ TEST(Async, ASilentLineTakesTheBaudRateOfAnother) {
   EXPECT_EQ(all.outcome.measured_baud[0], 0);
 }
 
-// Checks that the detected bit time is the same for blocks of three sizes, with a sender whose clock drifts by 1 %
-// and more changes than the detection uses.
+// Checks that the detected bit time is the same for blocks of three sizes, with a sender whose clock changes by 1 % and
+// more changes than the detection uses.
 TEST(Async, DetectionDoesNotDependOnBlocks) {
   Wires wires{{{}}};
   for (const double bit : {5.0, 5.05}) {

@@ -76,9 +76,9 @@ void look_ahead(LevelReader& reader, std::vector<Levels>& parts, Enough&& enough
 ///   of the line is unknown
 /// - `bool join(const Levels&, Guess&)`: works like `decode`, with the result of `guess`
 ///
-/// A guess assumes that the first change begins a character or word. The true state is continued into the block until
-/// it begins a character or word at the same time as the guess. From there on both depend only on later changes, so the
-/// guess is correct. If true state and guess never meet, the block is decoded twice, and the result is still correct.
+/// A guess does not know what was before its block. The true state is continued into the block until it begins a
+/// character or word at the same time as the guess. From there on both depend only on later changes, so the guess is
+/// correct. If true state and guess never meet, the block is decoded twice, and the result is still correct.
 ///
 /// The calling thread calls `decode` and `join`. Up to two blocks per thread are in progress. `run` throws exceptions
 /// of the reader and the decoding.
@@ -135,8 +135,8 @@ class BlockRun {
 
   [[nodiscard]] bool can_claim() const { return !exhausted_ && !stopped_ && !claiming_ && !free_jobs_.empty(); }
 
-  // Claims a block and prepares it; the lock is held before and after the call. Only one thread claims at a time, which
-  // is most of the work for text, while the other threads decode earlier blocks.
+  // Claims a block and prepares it; the lock is held before and after the call. Only one thread claims at a time, while
+  // the others decode earlier blocks: for text, claiming is most of the work.
   void prepare(std::unique_lock<std::mutex>& lock, unsigned thread) {
     // The block that this thread used last is still in its cache.
     const auto last =

@@ -34,7 +34,7 @@ struct AsyncLine {
 struct AsyncOutcome {
   std::string problem;  // reason why nothing could be decoded, as a sentence; "": none
   std::vector<AsyncFormat> formats;
-  // Baud rate of each line, measured over the whole capture; 0: no good character, or a file without times.
+  // Baud rate of each line, measured over all characters without a fault; 0: there are none, or the file has no times.
   std::vector<double> measured_baud;
   std::vector<AsyncDecoder::Statistics> statistics;
 };

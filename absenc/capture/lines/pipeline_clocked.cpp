@@ -147,8 +147,8 @@ bool changes_in_rests(const std::vector<Burst>& bursts, const std::vector<Levels
   return true;
 }
 
-// Sets the limits in `format` above which rests of the clock end words. Returns the problem as a sentence, or ""
-// without a problem.
+// Measures the clock at the beginning of the capture, and sets `settle` and the limits in `format` above which rests of
+// the clock end words. Returns the problem as a sentence, or "" without a problem.
 std::string find_pause(LevelReader& reader, const WireIndices& wires, const ClockedLine& line,
                        std::vector<Levels>& parts, ClockedFormat& format) {
   Changes clock;

@@ -54,7 +54,8 @@ inline std::vector<EncoderAddress> variations_of(const Unit& unit) {
   }
   return all;
 }
-/// Returns the unit's identifier, followed by the first option that differs from its default: "UNIT crc_width=0".
+/// Returns the unit's identifier, followed by the first option that differs from its default, if any: "UNIT
+/// crc_width=0".
 inline std::string variation_name(const EncoderAddress& address) {
   const EncoderAddress usual = parse_address(fmt::format("sim:{}", address.unit->id));
   for (std::size_t i = 0; i < address.unit->options.size(); ++i) {

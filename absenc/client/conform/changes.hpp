@@ -82,8 +82,8 @@ class ChangeTester {
   ChangeTester(const Unit& unit, std::string_view name, ChangesLine line, bool resets)
       : unit_(unit), name_(name), line_(std::move(line)), resets_(resets) {}
 
-  /// Tests one clause, stores verdict and evidence in `result`, and restores the changed values, also before an
-  /// exception is passed on.
+  /// Tests one clause and stores verdict and evidence in `result`. Afterwards, also before it passes on an exception,
+  /// tries to restore the changed values; the commands for those that stay changed are added to `left`.
   void test(const Clause& clause, ClauseResult& result);
 
   /// Returns the commands with which the user restores values that the test could not restore.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the clauses that change an encoder: at least two mutants break each clause, one of them breaks no other clause.
-// If the test is ended at any step, the encoder keeps its settings, and its memory unless that counts its writes.
+// Tests the clauses that change an encoder: at least two mutants break each clause, at least one of them no other
+// clause. A test that is ended at some step leaves the encoder's settings as they were, and its memory unless that
+// counts its writes.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -273,8 +274,8 @@ std::vector<Spoil<Item>> spoils_of(const EncoderAddress& address, const Clause& 
       });
     }
   }
-  // For clauses that change the encoder, adds encoders that ignore a window of consecutive requests: spoiling a byte of
-  // the memory breaks no clause about a setting that the memory does not contain.
+  // For clauses from Demand::set on, adds encoders that ignore a window of consecutive requests: spoiling a byte of the
+  // memory breaks no clause about a setting that the memory does not contain.
   const unsigned step = address.unit->link == LinkKind::clocked ? 20 : 5;
   for (const unsigned window : {30u, 1000u}) {
     for (unsigned from = 1; clause.demand >= Demand::set && from <= requests; from += step) {
@@ -351,8 +352,8 @@ void check_ends(const EncoderAddress& address) {
     } catch (const Cancelled&) {
       ended = kind == 2;
     }
-    // An interrupt must end the test at every step. A short loss of the line may have no effect, because it is harmless
-    // while values are being restored.
+    // Only an interrupt must end the test at every step. A short loss of the line is harmless while values are being
+    // restored.
     EXPECT_TRUE(ended || kind != 0) << at;
     if (!counts) {
       ASSERT_EQ(bench.memory(), before) << "end " << kind << " at " << at << " of " << steps;
@@ -416,7 +417,7 @@ TEST(Conformance, NamesCommandThatRestoresAfterLostLine) {
   EXPECT_GT(changed, 4U);
 }
 
-// A test must erase values that cannot be restored only with `resets`. A counter that is already 0 proves nothing.
+// Without `resets`, a test must not erase values that it cannot restore. A counter that is already 0 proves nothing.
 TEST(Conformance, ErasesZeroTurnsAndAlarmsOnlyWithResets) {
   const auto found = [](std::string_view text, bool resets) {
     const Bench<std::uint8_t> bench(parse_address(text));

@@ -70,7 +70,7 @@ void add_reply_mutants(ReplyChanges<Item>& all, void (*change_reply)(std::vector
   add_reply_mutants<Item>(all, [change_reply](Mutant<Item>& m) { m.change_reply = change_reply; });
 }
 
-/// Adds mutants that send their first reply again: the whole reply, or its first bits with the rest of a later reply.
+/// Adds mutants that send an earlier reply again: the whole reply, or its first bits with the rest of a later reply.
 /// Adds none on CAN or without a clause error that they could cause.
 template <class Item>
 void add_stale_mutants(ReplyChanges<Item>& all, const Clause& clause) {
@@ -163,8 +163,8 @@ ReplyChanges<Item> command_mutants(const EncoderAddress& address) {
   return all;
 }
 
-/// Returns mutants that treat special requests wrongly, which are all requests that differ from the first one. The
-/// mutants send the reply to the first request, no reply, or another reply.
+/// Returns mutants that treat special requests (Mutant::is_special) wrongly: they send the reply to the first request,
+/// no reply, or another reply.
 template <class Item>
 ReplyChanges<Item> special_request_mutants(const Clause& clause) {
   using M = Mutant<Item>;

@@ -31,10 +31,10 @@ inline void conclude(ClauseResult& result, bool kept, std::string evidence) {
 /// Returns the reason why the clause does not apply with these options; "" if it applies.
 [[nodiscard]] std::string reason_against(const Unit& unit, const Options& options, const Clause& clause);
 
-/// Returns how many changes of a good exchange the decoder reports as one of `errors`. Changes are a wrong bit, a
-/// missing or additional byte, and the same reply to another request; if none of these is reported, except on clocked
-/// links and CAN, a wrong bit with any last byte, of which only the first reported one counts. 0: no change of this
-/// exchange is reported so, as by a unit that has no such check with these options.
+/// Returns how many changes of a good exchange the decoder reports as one of `errors`; 0 for example if the unit has no
+/// such check with these options. Changes are a wrong bit, a missing or additional byte, and the same reply to another
+/// request. If the decoder reports none of them, a wrong bit together with another last byte is tried on links of
+/// bytes, and counts once.
 [[nodiscard]] std::size_t detected_changes(const Unit& unit, const Options& options,
                                            const capture::ObservedExchange& good, Errors errors);
 

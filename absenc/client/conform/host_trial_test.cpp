@@ -243,8 +243,8 @@ void expect_none_kept(const Conformance& found, std::string_view who) {
   EXPECT_EQ(with_verdict(found, Verdict::kept), std::vector<std::string>{}) << who << "\n" << found.report();
 }
 
-/// Judges senders of random bytes or CAN frames, of damaged requests (also in turn with good ones) and of requests of
-/// other units, which ignore replies. They must keep no clause.
+/// Judges senders that ignore replies: of random bytes or CAN frames, of damaged requests (also in turn with good ones)
+/// and of requests of other units. They must keep no clause.
 template <class Item>
 void check_stranger_hosts(const EncoderAddress& address) {
   const auto judged_sending = [&](const auto& next) { return Host<Item>(address, {}).judged_sending(next); };

@@ -127,7 +127,8 @@ std::vector<Item> reply_of(const EncoderAddress& address) {
   return {reply_items.begin(), reply_items.end()};
 }
 
-/// Returns a good reply of an encoder with another address on the same line; empty if the unit has no addresses.
+/// Returns a good reply of an encoder with another address; empty if the unit has no addresses or the encoder cannot be
+/// read.
 template <class Item>
 std::vector<Item> reply_of_neighbour(const EncoderAddress& address) {
   EncoderAddress other = address;
@@ -169,8 +170,8 @@ ObservedFrame frame_of(const std::vector<Item>& items, std::size_t bits = 0) {
   return frame;
 }
 
-/// Returns the number of good replies and stream frames that the port `tap` stored, checked with the options of the
-/// clause.
+/// Counts the good frames in the replies and streams that the port `tap` stored, without flat replies (`is_flat`); a
+/// frame may count twice. Checks them with the options of the clause.
 template <class Item>
 std::size_t good_replies(EncoderAddress address, const Clause& clause, const TapPort<Item>& tap) {
   const Unit& unit = *address.unit;
@@ -197,8 +198,8 @@ std::size_t good_replies(EncoderAddress address, const Clause& clause, const Tap
   return good;
 }
 
-/// Returns whether the port `tap` stored the request of the clause; if that has no bytes, whether it stored requests of
-/// more than one kind.
+/// Returns whether the port `tap` stored the request of the clause; if that is not known as bytes, whether it stored
+/// requests of more than one kind.
 template <class Item>
 bool was_sent(const EncoderAddress& address, const Clause& clause, const TapPort<Item>& tap) {
   const Unit& unit = *address.unit;

@@ -98,8 +98,8 @@ class Tester {
 
   // ---- Access to the line
 
-  // Runs a command and returns its result. On an interrupt, the conversation first restores what it changed in the
-  // encoder for its own use.
+  // Runs a command and returns its result. Throws os::Interrupted; a conversation that has changed the encoder for its
+  // own use restores that first.
   CommandResult run(const Command& command, Arguments arguments, unsigned attempts) {
     runner_.set_options(options_);
     runner_.start_again(attempts);
@@ -167,7 +167,7 @@ class Tester {
   [[nodiscard]] bool is_streamed(const Options& options) const {
     return unit_.streams != nullptr && unit_.streams(options);
   }
-  // Returns whether the encoder replies to requests. On clocked and SPI links the host clocks the bits instead.
+  // Returns false on clocked and SPI links: the host clocks the bits there, so no reply can be late.
   [[nodiscard]] bool is_polled() const { return unit_.link != LinkKind::clocked && unit_.link != LinkKind::spi; }
   // Returns whether one of up to three readings gets a good reply: otherwise a missing reply to another request is no
   // evidence.
@@ -220,7 +220,8 @@ class Tester {
       return request;
     }
   }
-  /// Listens for `time` and counts unsolicited frames with the identifier of the readings' replies. CAN only.
+  /// Listens for `time` and counts valid frames with the identifier of the readings' replies. CAN only; 0 on other
+  /// links.
   UnsolicitedFrames count_unsolicited(Time time) {
     UnsolicitedFrames heard;
     const Attempted* const good = readings_.first_good();

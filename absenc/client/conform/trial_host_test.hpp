@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Hosts in virtual time for conformance tests: our own host with a defect, and senders that are no host of the
-// protocol.
+// Hosts in virtual time for conformance tests: our own host, with or without a defect, and senders that are no host of
+// the protocol.
 #pragma once
 
 #include <fmt/format.h>

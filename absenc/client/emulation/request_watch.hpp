@@ -83,8 +83,8 @@ class RequestWatch final : public Machine<Item> {
     note_bad(to_hex(bytes));
   }
 
-  // Counts requests in received bytes. Skips bytes that collide with a reply on a half-duplex line, and those after
-  // them up to a pause: they may be damaged by the collision.
+  // Counts requests in received bytes. After a collision with a reply on a half-duplex line, and after bytes that begin
+  // no request, ignores bytes up to a pause.
   void look_at_bytes(Bytes bytes, Time at, Time late) {
     const Time pause = at - character_ * static_cast<std::int64_t>(bytes.size()) - heard_at_;
     heard_at_ = at;
@@ -130,7 +130,7 @@ class RequestWatch final : public Machine<Item> {
 
   [[nodiscard]] Error error_of(const Frame& request) const { return unit_.check(options_, request, {}); }
 
-  // Bad bytes before the first good request are counted separately: opening a port may produce a few.
+  // Moves the count of bad requests to `before` at the first good one: opening a port may produce a few.
   void note_good() {
     if (++counts_.good > 1) return;
     counts_.before += counts_.bad;

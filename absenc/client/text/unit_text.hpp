@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Converts between texts of users and a unit's data: finds units, options, commands and fields by name, and prints
-// their values.
+// Finds units, commands, alarms and conditions by the names that users write, parses options and arguments, and returns
+// values of a unit as text.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +14,7 @@
 
 namespace absenc::client {
 
-/// Returns the unit of this name. Throws UsageError if there is none; it names the protocols of the maker or model of
-/// this name, or else suggests a similar protocol or lists all.
+/// Returns the unit of this name. Throws UsageError, with a suggestion, if there is none.
 [[nodiscard]] const Unit& require_unit(std::string_view id);
 [[nodiscard]] const Command& require_command(const Unit& unit, std::string_view name);
 
@@ -23,21 +22,21 @@ namespace absenc::client {
 [[nodiscard]] OptionText split_setting(std::string_view text);
 
 /// Returns the options of a model, changed by settings; "model" may be one of the settings. Throws UsageError; for an
-/// unknown name the error also suggests `extra_names`.
+/// unknown name it may suggest one of `extra_names`.
 [[nodiscard]] Options require_options(const Unit& unit, std::string_view model, std::span<const OptionText> settings,
                                       std::span<const std::string_view> extra_names = {});
 /// Returns the options of a model, changed by settings of the form "name=value", as from --option. Throws UsageError.
 [[nodiscard]] Options require_options(const Unit& unit, std::string_view model, std::span<const std::string> settings);
 
-/// Parses the arguments of the command, with defaults for those that are left out, and returns one number for each.
-/// Throws UsageError.
+/// Parses the arguments of the command and returns one number for each; an optional one that is left out gets its
+/// default. Throws UsageError.
 [[nodiscard]] std::vector<std::int64_t> require_arguments(const Command& command, std::span<const std::string> written);
 
-/// Checks numbers as arguments of the command and returns one number for each argument, with defaults for those that
-/// are left out. Throws UsageError.
+/// Checks numbers as arguments of the command and returns one number for each argument; an optional one that is left
+/// out gets its default. Throws UsageError.
 [[nodiscard]] std::vector<std::int64_t> complete_arguments(const Command& command, std::span<const std::int64_t> given);
 
-/// Returns the options with which the encoder is reached after the command `setter` has set its option to `value`.
+/// Returns `options` with the option that the command `setter` changes set to `value`; all others stay as they are.
 [[nodiscard]] Options options_behind(const Unit& unit, const Options& options, const Command& setter,
                                      std::int64_t value);
 
@@ -63,8 +62,7 @@ struct RoleArgument {
 
 /// Returns the unit's condition of this name; null if the virtual encoder has no such condition.
 [[nodiscard]] const Condition* find_condition(const Unit& unit, std::string_view name);
-/// Returns the unit's condition of this name. If there is none, throws UsageError, which suggests a similar name or
-/// lists all if the unit has any.
+/// Returns the unit's condition of this name. Throws UsageError if there is none.
 [[nodiscard]] const Condition& require_condition(const Unit& unit, std::string_view name);
 /// Parses a value of the condition. Throws UsageError if it is not a number within the condition's range.
 [[nodiscard]] std::int64_t require_value(const Condition& condition, std::string_view written);
@@ -76,10 +74,10 @@ struct RoleArgument {
 /// Returns a time as text with a suitable unit: "85 us", "2.1 ms" or "1.5 s".
 [[nodiscard]] std::string to_text(Time time);
 
-/// Returns the possible values of an option as text: "1 to 24", or the names of its choices, "none or odd or even".
+/// Returns the possible values of an option as text, such as "1 to 24", or its choices as "none or odd or even".
 [[nodiscard]] std::string range_of(const Option& option);
 [[nodiscard]] std::string to_text(const Option& option, std::int64_t value);
-/// Returns the value of an option, stored as an integer, divided by 10^decimals: the number that the user writes.
+/// Returns `value`, which an option stores as an integer, divided by 10^decimals.
 [[nodiscard]] double real_value(const Option& option, std::int64_t value);
 
 /// Returns the option `name` with its value as a setting, "baud=57600"; "" if the unit has no such option.
@@ -97,7 +95,7 @@ struct RoleArgument {
 [[nodiscard]] std::string_view action_of(const FlagInfo& flag, bool beside_alarms);
 [[nodiscard]] std::vector<std::string_view> flag_names(const FieldInfo& field, std::uint64_t bits);
 [[nodiscard]] std::string to_text(const FieldValue& value);
-/// Returns the number in hexadecimal, "0x17"; a negative number, which options use for "any", in decimal.
+/// Returns the number in hexadecimal, "0x17"; a negative number in decimal.
 [[nodiscard]] std::string hexadecimal(std::int64_t value);
 /// Returns bytes of an encoder as text, with '.' for every character that is not printable ASCII.
 [[nodiscard]] std::string printable(Bytes bytes);

@@ -30,8 +30,7 @@ class CanEngine : public Conversation<CanFrame> {
   void feed(const Event<CanFrame>& event) final;
   /// Returns the next step that the port must take.
   Step<CanFrame> next(Time now) final;
-  /// Puts nothing, so that names and texts of fields are only linked where they are used. Reported (command.hpp) puts
-  /// them.
+  /// Puts nothing, so that the names and texts of fields are linked only where Reported (command.hpp) is used.
   void report(FieldSink&) const override {}
   [[nodiscard]] Error error() const final { return outcome_.error; }
   [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
@@ -77,7 +76,8 @@ class CanEngine : public Conversation<CanFrame> {
   void finish(const Outcome& outcome);
   /// Stores `frame`, which was complete at `at`, as the answer to the request, for `exchange`.
   void keep(const CanFrame& frame, Time at);
-  /// Returns whether the texts of the outcome replace all other explanations of the error (see `only`).
+  /// Returns whether the explanation of the last reply is left out, because the texts of the outcome replace it
+  /// (`only`).
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
 
   /// Handles a received frame, which was complete at `at`. To send, listen or end, it calls one of the functions above;

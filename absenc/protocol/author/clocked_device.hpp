@@ -11,7 +11,8 @@
 
 namespace absenc::author {
 
-/// Bits that the encoder drives on the line, one for each clock. After them the line idles, or is low after `hold_low`.
+/// Bits that the encoder drives on the line, one for each clock. After them the line is high, or low if `hold_low` was
+/// called.
 using DrivenBits = BitBuffer<512>;
 
 /// A virtual encoder on a clocked link; a subclass provides the bits.

@@ -31,8 +31,7 @@ class ClockedEngine : public Conversation<std::uint8_t> {
   /// Returns the next step that the port must take.
   Step<std::uint8_t> next(Time now) override;
   [[nodiscard]] Error error() const final { return error_; }
-  /// Puts nothing, so that names and texts of fields are only linked where they are used. Reported (command.hpp) puts
-  /// them.
+  /// Puts nothing, so that the names and texts of fields are linked only where Reported (command.hpp) is used.
   void report(FieldSink&) const override {}
   /// Returns the bits of the last transfer, as bytes, and its times.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const final {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Declares commands of a unit: each by its request and the conversation that executes it. The storage that a command
-// needs, and the fields and texts that it reports, follow from the declaration.
+// Declares commands of a unit: each by its description, its request and the conversation that executes it.
 #pragma once
 
 #include <algorithm>
@@ -53,8 +52,8 @@ struct ItemOf<P> {
 template <class P>
 using ItemOf = typename detail::ItemOf<P>::Item;
 
-/// Functions that turn requests and replies of a unit into fields, and errors into texts for people. Firmware that
-/// uses no Unit does not link them. All conversations that Reported extends by them derive from `Host`.
+/// Functions that turn requests and replies of a unit into fields, and errors into texts for people. `Host` is a base
+/// class of the conversations that use the report.
 template <class P, class Host = Conversation<ItemOf<P>>>
 struct Report {
   /// Class with the functions of the protocol.
@@ -72,21 +71,20 @@ struct Report {
   void (*put_request)(FieldSink&, const Format&, const Request&) = nullptr;
   /// Puts the fields of a valid reply to the request into the sink.
   void (*put_reply)(FieldSink&, const Format&, const Request&, const Reply&) = nullptr;
-  /// Returns the document's explanation of an invalid or missing reply. Conversations do not call it if a procedure has
-  /// an advice of its own, its outcome stands alone (`only`), or the line is never silent. Null: none.
+  /// Returns the document's explanation of an invalid or missing reply, for errors that a procedure has not explained
+  /// itself. Null: none.
   Explanation (*explain)(const Format&, Error, Items request, Items reply) = nullptr;
-  /// Returns the explanation of the error of a conversation that ended, for units in which only the conversation knows
-  /// the reason. If set, it replaces `explain` for conversations.
+  /// Returns the explanation of the error of a conversation. If set, conversations use it instead of `explain`.
   Explanation (*explain_host)(const Host&) = nullptr;
-  /// Writes the explanation of the error of `host` into the sentence, for units that put explanations together from
-  /// parts. If set, it replaces the details of `explain` and `explain_host` for conversations.
+  /// Writes the explanation of the error of `host` into the sentence. If set, conversations use it instead of the
+  /// details of `explain` and `explain_host`.
   void (*tell)(Sentence&, const Host& host) = nullptr;
   /// Advice for the error that the line is never silent.
   std::string_view noise_advice = endless_noise.advice;
 };
 
-/// Functions that turn the result of a procedure, of type `Found`, into fields. `Subject` is the format, or a class
-/// that the conversation derives from if the format alone is not enough.
+/// Functions that report the result, of type `T`, of a procedure. `put` and `put_left` get the format or, if `Subject`
+/// is a base class of the conversation, the conversation.
 template <class Subject, class T>
 struct Finding {
   /// The format, or the class of the conversation, that the functions get.
@@ -96,7 +94,7 @@ struct Finding {
 
   /// Puts the fields of the result of a successful procedure into the sink.
   void (*put)(FieldSink&, const Subject&, const T&) = nullptr;
-  /// Puts the fields of the changes that an interrupted procedure leaves in the encoder into the sink. Null: none.
+  /// Puts into the sink the changes that an interrupted procedure leaves in the encoder. Null: there are none.
   void (*put_left)(FieldSink&, const Subject&, const T&) = nullptr;
   /// Returns a sentence about the changes that a failed procedure leaves in the encoder; "": there are none. Null:
   /// never.
@@ -109,8 +107,8 @@ constexpr void put_values(FieldSink& sink, const What&... what) {
   fields.put(sink, values(what...));
 }
 
-/// The conversation `Base` with reports: it delivers the fields and texts of `unit_report`. A procedure has one
-/// `finding`, which delivers its result; without a finding the last reply is the result.
+/// The conversation `Base`, which also reports fields and texts by the functions of `unit_report`. `finding` reports
+/// the result of a procedure; without it the last reply is the result.
 template <const auto& unit_report, class Base, const auto&... finding>
 class Reported final : public Base {
  public:
@@ -128,11 +126,10 @@ class Reported final : public Base {
     }
     if (const Reading* reading = this->reading()) sink.put_reading(*reading);
   }
-  /// Puts the fields of the changes that an interrupted procedure leaves in the encoder into `sink`; nothing if there
-  /// are none.
+  /// Puts into `sink` the changes that an interrupted procedure leaves in the encoder.
   void report_left(FieldSink& sink) const override { (put_left<finding>(sink), ...); }
-  /// Returns a text about the result for people: the explanation of the error, the failed step, and changes left in the
-  /// encoder. Empty: none.
+  /// Returns a text for people: the explanation of the error, the procedure's own text, and the changes left in the
+  /// encoder. May be empty.
   [[nodiscard]] std::string_view detail() const override {
     words_.clear();
     const std::string_view own = Base::detail();
@@ -207,12 +204,11 @@ struct CommandOf {
   using Request = typename P::Request;
 
   Command info;  ///< Description of the command.
-  /// Returns the request that does the work of the command, although a procedure may send more. It returns an error, or
-  /// a request that P::encode refuses, if the arguments allow none. Null: there is none (clocked lines), or the
-  /// requests are not known beforehand.
+  /// Returns the main request of the command; an error, or a request that P::encode refuses, if the arguments are
+  /// impossible. Null: no request is known beforehand.
   Result<Request> (*request)(const Format&, Arguments);
-  /// Constructs the conversation of the command at the start of the storage, which has at least `size` bytes; the rest
-  /// holds coroutine frames.
+  /// Constructs the conversation of the command, and the coroutine frames of a procedure, in the storage. Returns an
+  /// empty Any if the storage is too small.
   Any<Conversation> (*make)(const Format&, Arguments, std::span<std::byte>);
   std::size_t size;  ///< bytes of storage that the conversation needs, without the frames of coroutines
   /// Returns why an encoder of this format lacks the command; "": it has the command. Null: every encoder has it.
@@ -221,7 +217,7 @@ struct CommandOf {
   Any<Conversation> (*make_other)(const Format&, Arguments, std::span<std::byte>) = nullptr;
   /// Returns whether `make_other` makes the conversation for this format; null: never.
   bool (*is_other)(const Format&) = nullptr;
-  /// Returns whether the options of this format are consistent; no conversation is made otherwise. Null: always.
+  /// Returns whether the command is possible with this format. Null: it always is.
   bool (*possible)(const Format&) = nullptr;
 
   /// Returns a copy of this command that is refused for formats for which `why` returns a reason.
@@ -230,7 +226,7 @@ struct CommandOf {
     one.missing = why;
     return one;
   }
-  /// Returns a copy of this command whose conversation is made only for formats for which `is_possible` is true.
+  /// Returns a copy of this command that is possible only for formats for which `is_possible` is true.
   [[nodiscard]] constexpr CommandOf only_if(bool (*is_possible)(const Format&)) const {
     CommandOf one = *this;
     one.possible = is_possible;
@@ -244,8 +240,8 @@ struct CommandOf {
     one.size = std::max(size, other.size);
     return one;
   }
-  /// Returns whether a conversation can be made with these arguments: false if P::encode refuses a request that is no
-  /// pulse. An error of `request` gives true, because the conversation reports that error.
+  /// Returns false if P::encode refuses the request, unless the request is a pulse. Returns true if `request` returns
+  /// an error, which the conversation then reports.
   [[nodiscard]] bool can_ask(const Format& format, Arguments arguments) const {
     if constexpr (std::is_same_v<Request, NoRequest>) {
       return true;
@@ -295,8 +291,8 @@ Any<Conversation> make_run(const typename Machine::Format& format, Arguments arg
 template <const auto& unit_report>
 using ReportedProtocol = typename std::remove_cvref_t<decltype(unit_report)>::Protocol;
 
-/// Returns the declaration of a command that reads a position, or another value, with one request, which `request`
-/// makes from the format. The conversation `Reader` executes it.
+/// Returns the declaration of a command that reads a position or another value. `request` makes its request from the
+/// format, and the conversation `Reader` executes it.
 template <const auto& unit_report, auto request, class Reader = ReadPosition<ReportedProtocol<unit_report>>>
 [[nodiscard]] constexpr CommandOf<ReportedProtocol<unit_report>> reading(const Command& info) {
   using P = ReportedProtocol<unit_report>;

@@ -17,8 +17,9 @@
 namespace absenc::author {
 
 /// The properties of a unit of the protocol `P`, from which Descriptor (unit.hpp) makes the Unit. `P` has the members
-/// that dialog.hpp and device.hpp, clocked_host.hpp or can_dialog.hpp list. `VirtualEncoder`, a Device such as
-/// BusDevice or ClockedDevice, is constructed from (format, shaft). `Host`: as in Report.
+/// that its kind of line needs: those of dialog.hpp and device.hpp, of clocked_host.hpp, or of can_dialog.hpp.
+/// `VirtualEncoder`, a Device such as BusDevice or ClockedDevice, is constructed from (format, shaft). `Host`: as in
+/// Report.
 template <class P, class VirtualEncoder, class Host = Conversation<ItemOf<P>>>
 struct Declaration {
   /// Class with the functions of the protocol.

@@ -137,9 +137,9 @@ void Responder::search_again(Time at) {
   for (const std::uint8_t byte : heard.view().subspan(1)) receive_byte(byte, at);
 }
 
-// Handles a byte received while the encoder sends. A request breaks a rule then. It is excused, in at most
-// `most_excuses` consecutive replies, if this program was delayed so long that the host may have repeated the request
-// after its timeout: longer than the assumed timeout of the host times the number of requests in this transmission.
+// Handles a byte received while the encoder sends. A request breaks a rule then, unless this program was delayed so
+// long that the host may have repeated the request after its timeout. At most `most_excuses` consecutive replies are
+// excused.
 void Responder::receive_while_transmitting(std::uint8_t byte, Time at) {
   if (!interruption_.begins_request(request_size({&byte, 1}), at, times_.character)) return;
   ++interrupted_;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Device side of a line of characters (UART): Responder recognizes requests, ignores those for other encoders, answers
-// in time, and checks that hosts do not send meanwhile. It knows no protocol, and is compiled once. BusDevice adds a
-// protocol and a memory.
+// Device side of a line of characters (UART): Responder recognizes requests, answers those for this encoder, and checks
+// that hosts do not send meanwhile. It knows no protocol, and is compiled once. BusDevice adds a protocol and a memory.
 #pragma once
 
 #include <array>
@@ -52,12 +51,12 @@ class Responder : public EncoderOn<std::uint8_t> {
   void transmit(Bytes bytes, Time at);
   /// Returns whether the encoder is sending, or is about to send a reply.
   [[nodiscard]] bool is_transmitting() const { return transmitting_; }
-  /// Returns the earliest time at which bytes delivered at `at` may have arrived, because the program that delivers
-  /// them may have been delayed. Times that a host must wait are measured from this time.
+  /// Returns the earliest time at which the last received bytes, delivered at `at`, may have arrived, because the
+  /// program that delivers them may have been delayed.
   [[nodiscard]] Time earliest(Time at) const { return at - late_; }
 
   /// Returns the length of the request that begins with the bytes `begin`, or how many bytes are needed to know the
-  /// length, at least one. 0: no request begins with these bytes, and the search continues at the next byte.
+  /// length. 0: no request begins with these bytes.
   [[nodiscard]] virtual std::size_t request_size(Bytes begin) const = 0;
   /// Returns the length of the reply to `request`, which is for another encoder; 0: none.
   [[nodiscard]] virtual std::size_t others_reply_size(Bytes request) const = 0;

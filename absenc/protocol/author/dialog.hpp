@@ -93,8 +93,8 @@ class HostOf : public Engine {
   std::array<std::uint8_t, 3 * P::longest_reply> storage_;
 };
 
-/// Conversation that reads a position with one request. It must be fast, because a drive reads ten thousand times a
-/// second.
+/// Conversation that reads a position or another value with one request. It must be fast, because a drive may read ten
+/// thousand positions a second.
 template <class P>
 class ReadPosition : public HostOf<P> {
  public:
@@ -128,8 +128,8 @@ class DialogOf : public HostOf<P>, public Routine {
   /// Type of the protocol's replies.
   using Reply = typename P::Reply;
 
-  /// A request that a procedure can await, after setting its properties. With `must` the procedure ends if there is no
-  /// valid reply, and the result is the reply; otherwise the result is the reply or the error.
+  /// A request that a procedure can await, after setting its properties. With `must` awaiting it gives the reply, and
+  /// ends the procedure if there is no valid one; otherwise it gives the reply or the error.
   template <bool must>
   class [[nodiscard]] Question {
    public:
@@ -238,7 +238,8 @@ class DialogOf : public HostOf<P>, public Routine {
   }
   [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
   [[nodiscard]] std::string_view advice() const override { return outcome_.advice; }
-  /// Returns whether the texts of the procedure's outcome replace all other explanations of its error (see `only`).
+  /// Returns whether the explanation of the last reply is left out, because the texts of the procedure's outcome
+  /// replace it (`only`).
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
   [[nodiscard]] ChangeSent change_sent() const final { return change(); }
   /// Declares that from now on the procedure, when it is asked to end early, restores the encoder before it ends. Such
@@ -313,9 +314,8 @@ struct ProcedureDialog<P> {
 };
 }  // namespace detail
 
-/// Type of the dialog of a protocol's procedures: `P::Dialog` if the protocol declares it, because its requests do not
-/// have one reply each; otherwise DialogOf. `P::Dialog` is a Routine and an engine of its kind of line, constructed
-/// from (format, arena).
+/// Type of the dialog of a protocol's procedures: `P::Dialog` if the protocol declares it, otherwise DialogOf.
+/// `P::Dialog` is a Routine and an engine of its kind of line, constructed from (format, arena).
 template <class P>
 using ProcedureDialog = typename detail::ProcedureDialog<P>::Type;
 

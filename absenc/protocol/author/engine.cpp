@@ -166,8 +166,8 @@ void Engine::sent(Time at) {
   check_reply();  // bytes may have been received during a pulse
 }
 
-// Checks a complete reply, unless the manner demands silence first. A valid reply or a refusal ends the exchange; after
-// any other error the engine waits for silence.
+// Checks a complete reply, unless the manner demands silence first. After a valid reply or a refusal the engine
+// continues at once, after any other error it waits for silence.
 void Engine::check_reply() {
   if (state_ != State::receiving) return;
   const std::size_t whole = expected();

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of a line of characters (UART) on which each request has one reply: sends a request, receives the reply,
-// waits for silence after an error, repeats the request, and ends with an error after the last repetition. It knows no
-// protocol, and is compiled once.
+// Host side of a line on which the encoder answers requests: sends a request, receives the reply, and repeats the
+// request after an error. It knows no protocol, and is compiled once.
 #pragma once
 
 #include <algorithm>
@@ -28,10 +27,10 @@ struct Manner {
   unsigned repeats = 0;       ///< how often the request is sent again, at most, after an invalid or missing reply
   Time pause{};               ///< pause before a repetition, from the last sent or received character
   bool expects_reply = true;  ///< false: the encoder does not reply, so the exchange ends with the request
-  /// Whether a reply is accepted only when silence follows it, because its checksum alone is too weak.
+  /// Whether a reply is checked only after the silence that follows it.
   bool ends_by_silence = false;
-  /// Whether any undamaged reply, or none, is accepted, because the document does not define it: the received bytes are
-  /// not checked, and silence ends the exchange.
+  /// Whether any undamaged reply, or none, is accepted: the received bytes are not checked, and silence ends the
+  /// exchange.
   bool any_reply = false;
   Time answer_limit{};     ///< longest time until the reply begins; 0: HostTimes::answer_limit
   Time hold{};             ///< how long the encoder may still be busy with the request after an error
@@ -41,12 +40,12 @@ struct Manner {
   ExtraWire wire{};        ///< Wire that is pulsed, if `pulse` is not 0.
 };
 
-/// Conversation on a line of characters; a subclass recognizes a complete reply and handles it. DialogOf makes such a
+/// Conversation on a line of characters; a subclass recognizes a complete reply and handles it. HostOf makes such a
 /// class from a protocol. CAN and clocked lines have engines of their own, because replies end differently there.
 ///
 /// After an invalid reply the engine waits for silence before it ends or sends again: sending while an encoder sends
 /// can destroy the encoder's driver. If the line is not silent within HostTimes::patience, the exchange ends with an
-/// error. A valid reply or a refusal (`is_whole`) ends the exchange at once, unless Manner demands silence after it.
+/// error. After a valid reply or a refusal (`is_whole`) the engine waits for silence only if Manner demands it.
 class Engine : public Conversation<std::uint8_t> {
  public:
   /// Not copyable: requests and replies are views into the conversation itself.
@@ -58,32 +57,31 @@ class Engine : public Conversation<std::uint8_t> {
   /// Returns the next step that the port must take.
   Step<std::uint8_t> next(Time now) final;
   [[nodiscard]] Error error() const final { return error_; }
-  /// Puts nothing, so that names and texts of fields are only linked where they are used. Reported (command.hpp) puts
-  /// them, and explains the error that the line is never silent.
+  /// Puts nothing, so that the names and texts of fields are linked only where Reported (command.hpp) is used.
   void report(FieldSink&) const override {}
   /// Returns the last request, none after `listen`, and the bytes of `reply`.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const final { return {out_, reply(), sent_at_, received_at_}; }
 
-  /// Returns the time at which the last request was due to begin. An SPI device is taken to answer with its state at
-  /// that time.
+  /// Returns the time at which the last request was due to begin.
   [[nodiscard]] Time begun_at() const { return begun_at_; }
-  /// Returns the time at which the last bit of the last request was sent; for a pulse, the time at which it began.
+  /// Returns the time at which the last bit of the last request was sent; for a pulse, the time Manner::pulse before
+  /// the end of the pulse.
   [[nodiscard]] Time sent_at() const { return sent_at_; }
-  /// Returns the latest of these times: the first step, the last received byte, the end of the last request, the end
-  /// of the last time of listening.
+  /// Returns the time from which pauses are measured: the end of the last request, received byte or time of listening;
+  /// before these, the first step.
   [[nodiscard]] Time received_at() const { return received_at_; }
   /// Returns the bytes received since the last request, or listening, began, valid or not, as far as there is room.
   [[nodiscard]] Bytes reply() const { return Bytes(storage_).first(size_); }
   /// Returns whether the last exchange was abandoned because the line is never silent. Repeating the request does not
   /// help then.
   [[nodiscard]] bool is_noisy() const { return noisy_; }
-  /// Returns whether, since the last request began, a character was damaged, or was received while no reply was
-  /// awaited; without characters received while listening, or during a pulse unless damaged.
+  /// Returns whether, since the last request began, a character was damaged or was received while no reply was awaited.
+  /// Characters received while listening do not count, nor undamaged ones during a pulse.
   [[nodiscard]] bool is_disturbed() const { return disturbed_; }
 
  protected:
-  /// Constructs an engine. `storage`: room for a reply, and more than the longest reply, so that a reply that is too
-  /// long is detected. It must outlive the engine.
+  /// Constructs an engine. `storage` must outlive it, and have more room than the longest reply needs, so that a reply
+  /// that is too long is detected.
   Engine(const HostTimes& times, MutableBytes storage) : storage_(storage), times_(times) {}
   ~Engine() = default;
 
@@ -98,8 +96,8 @@ class Engine : public Conversation<std::uint8_t> {
   void set_times(const HostTimes& times) { times_ = times; }
   /// Sets that nothing is sent until `time`, and that `woken` is called then.
   void sleep(Time time);
-  /// Sets that the line is listened to for `duration`, from the next step on: `heard` is called for received bytes, and
-  /// `woken` at the end. The end is checked at every step, so also after bytes, which a port delivers before timers.
+  /// Sets that the line is listened to for `duration`, from the next step on. `heard` is called for received bytes and
+  /// for each damaged character, and `woken` at the end.
   void listen(Time duration);
   /// Continues to listen until the end of the time. To be called after `heard`.
   void listen_on() { state_ = State::listening; }
@@ -112,7 +110,8 @@ class Engine : public Conversation<std::uint8_t> {
   /// Returns the length of the reply that begins with the bytes `reply()`; 0: it is not known yet, or only silence ends
   /// the reply.
   [[nodiscard]] virtual std::size_t expected() const = 0;
-  /// Checks the complete reply in `reply()`, and stores its content if it is valid. Returns the first error, or none.
+  /// Checks the reply in `reply()`, which has ended, and stores its content if it is valid. Returns the first error, or
+  /// none.
   [[nodiscard]] virtual Error check() = 0;
   /// Returns whether a reply with this error is complete, as a refusal is, so that nothing follows it. After any other
   /// error more bytes may follow, which must not collide with the next request.
@@ -140,8 +139,7 @@ class Engine : public Conversation<std::uint8_t> {
   void wake(Time now);
   [[nodiscard]] Time rest_end() const;
   void begin_or_end(Step<std::uint8_t>& step, Time now);
-  // Stores received bytes as part of the reply. Bytes for which there is no room are dropped: the reply is too long
-  // already.
+  // Appends received bytes to `reply()`, and drops those for which there is no room.
   void keep(Bytes bytes) {
     const MutableBytes room = storage_.subspan(size_);
     const std::size_t fitting = std::min(bytes.size(), room.size());
@@ -157,8 +155,8 @@ class Engine : public Conversation<std::uint8_t> {
   void conclude_with(Error error);
   void start(Time earliest);
 
-  // Members that every received character needs come first: a Cortex-M0+ reaches the first 32 bytes of an object in one
-  // instruction.
+  // Byte members that every received character needs come first: a Cortex-M0+ loads a byte in one instruction only from
+  // the first 32 bytes of an object.
   State state_ = State::over;
   bool disturbed_ = false;
   bool item_received_ = false;  // a byte, or a damaged character, was received in this exchange
@@ -170,8 +168,7 @@ class Engine : public Conversation<std::uint8_t> {
   std::size_t due_ = 0;  // bytes of the reply still to be received
   MutableBytes storage_;
   HostTimes times_;
-  // A byte received at this time or later shows that the line is never silent. Without such a byte the port reports
-  // silence, which ends the exchange.
+  // An item received at this time or later shows that the line is never silent.
   Time noise_end_{};
   Time received_at_{};
   Manner manner_{};

@@ -55,8 +55,8 @@ constexpr FieldInfo::Kind kind_of() {
 }
 }  // namespace detail
 
-/// Returns the declaration of a field whose value is `member`. The type of the member gives the kind of the field. A
-/// member that is an optional without a value is not put.
+/// Returns the declaration of a field whose value is `member`, or the result of the function `member`. The type of the
+/// value gives the kind of the field. A value that is an empty optional is not put.
 template <auto member>
 [[nodiscard]] constexpr FieldOf<member> field(std::string_view name, std::string_view unit, std::string_view meaning,
                                               Role role = Role::other) {
@@ -83,8 +83,7 @@ struct FieldsOf {
   /// Constructs the table from the fields, in the order in which they are put.
   constexpr explicit FieldsOf(const FieldOf<members>&... all) : infos{all.info...} {}
 
-  /// Puts each field of `values` into `sink`, in the order of the table; members that are optionals without a value are
-  /// left out.
+  /// Puts each field of `values` into `sink`, in the order of the table; values that are empty optionals are left out.
   constexpr void put(FieldSink& sink, const Values& values) const {
     std::size_t index = 0;
     (put_one(sink, infos[index++], shown<members>(values)), ...);

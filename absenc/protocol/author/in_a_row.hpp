@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Commands that an encoder executes only after their request was sent several times in a row: resets, zero, presets.
-// Host and virtual encoder share the numbers of the document.
 #pragma once
 
 #include <cstdint>

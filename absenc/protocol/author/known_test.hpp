@@ -38,7 +38,7 @@ std::vector<std::vector<std::uint8_t>> talk(Reader& reader, const std::vector<st
 }
 
 /// Expects that ReadKnownPosition and ReadPosition give the same result for the valid reply `good`, for the reply with
-/// each of its bits wrong, and for each incomplete reply.
+/// any one of its bits wrong, and for each incomplete reply.
 template <class P, const typename P::Format& format, const typename P::Request& request>
 void expect_known_as_any(const std::vector<std::uint8_t>& good) {
   std::vector<std::vector<std::uint8_t>> replies{good};

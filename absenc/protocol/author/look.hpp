@@ -26,8 +26,8 @@ namespace absenc::author {
   return reading;
 }
 
-/// Where `look` stores the exchange that read a position. The `Found` of a procedure that calls `look` is this struct,
-/// or derives from it.
+/// The last exchange that `look` stored. The `Found` of a procedure that calls `look` is this struct, or derives from
+/// it.
 template <class P>
 struct Looked {
   typename P::Request request{};  ///< The request that was sent.

@@ -98,8 +98,8 @@ template <auto member>
   return one;
 }
 
-/// Returns the option `one`, marked so that users may write up to `decimals` digits after the decimal point; its
-/// values are in units of the last one.
+/// Returns the option `one`, marked so that users may write up to `decimals` digits after the decimal point; its values
+/// are in units of the last digit.
 template <unsigned decimals, auto member>
 [[nodiscard]] constexpr OptionOf<member> decimal(OptionOf<member> one) {
   one.info.decimals = decimals;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Device side of a paged memory that is busy for a while after a page change and after a write, except of a register:
-// an EEPROM and registers, whose bytes have addresses of 7 or 8 bits. It knows no protocol, and is compiled once.
+// Device side of a paged memory with an EEPROM and registers: it is busy for a while after a page change and after a
+// write into the EEPROM. It knows no protocol, and is compiled once.
 #pragma once
 
 #include <cstdint>

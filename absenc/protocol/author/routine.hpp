@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs procedures (commands of several requests) as coroutines without a heap, so that each reads like its paragraph of
-// the document. The coroutine frames are in storage of the caller, one after the other.
+// Runs procedures (commands of several requests) as coroutines, so that each reads like its paragraph of the document.
+// The coroutine frames are in storage of the caller, without a heap.
 #pragma once
 
 #include <coroutine>
@@ -27,7 +27,7 @@ struct Outcome {
   std::string_view detail{};  ///< the step that failed, and the evidence
   std::string_view advice{};  ///< what to try, instead of the error's own advice
   Time hold{};                ///< how long the encoder must not be disturbed after the last sent or received character
-  /// True: `detail` and `advice` replace all other texts, so the explanation of the last reply is not added.
+  /// True: the explanation of the last reply is not added to `detail` and `advice`.
   bool alone = false;
 };
 
@@ -168,7 +168,7 @@ struct Procedure {
 };
 
 /// Return type of a coroutine that is a part of a procedure and has a result: `const Reply reply = co_await
-/// look(dialog);`. Only one part runs at a time.
+/// look(dialog);`.
 template <class T>
 struct [[nodiscard]] Part {
   /// Functions that the compiler calls for a coroutine that returns a Part.

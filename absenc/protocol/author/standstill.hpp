@@ -11,8 +11,7 @@
 
 namespace absenc::author {
 
-/// Time between two readings of the position, which show whether the shaft turns faster than 0.33 rpm (or than one
-/// count per reading, with few bits).
+/// Time between two readings that show whether the shaft stands still: 0.02 degrees in this time are 0.33 rpm.
 inline constexpr Time between_looks = std::chrono::milliseconds(10);
 /// Greatest difference of two positions of a standing shaft, caused by noise, in 1/1000 degree.
 inline constexpr std::uint32_t standstill_millidegrees = 20;

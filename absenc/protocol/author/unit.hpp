@@ -56,8 +56,8 @@ struct Descriptor {
   static constexpr Error decode(const Options& values, Frame asked, Frame frame, FieldSink& sink) {
     return decode_by(declared.format(values), asked, frame, sink);
   }
-  /// Checks a frame of an encoder with the format `f` and puts its fields into `sink`. `AnyFormat`: Format, or Format
-  /// compiled. Returns the first error.
+  /// Checks a frame of an encoder with the format `f` and puts its fields into `sink`. `AnyFormat`: Format or
+  /// Format::Compiled. Returns the first error.
   template <class AnyFormat>
   static constexpr Error decode_by(const AnyFormat& f, Frame asked, Frame frame, FieldSink& sink) {
     if constexpr (declared.decode_control != nullptr) {
@@ -250,8 +250,8 @@ struct Descriptor {
   /// Returns the settings of the line with these options.
   static constexpr LineSettings settings(const Options& values) { return line_of(declared.format(values)); }
 
-  /// Returns whether the encoder answers a request, as Protocol::manner states; false if any reply is accepted, true
-  /// for an invalid request.
+  /// Returns whether the encoder answers a request, as Protocol::manner states: false with Manner::any_reply. Returns
+  /// true for an invalid request.
   static bool is_answered(const Options& values, Frame asked) {
     const Format f = declared.format(values);
     const Result<Request> request = P::decode_request(f, asked.bytes);

@@ -114,7 +114,7 @@ class Talk {
 /// encoder. A sent frame that it leaves without bytes is lost.
 using Tamper = std::function<void(unsigned nth, Wire& bytes)>;
 
-/// A virtual encoder with functions that change the bytes that it receives and sends; by default none is changed.
+/// Wraps a virtual encoder with functions that change the bytes that it receives and sends; by default none is changed.
 class Tampered final : public Machine<std::uint8_t> {
  public:
   explicit Tampered(Machine<std::uint8_t>& encoder) : encoder_(encoder) {}
@@ -152,7 +152,7 @@ class Tampered final : public Machine<std::uint8_t> {
   Wire out_;
 };
 
-/// A line in virtual time with a virtual encoder and at most one host, which is idle between conversations.
+/// A line in virtual time with at most one host, which is idle between conversations.
 struct HostedLine : sim::Line<std::uint8_t> {
   HostedLine(LinkKind kind, const LineSettings& settings) : Line(kind, settings) {}
 

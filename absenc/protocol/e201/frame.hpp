@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Commands of the RLS E201-9S USB interface, one character each, some with a number, and its ASCII replies. README.md
-// lists the commands with their sources. text.hpp decodes replies that no document describes, as leniently as possible.
+// lists the commands with their sources.
 #pragma once
 
 #include <array>
@@ -192,8 +192,8 @@ inline constexpr unsigned widest = 64;  ///< Greatest width of a position in bit
   return reply;
 }
 
-/// The protocol as the code in absenc/protocol/author uses it: frames, lengths and times. author/dialog.hpp explains
-/// each member.
+/// The protocol as the code in absenc/protocol/author uses it: frames, lengths and times. author/dialog.hpp and
+/// author/device.hpp explain the members.
 struct Protocol {
   /// Layout of the encoder's frames and properties of the interface, as the unit's options select them.
   using Format = e201::Format;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Procedures of the E201-9S that take several exchanges, and their results; README.md describes each procedure.
+// Procedures of the E201-9S, and their results.
 #pragma once
 
 #include <array>
@@ -61,9 +61,9 @@ struct InterfaceResults {
   [[nodiscard]] unsigned recommended() const;
 };
 
-/// Reads a position with `4`. If the reply is missing or has a wrong length, and the line is not busy without end,
-/// reads the firmware version: before 1.16 the error is unsupported, otherwise `4` is sent once more, unless it had no
-/// reply and the version no valid one.
+/// Reads a position with `4`. If the reply is missing or has a wrong length, the procedure may read the firmware
+/// version to find the cause, and send `4` once more. Error besides those of the exchanges: unsupported (firmware
+/// before 1.16).
 author::Procedure read(Dialog& dialog, InterfaceResults& found);
 /// Reads version, serial number, supply and clock. A missing or invalid reply is an error only if it is that of the
 /// version, or if the line is never silent.

@@ -223,8 +223,8 @@ TEST(E201Zero, ReadsZeroBack) {
   EXPECT_EQ(bench.run("decimal").fields, (Fields{{"counts", 275086}}));
 }
 
-// Checks how far the encoder may move while the zero is set: by 0.02 degrees, but by one count in any case, which are
-// 29 counts of 19 bits and 1 count of 12 bits.
+// Checks how far the encoder may move while the zero is set: by 0.02 degrees (29 counts of 19 bits), or by one count if
+// that is more, as with 12 bits.
 TEST(E201Zero, RefusesMovingEncoder) {
   struct Case {
     std::string bits;

@@ -217,7 +217,7 @@ TEST_P(EncolinkRegister, ReportsUnpluggedEncoder) {
   EXPECT_FALSE(says(save.detail, "may have been executed")) << save.detail;
 }
 
-// The answer to the write is lost, so the procedure must read the register before it writes again.
+// The answer to the write is lost. Reading back shows that it was executed, so the procedure must not write again.
 TEST_P(EncolinkRegister, ReadsBackBeforeRepeatingWrite) {
   Bench bench(testing::single, interface);
   bench.tampered.replies(damaging({22}));
@@ -231,7 +231,7 @@ TEST_P(EncolinkRegister, ReadsBackBeforeRepeatingWrite) {
   EXPECT_EQ(written, 1u);
 }
 
-// The encoder receives an unknown operation: channel 3 stays idle, and the register keeps its value.
+// While the operation byte is replaced by an unknown one, channel 3 stays idle and the register keeps its value.
 TEST_P(EncolinkRegister, RepeatsWriteThatWasNotExecuted) {
   for (const auto& [times, error] :
        std::to_array<std::pair<int, Error>>({{2, Error::none}, {3, Error::cross_check_failed}})) {

@@ -16,8 +16,8 @@
 namespace absenc::encolink {
 
 /// Combines captured frames to cycles of channel 2 and to register accesses. A cycle begins with the first position
-/// frame after a reset of the channels (AA, BB). Without a reset, or after lost frames, a cycle is found by its
-/// checksum and by its position, which equals that of the first frame of the cycle.
+/// frame after a reset of the channels (AA, BB), or after a valid cycle. If the alignment is unknown, a cycle is found
+/// by its checksum and by its position, which equals that of the first frame of the cycle.
 class ChannelFollower final : public Follower {
  public:
   /// Creates a follower for encoders with this format.

@@ -21,8 +21,7 @@ constexpr std::array<Text, 3> texts{
 
 // Index, after those of the registers, of the turns that a preset subtracts from the shaft's turns.
 constexpr std::size_t turns_taken = registers.size();
-// Initial values of the registers that are numbers, and of `turns_taken`. Values that only a calibration or the factory
-// determines are 0.
+// Values of `values_` at shipping: 0 unless stated here.
 constexpr auto at_shipping = [] {
   std::array<std::uint32_t, turns_taken + 1> values{};
   values[firmware_major] = 1;

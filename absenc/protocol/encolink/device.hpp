@@ -82,7 +82,8 @@ class VirtualEncoder final : public author::Responder {
   Format format_;
   const Shaft* shaft_;
   std::array<std::int64_t, conditions.size()> conditions_{};
-  // Values of the registers that store a number; the last element: the turns that a preset subtracts from the shaft's.
+  // Numbers of the registers, by index in the table, and behind them the turns that a preset subtracts from the shaft's
+  // turns. A register whose value is computed does not use its element.
   std::array<std::uint32_t, registers.size() + 1> values_{};
   std::array<std::uint8_t, 31> memory_{};
 

@@ -43,7 +43,7 @@ inline constexpr Time busy_limit = 2s;   ///< Longest time for which the host wa
 inline constexpr Time calibration_time = 1s;     ///< Duration of the virtual encoder's self-calibration.
 inline constexpr Time calibration_limit = 15s;   ///< Timeout of a self-calibration; the vendor allows the shaft 10 s.
 inline constexpr Time calibration_poll = 100ms;  ///< Time between two polls of a running self-calibration.
-/// Time without a valid frame and without a loss of alignment after which the host stops receiving a stream.
+/// Longest time that the host waits for the next result of a stream: a frame, or a loss of alignment.
 inline constexpr Time listen_limit = 500ms;
 
 // ---- Frames
@@ -78,8 +78,8 @@ inline constexpr unsigned maximum_multiturn_bits = 16;  ///< Greatest number of 
 /// Bytes of one reply.
 using ReplyBytes = ByteBuffer<reply_capacity>;
 
-/// Interface of the encoder. On SPI, a transfer carries a frame made when the transfer begins. On a UART, the reply
-/// follows the request.
+/// Interface of the encoder. On SPI, a frame is made when its transfer begins, before the request in the same transfer
+/// is received. On a UART, the reply follows the request.
 enum class Interface : std::uint8_t { uart, spi };
 /// Whether the encoder adds the position offset to the measured position or subtracts it. The register map does not
 /// state it.
@@ -350,10 +350,9 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return reading;
 }
 
-/// Returns the reading `now` with the alarms of the earlier reading `before` that still apply; see Unit. The status of
-/// a channel 2 cycle stays valid while the error and warning bits of position frames do not contradict it. If these
-/// bits change, only the next cycle reports which alarm changed: a set bit does not name its alarm, and a clear bit
-/// clears only the alarms of its own kind.
+/// Returns `now`, completed by the alarms of `before`, the completed reading before it (Unit::remembered). They are
+/// added only if the error and warning bits of `now` agree with them; otherwise the alarms behind a set bit stay
+/// unknown until the next cycle of channel 2.
 [[nodiscard]] constexpr Reading remembered(const Reading& before, Reading now) {
   const std::uint32_t unknown = before.alarms_reported & ~now.alarms_reported;
   if (unknown == 0 || now.singleturn_bits == 0) return now;

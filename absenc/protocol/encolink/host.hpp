@@ -48,15 +48,15 @@ struct Frames {
   /// Decodes a reply, except that to `identify`, whose content is ignored. Errors: line_stuck (SPI: all bytes are 00,
   /// or all are FF), and those of decode_position or of decode_identity.
   static Result<Position> decode(const Format& format, const Request& request, Bytes reply);
-  /// Returns whether the host awaits no more bytes: on SPI, where a transfer has a fixed length; on a UART more may
-  /// follow.
+  /// Returns whether an invalid reply is complete: on SPI, where a transfer has a fixed length. On a UART more bytes
+  /// may follow.
   static bool is_whole(const Format& format, Error) { return format.interface == Interface::spi; }
   /// Returns the shortest time between two frames; the host also keeps it between two conversations.
   static constexpr Time pause(const Format& format) { return format.interface == Interface::spi ? spi_pause : Time{}; }
 };
 
-/// The content of successive frames: the position, and cycles of channel 2. Each frame carries one byte of a cycle,
-/// from a reset of the channels until a frame is lost or a cycle has an error.
+/// The content of successive frames: the position, and cycles of channel 2. Each frame carries one byte of a cycle. The
+/// alignment to a cycle is known from a reset of the channels until a frame is lost or a cycle has an error.
 struct Channels {
   Reading reading{};                      ///< Reading from the last valid frame; empty before the first.
   std::optional<std::uint16_t> status{};  ///< Detailed status in the last valid cycle; no value before it.
@@ -67,8 +67,8 @@ struct Channels {
   /// Whether all bytes of the last cycle were 0, as while the encoder starts.
   bool silent = false;
 
-  /// Processes the valid frame that `host` has received. A cycle whose position differs from that of its first frame
-  /// ends with cross_check_failed. A cycle with an error ends the alignment.
+  /// Processes the valid frame that `host` has received. A valid cycle whose position differs from that of its first
+  /// frame ends with cross_check_failed. A cycle with an error ends the alignment.
   void take(const author::HostOf<Frames>& host);
 
  private:

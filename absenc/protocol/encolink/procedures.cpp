@@ -15,8 +15,7 @@ namespace {
 
 constexpr unsigned frame_attempts = 3;
 constexpr unsigned cycle_attempts = 3;
-// greatest number of attempts of a register access: an access takes some hundred frames, and all of them must be
-// valid
+// greatest number of attempts of a register access: an access takes many frames, and all of them must be valid
 constexpr unsigned access_attempts = 5;
 constexpr unsigned write_attempts = 3;
 // number of idle cycles allowed between the last byte of an access and its answer
@@ -107,7 +106,8 @@ Part<Error> send(Dialog& dialog, ProcedureState& found) {
   co_return Error::none;
 }
 
-// Requests frames until a cycle of channel 2 ends; `found.channel3` is then the channel 3 byte of the cycle.
+// Requests frames until a cycle of channel 2 ends or a frame is lost. After a valid cycle, `found.channel3` is its
+// channel 3 byte.
 Part<Error> receive(Dialog& dialog, ProcedureState& found) {
   do {
     const Error error = co_await ask_frame(dialog, found, {});
@@ -116,8 +116,8 @@ Part<Error> receive(Dialog& dialog, ProcedureState& found) {
   co_return Error::none;
 }
 
-// Ends an attempt of a register access whose answer is missing or invalid. A write that the encoder may have executed
-// is not repeated before the register was read back.
+// Ends an attempt of a register access that got no valid answer. `again` stays false for a write that the encoder may
+// have executed.
 AccessOutcome lost(ProcedureState& found, Error error, std::string_view detail = {}) {
   if (found.ended.value_or(Error::none) != Error::none) {
     detail = *found.ended == Error::cross_check_failed ? channels_disagree : channel2_damaged;
@@ -161,7 +161,7 @@ Part<AccessOutcome> try_to_execute(Dialog& dialog, ProcedureState& found) {
   co_return found.end(AccessOutcome::good, done);
 }
 
-// Executes the present register access in up to five attempts. Reads the identity first, because registers of an
+// Executes the present register access in up to five attempts. Reads an unknown identity first, because registers of an
 // AksIM-4 must not be accessed.
 Part<AccessOutcome> execute(Dialog& dialog, ProcedureState& found) {
   if (!dialog.format().has_ch2) co_await dialog.stop({Error::unsupported, no_channel2});
@@ -202,8 +202,7 @@ Part<bool> read(Dialog& dialog, ProcedureState& found, RegisterIndex index) {
   return read(dialog, found, registers[index].address, registers[index].size);
 }
 
-// Records that the encoder refused a write. A procedure may write twice: only a refusal of the first write leaves the
-// encoder unchanged.
+// Records that the encoder rejected a write, unless an earlier write of the procedure has changed the encoder.
 void note_refusal(Dialog& dialog, const ProcedureState& found, AccessOutcome access_outcome) {
   if (access_outcome == AccessOutcome::refused && found.why.error == Error::request_rejected && !found.changed)
     dialog.refused();

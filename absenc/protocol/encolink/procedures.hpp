@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Procedures of EncoLink and their state. Positions continue during register accesses; most procedures emit each
-// position.
+// Procedures of EncoLink and their state. Positions continue during register accesses, and a procedure can emit them.
 #pragma once
 
 #include <cstdint>
@@ -73,9 +72,9 @@ struct ProcedureState : Channels {
   }
 };
 
-/// Reads `size` bytes at `address` by a register access, in up to five attempts, while positions continue. Returns how
-/// the last attempt ended. Stops the procedure if the encoder has no registers, or those of an AksIM-4, or sends no
-/// valid identity that agrees with the options.
+/// Reads `size` bytes at `address` by a register access, in up to five attempts. Returns how the last attempt ended.
+/// Stops the procedure without channel 2, for an AksIM-4, and if the identity cannot be read or contradicts the
+/// options.
 author::Part<AccessOutcome> attempt_read(Dialog& dialog, ProcedureState& found, std::uint32_t address,
                                          std::uint16_t size);
 /// Writes `value` as `size` bytes to `address` like `attempt_read`, but repeats no write that the encoder may have
@@ -112,8 +111,8 @@ author::Procedure write_memory(Dialog& dialog, ProcedureState& found, Arguments 
 author::Procedure send_command(Dialog& dialog, ProcedureState& found, std::uint8_t command);
 
 /// Makes the present position the zero of the turn, by the position offset. Argument: 1 to save the offset. Errors
-/// besides those of `write_register`: invalid_argument (the encoder is starting, or the position is invalid), not_still
-/// (the shaft turns), cross_check_failed (the position is not zero afterwards; the old offset is restored).
+/// besides those of `write_register`: invalid_argument (the position is invalid), not_still (the shaft turns),
+/// cross_check_failed (the position is not zero afterwards; the old offset is restored).
 author::Procedure zero(Dialog& dialog, ProcedureState& found, Arguments arguments);
 /// Sets the turn counter. Arguments: turns, 1 to save them. Errors besides those of `write_register`: unsupported (the
 /// encoder has no turn counter), invalid_argument (the turn counter has too few bits), cross_check_failed (the turns

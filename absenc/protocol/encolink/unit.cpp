@@ -57,7 +57,7 @@ constexpr auto options = author::OptionsOf{
 
 // ---- Requests
 
-/// Content of a request: its two bytes, or a register access whose bytes are sent one by one as `ra`.
+/// Content of a request: its first byte, or a register access whose bytes are sent one by one as `ra`.
 struct Request {
   Config config = Config::position;
   std::optional<RegisterRequest> access{};
@@ -342,8 +342,8 @@ FormatEvidence collect_evidence(const Format& format, std::span<const Capture> c
   return evidence;
 }
 
-// Finds the numbers of bits of position and turns that fit the captures. Without an identity, the length of most
-// position frames decides: in one of 250 frames with turns, a shorter part has a valid checksum too.
+// Takes the resolution from an identity. Takes whether there are turns from the identity or, without one, from the
+// length of most position frames: in one of 250 frames with turns, a shorter part has a valid checksum too.
 bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sink) {
   const FormatEvidence evidence = collect_evidence(options.format(values), captures);
   constexpr std::string_view open = "these frames do not tell";

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Settings that a virtual RAA38S6 stores over power off, for lines with commands that change them. Each write wears the
-// memory.
+// Settings that a virtual RAA38S6 stores over power off, for lines with commands that change them, and the number of
+// writes to its memory.
 #pragma once
 
 #include <algorithm>

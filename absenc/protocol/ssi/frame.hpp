@@ -192,8 +192,8 @@ enum class ErrorBit : std::uint8_t { none, active_high, active_low };
   return word;
 }
 
-/// Appends to the counts in `word` the further bits that are chosen: an error bit, and a parity bit over all bits
-/// before it. `gray`: the counts are Gray-coded. Returns the format.
+/// Returns the format `word` with the further bits that are chosen: an error bit, and a parity bit over all bits before
+/// it. `gray`: the counts are Gray-coded.
 [[nodiscard]] constexpr WordFormat word_with(WordFormat word, bool gray, ErrorBit error, Parity parity) {
   if (gray) word.set_gray();
   if (error != ErrorBit::none) word.add({"error", Meaning::error, 1, error == ErrorBit::active_low});

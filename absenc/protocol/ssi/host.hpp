@@ -25,7 +25,7 @@ struct Protocol {
   }
   /// Returns the number of clocks of one reading.
   static constexpr unsigned clocks(const Format& format) { return ssi::clocks(format); }
-  /// Decodes a reply with all checks; returns the first error if one fails. `AnyFormat`: Format, or Format compiled.
+  /// Decodes a reply with all checks; returns the first error if one fails. `AnyFormat`: Format or Format::Compiled.
   template <class AnyFormat>
   static constexpr Result<Word> decode(const AnyFormat& format, const BitView& bits) {
     return ssi::decode(format, bits);

@@ -221,8 +221,7 @@ export class EncoderPage {
     if (scaled) this.scale.move(encoder.position_mm === null ? null : encoder.position_mm / encoder.length_mm, `${numberText(encoder.length_mm)} mm`);
     const counts = encoder.counts === null ? [] : [`${numberText(encoder.counts)} ${encoder.counts_in_all === null ? "counts" : `of ${numberText(encoder.counts_in_all)} counts`}`];
     showParts(this.below, [...belowFigure(encoder, state.at_ms), ...counts]);
-    // While the port is missing, lost or used by an examination (AWAY), no command can reach the encoder; the doctor
-    // finds the reason.
+    // No command can reach the encoder while its port is missing, lost or used by an examination (AWAY).
     for (const button of this.commands.querySelectorAll("[data-command]")) button.disabled = AWAY.includes(encoder.state);
     this.showWrong();
     this.showChoices();

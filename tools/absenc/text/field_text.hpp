@@ -19,8 +19,7 @@ using namespace client;
 [[nodiscard]] Json options_to_json(const Unit& unit, const Options& options);
 
 /// Puts decoded fields into a JSON object. A value of a reading that is invalid or of unknown validity has a further
-/// key such as `singleturn_valid` behind it: false, or null if no reply reports the validity. A value without such a
-/// key is valid.
+/// key such as `singleturn_valid` behind it: false, or null if no reply reports the validity.
 struct JsonFields final : FieldSink {
   void put(const FieldValue& value) override;
   void put_reading(const Reading& reading) override;

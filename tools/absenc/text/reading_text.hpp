@@ -35,9 +35,9 @@ enum class Doubt : std::uint8_t {
 /// Returns position and turns, the first part of the line that `reading_text` returns.
 [[nodiscard]] std::string place_text(const Reading& reading, Doubt doubt = Doubt::none);
 
-/// Returns flags as text: "no alarms", "alarms: over_heat", "alarms not reported" or "alarms: counting_error (not
-/// reported: over_speed)"; for flags of a status "status clear" or "status: alarm". Unreported flags are named if they
-/// are at most four, and not all flags.
+/// Returns flags as text, such as "no alarms", "alarms: over_heat", "alarms not reported" or "alarms: counting_error
+/// (not reported: over_speed)"; for flags of a status "status clear" or "status: alarm". Unreported flags are named if
+/// they are at most four, and not all flags.
 [[nodiscard]] std::string flags_text(const Unit& unit, const Flags& flags);
 
 /// Returns one line for each set flag, with its meaning and what the user should do; "" if no flag is set. With

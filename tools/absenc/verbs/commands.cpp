@@ -13,8 +13,8 @@ namespace absenc::tool {
 
 namespace {
 
-// Returns a sentence that names the unit's commands of Verb::run whose names contain `word`: "set-zero" for "zero"; ""
-// without such commands.
+// Returns the end of an error text: a sentence that names the unit's commands of Verb::run whose names contain `word`,
+// such as "set-zero" for "zero"; "" without such commands.
 std::string related(const Unit& unit, std::string_view word) {
   std::string names;
   for (const Command& command : unit.commands) {

@@ -77,7 +77,8 @@ int run_conform(const Invocation& invocation) {
   return tell_verdict(invocation, conformance);
 }
 
-/// Tests a host behind an SPI controller. The class is part of the command, so that the library does not need libfuse.
+/// Serves a host through an SPI controller while the host is tested. The class is part of the command, so that the
+/// library does not need libfuse.
 class SpidevStage final : public HostStage {
  public:
   SpidevStage(const EncoderAddress& address, const std::string& name)

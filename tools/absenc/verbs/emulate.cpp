@@ -148,8 +148,8 @@ struct EmulationRun {
     if (keeps_memory) file.load(line.first().memory());
   }
 
-  /// Calls `serve(machine)`, which runs the encoders until a signal arrives or `end` is reached and returns notes about
-  /// the line. Prints counts and notes. Returns the exit status.
+  /// Calls `serve(machine)`, which runs the encoders and returns notes about the line. Then prints counts and notes.
+  /// Returns the exit status.
   template <class Serve>
   int run(const Serve& serve) {
     const Time start = os::now();

@@ -96,11 +96,11 @@ using Dialog = author::DialogOf<Protocol>;
 /// (as timeout, and frames are destroyed), cross_check_failed (another rate).
 author::Procedure set_cyclic(Dialog& dialog, Values& found, Arguments arguments);
 
-/// Changes the zero or the direction. Order 20 makes the present position 0, as the document suggests; the position is
-/// read before and after, and nothing is written if it is near 0 already. Order 22 sets the counting direction, which
-/// no command reads; the position afterwards must be unchanged or mirrored. Errors besides those of reading the
-/// position: not_still (the shaft turns), cross_check_failed (any other position, or the node no longer sends cyclic
-/// positions), timeout (order 22 has neither an answer nor an effect).
+/// Changes the zero or the direction; cyclic positions of the node are stopped meanwhile. Order 20 makes the present
+/// position 0, as the document suggests; it is not sent if the position is near 0 already. Order 22 sets the counting
+/// direction, which no command reads; the position afterwards must be unchanged or mirrored. Errors besides those of
+/// reading the position: not_still (the shaft turns), cross_check_failed (any other position, or the node no longer
+/// sends cyclic positions), timeout (order 22 has neither an answer nor an effect).
 author::Procedure change(Dialog& dialog, Values& found, Order order, Arguments arguments);
 
 /// Requests a position of the node, and reports the node's number if a frame from it is received. Requests no other

@@ -267,8 +267,8 @@ constexpr std::string_view scan_hint = "`absenc scan` shows which: set node=";
 constexpr unsigned before_requests = 0;
 constexpr unsigned after_requests = 256;
 
-// Counts the frames of all nodes until the listening time is over. `asked`: the last number that was requested,
-// or one of the values above.
+// Counts the frames from all nodes until the time to wait is over. `asked`: the last number that was requested, or one
+// of the values above.
 Part<bool> count_node_frames(Dialog& dialog, Nodes& nodes, unsigned asked) {
   Time from = never;
   while (const MaybeFrame frame = co_await dialog.heard()) {

@@ -170,7 +170,8 @@ struct Reply {
   return reply.size() > 7 && reply[1] == function::read && reply[2] == 4 && (reply.size() == 8 || reply.back() == 0);
 }
 
-/// Returns whether the length of the first of two replies is in doubt even with the second reply.
+/// Returns whether the length of the first reply stays in doubt after the second one: the length of the second is
+/// doubtful too, and different.
 [[nodiscard]] constexpr bool differ_doubtfully(const Reply& first, const Reply& second) {
   return second.doubtful_size != 0 && second.doubtful_size != first.doubtful_size;
 }
@@ -315,7 +316,8 @@ struct Protocol {
   }
 };
 
-/// Reads a position with function 03. If the CRC does not prove the length of the reply, a second reply confirms it.
+/// Reads a position with function 03. If the CRC does not prove the length of the reply, a second reply must confirm
+/// it.
 using ReadPosition = author::ReadConfirmed<Protocol>;
 
 }  // namespace absenc::raa38::rtu

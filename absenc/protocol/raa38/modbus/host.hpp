@@ -51,8 +51,9 @@ struct CommandValues : Values {
 /// Interface by which procedures send requests and await replies.
 using Dialog = author::DialogOf<Protocol>;
 
-// If no encoder answers at the address of the format before a setting is sent, the procedures below except
-// `read_address` and `scan` send A0. If an encoder with another address answers, their error text names that address.
+// When no encoder answers at the address of the format, the procedures below except `read_address` and `scan` send A0,
+// but not after they have sent a setting. If an encoder with another address answers, their error text names that
+// address.
 
 /// Reads the position once and reports it.
 author::Procedure read_position_once(Dialog& dialog, CommandValues& found);
@@ -69,10 +70,11 @@ author::Procedure read_address(Dialog& dialog, CommandValues& found);
 /// the error of the reply at the rate of the format, or of a line that is never silent.
 author::Procedure find_baud(Dialog& dialog, CommandValues& found);
 
-/// Result of a scan of the slaves on a line. The scan sends A0 first, which a single encoder answers; otherwise it
-/// requests every address from the first argument to the second. If all replies of an address are damaged, two encoders
-/// share it or the line is bad. Errors: timeout if no slave answers, invalid_argument if the last address is before the
-/// first or if the position has more bits than one requested register, or the error of a line that is never silent.
+/// Result of a scan of the slaves on a line. The scan sends A0 first; if a single encoder answers it and its position
+/// can be read, the scan ends. Otherwise it requests every address from the first argument to the second. If all
+/// replies of an address are damaged, two encoders share it or the line is bad. Errors: timeout if no slave answers,
+/// invalid_argument if the last address is before the first or if the position has more bits than one requested
+/// register, or the error of a line that is never silent.
 struct Slaves {
   /// Result of polling one address: no answer, a valid answer, three damaged answers, or a refusal.
   enum class Kind : std::uint8_t { none, answers, clash, refuses };
@@ -81,10 +83,9 @@ struct Slaves {
 /// Scans the line for slaves.
 author::Procedure scan(Dialog& dialog, Slaves& found, Arguments arguments);
 
-/// Sets the address with A1. Refuses an address at which another slave answers, even with a damaged reply
-/// (invalid_argument). Then reads the position at the new address to verify. Errors besides those of reading the
-/// position: request_rejected, cross_check_failed (the encoder still has its old address), timeout (the encoder answers
-/// at neither address).
+/// Sets the address with A1. Refuses an address at which another slave answers (invalid_argument). Then reads the
+/// position at the new address to verify. Errors besides those of reading the position: request_rejected,
+/// cross_check_failed (the encoder still has its old address), timeout (the encoder answers at neither address).
 author::Procedure set_address(Dialog& dialog, CommandValues& found, Arguments arguments);
 
 /// Sets the baud rate of encoder and line with CC and verifies that the encoder answers. Errors besides those of

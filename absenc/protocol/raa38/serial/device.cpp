@@ -63,8 +63,8 @@ void VirtualEncoder::triggered(const ByteEvent& event) {
   transmit(encode_position(format(), position(event.at)), event.at + Protocol::device_times(format()).answer_time);
 }
 
-// Reports a request `BC AA Bx` that arrives during a transmission. Two encoders with one number send at the same time,
-// so only a whole request with the number of this encoder breaks the rule, not other bytes.
+// Reports a request `BC AA Bx` for this encoder that arrives during its transmission. Other bytes are no violation:
+// another encoder with the same number may send them.
 void VirtualEncoder::check_during_transmission(const ByteEvent& event) {
   const std::uint32_t own = 0xBCAA00u | number_mark | format().unit;
   // This program may have been scheduled so late that the frame should have been sent before the request arrived; then

@@ -21,8 +21,8 @@ class VirtualEncoder final : public author::BusDevice<Protocol, VirtualEncoder, 
   /// Switches the encoder off.
   void power_off(Time now) override;
 
-  /// Returns whether a request is for this encoder: the request has its number, and the encoder has the command if
-  /// the request sets the zero.
+  /// Returns whether a request is for this encoder: a read request with its number, or, if it sets its zero by command,
+  /// a request to do so with the number `zeroed_unit`.
   [[nodiscard]] bool is_mine(const Request& request) const;
   /// Executes a request and returns the reply; no value after the request that sets the zero, which is not answered.
   std::optional<Position> answer(const Request& request, Time at);

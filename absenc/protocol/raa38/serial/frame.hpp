@@ -26,8 +26,8 @@ enum class Mode : std::uint8_t {
   bus,        ///< A request with the encoder's number.
 };
 
-/// Values that are accepted as the second byte of a frame: 81 as in the document's tables (fixed), Bx with the
-/// encoder's number as in its text about the bus (echo), or both (automatic).
+/// Second byte of a frame: 81 as in the document's tables (fixed), Bx with the encoder's number as in its text about
+/// the bus (echo), or either (automatic).
 enum class SecondByte : std::uint8_t { automatic, fixed, echo };
 
 /// How the zero of an encoder is set; this depends on how the encoder was ordered.
@@ -253,7 +253,7 @@ struct Protocol {
     const RequestBytes request = encode_request({});
     return begin[0] == request[0] && (begin.size() < 2 || begin[1] == request[1]) ? request_bytes : 0;
   }
-  /// Returns the length of the reply to `request`, in bytes; 0 for the request BC AA Cx, which has no reply.
+  /// Returns the length in bytes of the reply to a request that is sent as bytes; 0 for BC AA Cx, which has no reply.
   static constexpr std::size_t reply_size(const Format& format, const Request& request) {
     return request.kind == Request::Kind::zero_clear ? 0 : format.frame_bytes();
   }
@@ -285,7 +285,7 @@ struct Protocol {
   }
 };
 
-/// Returns the request on which an encoder sends a position: bytes in bus mode, a pulse in handshake mode.
+/// Returns the request on which an encoder sends a position: bytes in bus mode, otherwise a pulse.
 [[nodiscard]] constexpr Request position_request(const Format& format) {
   return {format.mode == Mode::bus ? Request::Kind::read : Request::Kind::trigger, format.unit};
 }

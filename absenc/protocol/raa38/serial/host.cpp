@@ -170,7 +170,7 @@ using namespace author;
 
 constexpr unsigned scan_attempts = 2;
 
-// Listens until a valid frame is received and returns the newest valid position; an error if none arrives in time.
+// Listens until the decoder finds frames and returns the newest position; an error if it finds none in time.
 Part<Result<Position>> receive_frame(Dialog& dialog) {
   StreamDecoder decoder(dialog.format());
   Position position{.second_byte = dialog.format().own_second_byte()};

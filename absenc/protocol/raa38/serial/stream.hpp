@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds frames in the bytes of a streaming encoder: while aligned, each directly after the previous one; after bytes
-// were lost, by header, checksum, range and period.
+// Finds frames in the bytes of a streaming encoder: while aligned, each directly after the previous one; otherwise two
+// valid frames in a row.
 #pragma once
 
 #include <algorithm>
@@ -23,8 +23,7 @@ struct StreamFrame {
 
 /// Finds frames in received bytes. While aligned, a frame is accepted where the previous one ended; one with an FF
 /// after its second byte is accepted only when another header follows, which may take a period. Without alignment, two
-/// valid frames must follow each other; both are then reported. A disturbance therefore usually costs the frames that
-/// it hits, and one valid frame more if no two valid frames are left together.
+/// valid frames must follow each other; both are then reported.
 class StreamDecoder {
  public:
   /// Creates a decoder for a streaming encoder of this format.
@@ -61,7 +60,8 @@ class StreamDecoder {
   [[nodiscard]] constexpr bool in_step() const { return in_step_; }
   /// Returns the number of received bytes that belong to no frame.
   [[nodiscard]] constexpr std::uint64_t skipped() const { return discarded_.skipped(); }
-  /// Returns the number of frames that were damaged or could not be distinguished from damaged ones.
+  /// Returns the number of discarded frames, which DiscardedFrames computes from the bytes that belong to no valid
+  /// frame.
   [[nodiscard]] constexpr std::uint64_t discarded() const { return discarded_.count(); }
   /// Returns whether a frame was valid except for a position with more bits than the format has.
   [[nodiscard]] constexpr bool saw_larger_positions() const { return saw_larger_positions_; }
@@ -95,8 +95,8 @@ class StreamDecoder {
     return true;
   }
 
-  // Searches two valid frames in a row and drops bytes that cannot begin a frame. Returns false if more bytes are
-  // needed.
+  // Accepts two valid frames in a row that are not too early; otherwise drops the first byte. Returns false if more
+  // bytes are needed.
   template <class OnFrame>
   constexpr bool search(OnFrame& on_frame) {
     if (size_ < frame_) return false;
@@ -114,8 +114,8 @@ class StreamDecoder {
     return true;
   }
 
-  // Returns whether the second of two frames in a row follows the first after less than half a period, but not at the
-  // same time (both were received at once), so that the bytes are no frames.
+  // Returns whether the second of two frames in a row was received less than half a period after the first, so that the
+  // bytes are no frames. Frames that were received at once are not too early.
   [[nodiscard]] constexpr bool is_too_early() const {
     const Time between = times_[2 * frame_ - 1] - times_[frame_ - 1];
     return between > Time{} && between < format_.period() / 2;
