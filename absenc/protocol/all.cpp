@@ -24,6 +24,7 @@
   one(amt21, unit) \
   one(biss, safety_unit) \
   one(biss, chain_unit) \
+  one(nikon, unit) \
 
 #endif
 // clang-format on

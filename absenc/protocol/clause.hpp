@@ -28,8 +28,8 @@ enum class Demand : std::uint8_t {
   foreign_silent,  ///< the encoder does not answer a request to another address
   reacts,          ///< the encoder reacts to the request `ask` as `reaction` states
   // Demands about changes of the encoder, which the test undoes
-  byte_written,  ///< the byte at `page` and `address` can be written and read back
-  byte_alone,    ///< writing the byte at `page` and `address` leaves the four bytes below it unchanged
+  byte_written,  ///< the byte or word at `page` and `address` can be written and read back
+  byte_alone,    ///< writing the byte or word at `page` and `address` leaves the four below it unchanged
   page_alone,    ///< writing the byte at `page` and `address` leaves the byte at `address` of page `other` unchanged
   /// While the byte at `page` and `address` is written, a request to read it gets a busy reply; later it can be read.
   byte_busy,

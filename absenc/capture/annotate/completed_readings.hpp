@@ -11,11 +11,14 @@
 #include <vector>
 
 #include "absenc/capture/annotate/annotation.hpp"
+#include "absenc/core/bits.hpp"
 
 namespace absenc::capture {
 
 /// Passes annotations on to a sink and completes their readings with alarms of earlier replies. It stands behind the
 /// annotators, so that it sees all replies in the order of time.
+///
+/// A reply that has the alarms and no position completes the readings behind it.
 ///
 /// No frame reports that an encoder was switched off and on, but the encoder sends no replies while it is off: an
 /// unanswered request clears the stored alarms of all encoders. A reading in the reply to a request that clears alarms
@@ -37,19 +40,36 @@ class CompletedReadings final : public AnnotationSink {
     if (annotation.remark == Remark::unanswered && annotation.error == Error::timeout) last_.clear();
     const Reading* const now = annotation.contents.reading;
     const bool is_good = annotation.error == Error::none && annotation.remark != Remark::cut;
-    if (unit_->remembered == nullptr || now == nullptr || !is_good) return sink_->put(annotation);
+    if (unit_->remembered == nullptr || !is_good) return sink_->put(annotation);
     const std::int64_t address = address_of(annotation.contents);
-    Reading& last = last_[address];
-    last = unit_->remembered(last, *now);
-    Annotation completed = annotation;
-    completed.contents.reading = &last;
-    sink_->put(completed);
+    if (now != nullptr) {
+      Reading& last = last_[address];
+      last = unit_->remembered(last, *now);
+      Annotation completed = annotation;
+      completed.contents.reading = &last;
+      sink_->put(completed);
+    } else {
+      take_alarms(annotation.contents);
+      sink_->put(annotation);
+    }
     if (clears(annotation.request.bytes)) last_.erase(address);
   }
 
  private:
   static constexpr std::size_t longest_request = 64;
 
+  // Stores the alarms of each encoder that the reply reports.
+  void take_alarms(const Contents& contents) {
+    std::int64_t address = 0;
+    for (const FieldValue& field : contents.fields) {
+      if (field.info->role == Role::encoder) address = field.number;
+      if (field.info != unit_->alarms) continue;
+      const auto all = static_cast<std::uint32_t>(low_mask(static_cast<unsigned>(unit_->alarms->flags.size())));
+      const Reading reported{.alarms = static_cast<std::uint32_t>(field.number), .alarms_reported = all};
+      Reading& last = last_[address];
+      last = unit_->remembered(last, reported);
+    }
+  }
   [[nodiscard]] static std::int64_t address_of(const Contents& contents) {
     for (const FieldValue& field : contents.fields) {
       if (field.info->role == Role::encoder) return field.number;

@@ -10,9 +10,11 @@
 #include <utility>
 
 #include "absenc/client/error.hpp"
+#include "absenc/client/memory.hpp"
 #include "absenc/client/settings.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/client/text/wire_text.hpp"
+#include "absenc/core/bits.hpp"
 #include "absenc/os/error.hpp"
 
 namespace absenc::client {
@@ -166,7 +168,7 @@ void ChangeTester::test_busy(const Clause& clause, ClauseResult& result) {
 
 // Saves byte 0 of page 0, the page that is selected after power-on: `put_back` reads it, which selects that page again.
 void ChangeTester::test_closed(const Clause& clause, ClauseResult& result) {
-  save({.look = [this] { return std::int64_t{read_byte(0, 0)}; }, .write = [](std::int64_t) {}});
+  save({.look = [this] { return read_byte(0, 0); }, .write = [](std::int64_t) {}});
   static_cast<void>(read_byte(clause.page, clause.address));
   const SingleExchange sent = line_.send(request_of_ask(unit_, line_.options(), clause.ask));
   const bool as_demanded = reply_error(unit_, line_.options(), clause.as, {sent.request, sent.reply}) == Error::none;
@@ -336,8 +338,7 @@ std::int64_t ChangeTester::save_byte(std::uint32_t page, std::uint32_t address) 
     const auto arguments = role_arguments(setter, {{Role::page, page}, {Role::address, address}, {Role::value, value}});
     static_cast<void>(run(setter, arguments));
   };
-  const std::int64_t value =
-      save({.look = [this, page, address] { return std::int64_t{read_byte(page, address)}; }, .write = write});
+  const std::int64_t value = save({.look = [this, page, address] { return read_byte(page, address); }, .write = write});
   const bool paged = find_role(setter.arguments, Role::page) != nullptr;
   saved_.back().restore_command = fmt::format("absenc memory write {} 0x{:02X} 0x{:02X}{}", name_, address, value,
                                               paged ? fmt::format(" --page {}", page) : "");
@@ -425,12 +426,14 @@ Reading ChangeTester::read() const {
   return *ran.reading;
 }
 
-std::uint8_t ChangeTester::read_byte(std::uint32_t page, std::uint32_t address) const {
+// Returns the byte or word of the memory at this address.
+std::int64_t ChangeTester::read_byte(std::uint32_t page, std::uint32_t address) const {
   const Command& getter = *find_command(unit_, Verb::memory_read);
   const CommandResult ran =
       run(getter, role_arguments(getter, {{Role::page, page}, {Role::address, address}, {Role::count, 1}}));
-  if (ran.data.empty()) throw ClauseBroken{"no byte was told"};
-  return ran.data.front();
+  if (ran.value) return *ran.value;
+  if (ran.data.size() < word_bytes(unit_)) throw ClauseBroken{"no byte was told"};
+  return static_cast<std::int64_t>(load_little_endian(Bytes(ran.data).first(word_bytes(unit_))));
 }
 
 }  // namespace absenc::client

@@ -25,7 +25,8 @@ struct CommandResult {
   std::uint64_t requests = 0;  // number of requests that the command sent
   bool heard = false;          // whether anything but an echo was received after the last request
   Answer answer{};
-  std::vector<std::uint8_t> data{};  // bytes of the memory that the reply carries; empty if it carries none
+  std::optional<std::int64_t> value{};  // byte or word of the memory that the reply carries; nothing: none
+  std::vector<std::uint8_t> data{};     // several bytes that it carries, the low byte of a word first; empty: none
   std::optional<Reading> reading{};
 };
 
@@ -122,7 +123,7 @@ class ChangeTester {
   [[nodiscard]] SingleExchange send(const Command& command, Arguments arguments) const;
   [[nodiscard]] std::optional<BusyReply> busy_reply(const SingleExchange& sent) const;
   [[nodiscard]] Reading read() const;
-  [[nodiscard]] std::uint8_t read_byte(std::uint32_t page, std::uint32_t address) const;
+  [[nodiscard]] std::int64_t read_byte(std::uint32_t page, std::uint32_t address) const;
 
   const Unit& unit_;
   std::string name_;

@@ -122,7 +122,7 @@ class Tester {
     explicit CommandSink(CommandResult& into) : ran(into) {}
     void put(const FieldValue& field) override {
       if (field.info->role == Role::data) ran.data.assign(field.bytes.begin(), field.bytes.end());
-      if (field.info->role == Role::value && ran.data.empty()) ran.data = {static_cast<std::uint8_t>(field.number)};
+      if (field.info->role == Role::value) ran.value = field.number;
       sink.put(field);
     }
     CommandResult& ran;

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+// Constants of Nikon's A-format: command codes, alarms, times, memory; and Format, the differences between encoders.
+// README.md names the sources.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "absenc/core/time.hpp"
+#include "absenc/link/line.hpp"
+#include "absenc/protocol/unit.hpp"
+
+namespace absenc::nikon {
+
+using namespace std::chrono_literals;
+
+/// Bit rates that encoders have, in bits per second.
+inline constexpr std::array<std::uint32_t, 5> rates{2'500'000, 4'000'000, 6'666'667, 8'000'000, 16'000'000};
+
+inline constexpr Time answer_time = 3us;          ///< time from a request to its reply; assumed
+inline constexpr Time answer_limit = 100us;       ///< longest time that a host waits for a reply; assumed
+inline constexpr Time frame_pause = 10us;         ///< shortest pause between the frames of one request
+inline constexpr Time memory_read_time = 300us;   ///< longest time in which the encoder fetches a word of the EEPROM
+inline constexpr Time memory_write_time = 30ms;   ///< longest time of a write to the EEPROM, or of a reset
+inline constexpr std::uint8_t encoder_count = 8;  ///< number of encoders that one line can have
+
+inline constexpr std::size_t word_count = 256;             ///< number of words of the EEPROM
+inline constexpr std::uint8_t user_words = 0xF0;           ///< number of words of the EEPROM that hosts may write
+inline constexpr std::uint8_t temperature_address = 0xF9;  ///< address of the word with the temperature
+
+/// Areas of the EEPROM, whose words have 16 bits.
+inline constexpr std::array<MemoryArea, 2> memory_areas{{
+    {.page = 0, .first = 0, .count = user_words, .meaning = "the user's EEPROM", .word = 2},
+    {.page = 0,
+     .first = user_words,
+     .count = word_count - user_words,
+     .meaning = "of the maker; 0xF9 is the temperature",
+     .writable = false,
+     .in_dump = false,
+     .word = 2},
+}};
+
+/// Command codes (CC) of requests. The data of the reply follows the dash.
+enum class Code : std::uint8_t {
+  position = 0,  ///< position within the turn, then turns: 40 bits
+  lower = 1,     ///< the lower 24 of these bits
+  upper = 2,     ///< the upper 24 of these bits
+  alarms = 3,
+  all_positions = 4,  ///< as 0, of all encoders of the line in turn
+  all_lower = 5,
+  all_upper = 6,
+  all_alarms = 7,
+  clear_alarms = 8,
+  clear_turns = 9,
+  clear_both = 10,
+  set_address = 11,  ///< gives the address of the request to the only encoder of the line
+  zero = 12,
+  read_memory = 13,
+  write_memory = 14,
+  temperature = 15,
+  read_identity = 16,
+  read_only_identity = 17,  ///< as 16, of the only encoder of the line
+  write_identity = 18,
+  write_only_identity = 19,  ///< as 18, to the only encoder of the line
+  assign_address = 20,       ///< gives the address of the request to the encoder with this identification
+  short_position = 21,       ///< the lower 17 bits of the position
+  all_short_positions = 22,
+  with_alarms = 27,  ///< the lower 24 bits, and 16 bits of alarms
+  all_with_alarms = 28,
+  with_temperature = 29,  ///< the lower 24 bits, and the temperature
+  all_with_temperature = 30,
+};
+
+/// Bits of the alarms (ALM), in the order of the wire.
+namespace alarm {
+inline constexpr std::uint16_t battery = 1u << 0;           ///< alarm: the battery's voltage is low
+inline constexpr std::uint16_t multiturn_error = 1u << 1;   ///< alarm: battery and capacitor were empty
+inline constexpr std::uint16_t overflow = 1u << 2;          ///< alarm: the turn counter has overflowed
+inline constexpr std::uint16_t over_speed = 1u << 3;        ///< alarm: the shaft turned too fast
+inline constexpr std::uint16_t memory_error = 1u << 4;      ///< alarm: an access to the EEPROM failed
+inline constexpr std::uint16_t singleturn_error = 1u << 5;  ///< alarm: absolute and incremental position differ
+inline constexpr std::uint16_t ps_error = 1u << 6;          ///< alarm: position within the turn and turns differ
+inline constexpr std::uint16_t busy = 1u << 7;              ///< state: the encoder determines its position
+inline constexpr std::uint16_t memory_busy = 1u << 8;       ///< state: the EEPROM is being read or written
+inline constexpr std::uint16_t over_temperature = 1u << 9;  ///< alarm: the encoder is too hot
+inline constexpr std::uint16_t increment_error = 1u << 10;  ///< alarm: a signal of the incremental track is bad
+inline constexpr std::uint16_t all = 0x07FF;                ///< mask of all bits with a meaning
+/// Mask of the bits that are taken to make the position within the turn invalid.
+inline constexpr std::uint16_t position_lost = over_speed | singleturn_error | ps_error | busy | increment_error;
+/// Mask of the bits that are taken to make the turns invalid.
+inline constexpr std::uint16_t turns_lost = multiturn_error | over_speed | ps_error | busy;
+}  // namespace alarm
+
+/// Which bit of a word of the EEPROM, and of the identification, is sent first. Sources differ.
+enum class BitOrder : std::uint8_t { low_first, high_first };
+
+/// Properties of the encoder that its frames depend on.
+struct Format {
+  unsigned singleturn_bits = 20;             ///< bits of the position within the turn, 17 to 24
+  unsigned multiturn_bits = 16;              ///< bits of the turns, 0 to 16; 0: single-turn encoder
+  std::uint8_t address = 0;                  ///< address of the encoder on its line, 0 to 7
+  std::uint8_t rate = 0;                     ///< index into `rates`
+  BitOrder bit_order = BitOrder::low_first;  ///< order of the bits of words of the EEPROM and of the identification
+
+  /// Returns the settings of the RS-485 line: characters of 16 bits.
+  [[nodiscard]] constexpr LineSettings line() const { return {.rate = rates[rate], .data_bits = 16}; }
+  /// Returns the numbers of bits of position and turns.
+  [[nodiscard]] constexpr Resolution resolution() const { return {singleturn_bits, multiturn_bits}; }
+};
+
+/// Returns whether all encoders of the line answer a request with this code, one after the other.
+[[nodiscard]] constexpr bool is_for_all(Code code) {
+  return (code >= Code::all_positions && code <= Code::all_alarms) || code == Code::all_short_positions ||
+         code == Code::all_with_alarms || code == Code::all_with_temperature;
+}
+/// Returns the code that asks a single encoder for the same data.
+[[nodiscard]] constexpr Code single(Code code) {
+  if (!is_for_all(code)) return code;
+  const auto number = static_cast<std::uint8_t>(code);
+  return static_cast<Code>(code <= Code::all_alarms ? number - 4 : number - 1);
+}
+/// Returns whether the address of a request with this code is not that of the encoder that answers it: the encoder is
+/// the only one of the line, or is found by its identification.
+[[nodiscard]] constexpr bool is_for_any_address(Code code) {
+  return code == Code::set_address || code == Code::read_only_identity || code == Code::write_only_identity ||
+         code == Code::assign_address;
+}
+/// Returns whether eight requests with this code execute its command.
+[[nodiscard]] constexpr bool is_reset(Code code) { return code >= Code::clear_alarms && code <= Code::zero; }
+/// Returns whether the data of request and reply with this code is an identification.
+[[nodiscard]] constexpr bool has_identity(Code code) {
+  return code >= Code::read_identity && code <= Code::assign_address;
+}
+/// Returns whether requests with this code carry an identification.
+[[nodiscard]] constexpr bool sends_identity(Code code) {
+  return code >= Code::write_identity && code <= Code::assign_address;
+}
+/// Returns whether requests with this code read or write a word of the EEPROM.
+[[nodiscard]] constexpr bool is_memory_access(Code code) {
+  return code == Code::read_memory || code == Code::write_memory;
+}
+/// Returns whether a request with this code writes the EEPROM or the identification, or sets an address.
+[[nodiscard]] constexpr bool is_write(Code code) { return code == Code::write_memory || sends_identity(code); }
+
+/// Returns the code with this number; nothing for 23 to 26 and 31, which no source lists.
+[[nodiscard]] constexpr std::optional<Code> code_of(unsigned number) {
+  if (number > 30 || (number > 22 && number < 27)) return std::nullopt;
+  return static_cast<Code>(number);
+}
+
+/// Bits that CC 21 and 22 read.
+inline constexpr unsigned short_bits = 17;
+
+/// Returns the number of bits of data in the reply of one encoder: 40, 24 or 17.
+[[nodiscard]] constexpr unsigned data_bits(Code code) {
+  const Code one = single(code);
+  if (one == Code::short_position) return short_bits;
+  return one == Code::position || one == Code::with_alarms || one == Code::with_temperature ? 40 : 24;
+}
+/// Returns the length in bytes of the reply of one encoder: IF and two data frames, three for 40 bits, one for 17.
+[[nodiscard]] constexpr std::size_t reply_length(Code code) {
+  return single(code) == Code::short_position ? 4 : 3 + data_bits(code) / 8;
+}
+/// Returns the number of frames of a request: CDF, and MDF2 or MDF0 to MDF2.
+[[nodiscard]] constexpr std::size_t frames_of(Code code) {
+  if (code == Code::read_memory) return 2;
+  return is_write(code) ? 4 : 1;
+}
+
+/// Returns the time of the slot of one encoder if all encoders of a line answer in turn: its reply, and the pause
+/// before the next one, 3 us at 2.5 Mbit/s, 2 us at 4 and 6.67, and 1.5 us above.
+[[nodiscard]] constexpr Time slot(const Format& format, Code code) {
+  const Time pause = format.rate == 0 ? Time(3us) : format.rate < 3 ? Time(2us) : Time(1500ns);
+  return format.line().byte_time() * static_cast<int>(reply_length(code)) + pause;
+}
+
+}  // namespace absenc::nikon

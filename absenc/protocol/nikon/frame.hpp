@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: Apache-2.0
+// Frames of Nikon's A-format: encoding, decoding, and all checks. README.md draws the frames.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "absenc/core/bits.hpp"
+#include "absenc/core/bytes.hpp"
+#include "absenc/core/crc.hpp"
+#include "absenc/core/result.hpp"
+#include "absenc/protocol/nikon/format.hpp"
+
+namespace absenc::nikon {
+
+/// A request of the A-format.
+struct Request {
+  Code code = Code::position;  ///< command code (CC)
+  std::uint8_t address = 0;    ///< address of the encoder (EA), 0 to 7; for CC 11 and 20 the new one
+  std::uint8_t word = 0;       ///< CC 13 and 14: address of the word
+  std::uint32_t value = 0;     ///< CC 14: the word; CC 18 to 20: the identification, 24 bits
+};
+
+/// Data of the reply of one encoder.
+struct OneReply {
+  std::uint8_t address = 0;  ///< address of the encoder (EA)
+  std::uint8_t status = 0;   ///< status bits (ES), whose meanings no source states; CC 21 and 22 have one
+  std::uint64_t data = 0;    ///< `data_bits` bits of data, the first bit of the wire lowest
+};
+/// Replies to a request: one, or those of several encoders in the order of their addresses.
+struct Reply : OneReply {
+  std::uint8_t count = 1;                            ///< number of replies
+  std::array<OneReply, encoder_count - 1> others{};  ///< the replies behind the first
+  /// Alarms of the same encoder that another request (CC 3) has read; nothing: none has.
+  std::optional<std::uint16_t> alarms_read{};
+  /// Returns the reply number `index`, below `count`.
+  [[nodiscard]] constexpr const OneReply& at(std::size_t index) const { return index == 0 ? *this : others[index - 1]; }
+};
+
+inline constexpr std::size_t frame_bytes = 2;  ///< bytes of a frame: one character of 16 bits
+inline constexpr std::size_t longest_one = 8;  ///< length of the longest reply of one encoder in bytes
+/// Bytes of a request.
+using RequestBytes = ByteBuffer<4 * frame_bytes>;
+/// Bytes of the reply of one encoder.
+using ReplyBytes = ByteBuffer<longest_one>;
+
+namespace detail {
+
+inline constexpr unsigned request_sync = 2;  // 010
+inline constexpr unsigned reply_sync = 4;    // 001
+
+// Returns the CRC-3 (x^3 + x + 1, start 0) of the ten bits behind the sync code of a request frame.
+[[nodiscard]] constexpr unsigned crc3(unsigned frame) {
+  unsigned crc = 0;
+  for (unsigned i = 3; i < 13; ++i) {
+    const bool feeds = ((crc >> 2 ^ frame >> i) & 1) != 0;
+    crc = (crc << 1 & 7) ^ (feeds ? 3u : 0u);
+  }
+  return crc;
+}
+// Returns a request frame: sync code, frame code, eight bits, and the CRC, whose highest bit is sent first.
+[[nodiscard]] constexpr unsigned request_frame(unsigned frame_code, unsigned bits) {
+  const unsigned frame = request_sync | frame_code << 3 | bits << 5;
+  return frame | static_cast<unsigned>(reflect(crc3(frame), 3)) << 13;
+}
+[[nodiscard]] constexpr unsigned frame_at(Bytes bytes, std::size_t index) {
+  return bytes[2 * index] | static_cast<unsigned>(bytes[2 * index + 1]) << 8;
+}
+constexpr void push_frame(auto& bytes, unsigned frame) {
+  bytes.push_back(static_cast<std::uint8_t>(frame));
+  bytes.push_back(static_cast<std::uint8_t>(frame >> 8));
+}
+// Returns the eight bits of the MDF with this frame code, 1 to 3.
+[[nodiscard]] constexpr unsigned memory_bits(const Request& request, std::uint32_t sent, unsigned frame_code) {
+  if (frame_code == 3 && is_memory_access(request.code)) return request.word;
+  return sent >> 8 * (frame_code - 1) & 0xFF;
+}
+
+}  // namespace detail
+
+/// Returns the word of the EEPROM, or the identification, of a request or reply with this code, whose bits are sent as
+/// `sent`; or the reverse.
+[[nodiscard]] constexpr std::uint32_t in_bit_order(const Format& format, Code code, std::uint32_t sent) {
+  const unsigned bits = is_memory_access(code) ? 16 : 24;
+  const auto value = static_cast<std::uint32_t>(sent & low_mask(bits));
+  return format.bit_order == BitOrder::low_first ? value : static_cast<std::uint32_t>(reflect(value, bits));
+}
+
+/// Parameters of the CRC-8 of replies: x^8 + x^4 + x^3 + x^2 + 1, start 0.
+inline constexpr CrcParameters crc_parameters{8, 0x1D, 0, true, true, 0};
+/// Returns the CRC-8 of the bits of a reply in the order of the wire, as the byte at its end: the highest bit of the
+/// CRC is sent first, so it is the lowest bit of that byte.
+[[nodiscard]] constexpr std::uint8_t checksum(Bytes bytes) { return Crc<crc_parameters, CrcTable::nibble>::of(bytes); }
+
+/// Returns the bytes of a request.
+[[nodiscard]] constexpr RequestBytes encode_request(const Format& format, const Request& request) {
+  RequestBytes bytes;
+  detail::push_frame(bytes, detail::request_frame(0, request.address | static_cast<unsigned>(request.code) << 3));
+  const auto frames = static_cast<unsigned>(frames_of(request.code));
+  const std::uint32_t sent = in_bit_order(format, request.code, request.value);
+  for (unsigned frame_code = 5 - frames; frames > 1 && frame_code <= 3; ++frame_code) {
+    detail::push_frame(bytes, detail::request_frame(frame_code, detail::memory_bits(request, sent, frame_code)));
+  }
+  return bytes;
+}
+
+/// Decodes a request. Errors: wrong_length; bad_framing (sync or frame code); bad_checksum; unsupported (a command code
+/// that no source lists).
+[[nodiscard]] constexpr Result<Request> decode_request(const Format& format, Bytes bytes) {
+  if (bytes.size() < frame_bytes || bytes.size() % frame_bytes != 0) return Error::wrong_length;
+  for (std::size_t i = 0; i < bytes.size() / frame_bytes; ++i) {
+    const unsigned frame = detail::frame_at(bytes, i);
+    if ((frame & 7) != detail::request_sync) return Error::bad_framing;
+    if (frame != detail::request_frame(frame >> 3 & 3, frame >> 5 & 0xFF)) return Error::bad_checksum;
+  }
+  const unsigned first = detail::frame_at(bytes, 0);
+  if ((first >> 3 & 3) != 0) return Error::bad_framing;
+  const std::optional<Code> code = code_of(first >> 8 & 31);
+  if (!code) return Error::unsupported;
+  Request request{.code = *code, .address = static_cast<std::uint8_t>(first >> 5 & 7)};
+  const std::size_t frames = frames_of(*code);
+  if (bytes.size() != frames * frame_bytes) return Error::wrong_length;
+  std::uint32_t sent = 0;
+  for (std::size_t i = 1; i < frames; ++i) {
+    const unsigned frame = detail::frame_at(bytes, i);
+    const auto frame_code = static_cast<unsigned>(4 - frames + i);
+    if ((frame >> 3 & 3) != frame_code) return Error::bad_framing;
+    const unsigned bits = frame >> 5 & 0xFF;
+    if (frame_code == 3 && is_memory_access(*code)) {
+      request.word = static_cast<std::uint8_t>(bits);
+    } else {
+      sent |= bits << 8 * (frame_code - 1);
+    }
+  }
+  request.value = in_bit_order(format, *code, sent);
+  return request;
+}
+
+/// Returns the bytes of the reply of one encoder to a request with this code.
+[[nodiscard]] constexpr ReplyBytes encode_reply(Code code, const OneReply& reply) {
+  const unsigned begin = detail::reply_sync | static_cast<unsigned>(reply.address) << 3;
+  ReplyBytes bytes;
+  if (single(code) == Code::short_position) {
+    const auto low_bits = static_cast<unsigned>(reply.data & 0x1FF);
+    detail::push_frame(bytes, begin | (reply.status != 0 ? 1u : 0u) << 6 | low_bits << 7);
+    bytes.push_back(static_cast<std::uint8_t>(reply.data >> 9));
+  } else {
+    detail::push_frame(bytes, begin | static_cast<unsigned>(code) << 6 | static_cast<unsigned>(reply.status) << 12);
+    for (unsigned at = 0; at < data_bits(code); at += 8) {
+      bytes.push_back(static_cast<std::uint8_t>(reply.data >> at));
+    }
+  }
+  bytes.push_back(checksum(bytes));
+  return bytes;
+}
+
+namespace detail {
+
+[[nodiscard]] constexpr std::uint8_t address_in(Bytes reply) { return frame_at(reply, 0) >> 3 & 7; }
+[[nodiscard]] constexpr OneReply split_one(Code code, Bytes bytes) {
+  const unsigned info = frame_at(bytes, 0);
+  if (single(code) == Code::short_position) {
+    return {.address = address_in(bytes),
+            .status = static_cast<std::uint8_t>(info >> 6 & 1),
+            .data = info >> 7 | std::uint64_t{bytes[2]} << 9};
+  }
+  OneReply reply{.address = address_in(bytes), .status = static_cast<std::uint8_t>(info >> 12)};
+  for (std::size_t i = 2; i + 1 < bytes.size(); ++i) reply.data |= std::uint64_t{bytes[i]} << 8 * (i - 2);
+  return reply;
+}
+// Checks the reply of one encoder, whose length is right, up to its fixed bits.
+[[nodiscard]] constexpr Error check_one(Code code, Bytes bytes) {
+  if (checksum(bytes.first(bytes.size() - 1)) != bytes.back()) return Error::bad_checksum;
+  const unsigned info = frame_at(bytes, 0);
+  if ((info & 7) != reply_sync) return Error::bad_framing;
+  if (single(code) == Code::short_position) return Error::none;
+  if ((info >> 6 & 31) != static_cast<unsigned>(code)) return Error::unexpected_reply;
+  return (info >> 11 & 1) == 0 ? Error::none : Error::unexpected_reply;
+}
+// Checks that bits that the sources draw as 0 are 0, and that the position has no bits above the turns.
+[[nodiscard]] constexpr Error check_range(const Format& format, Code code, std::uint64_t data) {
+  const unsigned all_bits = format.singleturn_bits + format.multiturn_bits;
+  const auto bits_above = [&](std::uint64_t value, unsigned bits) {
+    return value >> bits == 0 ? Error::none : Error::out_of_range;
+  };
+  const Code one = single(code);
+  if (one == Code::position) return bits_above(data, all_bits);
+  if (one == Code::upper) return bits_above(data, all_bits - 16);
+  if (one == Code::alarms || is_reset(one)) return bits_above(data, 16);
+  const bool is_lower = one == Code::lower || one == Code::with_alarms || one == Code::with_temperature;
+  if (is_lower) return bits_above(data & 0xFFFFFF, all_bits);
+  return Error::none;
+}
+
+}  // namespace detail
+
+/// Checks a reply, or the replies of several encoders, in this order: length, checksum, first bits, code, fixed bits,
+/// address, range. Returns the decoded replies, or the error of the first failed check.
+[[nodiscard]] constexpr Result<Reply> decode_reply(const Format& format, const Request& request, Bytes bytes) {
+  const std::size_t size = reply_length(request.code);
+  const bool all = is_for_all(request.code);
+  if (bytes.empty() || bytes.size() % size != 0 || bytes.size() > (all ? encoder_count : 1) * size) {
+    return Error::wrong_length;
+  }
+  Reply reply;
+  reply.count = 0;
+  for (; !bytes.empty(); bytes = bytes.subspan(size)) {
+    const Bytes one = bytes.first(size);
+    if (const Error error = detail::check_one(request.code, one); error != Error::none) return error;
+    const OneReply now = detail::split_one(request.code, one);
+    const bool is_next = all ? reply.count == 0 || now.address > reply.at(reply.count - 1u).address
+                             : is_for_any_address(request.code) || now.address == request.address;
+    if (!is_next) return Error::unexpected_reply;
+    if (const Error error = detail::check_range(format, request.code, now.data); error != Error::none) return error;
+    if (reply.count == 0) {
+      static_cast<OneReply&>(reply) = now;
+    } else {
+      reply.others[reply.count - 1u] = now;
+    }
+    ++reply.count;
+  }
+  return reply;
+}
+
+/// Returns the length of the reply of one encoder that begins with the bytes `begin`, or how many bytes are needed to
+/// know it. The reply to CC 21 and 22 has bits of the position where others have their code: it is recognized only if
+/// no other reply has these bits.
+[[nodiscard]] constexpr std::size_t reply_size(Bytes begin) {
+  if (begin.size() < frame_bytes) return frame_bytes;
+  const unsigned info = detail::frame_at(begin, 0);
+  if ((info & 7) != detail::reply_sync) return 0;
+  const std::optional<Code> code = code_of(info >> 6 & 31);
+  const bool is_short = !code || (info >> 11 & 1) != 0 || single(*code) == Code::short_position;
+  return reply_length(is_short ? Code::short_position : *code);
+}
+/// Returns the request that a reply of one encoder shows: its code, or CC 21 for a short reply, and the address.
+/// Errors: wrong_length; unexpected_reply (a command code that no source lists).
+[[nodiscard]] constexpr Result<Request> request_of_reply(Bytes reply) {
+  if (reply.size() < reply_length(Code::short_position)) return Error::wrong_length;
+  Request request{.code = Code::short_position, .address = detail::address_in(reply)};
+  if (reply.size() == reply_length(Code::short_position)) return request;
+  const std::optional<Code> code = code_of(detail::frame_at(reply, 0) >> 6 & 31);
+  if (!code) return Error::unexpected_reply;
+  request.code = *code;
+  return request;
+}
+
+}  // namespace absenc::nikon
