@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tests of what only Nikon's A-format has: characters of 16 bits in captures, requests of several frames, a memory of
-words."""
+words, alarms with a second request, several encoders that answer one request."""
 
 import os
 import unittest
 from pathlib import Path
 
-from command_support import Case, absenc, json_lines
+from command_support import Case, Emulator, absenc, json_lines
 
 
 class Nikon(Case):
@@ -51,7 +51,43 @@ class Nikon(Case):
         self.assertIn("1 word written", absenc("memory", "load", "sim:nikon", str(dump), "--yes").stdout)
         halved = text.replace("address 0x00: 0000", "address 0x00: 00")
         dump.write_text(halved, encoding="utf-8")
-        self.assertIn("words of 4 hexadecimal digits", absenc("memory", "load", "sim:nikon", str(dump), "--yes").stderr)
+        self.assertIn("words of four hexadecimal digits", absenc("memory", "load", "sim:nikon", str(dump), "--yes").stderr)
+
+    def test_alarms_complete_later_readings_of_a_capture(self):
+        """The first reading has a status that names no alarm; with the reply that does it is shown once more."""
+        file = self.file("alarm.vcd")
+        self.assert_good(absenc("wave", "nikon?alarm=singleturn_error", file, "--count", "3"))
+        rows = json_lines(absenc("decode", "nikon", file, "--json").stdout)
+        self.assertEqual([row["request"] for row in rows], ["0200", "02000223", "0223"] * 3)
+        positions = [row for row in rows if "singleturn_valid" in row]
+        self.assertEqual([row["singleturn_valid"] for row in positions], [None] + [False] * 5)
+        self.assertEqual([row["multiturn_valid"] for row in positions], [None] + [True] * 5)
+        self.assertEqual([row["alarms"] for row in positions], [None] + [["singleturn_error"]] * 5)
+
+    def test_reads_the_replies_that_others_print(self):
+        """TI's sample output shows ABS 1526F, which is 237.961120605 degrees of 17 bits, and 51200 turns."""
+        decoded = absenc("decode", "nikon", "--option", "singleturn_bits=17", "--request", "e244", "--hex", "04a16f5201900185", "--json")
+        fields = json_lines(decoded.stdout)[0]["fields"]
+        self.assertEqual((fields["singleturn"], fields["multiturn"]), (0x1526F, 51200))
+        self.assertAlmostEqual(fields["singleturn"] * 360 / 2**17, 237.961120605)
+
+    def scanned(self, line):
+        found = absenc("scan", f"nikon:{line}", "--json")
+        self.assert_good(found)
+        return [encoder["encoder_address"] for encoder in json_lines(found.stdout)[0]["encoders"]]
+
+    def test_encoders_of_a_line_answer_in_turn(self):
+        line = self.file("line")
+        with Emulator(self.directory, "--also", "address=3", "--also", "address=7&singleturn=1000", protocol="nikon", name="line"):
+            self.assertEqual(self.scanned(line), [0, 3, 7])
+            shown = absenc("run", f"nikon:{line}", "all-positions").stdout
+            self.assertEqual([text.split()[1] for text in shown.splitlines() if text.startswith(("encoder_address", "singleturn"))],
+                             ["0", "0", "3", "0", "7", "1000"])
+            refused = absenc("config", "set", f"nikon:{line}", "address", "2", "--yes")
+            self.assert_failed(refused, "another encoder answers on this line")
+            self.assert_good(absenc("config", "set", f"nikon:{line}?address=3", "identification", "0x123", "--yes"))
+            self.assert_good(absenc("run", f"nikon:{line}", "assign-address", "5", "0x123", "--yes"))
+            self.assertEqual(self.scanned(line), [0, 5, 7])
 
     @unittest.skipUnless(os.path.exists("/dev/ttyS0"), "this machine has no UART")
     def test_uart_refuses_wide_characters(self):

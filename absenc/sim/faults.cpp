@@ -123,10 +123,15 @@ bool FaultyDevice::damage(Step<std::uint8_t>& reply, Time now) {
     // On a clocked link corrupt, truncate and drop hit only bytes that the host clocks out.
     const auto taken = [&] { return reply.bits == 0 ? reply_.size() : std::min(reply_.size(), (reply.bits + 7) / 8); };
     if (strikes(FaultKind::corrupt)) flip_bits(std::span(reply_).first(taken()), random_);
-    if (taken() > 1 && strikes(FaultKind::truncate)) reply_.resize(1 + random_.below(taken() - 1));
-    if (strikes(FaultKind::drop)) reply_.erase(reply_.begin() + static_cast<std::ptrdiff_t>(random_.below(taken())));
+    const std::size_t each = rates_.character_bytes;
+    const auto characters = [&] { return (taken() + each - 1) / each; };
+    if (characters() > 1 && strikes(FaultKind::truncate)) reply_.resize(each * (1 + random_.below(characters() - 1)));
+    if (strikes(FaultKind::drop)) {
+      const auto first = reply_.begin() + static_cast<std::ptrdiff_t>(each * random_.below(characters()));
+      reply_.erase(first, std::min(first + static_cast<std::ptrdiff_t>(each), reply_.end()));
+    }
     if (strikes(FaultKind::garbage)) {
-      for (std::uint64_t more = 1 + random_.below(4); more > 0; --more) {
+      for (std::uint64_t more = each * (1 + random_.below(4)); more > 0; --more) {
         reply_.insert(reply_.begin(), static_cast<std::uint8_t>(random_.below(256)));
       }
     }

@@ -18,10 +18,10 @@ namespace absenc::sim {
 enum class FaultKind : std::uint8_t {
   drop,             ///< one byte of the reply is lost
   corrupt,          ///< 1 to 3 bits of the reply are flipped
-  truncate,         ///< the reply stops at a random byte, at least one byte is sent
+  truncate,         ///< the reply stops at a random character, at least one is sent
   delay,            ///< the reply is sent late
   echo,             ///< the bytes of the request are sent before the reply
-  garbage,          ///< 1 to 4 random bytes are sent before the reply
+  garbage,          ///< 1 to 4 random characters are sent before the reply
   silence,          ///< the reply is not sent
   repeat,           ///< the reply is sent twice
   request_corrupt,  ///< 1 to 3 bits of a byte that the device receives are flipped
@@ -39,6 +39,8 @@ struct FaultRates {
   /// Probability of each fault, 0 to 1, indexed by FaultKind.
   std::array<double, fault_names.size()> rates{};
   Time delay = std::chrono::microseconds(200);  ///< additional delay of a late reply
+  /// Bytes of a character, 1 or 2: drop, truncate and garbage remove or add whole characters.
+  std::uint8_t character_bytes = 1;
 
   /// Returns the probability of faults of this kind; a reference that can be assigned to.
   constexpr double& operator[](FaultKind kind) { return rates[static_cast<std::size_t>(kind)]; }

@@ -180,6 +180,29 @@ TEST_F(Faults, GarbageComesBeforeTheReply) {
   for (std::size_t size = 1; size <= 4; ++size) EXPECT_GT(seen.at(size), 3);
 }
 
+TEST_F(Faults, WholeCharactersOfTwoBytesAreLostOrAdded) {
+  const auto damaged_by = [&](FaultKind kind) {
+    FaultRates rates;
+    rates.character_bytes = 2;
+    rates[kind] = 1;
+    faulty->set_rates(rates);
+    return exchange();
+  };
+  damage(FaultKind::drop);
+  bool first_lost = false;
+  bool last_lost = false;
+  for (int i = 0; i < 20; ++i) {
+    const ByteVector damaged = damaged_by(FaultKind::drop);
+    first_lost = first_lost || damaged == ByteVector{0x33, 0x44};
+    last_lost = last_lost || damaged == ByteVector{0x11, 0x22};
+    EXPECT_EQ(damaged.size(), 2u);
+    EXPECT_EQ(damaged_by(FaultKind::truncate), (ByteVector{0x11, 0x22}));
+    const ByteVector longer = damaged_by(FaultKind::garbage);
+    EXPECT_TRUE(longer.size() % 2 == 0 && longer.size() > 4 && longer.size() <= 12) << longer.size();
+  }
+  EXPECT_TRUE(first_lost && last_lost);
+}
+
 TEST_F(Faults, DeviceContinuesAfterSuppressedReply) {
   damage(FaultKind::silence);
   device.timer_at = microseconds(500);  // the device's timer must still expire

@@ -56,6 +56,8 @@ class Waveform {
   /// waveform must outlive the line.
   void observe(Line<CanFrame>& line);
 
+  /// Draws a byte of an asynchronous character; if two share one, when the second one is drawn.
+  void byte(NodeRole sender, Time start, Time end, std::uint8_t byte);
   /// Draws one asynchronous character with the data bits `value`.
   void character(NodeRole sender, Time start, Time end, std::uint16_t value);
   /// Draws a transfer of an SPI or clocked link.
@@ -96,7 +98,6 @@ class Waveform {
     std::uint8_t byte = 0;
   };
 
-  void byte(NodeRole sender, Time start, Time end, std::uint8_t byte);
   void draw_lone(FirstByte& first);
   [[nodiscard]] std::size_t data_wire(NodeRole sender) const;
   void drive(std::size_t wire, Time from, Time to);

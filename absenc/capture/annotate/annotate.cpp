@@ -33,7 +33,8 @@ LineTicks line_ticks(const Unit& unit, double ticks_per_bit, std::uint64_t ticks
       ticks_per_second != 0 ? static_cast<double>(ticks_per_second) : ticks_per_bit * unit.line.with_some_rate().rate;
   const auto ticks = [](double count) { return std::max<Tick>(1, static_cast<Tick>(count)); };
   const auto ticks_of = [rate](Time time) { return static_cast<Tick>(static_cast<double>(time.count()) * rate / 1e9); };
-  return {.pause = std::max(ticks(ticks_per_bit * unit.timing.pause_bits), ticks_of(unit.timing.frame_pause)),
+  return {.pause = ticks(ticks_per_bit * unit.timing.pause_bits),
+          .frame_pause = ticks_of(unit.timing.frame_pause),
           .character = ticks(ticks_per_bit * unit.line.character_bits()),
           .turnaround = ticks_of(unit.timing.turnaround),
           .limit = ticks_of(unit.timing.turnaround_limit)};
@@ -99,15 +100,31 @@ Tick Annotator::pause_of(const Channel& channel) const {
   return channel.synchronised ? settings_.ticks.pause : std::max(settings_.ticks.pause, settings_.ticks.character);
 }
 
+// Returns whether the run ends with a complete good request, behind which another sender may begin.
+bool Annotator::ends_with_request(const Channel& channel) {
+  const Bytes bytes = channel.run.bytes();
+  for (std::size_t size = 1; size <= bytes.size(); ++size) {
+    if (judge_.request_size(bytes.last(size)) == size) return true;
+  }
+  return false;
+}
+
+// Returns whether a silence until `begin` ends the run. A longer one is needed within a request of several frames, and
+// between replies of several encoders.
+bool Annotator::is_over(const Channel& channel, Tick begin) {
+  if (channel.run.empty()) return false;
+  const Tick end = channel.run.end();
+  if (begin < end + pause_of(channel)) return false;
+  return begin >= end + settings_.ticks.frame_pause || ends_with_request(channel);
+}
+
 void Annotator::take(const Character& character) {
   Channel& channel = channels_[character.channel];
   if (settings_.by_arrival) {
     if (channel.run.full()) parse(channel, false, false);
     return channel.run.push(character);
   }
-  const auto paused = [&](const Channel& one) {
-    return !one.run.empty() && character.begin >= one.run.end() + pause_of(one);
-  };
+  const auto paused = [&](const Channel& one) { return is_over(one, character.begin); };
   if (settings_.channel_count == 2) {
     Channel& other = channels_[character.channel ^ 1u];
     const bool other_first = paused(other) && (!paused(channel) || other.run.end() <= channel.run.end());

@@ -91,6 +91,8 @@ class Annotator {
   // times.
   void take(const Character& character);
   [[nodiscard]] Tick pause_of(const Channel& channel) const;
+  [[nodiscard]] bool ends_with_request(const Channel& channel);
+  [[nodiscard]] bool is_over(const Channel& channel, Tick begin);
   void close(Channel& channel, bool cut);
   void parse(Channel& channel, bool whole, bool cut);
 
@@ -110,6 +112,10 @@ class Annotator {
   std::size_t take_bad();
   void report_bad(std::size_t size);
 
+  // Returns the index of a request into `reply_sizes_`: its first two bytes contain the command.
+  [[nodiscard]] static std::size_t size_index(Bytes request) {
+    return (request[0] + 31u * (request.size() > 1 ? request[1] : 0u)) % 256;
+  }
   [[nodiscard]] Bytes rest(std::size_t from) const { return channel_->run.bytes().subspan(from); }
   [[nodiscard]] Piece piece(std::size_t size) const;
   [[nodiscard]] std::size_t reply_at(Bytes request, std::size_t from, std::size_t usual = 0);
@@ -125,7 +131,7 @@ class Annotator {
   Exchanges exchanges_;
   Options options_;
   std::array<Channel, 2> channels_{};
-  std::array<std::size_t, 256> reply_sizes_{};  // size of the last good reply, by the first byte of its request
+  std::array<std::size_t, 256> reply_sizes_{};  // size of the last good reply, by the index of its request
   std::vector<Character> undecided_;            // characters stored until the channels' directions are known
 
   bool is_first_ = true;  // the next frame is the first, and its beginning may lie before the capture

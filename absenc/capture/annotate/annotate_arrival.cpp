@@ -40,7 +40,7 @@ std::size_t Annotator::whole_frame() {
   if (!channel_->at_frame_start) return 0;
   const auto answered = [&](std::size_t size) {
     const Bytes request = rest(at_).first(size);
-    return reply_at(request, at_ + size, reply_sizes_[request[0]]) != 0;
+    return reply_at(request, at_ + size, reply_sizes_[size_index(request)]) != 0;
   };
   const std::size_t size = request_at(at_);
   // Returns whether the request at `at_` stands alone and the same bytes follow: its host had a timeout.
@@ -52,7 +52,8 @@ std::size_t Annotator::whole_frame() {
   const std::optional<std::size_t> which = request_before(channel_->run.begin(at_));
   if (which) {
     const Exchanges::PendingRequest& pending = exchanges_.waiting()[*which];
-    if (pending.error != Error::none || reply_at(pending.bytes(), at_, reply_sizes_[pending.storage[0]]) != 0) {
+    if (pending.error != Error::none ||
+        reply_at(pending.bytes(), at_, reply_sizes_[size_index(pending.bytes())]) != 0) {
       return match_reply();
     }
     if (!repeats() && judge_.is_incomplete(Direction::reply, rest(at_))) return 0;

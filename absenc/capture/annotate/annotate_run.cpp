@@ -115,7 +115,7 @@ std::size_t Annotator::match_reply() {
     if (size != 0) exchanges_.report_reply(*which, piece(size), pending.error, pending.remark, {});
     return size;
   }
-  std::size_t& usual = reply_sizes_[pending.storage[0]];
+  std::size_t& usual = reply_sizes_[size_index(pending.bytes())];
   const std::size_t size = reply_at(pending.bytes(), at_, usual);
   const bool leaves_rest = whole_ && size < rest(at_).size();
   if (size == 0 || leaves_rest) {
@@ -275,14 +275,14 @@ std::size_t Annotator::bad_size() {
   };
   if (channel_->carries == Carries::both && whole_) {
     const std::optional<std::size_t> which = request_before(channel_->run.begin(at_));
-    const std::size_t usual = which ? reply_sizes_[exchanges_.waiting()[*which].storage[0]] : 0;
+    const std::size_t usual = which ? reply_sizes_[size_index(exchanges_.waiting()[*which].bytes())] : 0;
     if (ends_before_request(usual)) return usual;
     const std::size_t size = judge_.frame_size(Direction::reply, rest(at_));
     if (ends_before_request(size)) return size;
   }
   // A damaged reply may have its usual length, with a pause behind it.
   if (const auto pending = request_before(channel_->run.begin(at_)); settings_.by_arrival && pending) {
-    const std::size_t usual = reply_sizes_[exchanges_.waiting()[*pending].storage[0]];
+    const std::size_t usual = reply_sizes_[size_index(exchanges_.waiting()[*pending].bytes())];
     for (const std::size_t size : {usual, judge_.frame_size(Direction::reply, rest(at_))}) {
       if (size != 0 && size < left && has_gap(at_ + size)) return size;
     }

@@ -30,7 +30,8 @@ inline Options options_of(const Unit& unit, const std::vector<OptionText>& setti
 /// Returns the line settings of `unit`, with a default rate if the unit's document states none.
 inline LineSettings line_of(const Unit& unit) { return unit.line.with_some_rate(); }
 
-/// Bytes that host or encoder sent without a pause, with the times in ticks.
+/// Bytes that host or encoder sent without a pause longer than those between frames of a request, with the times in
+/// ticks.
 struct Transmission {
   sim::NodeRole by;
   std::vector<std::uint8_t> bytes;
@@ -60,7 +61,7 @@ class Talker {
     device_->power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);
     line_.attach(sim::NodeRole::device, faulty_);
     line_.observe([this](std::size_t sender, Time start, Time end, std::uint8_t byte) {
-      if (waveform_ != nullptr) waveform_->character(line_.role(sender), start, end, byte);
+      if (waveform_ != nullptr) waveform_->byte(line_.role(sender), start, end, byte);
       record(line_.role(sender), static_cast<Tick>(start.count()), static_cast<Tick>(end.count()), byte);
     });
     line_.observe_transfers([this](const auto& transfer) {
@@ -118,7 +119,12 @@ class Talker {
       for (const Transmission& one : record_.transmissions)
         record_.collided = record_.collided || (one.by != by && one.end > begin);
     }
-    if (last != record_.transmissions.rend() && last->end == begin) {
+    // The frames of one request have pauses between them.
+    const Tick pause = by == sim::NodeRole::host ? static_cast<Tick>(unit_.timing.frame_pause.count()) : 0;
+    const bool is_newest = last == record_.transmissions.rbegin();
+    const bool goes_on =
+        last != record_.transmissions.rend() && (last->end == begin || (is_newest && begin - last->end <= pause));
+    if (goes_on) {
       last->bytes.push_back(byte);
       last->end = end;
     } else {

@@ -134,6 +134,7 @@ class WholeWay : public ::testing::TestWithParam<const Unit*> {
 TEST_P(WholeWay, EqualsDirectAnnotation) {
   sim::FaultRates faults = sim::testing::damaged_replies(0.02);
   faults[sim::FaultKind::delay] = faults[sim::FaultKind::repeat] = 0;  // these faults make both sides send at once
+  faults.character_bytes = static_cast<std::uint8_t>(line.character_bytes());
   Talker talker(unit, options, faults, 7);
   Drawing drawing("capture");
   WaveformSink<sim::Waveform> wires(drawing);

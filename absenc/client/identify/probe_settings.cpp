@@ -96,6 +96,7 @@ std::vector<std::vector<std::uint8_t>> harmful_to_others(const Unit& unit, std::
   std::vector<std::vector<std::uint8_t>> all;
   for (const Unit* other : all_units()) {
     if (other == &unit || !fits(*other, search) || !can_receive(*other, rate, search)) continue;
+    if (other->line.data_bits != unit.line.data_bits) continue;  // it receives other characters
     Options defaults;
     for (std::size_t i = 0; i < other->options.size(); ++i) defaults.values[i] = other->options[i].default_value;
     for (const Command& command : other->commands) {

@@ -86,6 +86,7 @@ VirtualDevice::VirtualDevice(const Unit& unit, const Options& options, const Dev
     conditions_[static_cast<std::size_t>(&condition - unit.conditions.data())] =
         require_value(condition, written.value);
   }
+  rates_.character_bytes = static_cast<std::uint8_t>(line_settings(unit, options).character_bytes());
   if (!had_faults_ && !settings.faults_may_come) return;
   if (device_.bytes != nullptr) faulty_ = std::make_unique<sim::FaultyDevice>(*device_.bytes, rates_, settings.seed);
   if (device_.frames != nullptr) {

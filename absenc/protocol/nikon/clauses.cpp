@@ -68,21 +68,23 @@ constexpr auto clauses = std::array{
 namespace script {
 using std::chrono::microseconds;
 using std::chrono::milliseconds;
-constexpr std::array<std::int64_t, 2> one_word{1, 1};
-
 constexpr auto seven_zeros =
     std::array{HostStep{microseconds(100), "zero", {}, 7}, HostStep{microseconds(100), "position"}};
 constexpr auto one_clear =
     std::array{HostStep{microseconds(100), "clear-alarms"}, HostStep{microseconds(100), "reset-multiturn", {}, 8}};
-constexpr auto reads_at_once = std::array{HostStep{milliseconds(1), "memory-read", one_word},
-                                          HostStep{microseconds(100), "memory-read", one_word}};
-constexpr auto read_after_write =
-    std::array{HostStep{milliseconds(1), "memory-write", one_word}, HostStep{milliseconds(1), "memory-read", one_word}};
-// The two frames of a request for word 0x12 of the EEPROM, and the four that write a word there.
-constexpr auto close_frames = std::array{HostStep{milliseconds(1), "020d"}, HostStep{microseconds(5), "5a02"}};
-constexpr auto close_write = std::array{HostStep{milliseconds(1), "022e"}, HostStep{microseconds(15), "8a67"},
-                                        HostStep{microseconds(5), "520b"}, HostStep{microseconds(15), "5a02"}};
-constexpr auto apart_frames = std::array{HostStep{milliseconds(1), "020d"}, HostStep{microseconds(15), "5a02"}};
+// The frames of requests that read and write word 0x12 of the EEPROM.
+constexpr HostStep read_word{milliseconds(40), "020d"};
+constexpr HostStep write_word{milliseconds(40), "022e"};
+constexpr HostStep low_byte{microseconds(15), "8a67"};
+constexpr HostStep high_byte{microseconds(15), "520b"};
+constexpr HostStep word_address{microseconds(15), "5a02"};
+constexpr HostStep read_again{microseconds(100), "020d"};
+constexpr HostStep read_soon{milliseconds(1), "020d"};
+constexpr auto reads_at_once = std::array{read_word, word_address, read_again, word_address};
+constexpr auto read_after_write = std::array{write_word, low_byte, high_byte, word_address, read_soon, word_address};
+constexpr auto close_frames = std::array{read_word, HostStep{microseconds(5), "5a02"}};
+constexpr auto closer_frames = std::array{read_word, HostStep{microseconds(1), "5a02"}};
+constexpr auto apart_frames = std::array{read_word, word_address};
 }  // namespace script
 
 /// Clauses for hosts.
@@ -111,7 +113,7 @@ constexpr std::array<HostClause, 8> host_clauses{{
      .words = "the frames of one request are 10 us apart, or more",
      .demand = HostDemand::rule,
      .rule = "frames of a request less than 10 us apart",
-     .breaks = {script::close_frames, script::close_write},
+     .breaks = {script::close_frames, script::closer_frames},
      .keeps = script::apart_frames},
 }};
 

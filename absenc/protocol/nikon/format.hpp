@@ -20,7 +20,7 @@ using namespace std::chrono_literals;
 inline constexpr std::array<std::uint32_t, 5> rates{2'500'000, 4'000'000, 6'666'667, 8'000'000, 16'000'000};
 
 inline constexpr Time answer_time = 3us;          ///< time from a request to its reply; assumed
-inline constexpr Time answer_limit = 100us;       ///< longest time that a host waits for a reply; assumed
+inline constexpr Time answer_limit = 300us;       ///< longest time that a host waits for a reply; assumed
 inline constexpr Time frame_pause = 10us;         ///< shortest pause between the frames of one request
 inline constexpr Time memory_read_time = 300us;   ///< longest time in which the encoder fetches a word of the EEPROM
 inline constexpr Time memory_write_time = 30ms;   ///< longest time of a write to the EEPROM, or of a reset

@@ -21,6 +21,9 @@ struct Request {
   std::uint8_t address = 0;    ///< address of the encoder (EA), 0 to 7; for CC 11 and 20 the new one
   std::uint8_t word = 0;       ///< CC 13 and 14: address of the word
   std::uint32_t value = 0;     ///< CC 14: the word; CC 18 to 20: the identification, 24 bits
+  /// Whether a request for the alarms (CC 3) follows: both are one frame that only captures have.
+  bool with_status = false;
+  std::uint8_t status_address = 0;  ///< `with_status`: address of the request for the alarms
 };
 
 /// Data of the reply of one encoder.
@@ -44,7 +47,7 @@ inline constexpr std::size_t longest_one = 8;  ///< length of the longest reply 
 /// Bytes of a request.
 using RequestBytes = ByteBuffer<4 * frame_bytes>;
 /// Bytes of the reply of one encoder.
-using ReplyBytes = ByteBuffer<longest_one>;
+using OneReplyBytes = ByteBuffer<longest_one>;
 
 namespace detail {
 
@@ -138,10 +141,23 @@ inline constexpr CrcParameters crc_parameters{8, 0x1D, 0, true, true, 0};
   return request;
 }
 
+/// Decodes a request, or two requests of a capture of which the second one reads the alarms of the same encoder.
+/// Errors: those of `decode_request`.
+[[nodiscard]] constexpr Result<Request> decode_captured(const Format& format, Bytes bytes) {
+  const Result<Request> whole = decode_request(format, bytes);
+  if (whole || bytes.size() != 2 * frame_bytes) return whole;
+  Result<Request> first = decode_request(format, bytes.first(frame_bytes));
+  const Result<Request> second = decode_request(format, bytes.subspan(frame_bytes));
+  if (!first || !second || second->code != Code::alarms) return whole;
+  first->with_status = true;
+  first->status_address = second->address;
+  return first;
+}
+
 /// Returns the bytes of the reply of one encoder to a request with this code.
-[[nodiscard]] constexpr ReplyBytes encode_reply(Code code, const OneReply& reply) {
+[[nodiscard]] constexpr OneReplyBytes encode_reply(Code code, const OneReply& reply) {
   const unsigned begin = detail::reply_sync | static_cast<unsigned>(reply.address) << 3;
-  ReplyBytes bytes;
+  OneReplyBytes bytes;
   if (single(code) == Code::short_position) {
     const auto low_bits = static_cast<unsigned>(reply.data & 0x1FF);
     detail::push_frame(bytes, begin | (reply.status != 0 ? 1u : 0u) << 6 | low_bits << 7);
@@ -198,7 +214,7 @@ namespace detail {
 
 /// Checks a reply, or the replies of several encoders, in this order: length, checksum, first bits, code, fixed bits,
 /// address, range. Returns the decoded replies, or the error of the first failed check.
-[[nodiscard]] constexpr Result<Reply> decode_reply(const Format& format, const Request& request, Bytes bytes) {
+[[nodiscard]] constexpr Result<Reply> decode_replies(const Format& format, const Request& request, Bytes bytes) {
   const std::size_t size = reply_length(request.code);
   const bool all = is_for_all(request.code);
   if (bytes.empty() || bytes.size() % size != 0 || bytes.size() > (all ? encoder_count : 1) * size) {
@@ -224,15 +240,32 @@ namespace detail {
   return reply;
 }
 
+/// Checks and decodes the reply to a request, as `decode_replies`. With `with_status` one reply has to be followed by
+/// that to the request for the alarms of this encoder, which the member `alarms_read` then has; error otherwise:
+/// unexpected_reply.
+[[nodiscard]] constexpr Result<Reply> decode_reply(const Format& format, const Request& request, Bytes bytes) {
+  if (!request.with_status) return decode_replies(format, request, bytes);
+  constexpr std::size_t alarms_size = reply_length(Code::alarms);
+  if (bytes.size() <= alarms_size) return Error::wrong_length;
+  Result<Reply> reply = decode_replies(format, request, bytes.first(bytes.size() - alarms_size));
+  if (!reply) return reply;
+  if (reply->count != 1 || reply->address != request.status_address) return Error::unexpected_reply;
+  const Result<Reply> alarms =
+      decode_replies(format, {.code = Code::alarms, .address = reply->address}, bytes.last(alarms_size));
+  if (!alarms) return alarms;
+  reply->alarms_read = static_cast<std::uint16_t>(alarms->data & alarm::all);
+  return reply;
+}
+
 /// Returns the length of the reply of one encoder that begins with the bytes `begin`, or how many bytes are needed to
-/// know it. The reply to CC 21 and 22 has bits of the position where others have their code: it is recognized only if
-/// no other reply has these bits.
+/// know it; 0: no reply does. The reply to CC 21 and 22 has bits of the position where others have their code: it is
+/// recognized only by bits that no other reply has.
 [[nodiscard]] constexpr std::size_t reply_size(Bytes begin) {
   if (begin.size() < frame_bytes) return frame_bytes;
   const unsigned info = detail::frame_at(begin, 0);
   if ((info & 7) != detail::reply_sync) return 0;
   const std::optional<Code> code = code_of(info >> 6 & 31);
-  const bool is_short = !code || (info >> 11 & 1) != 0 || single(*code) == Code::short_position;
+  const bool is_short = !code || (info >> 11 & 1) != 0;
   return reply_length(is_short ? Code::short_position : *code);
 }
 /// Returns the request that a reply of one encoder shows: its code, or CC 21 for a short reply, and the address.

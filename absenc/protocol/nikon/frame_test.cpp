@@ -38,7 +38,7 @@ TEST(NikonFrame, ChecksumsAreThoseThatAnotherVendorPrints) {
        {std::pair{0xFFFA6u, 0x7Au}, std::pair{0xFFFA7u, 0x59u}, std::pair{0xFFFA8u, 0xCAu}, std::pair{0xFFFA9u, 0xE9u},
         std::pair{0xFFFAAu, 0x55u}, std::pair{0xFFFABu, 0x76u}, std::pair{0xFFFACu, 0x0Bu}}) {
     const OneReply reply{.data = singleturn | std::uint64_t{0x8888} << 20};
-    const ReplyBytes bytes = encode_reply(Code::position, reply);
+    const OneReplyBytes bytes = encode_reply(Code::position, reply);
     EXPECT_EQ(reflect(bytes[7], 8), printed);
     const Result<Reply> decoded = decode_reply({}, {}, bytes);
     ASSERT_EQ(decoded.error(), Error::none);
@@ -93,7 +93,7 @@ TEST(NikonFrame, RepliesDecodeToWhatWasEncoded) {
   for (const Code code : all_codes()) {
     const bool is_short = data_bits(code) == 17;
     const OneReply reply{.address = 5, .status = std::uint8_t(is_short ? 1 : 9), .data = 0x155};
-    const ReplyBytes bytes = encode_reply(code, reply);
+    const OneReplyBytes bytes = encode_reply(code, reply);
     EXPECT_EQ(bytes.size(), reply_length(code));
     const Result<Reply> decoded = decode_reply({}, {.code = code, .address = 5}, bytes);
     ASSERT_EQ(decoded.error(), Error::none) << unsigned(code);
@@ -209,7 +209,7 @@ TEST(NikonReading, AlarmsMakePartsInvalid) {
   EXPECT_EQ(reading(alarm::battery | alarm::overflow | alarm::memory_busy).singleturn_validity(), Validity::valid);
   EXPECT_EQ(reading(alarm::all).alarms, alarm::all);
   for (unsigned bit = 0; bit < 11; ++bit) {
-    const std::uint16_t alarm = 1u << bit;
+    const auto alarm = static_cast<std::uint16_t>(1u << bit);
     Reading judged = to_reading({}, Code::position, {});
     judge(judged, alarm);
     const bool position_holds = bit <= 2 || bit == 4 || bit == 8 || bit == 9;

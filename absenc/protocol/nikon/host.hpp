@@ -10,7 +10,8 @@
 namespace absenc::nikon {
 
 /// Conversation that sends one request, and reads the alarms with a second one (CC 3) if the reply has a position or
-/// turns, no alarms, and a status other than 0. Nothing is repeated.
+/// turns, no alarms, and a status other than 0. If several encoders answer, their alarms are not read. Nothing is
+/// repeated.
 class ReadPosition : public author::HostOf<Protocol> {
  public:
   /// Reads from an encoder of this format with `request`.
@@ -37,7 +38,7 @@ class ReadPosition : public author::HostOf<Protocol> {
     } else {
       reply_ = HostOf::last();
       new (&reading_) Reading(last_reading());  // constructed in place, because a copy costs time
-      asks_for_alarms_ = has_position() && reading_.alarms_reported == 0 && !is_for_all(position_request_.code);
+      asks_for_alarms_ = has_position() && reading_.alarms_reported == 0 && reply_.count == 1;
       if (asks_for_alarms_) return ask({.code = Code::alarms, .address = reply_.address}, author::Manner{});
     }
     has_reading_ = has_position();

@@ -124,7 +124,7 @@ struct Protocol {
   }
   /// Decodes a request. Returns it, or the error of the first failed check.
   static constexpr Result<Request> decode_request(const Format& format, Bytes bytes) {
-    return nikon::decode_request(format, bytes);
+    return decode_captured(format, bytes);
   }
   /// Checks and decodes the bytes of a reply; returns the reply or the error of the first failed check.
   static constexpr auto decode = decode_reply;
@@ -132,7 +132,9 @@ struct Protocol {
   static constexpr bool is_whole(const Format&, Error) { return false; }
   /// Returns position and turns of a valid reply; of several replies, those of the first.
   static constexpr Reading reading(const Format& format, const Request& request, const Reply& reply) {
-    return to_reading(format, request.code, reply);
+    Reading reading = to_reading(format, request.code, reply);
+    if (reply.alarms_read) judge(reading, *reply.alarms_read);
+    return reading;
   }
   /// Returns the end of the request, because no source states when the encoder latches the position.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }

@@ -10,6 +10,7 @@
 #include "absenc/protocol/nikon/device.hpp"
 #include "absenc/protocol/nikon/host.hpp"
 #include "absenc/protocol/nikon/procedures.hpp"
+#include "absenc/protocol/nikon/status_follower.hpp"
 #include "absenc/protocol/nikon/vectors.hpp"
 
 namespace absenc::nikon {
@@ -26,7 +27,10 @@ constexpr void put_request(FieldSink& sink, const Format&, const Request& reques
 constexpr void put_reply(FieldSink& sink, const Format& format, const Request& request, const Reply& reply) {
   for (std::size_t i = 0; i < reply.count; ++i) {
     Values values = values_of(format, request.code, reply.at(i));
-    if (reply.alarms_read) values.alarms = reply.alarms_read;
+    if (reply.alarms_read) {
+      values.alarms = reply.alarms_read;
+      values.command.reset();  // two requests have two codes
+    }
     fields.put(sink, values);
   }
 }
@@ -102,7 +106,6 @@ constexpr auto commands = std::array{
     read<Code::position>({"position", Verb::read, 0, "position and turns, and the alarms if there is one"}),
     read<Code::lower>({"singleturn", Verb::read_part, 0, "position within the turn, from the lower 24 bits"}),
     read<Code::upper>({"multiturn", Verb::read_part, 0, "turns, from the upper 24 bits"}).unless(no_turns),
-    read<Code::short_position>({"short-position", Verb::read_part, 0, "lower 17 bits of the position within the turn"}),
     read<Code::with_alarms>({.name = "singleturn-alarms",
                              .verb = Verb::read_part,
                              .id = 0,
@@ -140,7 +143,7 @@ constexpr auto commands = std::array{
                                             "give an address to the encoder with an identification", assign_arguments,
                                             true, false}),
     command<report, nodes, scan<Protocol, encoder_count, request_to>, ask_for<Code::position>>(
-        {"scan", Verb::scan, 0, "ask each of the eight addresses"}),
+        {"scan", Verb::scan, 0, "ask each of the eight addresses", {}, false, false}),
 };
 
 // ---- Declaration
@@ -158,8 +161,6 @@ constexpr auto options = OptionsOf{
 };
 constexpr auto models = std::array{
     ModelText{"MAR-MC42A", "20 bits, 65536 turns, 2.5 Mbit/s", 6000, "singleturn_bits=20 multiturn_bits=16"},
-    ModelText{"17-bit", "17 bits, 65536 turns, 4 Mbit/s", 6000, "singleturn_bits=17 multiturn_bits=16 rate=4000000"},
-    ModelText{"24-bit", "24 bits, 65536 turns, 2.5 Mbit/s", 6000, "singleturn_bits=24 multiturn_bits=16"},
 };
 
 constexpr Result<Request> guess_request(const Format&, Bytes reply) { return request_of_reply(reply); }
@@ -169,7 +170,7 @@ BitRanges bits_in(const Options& values, Frame request, Frame reply, const Field
   const Format format = options.format(values);
   const Result<Request> asked =
       request.bytes.empty() ? request_of_reply(reply.bytes) : decode_request(format, request.bytes);
-  // The replies of several encoders have each field several times.
+  // The replies of several encoders have each field several times, and so have those to two requests.
   if (!asked || reply.bytes.size() != reply_length(asked->code)) return {};
   return place_of(format, asked->code, field);
 }
@@ -209,6 +210,11 @@ bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sin
   return true;
 }
 
+constexpr std::size_t follower_storage = sizeof(StatusFollower);
+Follower* make_follower(const Options& values, std::span<std::byte> storage) {
+  return absenc::detail::make_in<StatusFollower>(storage, options.format(values));
+}
+
 constexpr auto known_as = std::array<std::string_view, 2>{"Nikon", "A-format"};
 
 constexpr Declaration<Protocol, VirtualEncoder> declaration{
@@ -230,6 +236,8 @@ constexpr Declaration<Protocol, VirtualEncoder> declaration{
     .bits = bits_in,
     .probe = probe,
     .remembered = remembered,
+    .follower = make_follower,
+    .follower_storage = follower_storage,
     .alarms = fields.of<&Values::alarms>(),
     .memory = memory_areas,
     .conditions = conditions,

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tests of captures of Nikon's A-format in which a host reads the alarms because the status of a position is not 0.
+#include "absenc/protocol/nikon/status_follower.hpp"
+
+#include <gtest/gtest.h>
+
+#include <optional>
+#include <vector>
+
+namespace absenc::nikon {
+namespace {
+
+using Wire = std::vector<std::uint8_t>;
+
+constexpr OneReply alarmed{.address = 2, .status = 1, .data = 77};
+constexpr OneReply battery{.address = 2, .status = 1, .data = alarm::battery};
+
+/// Feeds the follower with captured exchanges.
+struct Conversation {
+  void exchange(const Request& request, const OneReply& reply) {
+    follower.follow(number++, encode_request({}, request), encode_reply(request.code, reply));
+    Composed one;
+    composed.reset();
+    if (follower.take(one)) {
+      composed = Wire(one.request.begin(), one.request.end());
+      composed_reply = Wire(one.reply.begin(), one.reply.end());
+      first = one.first;
+    }
+  }
+  void position(const OneReply& reply = alarmed, Code code = Code::position) {
+    exchange({.code = code, .address = reply.address}, reply);
+  }
+  void alarms(const OneReply& reply = battery) { exchange({.code = Code::alarms, .address = reply.address}, reply); }
+
+  StatusFollower follower{Format{}};
+  std::uint64_t number = 5;
+  std::optional<Wire> composed;  // the request
+  Wire composed_reply;
+  std::uint64_t first = 0;
+};
+
+TEST(NikonFollower, AlarmsBelongToThePositionBeforeThem) {
+  Conversation seen;
+  seen.position();
+  EXPECT_FALSE(seen.composed);
+  seen.alarms();
+  ASSERT_TRUE(seen.composed);
+  EXPECT_EQ(seen.first, 5u);
+  const Result<Request> asked = decode_captured({}, *seen.composed);
+  ASSERT_TRUE(asked);
+  EXPECT_TRUE(asked->with_status);
+  EXPECT_EQ(asked->address, 2);
+  EXPECT_FALSE(decode_request({}, *seen.composed)) << "an encoder has no such request";
+  const Result<Reply> answered = decode_reply({}, *asked, seen.composed_reply);
+  ASSERT_TRUE(answered);
+  EXPECT_EQ(answered->data, 77u);
+  EXPECT_EQ(answered->alarms_read, alarm::battery);
+  seen.alarms();
+  EXPECT_FALSE(seen.composed) << "they are told once";
+}
+
+TEST(NikonFollower, OnlyTheNextExchangeCounts) {
+  Conversation seen;
+  seen.alarms();
+  EXPECT_FALSE(seen.composed);
+  seen.position();
+  seen.position();
+  EXPECT_FALSE(seen.composed);
+  seen.alarms();
+  EXPECT_TRUE(seen.composed);
+  EXPECT_EQ(seen.first, 7u);
+  seen.position();
+  seen.follower.lose();
+  seen.alarms();
+  EXPECT_FALSE(seen.composed);
+  seen.position();
+  ++seen.number;
+  seen.alarms();
+  EXPECT_FALSE(seen.composed) << "an exchange is missing";
+}
+
+TEST(NikonFollower, AnotherEncoderIsNotMeant) {
+  Conversation seen;
+  seen.position();
+  seen.alarms({.address = 3, .status = 1, .data = alarm::battery});
+  EXPECT_FALSE(seen.composed);
+}
+
+TEST(NikonFollower, RepliesWithAlarmsNeedNoOthers) {
+  for (const Code code : {Code::with_alarms, Code::alarms, Code::temperature}) {
+    Conversation seen;
+    seen.position(alarmed, code);
+    seen.alarms();
+    EXPECT_FALSE(seen.composed) << static_cast<int>(code);
+  }
+}
+
+TEST(NikonFrame, CapturedRequestsAreTwoAtMost) {
+  const RequestBytes position = encode_request({}, {.code = Code::position, .address = 2});
+  const RequestBytes alarms = encode_request({}, {.code = Code::alarms, .address = 2});
+  const auto decode = [](std::initializer_list<Bytes> parts) {
+    Wire both;
+    for (const Bytes part : parts) both.insert(both.end(), part.begin(), part.end());
+    return decode_captured({}, both);
+  };
+  EXPECT_TRUE(decode({position, alarms}));
+  EXPECT_FALSE(decode({position}).value().with_status);
+  EXPECT_EQ(decode({position, position}).error(), Error::wrong_length);
+  EXPECT_FALSE(decode({position, alarms, alarms}));
+}
+
+TEST(NikonFrame, BothRepliesOfACaptureAreChecked) {
+  const Request asked{.code = Code::position, .address = 2, .with_status = true, .status_address = 2};
+  const auto joined = [&](const OneReply& second) {
+    const auto one = encode_reply(Code::position, alarmed);
+    const auto two = encode_reply(Code::alarms, second);
+    Wire both(one.view().begin(), one.view().end());
+    both.insert(both.end(), two.view().begin(), two.view().end());
+    return both;
+  };
+  Wire bytes = joined(battery);
+  EXPECT_TRUE(decode_reply({}, asked, bytes));
+  bytes.back() ^= 1;
+  EXPECT_EQ(decode_reply({}, asked, bytes).error(), Error::bad_checksum);
+  bytes = joined(battery);
+  bytes[2] ^= 1;
+  EXPECT_EQ(decode_reply({}, asked, bytes).error(), Error::bad_checksum);
+  EXPECT_EQ(decode_reply({}, asked, Bytes(bytes).first(4)).error(), Error::wrong_length);
+  EXPECT_FALSE(decode_reply({}, asked, joined({.address = 3})));
+}
+
+}  // namespace
+}  // namespace absenc::nikon
