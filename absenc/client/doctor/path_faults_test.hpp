@@ -67,7 +67,8 @@ inline bool has_weak_check(const Pair& pair) {
 
 /// Returns a fault in which an adapter makes `change` of each reply. The shaft swings a little about a position that
 /// contains one of these byte values, and with which at least half of the replies change. Units without such a
-/// position, or with a weak checksum, cannot have the fault.
+/// position, with a weak checksum, or with characters of more than 8 bits, which no serial adapter transfers, cannot
+/// have the fault.
 inline PathFault of_bytes(const std::string& name, const std::vector<std::uint64_t>& values, const Change& change,
                           Ids causes = {}) {
   causes.insert(name);
@@ -75,7 +76,7 @@ inline PathFault of_bytes(const std::string& name, const std::vector<std::uint64
             constexpr std::size_t probed = 20;
             std::optional<Outcome> outcome;
             const Pair usual = pair_of(unit, mode, rate);
-            if (has_weak_check(usual)) return outcome;
+            if (has_weak_check(usual) || unit.line.data_bits > 8) return outcome;
             for (const std::string& place : positions_with(unit, usual.far.encoder.options, values)) {
               Pair pair = pair_of(unit, mode, rate, {place, "motion=sine=0.2,20"});
               pair.far.change = change;
@@ -108,7 +109,7 @@ inline std::vector<PathFault> faults_of_bytes() {
   faults.push_back({"seven_bits", [](const Unit& unit, const std::string& mode, const std::string& rate) {
                       std::optional<Outcome> outcome;
                       Pair pair = pair_of(unit, mode, rate, {"motion=rpm=60"});
-                      if (has_weak_check(pair)) return outcome;
+                      if (has_weak_check(pair) || unit.line.data_bits > 8) return outcome;
                       pair.far.change = [](const ByteList&, ByteList reply) {
                         for (std::uint8_t& byte : reply) byte &= 0x7F;
                         return reply;
