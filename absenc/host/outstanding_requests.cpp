@@ -23,6 +23,11 @@ Time OutstandingRequests<Item>::pause_after(Items request) const {
 }
 
 template <class Item>
+Time OutstandingRequests<Item>::character() const {
+  return is_can ? Time{} : line_settings(*unit_, *options_).with_some_rate().character();
+}
+
+template <class Item>
 bool OutstandingRequests<Item>::is_reply(Items request, Items reply) const {
   return unit_->check(*options_, to_frame(request), to_frame(reply)) == Error::none;
 }

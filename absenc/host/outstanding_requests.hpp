@@ -53,6 +53,8 @@ class OutstandingRequests {
   [[nodiscard]] bool is_answered(Items request) const;
   /// Returns for how long after the last received item `request` must not be sent again.
   [[nodiscard]] Time pause_after(Items request) const;
+  /// Returns the duration of a character on the line, in nanoseconds; 0 on CAN.
+  [[nodiscard]] Time character() const;
   /// Returns whether `reply` is a valid reply to `request`.
   [[nodiscard]] bool is_reply(Items request, Items reply) const;
   /// Returns whether `reply`, valid or not, may belong to `request`. Always true for bytes; on a CAN bus other nodes

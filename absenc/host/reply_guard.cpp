@@ -17,8 +17,8 @@ constexpr Time longest_silence = 2500ms;
 // Least silence after which the replies that a stalled line delayed count as lost.
 constexpr Time stall_silence = 500ms;
 constexpr Time longest_lateness = 10s;  // a reply later than this counts as lost
-// Items that arrive for this time or longer are noise; not on CAN.
-constexpr Time noise_limit = 100ms;
+// Items that arrive for this time or longer, and until `received_` could be full, are noise; not on CAN.
+constexpr Time least_noise = 100ms;
 constexpr Time tick{1};
 
 }  // namespace
@@ -44,6 +44,11 @@ template <class Item>
 Time ReplyGuard<Item>::required_silence() const {
   const Time timeout = std::max(longest_timeout_, pending_.step.answer);
   return std::min(std::max(silent_timeouts * timeout, expected_lateness_ * 3 / 2), longest_wait());
+}
+
+template <class Item>
+Time ReplyGuard<Item>::noise_limit() const {
+  return std::max(least_noise, static_cast<int>(received_.capacity()) * outstanding_.character());
 }
 
 template <class Item>
@@ -144,10 +149,12 @@ Step<Item> ReplyGuard<Item>::next(Time now) {
         if (now < delaying_.until) return {.at = delaying_.until, .gap = pending_.step.gap};
         // Bytes of the request must not collide with bytes that still arrive; after `noise_limit` it is sent
         // nevertheless.
-        if (delaying_.noise_end == never) delaying_.noise_end = now + noise_limit;
-        if (!is_can && delaying_.received_at + pending_.step.gap > now && now < delaying_.noise_end) {
-          delaying_.until = delaying_.received_at + pending_.step.gap;
-          break;
+        if (!is_can && delaying_.received_at + pending_.step.gap > now) {
+          if (delaying_.noise_end == never) delaying_.noise_end = now + noise_limit();
+          if (now < delaying_.noise_end) {
+            delaying_.until = delaying_.received_at + pending_.step.gap;
+            break;
+          }
         }
         return send(now);
       case Phase::matching:
@@ -301,7 +308,7 @@ void ReplyGuard<Item>::store(Items items, Time at) {
   if (!is_can) strip_late(at);
   if (received_.empty()) return;
   matching_.received_at = at;
-  if (!is_can && at - matching_.first_at >= noise_limit) return conclude_noise();
+  if (!is_can && at - matching_.first_at >= noise_limit()) return conclude_noise();
   // A reply of unknown length ends with silence, because its first items may look like a complete reply.
   const std::size_t expected = is_can ? 1 : pending_.step.expect;
   if (expected == 0 || received_.size() < expected) return;

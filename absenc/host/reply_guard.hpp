@@ -24,8 +24,9 @@ namespace absenc::host {
 ///               request is sent and none is      conversation         request
 ///               outstanding; or matching or
 ///               listening has ended
-///   delaying    a request is to be sent          are dropped, late    the line was silent long enough, or is
-///                                                replies counted      noisy for 100 ms: the request is sent;
+///   delaying    a request is to be sent          are dropped, late    the line was silent long enough, or noisy
+///                                                replies counted      for 100 ms and the duration of 64
+///                                                                     characters: the request is sent;
 ///                                                                       no request is outstanding           forwarding
 ///                                                                       others are outstanding              matching
 ///   matching    a request was sent while others  are stored           a reply answers this request only;
@@ -128,6 +129,7 @@ class ReplyGuard final : public Machine<Item> {
   [[nodiscard]] bool is_request(const Step<Item>& step) const;
   [[nodiscard]] Time required_silence() const;
   [[nodiscard]] Time longest_wait() const;
+  [[nodiscard]] Time noise_limit() const;
 
   void end_exchange();
   void enter_forwarding(const Forwarding& data);

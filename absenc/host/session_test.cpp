@@ -58,7 +58,8 @@ struct OneRequest final : Machine<std::uint8_t> {
     return {.kind = Kind::transfer, .out = request, .expect = 6, .gap = gap};
   }
   static constexpr Time gap = 200us;
-  static constexpr std::array<std::uint8_t, 1> request{0x02};
+  static constexpr std::array<std::uint8_t, 1> position{0x02};
+  Bytes request = position;
   bool sent = false;
   Wire heard;
 };
@@ -108,6 +109,54 @@ TEST(ReplyGuard, SendsAfterATenthOfASecondOfNoise) {
   }
   EXPECT_GE(now, begin + 100ms);
   EXPECT_LT(now, begin + 110ms);
+}
+
+// At 2400 baud a reply may take longer than a tenth of a second: only items that arrive for the duration of 64
+// characters are noise.
+TEST(ReplyGuard, LongReplyOnSlowLineIsNoNoise) {
+  using Kind = Step<std::uint8_t>::Kind;
+  const Unit& unit = *find_unit("raa38-modbus");
+  Options options;
+  const std::array<OptionText, 1> slow{{{"baud", "2400"}}};
+  ASSERT_EQ(resolve_options(unit, {}, slow, options).kind, OptionError::Kind::none);
+  constexpr std::array<std::uint8_t, 4> other{0xFF, 0xA0, 0x40, 0x38};
+  constexpr std::array<std::uint8_t, 8> request{0x01, 0x03, 0x00, 0x00, 0x00, 0x01, 0x84, 0x0A};
+  const Wire reply{0x01, 0x03, 0x02, 0x01, 0x7F, 0xF8, 0x34};
+  ReplyGuard<std::uint8_t> guard;
+  Time now = 1s;
+  const auto send = [&](OneRequest& asking, Bytes bytes) {
+    asking.request = bytes;
+    guard.attach(asking, unit, options, true);
+    Step<std::uint8_t> step = guard.next(now);
+    while (step.kind == Kind::wait) step = guard.next(now = step.at);
+    guard.feed({.kind = Event<std::uint8_t>::Kind::sent, .at = now});
+  };
+  const auto receive = [&](Bytes items, Time after) {
+    now += after;
+    guard.feed({.kind = Event<std::uint8_t>::Kind::received, .at = now, .items = items});
+    return guard.next(now).kind;
+  };
+  OneRequest unanswered;
+  send(unanswered, other);
+  now += 3ms;
+  guard.feed({.kind = Event<std::uint8_t>::Kind::silence, .at = now});
+  guard.conclude();
+  OneRequest answered;
+  send(answered, request);
+  for (const std::uint8_t& byte : reply) EXPECT_EQ(receive({&byte, 1}, 20ms), Kind::wait);  // for 120 ms
+  EXPECT_EQ(answered.heard, reply);
+
+  guard.conclude();
+  OneRequest disturbed;
+  disturbed.request = request;
+  guard.attach(disturbed, unit, options, true);
+  const Time begin = now;
+  const Wire noise{0x55};
+  EXPECT_EQ(guard.next(now).kind, Kind::wait);
+  while (receive(noise, 100us) == Kind::wait && now < begin + 5s) continue;
+  const Time characters = 64 * line_settings(unit, options).character();
+  EXPECT_GE(now, begin + characters);
+  EXPECT_LT(now, begin + characters + 10ms);
 }
 
 // ---- Sessions
