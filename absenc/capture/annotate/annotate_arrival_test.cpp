@@ -285,6 +285,32 @@ TEST_P(Arrival, ReportsUnsolicitedFrames) {
   }
 }
 
+// Checks that exchanges of two commands whose replies differ in length are each reported when complete: in Modbus RTU
+// the address comes before the command.
+TEST(ArrivalOfCommands, ReplyHasUsualLengthOfItsCommand) {
+  const Unit& unit = *find_unit("raa38-modbus");
+  const std::vector<Exchange> exchanges{
+      {{0x01, 0x03, 0x00, 0x00, 0x00, 0x01, 0x84, 0x0A}, {0x01, 0x03, 0x02, 0x01, 0x7F, 0xF8, 0x34}},
+      {{0x01, 0xA1, 0x02, 0xD8, 0x51}, {0x02, 0xA1, 0xC1, 0x68}}};
+  Annotator::Settings settings;
+  settings.begins_silent = settings.by_arrival = true;
+  settings.gap = gap;
+  settings.ticks.limit = LineTicks::never;
+  AnnotationCollector collector;
+  const auto annotator =
+      std::make_unique<Annotator>(unit, testing::options_of(unit, {{"bits", "14"}}), settings, collector);
+  Tick now = 1000;
+  for (std::size_t i = 0; i < 10; ++i) {
+    for (const Wire& bytes : {exchanges[i % 2].request, exchanges[i % 2].reply}) {
+      for (const std::uint8_t byte : bytes) annotator->put({.begin = now, .end = now, .value = byte});
+      annotator->report_complete();
+      now += gap / 2;
+    }
+    EXPECT_EQ(collector.found.size(), i + 1);
+    EXPECT_TRUE(collector.found.back().is_good_exchange()) << i;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(All, Arrival, ::testing::ValuesIn(units_of_characters()), name_of);
 
 }  // namespace
