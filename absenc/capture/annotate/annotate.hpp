@@ -103,6 +103,7 @@ class Annotator {
   std::size_t match_reply();
   [[nodiscard]] bool is_followed_by_frame(std::size_t size);
   [[nodiscard]] std::optional<std::size_t> request_before(Tick begin) const;
+  [[nodiscard]] bool is_refusal(Bytes request, std::size_t from);
   [[nodiscard]] std::size_t echoed_reply_size(Bytes request, std::size_t from);
   std::size_t match_echoed_reply(std::size_t which, std::size_t size);
   std::size_t match_repeated();

@@ -156,19 +156,30 @@ bool Annotator::is_followed_by_frame(std::size_t size) {
          (behind.size() >= size && std::equal(reply.begin(), reply.end(), behind.begin()));
 }
 
-// Returns the size of an echo of `request` at `from` together with the good reply behind the echo, or 0. Adapters and
-// some encoders send echoes.
+// Returns whether all characters from `from` on are the encoder's refusal of `request`.
+bool Annotator::is_refusal(Bytes request, std::size_t from) {
+  const Bytes bytes = rest(from);
+  return channel_->run.clean(from, bytes.size()) &&
+         judge_.decode({.bytes = request}, {.bytes = bytes}) == Error::request_rejected;
+}
+
+// Returns the size of an echo of `request` at `from` together with the good reply or the refusal behind the echo, or 0.
+// Adapters and some encoders send echoes.
 std::size_t Annotator::echoed_reply_size(Bytes request, std::size_t from) {
   const Bytes bytes = rest(from);
   if (bytes.size() <= request.size() || !std::equal(request.begin(), request.end(), bytes.begin())) return 0;
+  if (whole_ && is_refusal(request, from + request.size())) return bytes.size();
   const std::size_t size = reply_at(request, from + request.size());
   return size == 0 ? 0 : request.size() + size;
 }
 
 std::size_t Annotator::match_echoed_reply(std::size_t which, std::size_t size) {
-  const std::size_t echo = exchanges_.waiting()[which].bytes().size();
+  const Bytes request = exchanges_.waiting()[which].bytes();
+  const std::size_t echo = request.size();
   at_ += echo;
-  exchanges_.report_reply(which, piece(size - echo), Error::none, Remark::echo, judge_.contents());
+  const Piece reply = piece(size - echo);
+  const Error error = judge_.decode({.bytes = request}, {.bytes = reply.bytes});
+  exchanges_.report_reply(which, reply, error, Remark::echo, judge_.contents());
   at_ -= echo;
   return size;
 }
@@ -219,7 +230,8 @@ bool Annotator::is_request(std::size_t size) {
   const bool turns = may_turn(at_ + size);
   const Bytes request = rest(at_).first(size);
   const bool answered = turns && (reply_at(request, at_ + size) != 0 ||
-                                  echoed_reply_size(request, at_ + size) == rest(at_ + size).size());
+                                  echoed_reply_size(request, at_ + size) == rest(at_ + size).size() ||
+                                  (whole_ && is_refusal(request, at_ + size)));
   const std::size_t as_reply = reply_at({}, at_);
   if (as_reply != 0 && (!answered || channel.last_size != 0)) return false;
   if (answered) return true;
