@@ -244,6 +244,10 @@ ReplyChanges<Item> mutants_of(const EncoderAddress& address, const Clause& claus
     case Demand::in_time:
       add_reply_mutants<Item>(all, [](List&, Step<Item>& step) { step.at += 15ms; });
       add_reply_mutants<Item>(all, [](List&, Step<Item>& step) { step.at += 60ms; });
+      // A host may wait for some characters longer, which are long on a slow line.
+      add_reply_mutants<Item>(all, [late = 60ms + 8 * address.line.with_some_rate().character()](Mutant<Item>& m) {
+        m.change_reply = [late](List&, Step<Item>& step) { step.at += late; };
+      });
       return all;
     case Demand::whole:
     case Demand::checked:

@@ -131,6 +131,17 @@ TEST(Conformance, EchoOfAdapterIsNoReply) {
   }
 }
 
+// A late reply answers its request: at 2400 baud its 7 characters take longer than 20 ms.
+TEST(Conformance, LateReplyOnSlowLineIsReceived) {
+  const ReplyChange<std::uint8_t> late{.change = [](Mutant<std::uint8_t>& mutant) {
+    mutant.always = true;
+    mutant.change_reply = [](std::vector<std::uint8_t>&, ByteStep& step) { step.at += 60ms; };
+  }};
+  const Conformance found =
+      conform_mutant<std::uint8_t>(parse_address("sim:raa38-modbus?baud=2400"), late, {.readings = 8});
+  EXPECT_EQ(verdict_of(found, "answer"), Verdict::kept) << found.report();
+}
+
 // A port that cannot change its rate, such as a TCP bridge or a pseudo-terminal.
 class FixedRatePort final : public Port<std::uint8_t> {
  public:

@@ -34,6 +34,7 @@ class Tester {
         options_(address.options),
         latency_(latency),
         rate_(address.line.with_some_rate().rate),
+        listening_(least_listening + reply_characters * address.line.with_some_rate().character()),
         runner_(address),
         read_(*find_command(unit_, Verb::read)),
         count_(std::max<std::size_t>(1, choices.readings)) {
@@ -91,8 +92,10 @@ class Tester {
   }
 
  private:
-  // time after a failed reading in which a late reply is still received
-  static constexpr Time listening = std::chrono::milliseconds(20);
+  // Time after a failed reading in which a late reply is still received, and the number of characters whose duration is
+  // added to it.
+  static constexpr Time least_listening = std::chrono::milliseconds(20);
+  static constexpr int reply_characters = 16;
   static constexpr unsigned times = 3;  // number of times that a test sends its command or request
   static constexpr bool is_can = std::is_same_v<Item, CanFrame>;
 
@@ -131,7 +134,7 @@ class Tester {
 
   // Takes one reading with these options; if it fails with an encoder that replies to requests, listens for a late
   // reply.
-  Attempted once(const Options& options, Time listen_for = listening) {
+  Attempted once(const Options& options, std::optional<Time> listen_for = {}) {
     runner_.set_options(options);
     if (!is_streamed(options)) runner_.start_again();
     Attempted one = runner_.once(read_);
@@ -142,7 +145,7 @@ class Tester {
     if (one.error == Error::none || !is_polled() || is_streamed(options)) return one;
     // A reading without any reply is a timeout, whatever error the host reports.
     if (!one.answered) one.error = Error::timeout;
-    runner_.listen(listen_for);
+    runner_.listen(listen_for.value_or(listening_));
     runner_.keep_exchange(one);
     return one;
   }
@@ -181,7 +184,7 @@ class Tester {
   /// Sends an edited request in place of the first request of a reading and returns the exchange; nothing if readings
   /// send no request.
   std::optional<Attempted> send_instead(const std::function<void(std::vector<Item>&)>& edit, std::uint32_t permille = 0,
-                                        Time listen_for = listening) {
+                                        std::optional<Time> listen_for = {}) {
     const std::uint64_t before = runner_.port().requests;
     bool edited = false;
     runner_.edit = [&](std::vector<Item>& request) {
@@ -390,6 +393,7 @@ class Tester {
   Options options_;
   Time latency_;
   std::uint32_t rate_;
+  Time listening_;
   Runner<Item> runner_;
   const Command& read_;
   std::size_t count_;
