@@ -28,7 +28,9 @@ namespace {
 constexpr std::size_t first_readings = 2;
 constexpr std::size_t trial_readings = 5;  // number of readings with each setting per turn of the comparison
 constexpr unsigned trial_turns = 2;
+// Time limit for the readings with each setting per turn, and the number of characters whose duration is added to it.
 constexpr Time trial_limit = std::chrono::milliseconds(500);
+constexpr int trial_characters = 200;
 constexpr Time models_limit = std::chrono::seconds(3);  // time limit of first readings with other models and options
 constexpr Time addresses_limit = std::chrono::seconds(4);
 constexpr Time identify_limit = std::chrono::seconds(10);
@@ -254,7 +256,8 @@ class Doctor {
     try {
       Examiner<Item> examiner(address, surroundings_.open(address), choices_.over);
       const Time begin = examiner.now();
-      examiner.read(*read, count, trial_limit, attempts);
+      const Time limit = trial_limit + trial_characters * address.line.with_some_rate().character();
+      examiner.read(*read, count, limit, attempts);
       return examiner.now() - begin;
     } catch (const os::Failure&) {  // the port does not support this setting, or failed
     } catch (const UsageError&) {   // the options need a wire that is not connected

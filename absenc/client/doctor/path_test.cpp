@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Checks, for every unit of a line of characters at each of its rates, that the first finding of doctor is an expected
-// one for each fault of `all_path_faults` that the unit can have.
+// one for each fault of `all_path_faults` that the unit can have; and how doctor compares other settings.
 #include <gtest/gtest.h>
 
 #include "absenc/client/doctor/path_faults_test.hpp"
@@ -79,6 +79,16 @@ std::string name_of_test(const ::testing::TestParamInfo<const Unit*>& one) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Units, DoctorWays, ::testing::ValuesIn(character_units()), name_of_test);
+
+// A setting is compared with the user's by 10 readings each. At 2400 baud 5 of them take 0.7 s.
+TEST(Doctor, SlowLineHasTimeForEachReadingOfComparison) {
+  Pair pair = pair_of(*find_unit("raa38-modbus"), "", "baud=2400", {"address=1"});
+  pair.far.delay = 35ms;
+  const Seen seen = examined(pair.asked + "&address=2", pair.far);
+  ASSERT_EQ(seen.first(), "wrong_address");
+  EXPECT_NE(seen.examination.first()->evidence.find("10 of 10 with address=1"), std::string::npos)
+      << seen.examination.first()->evidence;
+}
 
 }  // namespace
 }  // namespace absenc::client::path_faults

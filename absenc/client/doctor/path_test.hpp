@@ -27,12 +27,12 @@ using ByteList = std::vector<std::uint8_t>;
 /// A function that returns the changed bytes of the reply to a request.
 using Change = std::function<ByteList(const ByteList& request, ByteList reply)>;
 
-/// A machine between a device and the line that changes the device's replies, like the receiving side of an adapter, or
-/// drops them while a contact is open.
+/// A machine between a device and the line that changes or delays the device's replies, like the receiving side of an
+/// adapter, or drops them while a contact is open.
 class Adapter final : public Machine<std::uint8_t> {
  public:
-  Adapter(Machine<std::uint8_t>& device, Change change, std::function<bool(Time)> is_cut)
-      : device_(device), change_(std::move(change)), is_cut_(std::move(is_cut)) {}
+  Adapter(Machine<std::uint8_t>& device, Change change, std::function<bool(Time)> is_cut, Time delay)
+      : device_(device), change_(std::move(change)), is_cut_(std::move(is_cut)), delay_(delay) {}
 
   void feed(const Event<std::uint8_t>& event) override {
     if (event.kind == Event<std::uint8_t>::Kind::received) {
@@ -51,6 +51,7 @@ class Adapter final : public Machine<std::uint8_t> {
       changed_ += out_ != reply ? 1 : 0;
       if (!out_.empty()) {
         step.out = out_;
+        step.at += delay_;
         return step;
       }
       device_.feed({.kind = Event<std::uint8_t>::Kind::sent, .at = std::max(step.at, now)});
@@ -62,6 +63,7 @@ class Adapter final : public Machine<std::uint8_t> {
   Machine<std::uint8_t>& device_;
   Change change_;
   std::function<bool(Time)> is_cut_;
+  Time delay_;
   ByteList request_;
   ByteList out_;
   std::size_t changed_ = 0;
@@ -105,6 +107,7 @@ struct Far {
   Change change{};         // change of reply bytes by the adapter; empty: none
   std::optional<EncoderAddress> second{};  // second encoder on the same line; nothing: there is none
   std::function<bool(Time now)> is_cut{};  // returns true while a contact of the line is open; empty: never
+  Time delay{};                            // time by which the encoder's replies begin later
   bool goes_on = false;                    // whether the time of the encoder continues when the port is opened again
   // makes another device instead of the encoder; empty: the encoder is connected
   std::function<std::unique_ptr<Talker>()> other{};
@@ -165,8 +168,8 @@ class Opener {
     VirtualDevice& one = *end.devices.back();
     one.power_on(Time{});
     Machine<std::uint8_t>* machine = one.bytes();
-    if (far_.change || far_.is_cut) {
-      end.adapters.push_back(std::make_unique<Adapter>(*machine, far_.change, far_.is_cut));
+    if (far_.change || far_.is_cut || far_.delay != Time{}) {
+      end.adapters.push_back(std::make_unique<Adapter>(*machine, far_.change, far_.is_cut, far_.delay));
       machine = end.adapters.back().get();
     }
     return machine;
