@@ -213,4 +213,21 @@ TEST(Doctor, NothingIsCalledGoodOfWhichNothingWas) {
   }
 }
 
+/// All readings are good, because those with a damaged reply repeat their request: the damage shows the adapter.
+TEST(Doctor, RepeatedRequestsShowAdapter) {
+  Observations seen = positions([](std::size_t) { return 5; });
+  for (std::uint8_t i = 0; i < 20; ++i) {
+    ByteList reply = good_reply();
+    reply[2] = 0xFF;
+    reply[3] = i;
+    reply.back() = static_cast<std::uint8_t>(reply.back() ^ 0xFF ^ i);
+    reply.insert(reply.begin() + 2, 0xFF);
+    Attempted one{.error = Error::wrong_length, .raw = reply, .heard = true, .answered = true};
+    one.exchange.request.bytes = {0x1A};
+    one.exchange.reply.bytes = reply;
+    seen.repeated.push_back(one);
+  }
+  EXPECT_THAT(ids(judged(seen)), Contains("telnet_doubled"));
+}
+
 }  // namespace absenc::client

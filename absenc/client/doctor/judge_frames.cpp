@@ -347,7 +347,10 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
   const All repeated = damaged_requests(one);
   // The reading of a stream goes on to the next good frame, so its damaged frames are those between the pauses.
   const All of_stream = damaged(one.seen.damaged_frames);
-  if (std::optional<Finding> adapter = damage_by_adapter(one, one.seen.is_stream ? of_stream : all)) {
+  // A reading that repeats its requests is good, although an adapter damages some replies.
+  All by_adapter = one.seen.is_stream ? of_stream : all;
+  by_adapter.insert(by_adapter.end(), repeated.begin(), repeated.end());
+  if (std::optional<Finding> adapter = damage_by_adapter(one, by_adapter)) {
     findings.push_back(std::move(*adapter));
     return;
   }
