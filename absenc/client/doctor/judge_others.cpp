@@ -138,9 +138,12 @@ std::optional<Finding> other_settings(const Case& one, const All& all) {
   if (all.size() < enough) return {};
   std::vector<capture::ObservedExchange> exchanges;
   for (const Attempted* attempt : all) exchanges.push_back(attempt->exchange);
-  // greatest number of frames, because each is decoded with many sets of options
+  // Each frame is decoded with many sets of options, so at most this number is. They are spread over all frames: the
+  // first ones of a shaft that turns slowly may fit fewer bits than the position has.
   constexpr std::size_t most_tried = 32;
-  exchanges.resize(std::min(exchanges.size(), most_tried));
+  const std::size_t count = std::min(exchanges.size(), most_tried);
+  for (std::size_t i = 0; i < count; ++i) exchanges[i] = exchanges[i * exchanges.size() / count];
+  exchanges.resize(count);
   const std::vector<std::string> address = address_settings(one.unit, one.options);
   std::vector<OptionText> known;
   for (const std::string& setting : address) known.push_back(split_setting(setting));

@@ -90,5 +90,19 @@ TEST(Doctor, SlowLineHasTimeForEachReadingOfComparison) {
       << seen.examination.first()->evidence;
 }
 
+// The first 32 of 200 positions of a slowly turning shaft need 13 of their 16 bits.
+TEST(Doctor, OtherSettingsFitTheLastFramesToo) {
+  Pair pair = pair_of(*find_unit("raa38-modbus"), "", "baud=19200", {"bits=16", "singleturn=1100", "motion=rpm=14"});
+  pair.far.goes_on = true;
+  Opener opener(pair.far);
+  const EncoderAddress asked = parse_address(pair.asked + "&bits=10");
+  Observations observed;
+  while (observed.readings.size() < 200) observed.readings.push_back(read_once(asked, opener));
+  const Examination found = judge(*asked.unit, asked.options, observed);
+  ASSERT_NE(found.first(), nullptr);
+  EXPECT_EQ(found.first()->id, "wrong_settings");
+  EXPECT_NE(found.first()->action.find("bits=16"), std::string::npos) << found.first()->action;
+}
+
 }  // namespace
 }  // namespace absenc::client::path_faults
