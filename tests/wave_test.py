@@ -15,7 +15,7 @@ UNITS = [json.loads(line) for line in absenc("list", "--json").stdout.splitlines
 WIRES = {"half_duplex": {"line"}, "full_duplex": {"host", "device"}, "exchange": {"cs", "sck", "mosi", "miso"},
          "clocked": {"clock", "data"}, "can": {"can"}}
 # Message of `decode` for a frame of EncoLink's channels 2 or 3, whose bytes are spread over several exchanges.
-IN_PARTS = "each of the last exchanges carried a byte of it"
+IN_PARTS = "each of the last exchanges carried a part of it"
 
 
 class Wave(Case):

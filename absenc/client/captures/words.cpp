@@ -52,7 +52,7 @@ std::string message_of(const Unit& unit, const Options& options, const Annotatio
   const bool is_bus_error = annotation.remark == Remark::damaged && annotation.reply.can != nullptr;
   const std::string_view remark =
       is_bus_error ? capture::text_of_error(*annotation.reply.can) : text_of(annotation.remark);
-  if (annotation.error == Error::none && annotation.composed) return "each of the last exchanges carried a byte of it";
+  if (annotation.error == Error::none && annotation.composed) return "each of the last exchanges carried a part of it";
   if (annotation.error == Error::none || !remark.empty()) return std::string(remark);
   if (annotation.reply.empty()) return describe(unit.link, Subject::request, annotation.error);
   return sentence_for(unit, options, annotation.error, annotation.request, annotation.reply);
