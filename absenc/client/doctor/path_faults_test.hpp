@@ -84,7 +84,10 @@ inline PathFault of_bytes(const std::string& name, const std::vector<std::uint64
               const EncoderAddress asked = parse_address(pair.asked);
               for (std::size_t i = 0; i < probed; ++i) static_cast<void>(read_once(asked, opener));
               if (opener.changed() * 2 < probed) continue;
-              outcome = Outcome{examined(pair.asked, pair.far), causes};
+              const Outcome one{examined(pair.asked, pair.far), causes};
+              // The shaft may have left the values: a slow line takes many seconds.
+              if (one.seen.changed * 2 < one.seen.examination.tried) continue;
+              outcome = one;
               break;
             }
             return outcome;
@@ -122,8 +125,10 @@ inline std::vector<PathFault> faults_of_bytes() {
   faults.push_back(of_bytes("nul_lost", {0x00},
                             [](const ByteList&, const ByteList& reply) { return without(reply, {0x00}); },
                             {"bytes_missing"}));
+  // If the doubled byte is the last one of the frame, it is an extra byte.
   faults.push_back(of_bytes("telnet_doubled", {0xFF},
-                            [](const ByteList&, const ByteList& reply) { return with_before(reply, 0xFF, 0xFF); }));
+                            [](const ByteList&, const ByteList& reply) { return with_before(reply, 0xFF, 0xFF); },
+                            {"extra_bytes"}));
   return faults;
 }
 
@@ -237,7 +242,9 @@ inline std::vector<PathFault> faults_of_state() {
   std::vector<PathFault> faults;
   faults.push_back({"frozen", [](const Unit& unit, const std::string& mode, const std::string& rate) {
                       const Pair pair = pair_of(unit, mode, rate, {"singleturn=1383"});
-                      const Time turning = pair.far.rate >= 1'000'000 ? 100ms : 5s;
+                      Opener opener(pair.far);
+                      const Attempted usual = read_once(parse_address(pair.asked), opener);
+                      const Time turning = pair.far.rate >= 1'000'000 ? 100ms : std::max(Time(5s), 150 * usual.after);
                       return std::optional(Outcome{examined(pair.asked, pair.far, {.readings = 40, .turning = turning}),
                                                    {"position_frozen"}});
                     }});
@@ -245,8 +252,9 @@ inline std::vector<PathFault> faults_of_state() {
                       Pair pair = pair_of(unit, mode, rate, {"singleturn=1383"});
                       Opener opener(pair.far);
                       const Attempted usual = read_once(parse_address(pair.asked), opener);
-                      // The period and the interruption are long enough for many good readings and for many timeouts.
-                      const Time period = std::max({300 * usual.after, 60 * usual.limit, Time(50ms)});
+                      // The period and the interruption are long enough for many good readings and for many timeouts,
+                      // also of readings that repeat each request.
+                      const Time period = std::max({300 * usual.after, 200 * usual.limit, Time(50ms)});
                       pair.far.is_cut = [period](Time now) { return now % period > period * 7 / 10; };
                       const Choices choices{.readings = 100'000, .limit = 5 * period};
                       return std::optional(Outcome{examined(pair.asked, pair.far, choices), {"comes_and_goes"}});
@@ -254,7 +262,10 @@ inline std::vector<PathFault> faults_of_state() {
   faults.push_back({"starting", [](const Unit& unit, const std::string& mode, const std::string& rate) {
                       Pair pair = pair_of(unit, mode, rate, {"singleturn=1383"});
                       pair.far.goes_on = true;
-                      pair.far.is_cut = [](Time now) { return now < 900ms; };
+                      Opener opener(pair_of(unit, mode, rate).far);
+                      // The start is long enough for several timeouts of readings that repeat each request.
+                      const Time start = std::max(Time(900ms), 20 * read_once(parse_address(pair.asked), opener).limit);
+                      pair.far.is_cut = [start](Time now) { return now < start; };
                       return std::optional(Outcome{examined(pair.asked, pair.far), {"starting"}});
                     }});
   faults.push_back({"battery empty", [](const Unit& unit, const std::string& mode, const std::string& rate) {
