@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures Unit::decode of every unit, as captures, `decode` and `identify` call it: options, checks, and output of
-// every field; and Unit::decoder, as captures call it for many frames, of units that have one. The frames are the
-// unit's valid vectors with a reply; a unit without such a vector is left out. The time per frame is compared with that
-// of one CRC over the reply's bytes, computed bit by bit.
+// Measures Unit::decode of every unit that has a valid vector with a reply, and Unit::decoder if the unit has one. The
+// time per frame is compared with that of one CRC over the reply's bytes, computed bit by bit.
 #include <algorithm>
 #include <array>
 #include <cstdio>

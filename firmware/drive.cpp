@@ -188,8 +188,8 @@ void read(ReadingCheck& check, std::uint32_t until) {
   while (axis->take(result)) check.take(result);
 }
 
-// Runs a command of the unit, up to ten times, and returns whether it succeeded. The library never repeats a command
-// that changes the encoder. This program may, because clearing alarms or writing the same byte twice does no harm.
+// Runs a command of the unit until it succeeds, up to ten times, and returns whether it did. Clearing alarms or writing
+// the same byte twice does no harm.
 bool command(std::string_view name, Arguments arguments) {
   alignas(std::max_align_t) static std::array<std::byte, 4096> storage;
   const Unit& unit = tformat::unit;

@@ -53,7 +53,7 @@ def usual(unit, settings):
 # excluded.
 ENCODERS = [(unit, *case) for unit in UNITS if unit["link"] not in ("exchange", "clocked") for case in cases(unit)]
 
-# Time limit of an identify search in seconds, for a busy machine; on an idle one a search takes ten seconds.
+# Time limit of an identify search in seconds, long enough for a busy machine.
 SEARCH = 300
 
 

@@ -53,8 +53,8 @@ int main() {
 """
 FIRMWARE_SAYS = "90.0000 degrees, 7 turns\n"
 
-# A program that catches several errors of the library as std::exception, as the examples do. It prints a line after
-# each catch.
+# A program that catches several errors of the library as std::exception, as the examples do, and prints a line for
+# each.
 ENDINGS = r"""
 #include <cstdio>
 #include <chrono>

@@ -9,7 +9,7 @@ import unittest
 from command_support import Case, absenc, json_lines
 from monitor_test import Terminal
 
-# Range of the scale of SLOW: 32 bits of 0.05 um are 214748.3648 mm. It moves that far in one revolution.
+# Range of the scale of SLOW: 32 bits of 0.05 um are 214748.3648 mm.
 SLOW = "sim:biss?model=linear-32-0.05um&singleturn=1579271"
 FAST = "sim:biss?model=linear-26-1um&motion=rpm=60"
 

@@ -67,8 +67,8 @@ class Mutant(NamedTuple):
     after: str
     id: str
     switch: "Switch | None"
-    # Name of the constant that the mutant changes, None or empty for any other mutant. The mutant is switched only if
-    # the constant can become a function (as_functions).
+    # Name of the constant outside functions that the mutant changes, None or empty for any other mutant. The mutant is
+    # switched only if the constant can become a function (as_functions).
     constant: "str | None" = None
 
     def applied_to(self, text):
@@ -180,7 +180,8 @@ class Finder:
             if line in self._calculating:
                 return
             self._calculating.add(line)
-        # The id of a mutant depends on the code of its line only, not on the line's number or comments.
+        # The id of a mutant depends on its file, its rule and the code of its lines, not on their numbers or comments.
+        # Mutants that are equal in these are numbered.
         begin, behind = self.source.tokens_of_lines(line, self.source.line_of(end - 1))
         context = [token.text for token in tokens[begin:behind]]
         description = "\n".join([rule, after, str(first - begin), *context])

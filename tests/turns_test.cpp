@@ -56,8 +56,8 @@ std::vector<Case> cases() {
     all.push_back(
         {.unit = find_unit(unit), .encoder_options = encoder_options, .host_options = host_options, .take = take});
   };
-  // In this case the encoder's identity says that it counts no turns. Without that identity a host would expect 16 bits
-  // of turns.
+  // In these cases the encoder's identity says that it counts no turns. Without that identity a host would expect 16
+  // bits of turns.
   for (const std::string_view unit : {"encolink", "encolink-spi"})
     add(unit, {{"multiturn_bits", "0"}}, {}, Take::newest);
   for (const Take take : {Take::newest, Take::every}) {

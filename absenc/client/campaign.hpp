@@ -25,7 +25,7 @@ struct LineFault {
 /// line itself: bit, burst, double, talker, late.
 [[nodiscard]] std::span<const LineFault> line_faults();
 
-/// Settings of a campaign: the virtual encoder, the number of exchanges, and the faults with their rates.
+/// Settings of a campaign: the virtual encoder, the motion of its shaft, the number of exchanges, and the faults.
 struct CampaignChoices {
   std::string model{};                 ///< Name of a model; empty: the first that fits `options`.
   std::vector<std::string> options{};  ///< Options of the unit, as "address=3".
@@ -74,8 +74,8 @@ struct CampaignResult {
   Share given_up{};             ///< Share of readings that ended with an error after all attempts.
   Share recovered{};            ///< Share of readings that succeeded after a failed attempt.
   Share wrong{};                ///< Share of exchanges with a wrong position; includes `older`, excludes `changed`.
-  /// Share of exchanges (with `rpm`: of readings) after which a damaged request had changed the encoder for good; the
-  /// campaign then continues with a fresh encoder.
+  /// Share of exchanges (with `rpm`: of readings) with an error or a wrong position after which the encoder proves to
+  /// be changed by a damaged request; the campaign then continues with a fresh encoder.
   Share changed{};
   /// Share of exchanges that returned an earlier position of the shaft, taken from a frame that was sent before the
   /// request.

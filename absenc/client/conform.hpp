@@ -57,8 +57,8 @@ struct ConformChoices {
   std::size_t readings = 100;  ///< Number of readings, at least 1.
   /// Whether clauses that change the encoder are tested too; the test then tries to restore the values.
   bool changes = false;
-  /// With `changes`, whether the test may erase a zero, turns or alarms, which nothing can restore. If not, it tests
-  /// such clauses only on an encoder that has none of them to lose.
+  /// With `changes`, whether the test may erase a zero, turns or alarms, which nothing can restore. If not, a clause is
+  /// tested only if the encoder has nothing that its test would erase.
   bool resets = false;
   /// Polled during the test; once it returns true, the test ends with Cancelled. Empty: never.
   std::function<bool()> over{};
@@ -68,8 +68,9 @@ struct ConformChoices {
 [[nodiscard]] std::string_view name_of(Verdict verdict);
 
 /// Tests the encoder of an address and returns the results. Changes the encoder only with `changes`. `text` and
-/// `settings` are those of `open`. Restores changed values before it throws UsageError, Cancelled or an exception of
-/// the port. If it cannot restore them, it throws a Failure instead, whose text contains the commands that do.
+/// `settings` are those of `open`. Restores changed values before it throws: UsageError, Cancelled, os::Interrupted, or
+/// an exception of the port. If it cannot restore them, it throws a Failure instead, whose text contains the commands
+/// that do.
 [[nodiscard]] Conformance conform(std::string_view text, std::span<const std::string> settings = {},
                                   const ConformChoices& choices = {});
 

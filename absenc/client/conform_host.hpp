@@ -22,10 +22,10 @@ struct ConformHostChoices {
   std::function<bool()> over{};
 };
 
-/// Tests a host and returns the results. Suppresses replies for a while, then damages replies, then, if the unit has a
-/// clause about it, requests; the host must continue with its requests. Ends when the number of answered requests or
-/// the silence of the host, after it first sent something, reaches its limit, or when `over` returns true. `text` and
-/// `place` are those of `emulate`. Throws UsageError, os::Interrupted and exceptions of the port.
+/// Tests a host and returns the results. Suppresses a few replies, then damages a few, then, if the unit has a clause
+/// about it, damages a few requests; the host must continue with its requests. Ends when the number of answered
+/// requests or the silence of the host, after it first sent something, reaches its limit, or when `over` returns true.
+/// `text` and `place` are those of `emulate`. Throws UsageError, os::Interrupted and exceptions of the port.
 [[nodiscard]] Conformance conform_host(std::string_view text, const EmulateChoices& place = {},
                                        const ConformHostChoices& choices = {});
 

@@ -9,7 +9,7 @@
 
 namespace absenc::client {
 
-/// How an encoder is mounted in its drive: settings of an address, after `?`, or of absenc.toml. They add angles to a
+/// How an encoder is mounted in its drive: settings of an address, after `?`, or of absenc.toml. They add values to a
 /// sample and leave the values of the encoder as they are.
 ///
 ///   joint_deg      = direction * (position_deg - offset_deg) / gear

@@ -37,8 +37,8 @@ struct Flags {
 /// them. Returns nothing if the unit has no alarms.
 [[nodiscard]] std::optional<Flags> joined_alarms(const Unit& unit, const Reading& reading);
 
-/// Returns the reading; if `confirmed` is false, the encoder is ready and its position is valid, with the validity of
-/// the position and of valid turns marked as unknown.
+/// Returns the reading. If the encoder is ready and its position is valid but not `confirmed`, the validity of the
+/// position and of valid turns is marked as unknown.
 [[nodiscard]] Reading checked(Reading reading, bool confirmed);
 
 }  // namespace absenc::client

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes long recordings: files with a header and rows for readings, failures, events of the port and gaps. Each line
-// of text is written by one system call, so that a killed process loses none; HDF5 rows are written within a second.
+// Writes long recordings: files with a header and rows for readings, failures, events of the port and gaps. Lines of
+// text are written at once, so that a killed process loses none; HDF5 rows are written within a second.
 #pragma once
 
 #include <cstdint>
@@ -43,9 +43,9 @@ class Recording {
 
   /// Reads and writes until the settings, Encoder::cancel, end_when or an interrupt end the recording; then flushes to
   /// the disk. Calls `on_written` with each sample: after its row was appended, or at once if it gets no row. If the
-  /// port is lost, waits until it is open again. Also writes rows for loss and return of the port and for readings that
-  /// were due but not taken. Returns whether the last sample was a reading. Throws UsageError, Failure, and os::Failure
-  /// from the disk, with kind `lost` if the file was removed, moved, replaced or cut.
+  /// port is lost, waits until it is open again. Also writes rows for loss and return of the port and, while it is
+  /// open, for readings that were due but not taken. Returns whether the last sample was a reading. Throws UsageError,
+  /// Failure, and os::Failure from the disk, with kind `lost` if the file was removed, moved, replaced or cut.
   bool run(const std::function<void(const Sample&)>& on_written = {});
 
   /// Returns the counts of the rows in all files.

@@ -26,8 +26,7 @@ struct Column {
     bool is_detail = false;  ///< Whether tables with one line for each row leave the value out.
     /// Whether the number is shown in hexadecimal; tables of values show it in decimal nevertheless.
     bool in_hex = false;
-    /// Whether the value only repeats the request or shows bytes of the reply, so that it is no property of the
-    /// encoder.
+    /// Whether the value repeats the request or shows bytes of the reply.
     bool is_exchange = false;
   };
 
@@ -48,7 +47,7 @@ struct Invalid {
   friend bool operator==(const Invalid&, const Invalid&) = default;
 };
 
-/// Alternative of `Value` for a value that no reply has reported so far, such as alarms that a reply does not carry.
+/// Alternative of `Value` for a value that is not known: no reply has reported the value, or whether it is valid.
 struct Unknown {
   /// Returns true, because all unknown values are equal.
   friend bool operator==(const Unknown&, const Unknown&) = default;
@@ -77,7 +76,7 @@ using Value = std::variant<std::monostate, std::int64_t, std::uint64_t, double, 
 /// Returns the value of a column as text with its unit: "80 degC".
 [[nodiscard]] std::string to_text(const Column& column, const Value& value);
 
-/// A row: values with their columns. Columns and values stay valid while the owner of the row is unchanged.
+/// A row: values with their columns, which the owner of the row owns. They are valid while the owner is unchanged.
 struct Row {
   std::span<const Column> columns;  ///< Descriptions of the values; the owner of the row owns them.
   std::vector<Value> values;        ///< Values of the row, one for each column.
@@ -112,9 +111,9 @@ struct Answer {
   [[nodiscard]] const Value& operator[](std::string_view name) const;
 };
 
-/// A sink that collects the fields of a reply into an answer. Fields of an invalid position become `Invalid`; fields of
-/// a position whose validity no reply has reported become `Unknown`. If a field repeats, as in a list, the last value
-/// is stored.
+/// A sink that collects the fields of a reply into an answer. `put_reading` then replaces the fields of an invalid
+/// position by `Invalid`, and those of a position whose validity is unknown by `Unknown`. If a field repeats, as in a
+/// list, the last value is stored.
 class AnswerSink final : public FieldSink {
  public:
   /// Adds the field as a column with its value, or replaces the value if the column exists.

@@ -12,11 +12,9 @@
 
 namespace absenc::client {
 
-/// Rows of samples and of gaps, in which readings were due but not taken. Columns: `time_s`, `protocol`; `angle_deg`,
-/// or for linear encoders `position_mm` and `position_um`; `singleturn` and `multiturn` with their bits and validity;
-/// flags; `confirmed`, `ok`; with motion `position`, `unwrapped_mm` (linear), `speed_rpm` or `speed_mm_s`, the matching
-/// `speed_uncertainty_...`, `speed_delay_s`, `missed`; `event`; and `message`, `sent` and `received`, which describe
-/// the failure or event of a row without a reading. The event of a reading is empty or "restarted".
+/// Rows of samples, and of gaps in which readings were due but not taken; `columns` describes their values. `message`,
+/// `sent` and `received` describe the failure or event of a row without a reading. The event of a reading is empty or
+/// "restarted".
 class SampleRows {
  public:
   /// Whether rows also have the columns of the motion, which is computed from several readings.

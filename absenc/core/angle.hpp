@@ -43,7 +43,7 @@ struct Reading {
   std::uint32_t alarms = 0;           ///< bits named by the unit's alarms field, then those of its second alarms field
   std::uint32_t status_reported = 0;  ///< bits of `status` that the encoder reported; the others are unknown, not clear
   std::uint32_t alarms_reported = 0;  ///< bits of `alarms` that the encoder reported; the others are unknown, not clear
-  /// Time for which the position holds: when the encoder sampled it, or the time that the protocol assumes for that.
+  /// Time for which the position is taken to hold: the known or assumed time of sampling, or else that of arrival.
   Time latched{};
   Time received{};  ///< time at which the last byte of the reply arrived
 

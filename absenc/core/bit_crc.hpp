@@ -12,8 +12,8 @@
 namespace absenc {
 
 /// The CRC of up to `4 * rows` bits in one number. It is linear: a table has the remainder of each four bits at each
-/// place, and no look-up waits for the result of another, as in a CRC from byte to byte. `Entry`: std::uint16_t;
-/// std::uint8_t is enough for widths up to 8.
+/// place, so that no look-up waits for the result of another. `Entry`: std::uint16_t; std::uint8_t is enough for widths
+/// up to 8.
 template <class Entry = std::uint16_t, std::size_t rows = 16>
 class BitCrc {
  public:

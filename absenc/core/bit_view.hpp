@@ -37,8 +37,8 @@ struct BitView {
     return value << count | window(first) >> (register_bits - count);
   }
 
-  /// Returns the same as `load` for 1 to 64 bits. Where a machine word has 64 bits it needs no loop for views of 8
-  /// bytes or more, so that decoders of formats with few fields are fast; the code is repeated where it is called.
+  /// Returns the same as `load` for 1 to 64 bits, without a loop where a machine word has 64 bits and the view 8 bytes
+  /// or more. The code is repeated where it is called.
   [[nodiscard, gnu::always_inline]] constexpr std::uint64_t load_quickly(std::size_t first, unsigned count) const {
     if constexpr (register_bits < 64) return load(first, count);
     const std::uint64_t begin = window(first);
@@ -59,7 +59,7 @@ struct BitView {
   static constexpr unsigned register_bits = sizeof(std::size_t) * 8;  ///< Number of bits of a machine word.
   static constexpr unsigned window_bits = register_bits - 7;          ///< Number of bits that `window` always has.
 
-  /// Returns one machine word whose top bit is the view's bit `first`, which is less than eight for each byte. At least
+  /// Returns one machine word whose top bit is the view's bit `first`, which is less than 8 * bytes.size(). At least
   /// its top `window_bits` bits are the view's bits from `first` on; bits behind the last byte are 0.
   [[nodiscard, gnu::always_inline]] constexpr std::size_t window(std::size_t first) const {
     if (bytes.size() < sizeof(std::size_t)) return short_window(bytes.data(), bytes.size(), first);

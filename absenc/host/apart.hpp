@@ -12,7 +12,7 @@ namespace absenc::host {
 /// arrived. Readings that waited in a buffer arrive together.
 enum class Times : std::uint8_t { latched, arrived };
 
-/// Returns whether only the arrival times of this encoder's readings are known, because it transmits unsolicited:
+/// Returns whether this encoder may transmit unsolicited, so that only the arrival times of its readings are certain:
 /// always on a CAN bus, otherwise if Unit::streams says so.
 [[nodiscard]] constexpr bool sends_unsolicited(const Unit& unit, const Options& options) {
   return unit.link == LinkKind::can || (unit.streams != nullptr && unit.streams(options));

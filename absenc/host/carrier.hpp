@@ -47,9 +47,8 @@ class Carrier {
     deliver({.kind = Event<Item>::Kind::sent, .at = now});
   }
   /// Reports received items; they are dropped while no conversation runs. If the machine sets a gap limit and expects
-  /// at least two characters, single characters are gathered, because that takes little time. They are delivered when
-  /// as many as the machine expects, at most 16, have arrived, a silence, timer or line error is reported, or several
-  /// items arrive in one call.
+  /// at least two characters, single characters are gathered. They are delivered when as many as the machine expects,
+  /// at most 16, have arrived, a silence, timer or line error is reported, or several items arrive in one call.
   void received(std::span<const Item> items, Time now) {
     if (items.size() == 1 && gathered_ + 1u < expected_) return gather(items.front(), now);
     take_input(items, now);
@@ -86,8 +85,7 @@ class Carrier {
     if (!is_busy()) return never;
     return waiting_ ? step_.at : std::min(at_, silence_end());
   }
-  /// Returns how many silences were reported to machines. Each shows that a reply was missing, incomplete or invalid,
-  /// or ends a reply whose end only silence shows.
+  /// Returns how many silences were reported to machines, for example because a reply was missing.
   [[nodiscard]] std::uint32_t silences() const { return silences_; }
 
  private:

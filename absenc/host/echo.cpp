@@ -35,7 +35,8 @@ ByteStep EchoFilter::next(Time now) {
   if (step.expect != 0) {
     step.expect += working_mode() == EchoMode::on ? echo_due_ : sent_.size() - std::min(sent_.size(), held_.size());
   }
-  // While only the echo was received, the encoder may still take its answer time: the gap limit must not be shorter.
+  // Until something besides the echo was received, the encoder may still take its answer time: the gap limit must not
+  // be shorter.
   if (!passed_) step.gap = std::max(step.gap, step.answer);
   return step;
 }

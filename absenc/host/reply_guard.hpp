@@ -106,7 +106,7 @@ class ReplyGuard final : public Machine<Item> {
     Time until = never;
     Time first_at{};       // when the first of the stored items was received
     Time received_at{};    // when the last of the stored items was received; if none was stored, end of the request
-    bool damaged = false;  // a line error was received; not on CAN also: the time limit passed while items arrived
+    bool damaged = false;  // a line error was received, or, except on CAN, the time limit passed
     // CAN: a frame that would be the reply if its identifier had 11 bits instead of 29; it explains a timeout.
     Buffer<Item, 1> foreign_frame{};
   };
@@ -167,7 +167,8 @@ class ReplyGuard final : public Machine<Item> {
   Matching matching_{};
   Listening listening_{};
   // One buffer for all phases, because a microcontroller has little RAM. Forwarding: the reply to report. Matching: the
-  // items received since the request. Delaying and listening: the last received items, which may end with a late reply.
+  // received items that may be the reply. Delaying and listening: the last received items, which may end with a late
+  // reply.
   Buffer<Item, is_can ? 1 : 64> received_{};
 
   Pending pending_{};

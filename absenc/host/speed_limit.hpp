@@ -9,8 +9,8 @@
 
 namespace absenc::host {
 
-/// Highest speed that a shaft or carriage is assumed to have. The default is a limit, because without one turns during
-/// a pause between readings were lost unnoticed (0.40 turns were shown instead of 10.40).
+/// Highest speed that a shaft or carriage is assumed to have. Without a limit, turns during a pause between readings
+/// would be lost unnoticed.
 struct SpeedLimit {
   /// Speed limit of rotary encoders in revolutions per minute. Default: the specified speed of the fastest supported
   /// encoders.
@@ -19,7 +19,7 @@ struct SpeedLimit {
   std::uint32_t mm_s = 20'000;
 };
 
-/// Multiple of the speed limit up to which a movement is too fast, but no jump; its users add margins.
+/// Multiple of the speed limit up to which a movement is too fast, but no jump.
 inline constexpr unsigned most_excess = 4;
 
 /// Returns the speed limit of the model in `options`, or else the default limit.
@@ -61,15 +61,16 @@ class Reach {
     constexpr std::uint32_t fastest = 0xFFFF'FFFF / turns_a_ns_of_1_rpm;
     return {turns_a_ns_of_1_rpm * (rpm < fastest ? rpm : fastest), 47, true};
   }
-  /// Returns the reach of a carriage of at most `mm_s` mm/s whose encoder counts `unit_um` micrometres. Uses floating
-  /// point.
+  /// Returns the reach of a carriage of at most `mm_s` mm/s whose encoder has counts of `unit_um` micrometres. Uses
+  /// floating point.
   [[nodiscard]] static constexpr Reach of_carriage(std::uint32_t mm_s, double unit_um) {
     double factor = mm_s / unit_um / 1e6;  // speed limit in counts per nanosecond
     std::int8_t shift = 0;
     for (; factor < 0x8000'0000 && shift < 100; factor *= 2) ++shift;
     return {factor < 0xFFFF'FFFF ? static_cast<std::uint32_t>(factor) + 1 : 0xFFFF'FFFF, shift, false};
   }
-  /// Returns the reach of a shaft or carriage that moves within `limit`, in counts of `resolution`.
+  /// Returns the reach of a shaft or carriage that moves within `limit`; `resolution` tells which of them it is, and
+  /// the size of a count of a linear encoder.
   [[nodiscard]] static constexpr Reach of(const SpeedLimit& limit, const Resolution& resolution) {
     return resolution.unit_um > 0 ? of_carriage(limit.mm_s, resolution.unit_um) : of_shaft(limit.rpm);
   }

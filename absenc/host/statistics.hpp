@@ -156,7 +156,8 @@ class Statistics {
   /// Adds a failed exchange, which replaces the oldest one if `most_stored` are stored.
   void add(const BadExchange<Item>& bad) { bad_[bad_count_++ % most_stored] = bad; }
 
-  /// Returns the distribution of the times from the end of the request to the end of the reply, of good exchanges.
+  /// Returns the distribution of the times from the end of the request to the end of the reply, in the last exchange of
+  /// each good conversation.
   [[nodiscard]] const Latencies& latencies() const { return latencies_; }
   /// Returns how many failed exchanges are stored, at most `most_stored`.
   [[nodiscard]] std::size_t kept() const { return std::min<std::size_t>(bad_count_, most_stored); }

@@ -11,10 +11,9 @@
 
 namespace absenc::host {
 
-/// A continuous position: adds the shorter of the two distances from each reading to the next. That is right while the
-/// position changes by less than half of the counted range: half a revolution for a single-turn encoder. The counted
-/// range follows from the readings, not from the options. If the time between two readings is too long for that at the
-/// speed limit (`longest_gap`), it starts again with the encoder's own turns and counts.
+/// A continuous position: adds the shorter of the two distances from each reading to the next. If the time between two
+/// readings is so long that the encoder may have moved nearly half of its range at the speed limit (`longest_gap`), it
+/// starts again with the encoder's own turns and counts.
 class Unwrapper {
  public:
   /// How a reading joins the positions before it.
@@ -31,8 +30,7 @@ class Unwrapper {
 
   /// Adds `reading` with the latch interval that its own times allow. Returns how it was joined.
   constexpr Joined add(const Reading& reading) { return add(reading, latch_time(reading)); }
-  /// Adds `reading`, which was latched in the interval `at`, and returns how it was joined. The reply may be late
-  /// because the encoder was, so the whole interval in which the position may have been latched counts.
+  /// Adds `reading`, which was latched at an unknown time in the interval `at`, and returns how it was joined.
   constexpr Joined add(const Reading& reading, const LatchTime& at) {
     if (!has_position(reading)) return Joined::ignored;
     const bool first = !started_;
@@ -47,8 +45,8 @@ class Unwrapper {
   }
 
   /// Returns whether the position of `reading` is farther from the last added one than `most_excess` times the speed
-  /// limit allows in the time between plus 1 ms, plus 4 counts. A jump is damage that the checksum does not detect, or
-  /// a moved zero. False if nothing can be compared or the time between is too long to judge.
+  /// limit allows in the time between plus 1 ms, plus 4 counts. False if nothing can be compared or the time between is
+  /// too long to judge.
   [[nodiscard]] constexpr bool jumps(const Reading& reading) const {
     if (!started_ || !has_position(reading) || !is_near(reading)) return false;
     constexpr Time vague{1'000'000};  // uncertainty of the latch time: 1 ms

@@ -7,8 +7,8 @@
 namespace absenc {
 
 /// One end of a line: carries out steps and reports events. Ports of the operating system throw on failure
-/// (os/error.hpp); a port on a microcontroller reports a failure as `line_error`. The interface is defined in link so
-/// that the loop in host/drive.hpp needs no os, and os does not depend on host.
+/// (os/error.hpp). The interface is defined in link so that the loop in host/drive.hpp needs no os, and os does not
+/// depend on host.
 template <class Item>
 struct Port {
   /// Returns the time on the port's own clock, which also stamps every event and never runs backwards.

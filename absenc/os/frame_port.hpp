@@ -9,7 +9,8 @@
 
 namespace absenc::os {
 
-/// Base class of all CAN ports. `now`, `begin` and `wait` throw Failure, Interrupted (os/signals.hpp) or Ended.
+/// Base class of the CAN ports in this folder. `now`, `begin` and `wait` throw Failure, Interrupted (os/signals.hpp) or
+/// Ended.
 ///
 /// A transfer begins at `at`, earlier only by the send slack; `begin` blocks until then. A frame received before a
 /// transfer began, or before `now` was called, is reported with a time not later than that transfer or call, however
@@ -38,8 +39,8 @@ class FramePort : public Port<CanFrame> {
   void set_end(Time end) { end_ = end; }
 
  protected:
-  /// Passes received frames to `push`. Blocks until at least one frame is received or `deadline` is reached; does not
-  /// block if `deadline` is in the past.
+  /// Passes received frames to `push`. Waits for the first one, at most until `deadline`; does not wait if `deadline`
+  /// is in the past.
   virtual void collect(Time deadline) = 0;
   virtual void send(const CanFrame& frame) = 0;
   virtual void apply(const LineSettings& settings) = 0;

@@ -18,8 +18,8 @@ class OutputFile {
   /// Waits until the content is on the disk, where the file system can do that. Throws Failure, also as `require_there`
   /// does.
   void sync();
-  /// Throws Failure `lost` if the path does not lead to this file any more or the file was truncated: nobody would find
-  /// further data. Throws Failure `system` if that cannot be checked. Checks nothing before the file has its name.
+  /// Throws Failure `lost` if the path does not lead to this file any more, or another program truncated the file.
+  /// Throws Failure `system` if that cannot be checked. Checks nothing before the file has its name.
   void require_there() const;
 
   [[nodiscard]] const std::string& path() const { return path_; }
@@ -50,8 +50,8 @@ class OutputFile {
 class LineFile final : public OutputFile {
  public:
   explicit LineFile(const std::string& path) : OutputFile(path, Appears::at_once) {}
-  /// Writes `lines` to the system at once. If the disk has no room for all of them, none remains in the file. Throws
-  /// Failure, also as `require_there` does.
+  /// Writes `lines` to the system at once; if that fails, as on a full disk, removes the written part. Throws Failure,
+  /// also as `require_there` does.
   void append(std::string_view lines);
 };
 

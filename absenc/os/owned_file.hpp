@@ -11,7 +11,8 @@
 
 namespace absenc::os {
 
-/// Identity of a file, independent of its names: two paths with equal identities lead to the same file.
+/// Identity of a file, independent of its names: two paths with equal identities lead to the same file, unless `number`
+/// is 0.
 struct FileIdentity {
   std::uint64_t device = 0;
   std::uint64_t number = 0;  // inode number; 0: no file
@@ -35,8 +36,7 @@ class OwnedFile {
   [[nodiscard]] bool made() const { return made_; }
 
   /// Replaces the file by a new one with `content`. At every time the path leads to a complete file, the old one or the
-  /// new one. The content then survives the end of this process; with `Durable::yes` also a power failure. Throws
-  /// Failure.
+  /// new one; with `Durable::yes` also after a power failure. Throws Failure.
   void replace(std::string_view content, Durable durable);
 
   /// Returns whether the path still leads to this file, and not to another or none.

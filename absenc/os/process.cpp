@@ -37,7 +37,8 @@ int write_standard_output(std::string_view bytes) {
       const int error = errno;
       struct stat file {};
       const bool is_file = ::fstat(STDOUT_FILENO, &file) == 0 && S_ISREG(file.st_mode);
-      // The part of `bytes` that was written is removed, unless another program has written behind it.
+      // The part of `bytes` that was written is removed from a regular file, unless another program has written behind
+      // it.
       if (done > 0 && is_file && file.st_size == ::lseek(STDOUT_FILENO, 0, SEEK_CUR)) {
         [[maybe_unused]] const int ignored = ::ftruncate(STDOUT_FILENO, file.st_size - done);
         ::lseek(STDOUT_FILENO, -done, SEEK_CUR);

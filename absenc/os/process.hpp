@@ -46,8 +46,7 @@ class RunDelay {
 
 enum class Durable : std::uint8_t { no, yes };
 
-/// A new file that replaces the file at `path` when it is complete; until then `path` leads to the old file or to none.
-/// Throws Failure.
+/// A new file that `take_place` puts at `path`; until then `path` leads to the old file or to none. Throws Failure.
 class NewFile {
  public:
   explicit NewFile(const std::string& path);

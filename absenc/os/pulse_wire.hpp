@@ -11,9 +11,8 @@ struct gpiod_line;
 
 namespace absenc::os {
 
-/// The user's choice of a wire for pulses. Levels are those of the UART's own pins, where a set RTS or DTR is low; an
-/// RS-232 driver inverts them. A wire is pulsed only if the user names it, because opening a port sets both RTS and
-/// DTR.
+/// The user's choice of a wire for pulses; without one no wire is pulsed. Levels of RTS and DTR are those of the UART's
+/// own pins, where a set line is low; an RS-232 driver inverts them.
 struct PulseWire {
   enum class Kind { none, rts, dtr, gpio } kind = Kind::none;
   std::string name{};           // gpio: name of the line as `gpioinfo` lists it

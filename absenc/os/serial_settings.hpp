@@ -36,9 +36,9 @@ std::optional<LineSettings> set_terminal(int descriptor, const LineSettings& set
   return difference * 100 <= requested;
 }
 
-/// Returns the rate to propose when the driver gave another rate than `requested`: the nearer one of `given` and of
-/// `base` (0: unknown), the input clock of its baud generator, divided by a whole number; `given` also if `base`
-/// promises a rate that the driver has just refused. Some drivers do not give the nearest rate but fall back to 9600.
+/// Returns the rate to propose when the driver gave the rate `given` instead of `requested`: the nearest of `given` and
+/// of `base` divided by a whole number. `base` is the input clock of the baud generator, 0 if unknown; it is ignored if
+/// it could give `requested`, because the driver did not.
 [[nodiscard]] constexpr std::uint32_t nearest_rate(std::uint32_t requested, std::uint32_t given, std::uint32_t base) {
   const auto distance = [requested](std::uint32_t rate) {
     return rate > requested ? rate - requested : requested - rate;

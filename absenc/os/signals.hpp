@@ -25,9 +25,9 @@ void catch_interrupts();
 /// thread has taken it.
 bool take_interrupt();
 
-/// While an object exists, the waits of this file and of the ports in this thread call `over` after each 20 ms without
-/// an event and throw Ended if it returns true: for conditions that no descriptor reports, such as a signal handled by
-/// an interpreter, or another thread.
+/// While an object exists, the waits of this file and of the ports in this thread call `over` of the newest object
+/// after each 20 ms without an event and throw Ended if it returns true: for conditions that no descriptor reports,
+/// such as a signal handled by an interpreter, or another thread.
 class CancelCheck {
  public:
   /// `over` must outlive the object; an empty function is never called.

@@ -32,8 +32,8 @@ void SlcanLine::write(Bytes text) { bytes_->begin({.kind = ByteStep::Kind::trans
 void SlcanLine::collect(Time deadline) {
   received_any_ = false;
   deadline = reach(bytes_->now()) ? Time{} : std::min(deadline, due());
-  // If the deadline is past, all available bytes are read, in at most `most_reads` reads; otherwise the reads end after
-  // the first one that completes a line, a refusal or garbage.
+  // If the deadline is past, reads all available bytes; otherwise reads until a line, a refusal or garbage is complete
+  // or the deadline is reached. Reads at most `most_reads` times.
   const bool everything = deadline <= bytes_->now();
   for (unsigned reads = 0; reads < most_reads && (everything || !received_any_); ++reads) {
     const Time now = bytes_->now();
@@ -102,7 +102,7 @@ void SlcanPort::apply(const LineSettings& settings) {
   }
 }
 
-// Waits until no more late replies of the adapter arrive. Replies carry no number, so replies to earlier commands must
+// Waits until the adapter is silent, but not endlessly. Replies carry no number, so replies to earlier commands must
 // not arrive after the next command.
 void SlcanPort::settle() {
   constexpr unsigned most_replies = 64;

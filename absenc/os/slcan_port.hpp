@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // CAN through an adapter on a serial port with the ASCII protocol of Lawicel (link/slcan.hpp), and the other end of
-// this protocol: a simulated adapter on a pseudo-terminal with virtual nodes behind it.
+// this protocol: a simulated adapter with virtual nodes behind it.
 #pragma once
 
 #include <deque>
@@ -64,8 +64,8 @@ class SlcanPort final : public SlcanLine {
 };
 
 /// A simulated CAN adapter: passes frames between the host and the device that is driven on this port, while the host
-/// has opened the adapter at the device's bit rate. Each frame takes its time on the bus. Frames that the host sends at
-/// once are queued, as many as an adapter can store; further frames are refused (BEL).
+/// has opened the adapter at the device's bit rate. A frame of the host reaches the device after its time on the bus.
+/// Frames that the host sends at once are queued, as many as an adapter can store; further frames are refused (BEL).
 class SlcanAdapter final : public SlcanLine {
  public:
   SlcanAdapter(std::shared_ptr<Port<std::uint8_t>> bytes, const LineSettings& settings)

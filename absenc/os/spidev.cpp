@@ -152,9 +152,9 @@ int Spidev::set_mode(std::uint32_t wanted) {
   return 0;
 }
 
-// Processes a message in up to three calls: the first requests the list of transfers, the second the list again with
-// its buffers, the third clocks them. Another thread of the program may change the list before the third call: then the
-// list that came with the buffers is used, or requested again if the sizes of the buffers do not match it.
+// Processes a message in several calls: the first requests the list of transfers, the next the list again with its
+// buffers, the last clocks them. If another thread of the program changes the list meanwhile, the list that came with
+// the buffers is used, or requested again if the sizes of the buffers do not match it.
 SpidevReply Spidev::message(std::uint64_t address, std::size_t size, Bytes in, std::size_t room, Time now) {
   if (size % sizeof(spi_ioc_transfer) != 0) return error_reply(EINVAL);
   if (size == 0) return {};

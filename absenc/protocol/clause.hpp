@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Types for the clauses of a protocol document that encoders and hosts must satisfy, as data. One engine
-// (client/conform) tests the clauses of all units.
+// Types that describe, as data, the clauses of protocol documents for encoders and hosts. client/conform tests them.
 #pragma once
 
 #include <array>
@@ -15,8 +14,7 @@ namespace absenc {
 
 /// Kind of a clause for encoders: the behaviour that the document demands. Names in backquotes are members of Clause.
 enum class Demand : std::uint8_t {
-  // Demands about readings, tested with the command that reads the position; the last one is tested with its own
-  // command
+  // Demands about readings of the position, and `does`, a demand about a command
   answered,  ///< the encoder answers each request, pulse or transfer
   streamed,  ///< the encoder sends frames unsolicited
   in_time,   ///< each reply begins before a host's timeout, because documents often state no limit
@@ -33,28 +31,29 @@ enum class Demand : std::uint8_t {
   page_alone,    ///< writing the byte at `page` and `address` leaves the byte at `address` of page `other` unchanged
   /// While the byte at `page` and `address` is written, a request to read it gets a busy reply; later it can be read.
   byte_busy,
-  /// With `page` selected, the request `ask` for a byte that does not exist gets a reply to the command `as`; the byte
-  /// at `page` and `address` exists.
+  /// With `page` selected, the request `ask` for a byte that is not open for the user gets a reply to the command `as`;
+  /// the byte at `page` and `address` is open.
   page_closed,
   set,  ///< the setting `setting` reads back as the value written: `value`, or `other` if it was `value` before
-  /// The position is 0 after the zero command with the argument `value`. That command changes the setting `setting`.
+  /// The zero command with the argument `value` makes the position about 0. That command changes the setting `setting`.
   zeroed,
-  /// One of the values `value` and `other` of the setting `setting`, which cannot be read, mirrors the position.
+  /// The position with one of the values `value` and `other` of the setting `setting` is the mirror of that with the
+  /// other value. The setting cannot be read.
   mirrored,
   /// After `command` with the argument `value` (half of it, if it is the present rate), the encoder sends that many
   /// frames per second unsolicited; `stop` ends them.
   paced,
   // Demands about values that the test cannot restore
   zero,  ///< the position, which was not 0 before, is 0 after the zero command
-  /// The command of `verb` resets the alarms in the mask `value`, or the turns; the position, and turns that are not
-  /// reset, stay.
+  /// The command of `verb` resets the alarms in the mask `value`, Verb::reset_multiturn also the turns; the position,
+  /// and turns that are not reset, stay.
   reset,
   restarts  ///< after `command` the encoder is silent at first; `value` ms later it reports the position from before
 };
 
 /// Returns whether testing a clause of this kind may change the encoder.
 [[nodiscard]] constexpr bool changes_encoder(Demand demand) { return demand >= Demand::byte_written; }
-/// Returns whether testing a clause of this kind may lose a value of the encoder for good: a position, turns, an alarm.
+/// Returns whether testing a clause of this kind may erase position, turns or alarms, which the test cannot restore.
 [[nodiscard]] constexpr bool loses(Demand demand) { return demand >= Demand::zero; }
 
 /// A set of errors: bit n is set if the enumerator of Error with the value n is in the set.
@@ -64,7 +63,7 @@ template <class... Some>
 [[nodiscard]] constexpr Errors any_of(Some... errors) {
   return ((Errors{1} << static_cast<unsigned>(errors)) | ...);
 }
-/// Errors of replies whose fixed bits, echoes, ranges or redundant values differ from the document's drawing.
+/// Errors in the content of a reply: fixed bits, echoes, ranges, counters, redundant values, or a stuck line.
 inline constexpr Errors form_errors = any_of(Error::bad_framing, Error::unexpected_reply, Error::out_of_range,
                                              Error::sequence_mismatch, Error::cross_check_failed, Error::line_stuck);
 
@@ -72,16 +71,16 @@ inline constexpr Errors form_errors = any_of(Error::bad_framing, Error::unexpect
 struct Ask {
   /// The whole request on the wire: bytes in hexadecimal, "ea 00 ea", or a CAN frame, "1ff:022b".
   std::string_view wire{};
-  /// Name of the command whose one request is sent, with its checksum, if `wire` is empty and `make` is null; "":
-  /// the command that reads the position.
+  /// Name of the command whose request is sent if `wire` is empty and `make` is null; "": the command that reads the
+  /// position.
   std::string_view command{};
   std::span<const std::int64_t> arguments{};  ///< Arguments of `command`; those left out have their defaults.
   bool wrong_end = false;                     ///< Whether the last byte has a wrong bit; not used with `wire`.
   /// Writes the request into `request` and returns its length, for requests that depend on the options and that no
   /// command sends. Null: `wire` or the request of `command` is sent.
   Result<std::size_t> (*make)(const Options& options, MutableBytes request) = nullptr;
-  /// Bit rate of the request in 1/1000 of the line's rate: at a suitable lower rate the last bit is where the receiver
-  /// expects the stop bit. 0: the line's rate.
+  /// Bit rate of the request in 1/1000 of the line's rate: at a suitable lower rate the last data bit is where the
+  /// receiver expects the stop bit. 0: the line's rate.
   std::uint32_t permille = 0;
 };
 
@@ -93,14 +92,14 @@ enum class Reaction : std::uint8_t {
   refusal_or_silent,  ///< the document permits either a refusal or silence
 };
 
-/// A demand of the document on an encoder. Its test passes only with evidence that depends on the demand, for example
-/// that a wrong bit in a valid reply would have been detected.
+/// A demand of the document on an encoder, with the data for its test.
 struct Clause {
   std::string_view id;         ///< identifier, unique in its unit: "crc"
   std::string_view paragraph;  ///< paragraph of the unit's document
   std::string_view words;      ///< Demand of the document, in words.
   Demand demand;               ///< Kind of the clause, which selects its test.
-  /// Options of encoders to which the clause applies, separated by blanks: "carries=biss crc_width!=0"; empty: all.
+  /// Conditions on the options of encoders to which the clause applies, separated by blanks: "carries=biss
+  /// crc_width!=0"; empty: it applies to all.
   std::string_view needs{};
   Errors errors = 0;                     ///< demand as_drawn: errors of replies that break the clause; 0: form_errors
   Ask ask{};                             ///< Request that the test sends, for demands that name `ask`.
@@ -127,21 +126,21 @@ enum class HostDemand : std::uint8_t {
   after_damage,   ///< the host sends further requests after a damaged reply
   after_refusal,  ///< the host sends further requests after the encoder refused a damaged one
   rule,           ///< the host never breaks `rule`
-  /// The host keeps `rule`, which is about consecutive requests. It is tested only while replies are valid, because a
-  /// host may give up after an error.
+  /// The host keeps `rule`, which is about consecutive requests. Requests during or soon after an injected fault do not
+  /// count, because a host may give up a sequence after an error.
   row
 };
 
-/// One kind of request of a host that ignores replies. Tests build hosts that break or keep a clause from such steps.
+/// A request of a host that ignores replies, and how often it is sent.
 struct HostStep {
   Time pause{};  ///< pause before the request, after the last sent character
-  /// Name of the command whose one request is sent, without the other steps of its procedure; or bytes to send: "1a
-  /// 1a".
+  /// Name of a command, whose encoded request is sent; or the bytes, or the CAN frame, to send: "1a 1a", "220:8020".
   std::string_view what{};
   std::span<const std::int64_t> arguments{};  ///< arguments; empty: required ones are 1, or their minimum if greater
   unsigned times = 1;                         ///< how often the request is sent, each time after `pause`
 };
-/// The steps of a scripted host that ignores replies, in order: requests with the pauses before them.
+/// The steps of a scripted host that ignores replies, in order. Tests build hosts that break or keep a clause from
+/// them.
 using HostScript = std::span<const HostStep>;
 
 /// A demand of a document on the host.
@@ -150,8 +149,7 @@ struct HostClause {
   std::string_view paragraph;  ///< Paragraph of the document.
   std::string_view words;      ///< Demand of the document, in words.
   HostDemand demand;           ///< Kind of the clause, which selects its test.
-  /// Name of the rule that the virtual encoder checks, or os::SpiDevice for `spi_mode_rule`; the clause is untested
-  /// until this rule has been checked.
+  /// Demands rule and row: name of the rule. The virtual encoder checks it, or os::SpiDevice if it is `spi_mode_rule`.
   std::string_view rule{};
   // Test hosts for this clause, if the hosts that the tests use for every clause do not break it.
   std::array<HostScript, 2> breaks{};  ///< scripted hosts that break this clause, or it and "asks"; empty: none

@@ -14,8 +14,7 @@
 
 namespace absenc {
 
-/// The last request of a conversation and the items received after it. They are stored so that a damaged frame can be
-/// shown to the user without reproducing it.
+/// The last request of a conversation, empty if it only listens, and the items received after it.
 template <class Item>
 struct Exchange {
   std::span<const Item> sent{};      ///< Bytes or CAN frames of the request.
@@ -32,8 +31,8 @@ struct Explanation {
 
 /// Counts of a conversation that streams.
 struct StreamCounts {
-  /// Number of received frames that were damaged or cannot be distinguished from damaged ones, whether an error
-  /// reported them or not.
+  /// Number of frames that were received damaged, also if no error reported them; estimated from the bytes that belong
+  /// to no valid frame.
   std::uint64_t discarded = 0;
 };
 
@@ -59,9 +58,9 @@ struct Conversation : Machine<Item> {
   /// Returns the position that is the result; null after an error, or if the command does not read a position.
   [[nodiscard]] virtual const Reading* reading() const { return nullptr; }
   /// Returns the counts of a conversation that streams. Such a conversation ends by itself only after an error: each
-  /// `emit` is a result, and the next one follows when it is run further. Null: the conversation ends with `done`.
+  /// `emit` is a result, and the next one follows when it is run further. Null: the conversation does not stream.
   [[nodiscard]] virtual const StreamCounts* stream() const { return nullptr; }
-  /// Returns whether the conversation delivers one result after the other without end, as `stream` describes.
+  /// Returns whether the conversation streams, as `stream` describes.
   [[nodiscard]] bool streams() const { return stream() != nullptr; }
   /// Returns whether a conversation that streams sends a request for each result. If so, the encoder sends nothing
   /// while the conversation is not run.
@@ -70,12 +69,11 @@ struct Conversation : Machine<Item> {
   virtual void report(FieldSink& sink) const = 0;
   /// Returns the last request and the items received after it.
   [[nodiscard]] virtual Exchange<Item> exchange() const = 0;
-  /// Asks the conversation to end early. A conversation that changes the encoder for its own use restores the encoder
-  /// first, ends by itself, and returns true here. Any other returns false and ignores the call: it may be abandoned at
-  /// any step.
+  /// Asks the conversation to end early. True: it first restores what it has changed in the encoder, and then ends by
+  /// itself. False: the call has no effect, and the conversation may be abandoned at any step.
   virtual bool abort() { return false; }
-  /// Returns whether a request that changes the encoder was sent. Valid at every step, also after an exception of the
-  /// port.
+  /// Returns whether a request that changes the encoder was sent, and whether it changed nothing. Valid at every step,
+  /// also after an exception of the port.
   [[nodiscard]] virtual ChangeSent change_sent() const { return ChangeSent::no; }
   /// Puts into `sink` the changes that the conversation leaves in the encoder if it cannot continue after the present
   /// step. By default nothing.
@@ -91,7 +89,7 @@ struct Violation {
   Time at;                ///< Time at which the host broke the rule.
 };
 
-/// An observer that a virtual encoder notifies each time it checks a rule, because the host did what the rule is about.
+/// An observer that is notified each time a virtual encoder checks a rule.
 struct RuleWatch {
   /// Is called for each check of `rule`. `kept`: whether the host kept the rule.
   virtual void looked(std::string_view rule, bool kept) = 0;
@@ -113,14 +111,14 @@ struct Device : Machine<Item> {
   /// Switches the encoder off at `now`.
   virtual void power_off(Time now) = 0;
   /// Raises the alarms `bits`, bits of the unit's alarm field; an encoder without alarms ignores the call. They stay
-  /// until `lower_alarms`; a host or power off may clear latched ones earlier.
+  /// until `lower_alarms`, but a host or power off may clear some of them earlier.
   virtual void raise_alarms(std::uint32_t bits) = 0;
   /// Ends the alarms `bits` that were raised, even if they are latched. An alarm that a condition causes may stay.
   virtual void lower_alarms(std::uint32_t bits) = 0;
   /// Sets the condition Unit::conditions[index] to `value`, which is within the condition's range. By default does
   /// nothing.
   virtual void set_condition(std::size_t /*index*/, std::int64_t /*value*/, Time /*now*/) {}
-  /// Returns the bytes of the encoder that survive power off. The caller may write them only while the encoder is off.
+  /// Returns the memory of the encoder that survives power off. The caller may write it only while the encoder is off.
   [[nodiscard]] virtual MutableBytes memory() = 0;
   /// Returns a number that the encoder increments with every change that it makes to `memory`.
   [[nodiscard]] virtual std::uint32_t memory_version() const = 0;

@@ -11,8 +11,7 @@
 
 namespace absenc {
 
-/// Returns a format with a position, and any others of the possible fields, in any order. Most have at most 64 bits,
-/// some up to 115.
+/// Returns a format with a position, and any others of the possible fields, in any order. It has at most 115 bits.
 inline WordFormat random_word(sim::Random& random) {
   std::vector<Meaning> meanings{Meaning::position};
   for (const Meaning one : {Meaning::multiturn, Meaning::error, Meaning::warning, Meaning::parity}) {

@@ -19,8 +19,7 @@
 
 namespace absenc {
 
-/// Purpose of a unit's command, by which the verbs of the command line (`absenc read`, `absenc zero` ...) find the
-/// command.
+/// Purpose of a unit's command. Programs that do not know the unit find its commands by this.
 enum class Verb : std::uint8_t {
   read,  ///< reads the position; `absenc read` uses the first such command
   read_part,
@@ -58,25 +57,26 @@ struct Command {
   std::uint8_t id;                        ///< number of the command within its unit: index into Unit::commands
   std::string_view meaning;               ///< Purpose of the command, as a phrase.
   std::span<const Argument> arguments{};  ///< Arguments of the command, in their order.
-  /// Whether the command changes the encoder; the page or bank that it selects for reading does not count.
+  /// Whether the command is treated as a change of the encoder. A page or bank that it selects for reading is no
+  /// change.
   bool changes_encoder = false;
   bool repeatable = true;  ///< Whether the same command may be sent again after an error.
-  /// For verb config_set: name of the config_get command that reads the setting. "": no command reads it; then the
-  /// setting has the name of this command, which checks the effect itself.
+  /// For verb config_set: name of the config_get command that reads the setting. "": no command reads it, and the
+  /// setting has the name of this command.
   std::string_view reads_back{};
-  /// For verb config_set: name of the option that gets the value of the first argument, because later commands on the
-  /// same open port need the new value. "": none.
+  /// For verb config_set: name of the option that the command changes to the value of its first argument, such as the
+  /// address. "": none.
   std::string_view changes_option{};
-  /// Possible effect of the command's requests on other devices on the line, a sentence without its full stop; "":
-  /// none. Users are asked before the command is sent.
+  /// Warning for users: the possible effect of the command's requests on other devices on the line, a sentence without
+  /// its full stop; "": none.
   std::string_view disturbs{};
   /// Whether, for verb read_part, the reading of this command has all alarms, although that of Verb::read may not.
   bool reads_alarms = false;
 };
 
-/// A range of bytes in the encoder's memory. The commands memory_read and memory_write access it by their arguments
-/// with the roles address, page, count, value and force; memory_read reports a field with the role data, or value for a
-/// single byte. A memory of words has one word at each address, and `data` has the low byte of each word first.
+/// A range of bytes in the encoder's memory. The commands memory_read and memory_write access it, and programs find
+/// their arguments by role: address, page, count, value, force. A memory of words has one word at each address, and
+/// `data` has the low byte of each word first.
 struct MemoryArea {
   std::uint32_t page;            ///< first page of the area; 0 if the memory has no pages
   std::uint32_t first;           ///< First address of the area on its page.
@@ -98,8 +98,7 @@ struct MemoryArea {
   }
 };
 
-/// A register of the encoder, accessed as a whole at its address. The commands memory_read and memory_write access it
-/// by their arguments with the roles address and value.
+/// A register of the encoder, accessed as a whole at its address by the commands memory_read and memory_write.
 struct RegisterInfo {
   std::string_view name;  ///< Name of the register.
   std::uint32_t address;  ///< Address of the register.
@@ -108,8 +107,8 @@ struct RegisterInfo {
   bool writable = false;  ///< Whether hosts may write the register.
 };
 
-/// A property of a virtual encoder's environment that its document mentions: a temperature, a battery, a fault of one
-/// channel.
+/// A property of a virtual encoder that can be set while it runs: a part of its environment, such as the temperature,
+/// or a fault.
 struct Condition {
   std::string_view name;  ///< Name of the condition.
   /// Unit of the value, as in FieldInfo::unit; "" for a plain number, and for yes (1) or no (0).
@@ -144,8 +143,8 @@ struct OpenBytes {
   std::size_t count = 0;  ///< Number of open bytes; 0: the frame is complete.
 };
 
-/// A test vector: a frame with the fields, or the error, that decoding must give. On clocked links request and reply
-/// are texts of 0 and 1; on CAN links texts such as "1ff:022b000000000000".
+/// A test vector: a request, a reply or both, with the fields or the error that decoding must give. On clocked links
+/// request and reply are texts of 0 and 1; on CAN links texts such as "1ff:022b000000000000".
 struct Vector {
   std::string_view id;                 ///< Identifier of the vector, unique within the unit.
   std::string_view meaning;            ///< The case that the vector shows, as a phrase.
@@ -283,7 +282,8 @@ struct ExtraWires {
 struct LineTiming {
   unsigned pause_bits = 15;  ///< shortest silence that ends a frame, in bit times
   Time frame_pause{};        ///< longest pause between the frames of one request; 0: a request is one frame
-  /// Time from the end of a request to the begin of its reply, as the document states it; 0: unknown.
+  /// Time from the end of a request to the begin of its reply, as the document states it, at the default rate of the
+  /// line; 0: unknown.
   Time turnaround{};
   Time turnaround_limit = std::chrono::milliseconds(100);  ///< longest time that hosts wait for a reply to begin
 };
@@ -293,8 +293,7 @@ struct Unit {
   std::string_view id;        ///< Identifier: the part of an address before the colon.
   std::string_view name;      ///< names of maker and protocol, for people
   std::string_view document;  ///< title of the protocol's document
-  /// Names of makers and encoder families by which users find the unit: "Tamagawa", "Smart-Abs". Names of models are in
-  /// `models`.
+  /// Other names by which users find the unit, such as those of makers and encoder families: "Tamagawa", "Smart-Abs".
   std::span<const std::string_view> known_as{};
   LinkKind link;      ///< Kind of link between host and encoder.
   LineSettings line;  ///< Default settings of the line. Rate 0: the document states none, so the user must.
@@ -314,18 +313,17 @@ struct Unit {
   /// Returns the alarms (bits of `alarms`) that an encoder with these options can report. Null: all.
   std::uint32_t (*reportable)(const Options& options) = nullptr;
   /// Field that describes the status flags of the second channel of an encoder with two; null: none. In a Reading their
-  /// bits follow those of the first channel in one number, so comparing alarms compares both channels; texts name the
-  /// flags of each channel.
+  /// bits follow those of the first channel in one number.
   const FieldInfo* second_status = nullptr;
   const FieldInfo* second_alarms = nullptr;  ///< Field of the alarms of the second channel; null: none.
   std::size_t host_storage;                  ///< bytes of storage that `host` needs, aligned for any type
   std::size_t device_storage;                ///< bytes of storage that `device` needs, aligned for any type
 
-  /// Checks a reply against its request and puts the fields of the reply into `sink`; with an empty reply, checks the
-  /// request and puts its fields. Returns the first error; `Error::none` if the frame is valid.
+  /// Checks a reply against its request and puts the fields of the reply, and its reading, into `sink`; with an empty
+  /// reply, checks the request and puts its fields. Returns the first error; `Error::none` if the frame is valid.
   Error (*decode)(const Options& options, Frame request, Frame reply, FieldSink& sink);
-  /// Constructs in `storage`, which has `decoder_storage` bytes, a decoder of many frames of an encoder with these
-  /// options, which is faster than `decode`. Null: `decode` is as fast.
+  /// Constructs in `storage`, which has `decoder_storage` bytes, a decoder that decodes many frames of an encoder with
+  /// these options faster than `decode`. Null: the unit has none.
   FrameDecoder* (*decoder)(const Options& options, std::span<std::byte> storage) = nullptr;
   std::size_t decoder_storage = 0;  ///< Bytes of storage that `decoder` needs, aligned for any type.
   /// Returns the error that `decode` returns, without delivering fields; `Error::none`: the reply, or with an empty
@@ -335,15 +333,15 @@ struct Unit {
     return decode(values, request, reply, nowhere);
   }
   /// Writes the request of a command into `request` and returns its length, at most `longest_encoded` bytes. On CAN and
-  /// clocked links it writes the text of the request, as in vectors; the text is empty if a host only clocks. Errors:
-  /// invalid_argument, buffer_too_small, unsupported.
+  /// clocked links it writes a text, as in vectors; the length may be 0 on clocked links. Errors: invalid_argument,
+  /// buffer_too_small, unsupported.
   Result<std::size_t> (*encode)(const Options& options, const Command& command, Arguments arguments,
                                 MutableBytes request);
   /// Returns where the frame ends that begins with the first of `bytes`.
   FrameEnd (*frame_end)(const Options& options, Direction direction, Bytes bytes);
-  /// Constructs the conversation of a command in `storage`, which has `host_storage` bytes. Returns an empty Any if the
-  /// options contradict each other, or the command's request cannot be encoded with these arguments. If the encoder
-  /// lacks the command, or an argument is missing or outside its range, the conversation ends at once with an error.
+  /// Constructs the conversation of a command in `storage`, which has `host_storage` bytes. An empty Any: the options
+  /// contradict each other, or the command's request cannot be encoded with these arguments. If the encoder lacks the
+  /// command, or an argument is missing or outside its range, the conversation ends at once with an error.
   Any<Conversation> (*host)(const Options& options, const Command& command, Arguments arguments,
                             std::span<std::byte> storage);
   /// Constructs a virtual encoder in `storage`, which has `device_storage` bytes; `shaft` must outlive it. Returns an
@@ -357,25 +355,20 @@ struct Unit {
   /// wire.
   bool (*is_checked)(const Options& options, Frame request, Frame reply, std::size_t bit) = nullptr;
   /// Returns the bits of this valid reply that carry `field`; none if the field has no fixed place, or is computed
-  /// (Gray code, decimal text). Null: unknown for all fields. The place may depend on options and request, so it is
-  /// determined for each frame; the kit (tests of every unit) cuts the bits out of valid frames and compares them with
-  /// the field.
+  /// (Gray code, decimal text). Null: unknown for all fields. The place may differ between frames.
   BitRanges (*bits)(const Options& options, Frame request, Frame reply, const FieldInfo& field) = nullptr;
-  /// Returns the unit's explanation of `error`: of a missing reply, or of a frame that `decode` refuses. Null: the unit
-  /// explains none.
+  /// Returns the unit's explanation of the error of an exchange, whose reply may be missing. Null: the unit explains
+  /// none.
   Explanation (*explain)(const Options& options, Error error, Frame request, Frame reply) = nullptr;
-  /// Returns the settings of the line with these options. Null: they are always `line`. Silences measured in characters
-  /// follow the rate of these settings, and a conversation that changes the rate must know the old one.
+  /// Returns the settings of the line with these options. Null: they are always `line`.
   LineSettings (*settings)(const Options& options) = nullptr;
   /// The unit of the same encoder behind an SPI controller, if that is another unit; null: there is no such unit.
   const Unit* over_spi = nullptr;
-  /// Puts the evidence about the values of those options that frames can show into `sink`. Returns whether some
-  /// combination of values explains all captures, which are in the order of time. If so, stores these values in
-  /// `options`; where the captures leave a value open, a possible value is stored, or the given value stays. All other
-  /// values in `options` must be set before. Null: frames do not show option values.
+  /// Compares captures, which are in the order of time, with values of those options that frames can show, and puts the
+  /// evidence into `sink`. Returns whether the values that it then leaves in `options` explain all captures. The other
+  /// options must have their values before. Null: frames do not show option values.
   bool (*probe)(Options& options, std::span<const Capture> captures, EvidenceSink& sink) = nullptr;
-  /// Returns the wires beside the data line that an encoder with these options needs. It is called before a port is
-  /// opened, because the user must name the wire, and a pseudo-terminal has none. Null: none.
+  /// Returns the wires beside the data line that an encoder with these options needs. Null: none.
   ExtraWires (*extra_wires)(const Options& options) = nullptr;
   LineTiming timing{};  ///< Times of the line, which decoding captures needs.
   /// Returns whether an encoder with these options sends unsolicited replies. Null: never. On clocked and CAN links a
@@ -392,12 +385,12 @@ struct Unit {
   /// index of the bit in this reply that the encoder sends in exchange; nothing if this reply has none. The bits of
   /// both sides, one per frame, are decoded as request and reply. Null: no reply of the unit has such a bit.
   std::optional<std::size_t> (*control_bit)(const Options& options, Frame reply) = nullptr;
-  /// Returns the reading `now` of one reply, completed by values that this reply does not carry and that earlier
-  /// replies of the same encoder have reported since power on. `before`: the completed reading of the reply before.
-  /// Null: each reply carries all values.
+  /// Returns the reading `now` of one reply, completed by those alarms in `before` that still apply and that this reply
+  /// does not report. `before`: the completed reading of the same encoder's previous reply. Null: readings are not
+  /// completed.
   Reading (*remembered)(const Reading& before, Reading now) = nullptr;
-  /// Constructs a Follower in `storage`, which has `follower_storage` bytes, aligned for any type. Null: no frame is
-  /// carried by several exchanges.
+  /// Constructs a Follower in `storage`, which has `follower_storage` bytes, aligned for any type. Null: the unit has
+  /// none.
   Follower* (*follower)(const Options& options, std::span<std::byte> storage) = nullptr;
   std::size_t follower_storage = 0;  ///< Bytes of storage that `follower` needs; 0: there is none.
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decodes and encodes the position word of clocked encoders by its WordFormat, and makes a reading of it.
+// Decodes and encodes a position word by its WordFormat, and makes a reading of it.
 #pragma once
 
 #include <array>
@@ -45,8 +45,8 @@ inline constexpr std::array<FlagInfo, 2> word_flags{{
     {"warning", "the encoder works near its limits", "check distance, dirt, temperature and supply", true},
 }};
 
-/// The values of a word that are shown as fields, except those with Meaning::value, whose names come from the word
-/// format.
+/// Types of the values of a word that are shown as fields, and of its alarms. Values with Meaning::value are not among
+/// them, because their names come from the word format.
 struct WordValues {
   std::uint64_t multiturn;   ///< Number of turns.
   std::uint64_t singleturn;  ///< Position within the turn, in counts.
@@ -87,8 +87,8 @@ struct PlacedField {
   bool active_low;    ///< Whether the field is sent inverted, so that 0 means that a flag is set.
 };
 
-/// Gives the functions of a position word access to a format that is known at run time only. Known does the same for a
-/// format known at compile time; both have these members.
+/// Gives the functions of a position word access to a format that may be known at run time only. Known does the same
+/// for a format known at compile time; both have these members.
 template <class Format>
 struct Given {
   static constexpr bool is_known = false;  ///< Whether the format is known at compile time.
@@ -111,7 +111,7 @@ struct Given {
 };
 
 /// Gives the functions of a position word access to a format that is known at compile time, so that nothing of the
-/// format is computed at run time. Given does the same for other formats.
+/// format is computed at run time.
 template <const auto& known>
 struct Known {
   static constexpr bool is_known = true;                 ///< Whether the format is known at compile time.
@@ -154,8 +154,8 @@ constexpr bool parity_of(const Bits& bits, std::size_t first, std::size_t end) {
   return odd ^ odd_parity(bits.load(first, static_cast<unsigned>(end - first)));
 }
 
-// Decodes or encodes a Gray-coded number that continues from field to field: each field needs the last bit of the field
-// before.
+// Decodes or encodes a Gray-coded number whose bits are split into several fields: each field needs the last bit of the
+// part of the number before it.
 class GrayFields {
  public:
   constexpr std::uint64_t decode(std::uint64_t gray, unsigned bits) {
@@ -173,9 +173,8 @@ class GrayFields {
   bool odd_ = false;
 };
 
-// The `count` bits of a frame from bit `first` on, for a format known at run time only. If they are 64 or fewer, they
-// are loaded once as one number, which is faster; one piece of code serves all formats. The frame must have all these
-// bits.
+// The `count` bits of a frame from bit `first` on; the frame must have all of them. Up to 64 bits are loaded once, as
+// one number, which is faster.
 class SomeBits {
  public:
   constexpr SomeBits(BitView bits, std::size_t first, unsigned count)
@@ -303,8 +302,7 @@ struct WordContents {
   return contents;
 }
 
-/// Returns the reading of a word. `word.error` makes position and turns invalid; without an error bit it is false,
-/// unless the protocol derives it (SSI: parity).
+/// Returns the reading of a word. `word.error` makes position and turns invalid.
 template <std::size_t size>
 [[nodiscard]] constexpr Reading to_reading(const WordContents& contents, const WordWith<size>& word,
                                            const Scale& scale) {

@@ -4,7 +4,7 @@
 //   word    = item { " " item }
 //   item    = [ name "=" ] meaning ":" bits [ "!" ]  |  "gray"
 //   meaning = position | multiturn | error | warning | parity | value | skip
-//   name    = up to 15 letters, digits and _
+//   name    = 1 to 15 letters, digits and _
 //
 // `!` is active low. `gray`: multiturn and position, in the order of the wire, are one Gray-coded number. `parity` is
 // even over all bits before it, with `!` odd. `value` is any other number; `skip` carries nothing and is sent as 0.
@@ -72,8 +72,7 @@ struct WordFormatError {
   std::size_t at = 0;         ///< index in the text at which the error is; its length: something is missing at the end
 };
 
-/// Format of a position word as data: its fields in order. It is made from options or from a text, and used by the code
-/// that decodes or sends words.
+/// Format of a position word as data: its fields in order.
 class WordFormat {
  public:
   static constexpr std::size_t maximum_fields = 12;  ///< Greatest number of fields of a word.

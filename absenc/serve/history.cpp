@@ -72,8 +72,8 @@ HistoryWriter::HistoryWriter(std::string path, const HistoryLimits& limits)
 }
 HistoryWriter::~HistoryWriter() = default;
 
-// Opens the history file. A damaged file that this server did not write is not replaced: it may belong to another
-// program.
+// Opens the history file. If it is damaged when this server opens it for the first time, it is not replaced: it may
+// belong to another program.
 void HistoryWriter::open() {
   try {
     file_.emplace(path_);

@@ -66,8 +66,8 @@ Request request_of(MHD_Connection* connection, const char* path, const char* met
   return request;
 }
 
-// Sets the headers of every response: content type, no caching, no embedding in other pages, no content sniffing, no
-// referrer, no external content.
+// Adds the content type to a response, and headers against caching, embedding in other pages, content sniffing,
+// referrers and external content.
 void add_headers(MHD_Response* response, const std::string& type) {
   ::MHD_add_response_header(response, "Content-Type", type.c_str());
   ::MHD_add_response_header(response, "Cache-Control", "no-store");

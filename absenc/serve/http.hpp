@@ -93,7 +93,8 @@ class HttpServer {
   /// `handler` is called in the connection thread for each request that the server does not refuse itself; it must
   /// return quickly. `vital`: paths that are answered even when too many connections are open. Throws client::Failure.
   HttpServer(os::Listener listener, Handler handler, std::vector<std::string> vital);
-  /// Aborts responses that are still being sent. Threads that write to a Stream must have ended before.
+  /// Stops the server; responses that are still being sent may be cut off. Threads that write to a Stream must have
+  /// ended before.
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;

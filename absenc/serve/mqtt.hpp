@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sends readings and events to an MQTT broker through a spool on disk. Two threads, so that neither an unreachable
-// broker nor a slow name lookup delays writing to the spool, and neither thread delays a reading.
+// Sends readings and events to an MQTT broker through a spool on disk, in threads of its own, so that neither the
+// broker nor the disk delays a reading.
 #pragma once
 
 #include <cstdint>

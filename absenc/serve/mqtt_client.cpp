@@ -124,7 +124,7 @@ void MqttClient::lose(const std::string& why) {
 }
 
 // Waits for the end of the MQTT client process. If the connection was not lost before, records that the process ended
-// unexpectedly: only a packet of the broker reaches it from outside and can make its library end it.
+// unexpectedly.
 void MqttClient::note_end() {
   const std::string how = process_.end(time_to_end);
   if (state_ == State::lost) return;

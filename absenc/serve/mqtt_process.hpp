@@ -2,7 +2,7 @@
 // The process that talks to the broker for `absenc serve`. It is this program, started again with an internal verb.
 //
 // libmosquitto 2.0.11 ends its process at some packets, by assertions in its parser of properties. The separate process
-// reads no encoder, and the spool has each reading and event that it holds, so its end costs only the connection. The
+// reads no encoder, and the readings and events that it got are in the spool, so its end costs only the connection. The
 // process is started from /proc/self/exe, not from a second program file: so it is always the same version, in a build
 // tree, installed, from the Debian package, and while the package is being upgraded.
 #pragma once

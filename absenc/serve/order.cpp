@@ -114,7 +114,7 @@ Json row_for_people(const Column& column, const Value& value) {
       .set("meaning", column.meaning);
 }
 
-// Reads settings. `wanted` is the command that reads one setting; null: all settings and the identification.
+// Reads settings and identification. `wanted` is the command that reads one of them; null: all.
 OrderResult read_settings(Encoder& encoder, const Command* wanted, const Between& between) {
   Json identity = Json::object();
   Json settings = Json::object();

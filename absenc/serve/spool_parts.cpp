@@ -78,8 +78,8 @@ void Spool::load_part(std::int64_t number) {
   }
 }
 
-// Handles spool files that were removed or moved while open. The newest file is still open and can be read. If the
-// folder was removed, the messages of the other files are lost.
+// Handles a spool whose folder or newest file was removed or moved. The messages of the newest file, which is still
+// open, are kept in memory. If the folder was removed, those of the other files are lost.
 void Spool::check_folder() {
   if (folder_ && folder_->is_there() && (newest_ == nullptr || newest_->log().is_there())) return;
   if (folder_) {
@@ -170,8 +170,9 @@ void Spool::recount(Part& part) {
   drop(lost, fmt::format("{} cannot be read from byte {} of {} on", path_of(part.number), offset, part.bytes));
 }
 
-// Deletes files whose messages are all acknowledged, except the last file, which has the reading numbers. If its
-// messages are all acknowledged while the disk cannot be written, the last file is shortened.
+// Deletes files whose messages are all acknowledged, or renames them if they are damaged; but not the last file, which
+// has the reading numbers. If its messages are all acknowledged while the disk cannot be written, the last file is
+// shortened.
 void Spool::tidy() {
   if (newest_ != nullptr && !condition_.trouble.empty() && parts_.back().waiting.messages == 0) {
     if (newest_->log().shrink_to(spool_record(facts_))) {

@@ -15,9 +15,8 @@ namespace absenc::serve {
 
 [[nodiscard]] inline double seconds_of(Time time) { return std::chrono::duration<double>(time).count(); }
 
-/// Returns the overview of an encoder: state, age_s, position, turns, speed with its uncertainty, alarms in words,
-/// errors of the last minute, and more. Values of the position, the speed and the alarms are null if the encoder is not
-/// live or the value is invalid or unknown.
+/// Returns the overview of an encoder. Values of its position, speed and alarms are null if the encoder is not live, or
+/// if the value is invalid or unknown.
 [[nodiscard]] client::Json overview(const Watch& watch, const Snapshot& snapshot);
 
 /// Returns the part of an encoder's overview that changes rarely: state, why the encoder is not live, alarms in words,
@@ -35,9 +34,9 @@ namespace absenc::serve {
 /// unknown speed is null.
 [[nodiscard]] client::Json points(const Watch& watch, std::span<const Point> taken);
 
-/// Returns the last minute of all encoders as
+/// Returns the last 60 seconds with readings of each encoder as
 /// {"encoders":[{"encoder":name,"seconds":[[at_s,position,speed],...]},...]}: the last position and the mean speed of
-/// each of the last 60 seconds with readings; null if no position was valid or no speed was known.
+/// each second; null if no position was valid or no speed was known.
 [[nodiscard]] client::Json last_minute(const Fleet::Watches& watches);
 
 /// Statistics of the server.

@@ -120,7 +120,7 @@ class Watch {
   void stop_outgoing(Outlet outlet);
 
   /// Gives an order to the reading thread. Returns "" or why the order is refused: another order waits, an examination
-  /// runs, or the thread has ended.
+  /// runs, or the server no longer reads this encoder.
   [[nodiscard]] std::string_view give(Order order);
 
   /// Acknowledges the alarm of this name, in all channels, until it is cleared; `who` is named in the event. Returns

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Combines several devices on one half-duplex line into one machine, for a port that does not simulate bits: a
+// Combines several devices on one half-duplex line into one machine, for a port that does not simulate bits, such as a
 // pseudo-terminal.
 #pragma once
 

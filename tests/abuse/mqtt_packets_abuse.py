@@ -174,7 +174,8 @@ class Packets(ServeCase):
         messages = []
         last = 0
         while last < goal:
-            # Each new message extends the deadline. After a refusal of a topic, a client retries it after a minute.
+            # Each new message extends the deadline. After refusals of a topic, a client waits for up to a minute before
+            # it retries.
             late = time.monotonic() + 90 + PATIENCE
             while not (new := self.broker.after(topic, len(messages))):
                 self.assertLess(time.monotonic(), late, f"reading {goal} comes after {last}: {server.json('/api/mqtt')}")

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that a command which changes an encoder has the effect that its verb promises. The effect is read over a line
-// without faults.
+// Checks the effect of commands that change an encoder: zero, resets, writes of memory bytes and of settings. The
+// effect is read over a line without faults.
 #pragma once
 
 #include <algorithm>
@@ -32,8 +32,8 @@ namespace absenc::kit {
   return values;
 }
 
-/// Returns random arguments that the command accepts, or no value if the unit declares no writable memory that the
-/// command could write.
+/// Returns random arguments that the command accepts; for a write to the memory those of a writable byte, or no value
+/// if the unit declares none.
 [[nodiscard]] inline std::optional<Values> change_arguments(const Unit& unit, const Command& command,
                                                             sim::Random& random) {
   if (command.verb != Verb::memory_write) return random_arguments(command, random);

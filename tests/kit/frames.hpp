@@ -39,7 +39,7 @@ struct OwnedFrame {
 /// Returns the frame whose bytes a vector states for its request or reply.
 [[nodiscard]] OwnedFrame frame_of(const Unit& unit, Bytes text);
 
-/// Value of one field. A real number is stored as a float, so that values which differ only by rounding are equal.
+/// Value of one field. A real number is rounded to a float, so that small differences do not count.
 struct Value {
   std::int64_t number = 0;
   float real = 0;

@@ -65,8 +65,9 @@ struct VectorReplay {
     return unit.decode(options, request.frame(), frame.frame(), seen);
   }
 
-  // Checks the fields that the conversation reported against those of the vector. A unit may report its raw fields
-  // under other names (such as a temperature read from memory), but the position must be equal.
+  // Checks that the fields that the conversation and the vector share are equal. A command that reads must also report
+  // the fields of the position, and the same position as the decoded frame. Other commands may report fields under
+  // other names, such as a temperature read from memory.
   void require_report(const Outcome& outcome) const {
     const bool reads = command.verb == Verb::read || command.verb == Verb::read_part;
     unsigned shared = 0;
@@ -106,8 +107,8 @@ struct VectorReplay {
   void characters() const {
     const Outcome whole = converse({reply.bytes});
     require(request.empty() || whole.tested_requests > 0, [] { return "is not sent"; });
-    // Only a command with one exchange must end with the error of the vector: a longer procedure may continue after a
-    // good reply, and may repeat its request after a bad one.
+    // Only a command of `is_one_question` must end with the error of the vector: a longer procedure may continue after
+    // a good reply, and may repeat its request after a bad one.
     if (is_one_question()) {
       require(whole.error == vector.error, [&] { return "ends with " + std::string(text_of(whole.error).name); });
     }
@@ -175,7 +176,7 @@ struct VectorReplay {
     }
   }
   // Sends seven good frames and, as the fifth, the frame `odd`: once frame by frame and once byte by byte. Returns how
-  // many readings the host made in both runs together.
+  // many good results the host emitted in both runs together.
   template <class Text>
   unsigned stream_with(const OwnedFrame& odd, Text&& text) const {
     unsigned good = 0;
@@ -274,7 +275,8 @@ struct VectorReplay {
   }
 };
 
-/// Returns the arguments with which the command sends this vector's request, or no value if the command cannot send it.
+/// Returns the arguments with which the command sends this vector's request, or waits for its unsolicited frame; no
+/// value if it does neither.
 std::optional<Values> arguments_for(const Unit& unit, const Options& options, const Command& command,
                                     const Vector& vector) {
   ReportedFields request_fields;
@@ -296,8 +298,7 @@ std::optional<Values> arguments_for(const Unit& unit, const Options& options, co
   return std::nullopt;
 }
 
-// Returns whether the vector's reply contains a reading. Some frames without a reading only occur in captures, and no
-// conversation accepts them.
+// Returns whether the vector's reply decodes without an error to a reading.
 bool has_reading(const Unit& unit, const Options& options, const Vector& vector) {
   ReportedFields seen;
   return unit.decode(options, frame_of(unit, vector.request).frame(), frame_of(unit, vector.reply).frame(), seen) ==
@@ -353,7 +354,7 @@ std::optional<Time> wait_for_reply(const Unit& unit, const Options& options) {
 }
 
 // Compares `turnaround_limit`, after which a decoded capture calls a reply late, with the longest timeout of the host
-// in any configuration: each must be at least three quarters of the other.
+// in any configuration: each must be at least three quarters of the other. Skips links whose clock the host drives.
 void compare_limits(const Unit& unit, Findings& findings) {
   std::optional<Time> longest;
   for (const Configuration& configuration : configurations(unit)) {

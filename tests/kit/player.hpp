@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Plays the encoder's side of one conversation. A reply supplied by the test, in pieces, answers the request under
-// test; a virtual encoder answers every other request.
+// test; a virtual encoder, if there is one, gets every other request.
 #pragma once
 
 #include <algorithm>

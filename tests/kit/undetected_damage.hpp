@@ -18,10 +18,9 @@ struct DamageCount {
 
   [[nodiscard]] double chance() const { return static_cast<double>(wrong) / static_cast<double>(damaged); }
 
-  /// Returns how many of `trials` further damaged replies may be accepted with a wrong value, if the probability is the
-  /// same as in this measurement. The expected number is `wrong` * trials / damaged. A limit of five standard
-  /// deviations and ten more (times trials / damaged if that is above 1) is exceeded by chance in less than one of a
-  /// million runs of `check_exchanges`.
+  /// Returns how many of `trials` further damaged replies may have a wrong value, if the probability is the same as in
+  /// this measurement: the expected number, `wrong` * trials / damaged, plus five standard deviations and ten (times
+  /// trials / damaged if that is above 1).
   [[nodiscard]] std::uint64_t allowed(std::uint64_t trials) const {
     const double ratio = static_cast<double>(trials) / static_cast<double>(damaged);
     const double deviation = std::sqrt(static_cast<double>(wrong) * ratio * (1 + ratio));
@@ -42,8 +41,8 @@ struct UndetectedDamage {
   }
 };
 
-/// Returns the rates measured with `samples` replies. A host may accept any prefix of the damaged bytes as a frame; if
-/// the encoder sends unsolicited frames, any part of them.
+/// Returns the rates measured with `samples` replies. On a line of characters a host may accept a prefix of the damaged
+/// bytes as a frame, or any part of them if the encoder sends unsolicited frames.
 [[nodiscard]] UndetectedDamage measure_undetected_damage(const Unit& unit, const Options& options,
                                                          const OwnedFrame& request, const OwnedFrame& reply,
                                                          const sim::FaultRates& rates, unsigned samples);

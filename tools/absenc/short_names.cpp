@@ -28,8 +28,8 @@ std::size_t count_different(std::span<const std::string> names) {
   return std::set<std::string_view>(names.begin(), names.end()).size();
 }
 
-// Returns the names in at most `width` bytes, all cut at the same place, as near to the middle as possible; different
-// names stay different. Returns nothing if no place achieves that.
+// Returns the names, with those of more than `width` bytes cut to this width, all at the same place and as near to the
+// middle as possible, so that different names stay different. Returns nothing if no place achieves that.
 Names cut_in_the_middle(std::span<const std::string> names, std::size_t width) {
   const std::size_t different = count_different(names);
   const std::size_t most = width - gap.size();
@@ -73,7 +73,8 @@ Names middles(std::span<const std::string> names) {
   return cuts;
 }
 
-// Returns the names cut to `width` bytes, each after its number in the list: "3 tfo..=7" is the third name.
+// Returns the names cut to `width` bytes, each after the number of its first occurrence in the list: "3 tfo..=7" is the
+// third name.
 Names numbered(std::span<const std::string> names, std::size_t width) {
   Names cuts;
   for (const std::string& name : names) {

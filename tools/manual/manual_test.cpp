@@ -61,7 +61,8 @@ constexpr std::array<const Subcommand*, 8> subcommands{&read, &memory,  &memory_
 
 std::string page() { return man_page("1.2-3", subcommands, all_units()); }
 
-// Returns bash's completions of the last word in `words`. As in bash, ':' and '=' in `words` are words of their own.
+// Returns bash's completions of the last word in `words`, in which ':' and '=' must be words of their own, as bash
+// passes them.
 std::vector<std::string> complete(const std::string& words) {
   std::string folder = std::filesystem::temp_directory_path() / "absenc-manual-XXXXXX";
   if (::mkdtemp(folder.data()) == nullptr) return {"no folder"};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds the frames of a protocol among the characters of a line, pairs requests with their replies and decodes them,
-// with the same functions of the protocol's unit as live readings.
+// Finds the frames of a protocol among the characters of a line, pairs requests with their replies, and decodes them
+// with the functions of the protocol's unit.
 #pragma once
 
 #include <array>
@@ -34,8 +34,8 @@ enum class Carries : std::uint8_t {
 /// A pause on the line ends a frame. The first characters of a capture, up to the first pause, may be the end of a
 /// frame or no characters at all: they are reported as cut, unless the line was silent before them. On a line that
 /// never pauses, the first frame is accepted only if more good frames follow it, because a weak checksum finds frames
-/// everywhere. On a line with both directions the bytes of a frame do not show whether it is a request or a reply: some
-/// replies equal their requests.
+/// everywhere. On a line with both directions the bytes of a frame do not always show whether it is a request or a
+/// reply: some replies equal their requests.
 ///
 /// With arrival times (`by_arrival`) a pause may lie within a frame and be missing between two frames. Frames are then
 /// separated by length and content, and pauses only help to judge bytes that are no good frame and requests without a

@@ -9,8 +9,8 @@ namespace absenc::capture {
 // ---- Bursts
 
 // Returns the word in a burst, without the bits of the idle line that the first clocks sample, and without the bit that
-// is sampled when a clock that was held low rises again. With `with_last` the word also
-// includes the level of the data line behind the last clock; else a burst without any other bits is returned unchanged.
+// is sampled when a clock that was held low rises again. With `with_last` the word also includes the level of the data
+// line behind the last clock. Without it, a burst that has no more bits than those is returned unchanged.
 Frame BurstAnnotator::word_of(const Burst& burst, bool with_last) {
   const bool rises = burst.low_before && judge_.unit().control_bit != nullptr;
   const std::size_t idle = judge_.unit().line.idle_clocks + (rises ? 1u : 0u);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Captures thousands of random exchanges, with faults or without, of every unit that does not use CAN. The annotator,
-// which knows neither the sender nor the frame boundaries of characters, must find each good exchange with its exact
-// times, and an error at the place of each bad one. Units of characters with a weak check are tested without faults.
+// Captures random exchanges, with faults or without, of every unit that does not use CAN. The annotators must find each
+// good exchange at its times, and an error at the place of each bad one.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -338,8 +337,8 @@ TEST_P(Characters, EveryExchangeWithoutFaults) {
   expect_same(annotate(settings_of(unit)), truth.expected);
 }
 
-// Returns whether more than 1/64 of random replies, as long as the reply of a test vector, pass the check: too many
-// damaged replies then look good.
+// Returns whether, for a test vector, more than 1/64 of random replies of the length of its reply pass the check: too
+// many damaged replies then look good.
 bool has_weak_check(const Unit& unit, const Options& options) {
   NoFields nowhere;
   sim::Random random(1);

@@ -8,7 +8,8 @@ namespace absenc::capture {
 
 namespace {
 
-// Number of characters to examine behind a frame on a line that does not pause: more than two frames of usual length.
+// On a line without pauses, frames are searched while more than this number of characters is left in the run: more than
+// two frames of usual length.
 constexpr std::size_t lookahead = 160;
 
 }  // namespace
@@ -20,8 +21,8 @@ Piece Annotator::piece(std::size_t size) const {
   return {rest(at_).first(size), run.begin(at_), run.end(at_ + size - 1)};
 }
 
-// Returns the size of a good reply to `request` that begins at `from`, or 0. A reply that ends at a pause is preferred,
-// then one of the size `usual` (0: not known): where only a checksum gives the size, a shorter match may be an
+// Returns the size of a good reply to `request` that begins at `from`, or 0. A reply that ends with the finished run,
+// or has the size `usual` (0: not known), is preferred: where only a checksum gives the size, a shorter match may be an
 // accident.
 std::size_t Annotator::reply_at(Bytes request, std::size_t from, std::size_t usual) {
   const Bytes bytes = rest(from);
@@ -119,8 +120,9 @@ std::size_t Annotator::match_reply() {
   const std::size_t size = reply_at(pending.bytes(), at_, usual);
   const bool leaves_rest = whole_ && size < rest(at_).size();
   if (size == 0 || leaves_rest) {
-    // A reply that leaves characters of the run may match by accident; an echo of the request with a reply that leaves
-    // none is no accident. Some replies equal their requests, and a reply may be sent twice.
+    // A reply that leaves characters of the run may match by accident. Then an echo of the request with a reply that
+    // leaves none is preferred, but not to a match no longer than the request: some replies equal their requests, and a
+    // reply may be sent twice.
     const bool may_be_accident = size == 0 || size > pending.bytes().size();
     // Bytes that equal the request and begin later than twice the turnaround time after it are the repeated request.
     const bool is_late = settings_.ticks.turnaround != 0 && begin > pending.end + 2 * settings_.ticks.turnaround;
@@ -223,7 +225,7 @@ bool Annotator::is_request(std::size_t size) {
     const Tick silence = channel.run.begin(at_) - std::min(channel.run.begin(at_), waiting.back().end);
     return settings_.ticks.turnaround == 0 || silence > 2 * settings_.ticks.turnaround;
   }
-  // After a complete exchange the host is the next sender, even if the frame could also be a reply.
+  // With arrival times: after a complete exchange the host is the next sender, even if the frame could also be a reply.
   const bool is_turn_of_host = settings_.by_arrival && channel.at_frame_start && channel.last_size == 0 &&
                                exchanges_.has_request() && exchanges_.waiting().empty() && !judge_.streams();
   if (is_turn_of_host) return true;
@@ -243,7 +245,7 @@ bool Annotator::is_request(std::size_t size) {
 
 std::size_t Annotator::match_unsolicited() {
   const bool streams = judge_.streams();
-  // A request is outstanding and was not matched: a good reply at `at_` belongs to another request.
+  // While a request is outstanding, a reply that does not match it is not taken as unsolicited.
   if (!streams && request_before(channel_->run.begin(at_))) return 0;
   const std::size_t size = reply_at({}, at_, channel_->last_size);
   if (size == 0) return 0;
@@ -269,9 +271,10 @@ std::size_t Annotator::take_bad() {
   return size;
 }
 
-// Returns the number of bad bytes from `at_` on. They end where good frames begin, at a pause (arrival times only), or
-// with the run; if the run still grows, half of the look-ahead before its end. Outside a stream of unsolicited frames a
-// single good reply does not end them: garbage before a good reply makes the exchange bad, like in live reading.
+// Returns the number of bad bytes from `at_` on: up to the next likely frame, to a pause (arrival times only), or to
+// the end of the run; if the run still grows, at most to half of the look-ahead before its end. Outside a stream of
+// unsolicited frames a single good reply does not end them: garbage before a good reply makes the exchange bad, like in
+// live reading.
 std::size_t Annotator::bad_size() {
   const std::size_t left = rest(at_).size();
   // In a stream of unsolicited frames, the next frame begins one frame size behind the beginning of the bad frame.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Completes each reading of a capture with the alarms that earlier replies of the same encoder reported, as a host that
-// reads live does. Applies to units with `remembered`.
+// Completes good readings of a capture with the alarms that earlier replies of the same encoder reported. Applies to
+// units with `remembered`.
 #pragma once
 
 #include <algorithm>
@@ -16,13 +16,13 @@
 namespace absenc::capture {
 
 /// Passes annotations on to a sink and completes their readings with alarms of earlier replies. It stands behind the
-/// annotators, so that it sees all replies in the order of time.
+/// annotators.
 ///
 /// A reply that has the alarms and no position completes the readings behind it.
 ///
 /// No frame reports that an encoder was switched off and on, but the encoder sends no replies while it is off: an
-/// unanswered request clears the stored alarms of all encoders. A reading in the reply to a request that clears alarms
-/// or resets the turns clears those of its encoder. Otherwise the encoder is assumed to have stayed on.
+/// unanswered request clears the stored alarms of all encoders. A request that clears alarms or resets the turns clears
+/// those of its encoder after its reply, if this has a reading. Otherwise the encoder is assumed to have stayed on.
 class CompletedReadings final : public AnnotationSink {
  public:
   /// `unit` and `sink` must outlive this object.

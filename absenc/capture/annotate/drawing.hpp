@@ -27,9 +27,9 @@ using ScratchFile = std::unique_ptr<std::FILE, CloseFile>;
 /// Creates a temporary file, which disappears when it is closed or the process ends. Returns null on failure.
 [[nodiscard]] inline ScratchFile temporary_file() { return ScratchFile(std::tmpfile()); }
 
-/// Level changes of wires and labels for them, of any length. Changes and labels are stored on disk, with a few bytes
-/// per change, because they are written only when all wires and the end time are known; so memory does not grow with
-/// the length. Ticks are nanoseconds.
+/// Level changes of wires, and labels at times; ticks are nanoseconds. Changes and labels are stored in temporary
+/// files, because they are written only when all wires and the end time are known; so memory does not grow with the
+/// length.
 class Drawing {
  public:
   struct Wire {
@@ -48,7 +48,7 @@ class Drawing {
   /// full disk may be noticed only by `rewind_labels`.
   void label(Tick at, std::string_view words);
   void set_end(Tick end) { end_ = end; }
-  /// Sets a function that is called regularly while the drawing is written to a file; an exception thrown by the
+  /// Sets a function that reports the progress while the drawing is written to a file; an exception thrown by the
   /// function ends the writing.
   void watch(std::function<void()> report_progress) { on_progress_ = std::move(report_progress); }
 

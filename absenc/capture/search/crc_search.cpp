@@ -118,7 +118,7 @@ class CrcSearch {
     return word;
   }
 
-  // Reads the checksums of all frames. Returns false if a frame has no valid checksum of this layout.
+  // Reads the checksums of all frames. Returns false if bits above the width of a checksum are not 0.
   bool take_checks(const Shape& shape) {
     checks_.clear();
     for (const auto& [length, frames] : frames_.lengths) {
@@ -231,8 +231,8 @@ class CrcSearch {
     add(shape, poly, widest_cover->first, {widest_cover->second.front()}, free_bits);
   }
 
-  // Adds a solution with the probability that it is chance: each independent checksum gives `width` bits; the
-  // polynomial and `free_bits` bits of init and xorout were chosen to fit.
+  // Adds a solution and its chance, to which `run` later adds the number of tried layouts: each independent checksum
+  // gives `width` bits; the polynomial and `free_bits` bits of init and xorout were chosen to fit.
   void add(const Shape& shape, std::uint32_t poly, const Key& key, std::vector<std::size_t> firsts, double free_bits) {
     CheckSolution solution;
     solution.parameters = {

@@ -50,11 +50,9 @@ struct CheckSearch {
   std::size_t open = 0;  // number of attempts at a layout for which the frames determine too little to list solutions
 };
 
-/// Returns checksums of 3 to 16 bits that explain every frame: all that are found with usual init and xorout or
-/// constants, else those with other values (of CRCs one for each layout and polynomial, and only if two frames have the
-/// same length). None if fewer than two frames differ. The frames must be all of bytes or all of bits. Duplicates add
-/// no evidence, nor do bits that never change, alone or combined: the evidence is the number of independent ways in
-/// which the covered parts differ. A checksum that never changes is not accepted.
+/// Returns checksums of 3 to 16 bits that explain every frame; none if fewer than two frames differ. Unusual values of
+/// init, xorout or constants are returned only where no usual ones fit. The frames must be all of bytes or all of bits.
+/// Duplicates and bits that never change add no evidence. A checksum that never changes is not accepted.
 [[nodiscard]] CheckSearch find_checks(std::span<const CheckedFrame> frames);
 
 /// Returns how many more frames with other data would settle whether `solution` is right: its chance would fall below

@@ -32,8 +32,8 @@ struct ObservedExchange {
   friend bool operator==(const ObservedExchange&, const ObservedExchange&) = default;
 };
 
-/// The evidence that exchanges give for a protocol. Bytes of a request that the reply repeats are no evidence, nor is a
-/// repeated reply.
+/// The evidence that exchanges give for a protocol. Bytes at the beginning of a reply that repeat the request are no
+/// evidence, nor is a repeated exchange.
 struct Evidence {
   std::size_t tried = 0;      // number of exchanges examined
   std::size_t explained = 0;  // number of exchanges with a good reply
@@ -51,7 +51,8 @@ struct Evidence {
 /// log10 of the chance up to which frames suffice as evidence for options, without the motion of the position.
 inline constexpr double frames_suffice = -2;
 
-/// Number of random replies tried for each frame if there are more than two frames, whose chances multiply.
+/// Greatest number of random replies tried for a frame if there are more than two different good exchanges, whose
+/// chances multiply.
 inline constexpr unsigned usual_attempts = 1u << 14;
 
 /// Returns the probability that the unit accepts a random reply of the length of `good.reply` to `good.request`: at

@@ -86,7 +86,7 @@ class HypothesisSearch {
   }
 
   /// Adds `base` with the numbers of bits that fit best, and `base` with every change of a single option that has
-  /// choices, alone and with the numbers of bits that fit best: no model explains all exchanges.
+  /// choices, alone and with the numbers of bits that fit best.
   void vary(const Options& base) {
     vary_bits(base);
     for (std::size_t i = 0; i < unit_.options.size(); ++i) {
@@ -102,8 +102,8 @@ class HypothesisSearch {
     }
   }
 
-  /// Adds `base` with every change of a single option that has choices. If the frames are no evidence by themselves,
-  /// the options with which the position moves least are then ranked first.
+  /// Adds `base` with every change of a single option that has choices, so that the motion of the position can rank
+  /// them.
   void vary_motion(const Options& base) {
     for (std::size_t i = 0; i < unit_.options.size(); ++i) {
       const auto count = static_cast<std::int64_t>(unit_.options[i].choices.size());

@@ -11,7 +11,7 @@
 namespace absenc::capture {
 
 /// Options that explain exchanges, with their evidence. Every attempt raises the chance of a false match. Here the
-/// attempts are those of one search; `rank` (client/identify) adds every unit, setting and encoder tried.
+/// attempts are those of one search; `rank` (client/identify) multiplies them by the number of searches.
 struct Hypothesis {
   Options options{};
   Evidence evidence{};
@@ -20,28 +20,28 @@ struct Hypothesis {
 
   /// Returns log10 of the probability that one of `tried` hypotheses is as good as this one by chance.
   [[nodiscard]] double chance() const;
-  /// Returns whether the frames alone suffice as evidence. Otherwise a unit that accepts any frame may still decode
-  /// positions that move plausibly.
+  /// Returns whether the evidence of the frames suffices (`is_found`), without that of the motion of the position.
   [[nodiscard]] bool is_proven() const;
 };
 
 /// Limit of `Hypothesis::chance`: a result at or below it is reported as found, a result above it only as possible.
 inline constexpr double is_found = -3;
 
-/// Returns whether the hypothesis `one` is ranked before `other`: hypotheses proven by their frames come before those
-/// that only the motion of the position supports.
+/// Returns whether the hypothesis `one` is ranked before `other`: hypotheses proven by their frames come first, then
+/// those with the smaller chance.
 [[nodiscard]] inline bool is_likelier(const Hypothesis& one, const Hypothesis& other) {
   if (one.is_proven() != other.is_proven()) return one.is_proven();
   return one.chance() < other.chance();
 }
 
-/// Returns the hypotheses that explain the most exchanges, the likeliest first; none if no exchange is explained.
-/// Models are tried before single options. The search starts from options with `settings` applied, for example
-/// the address of the polled encoder; it may change options that have choices or numbers of bits.
+/// Returns hypotheses that explain the most exchanges, the likeliest first; none if no exchange is explained. The
+/// search starts from options with `settings` applied, for example the address of the polled encoder, and may change
+/// them.
 [[nodiscard]] std::vector<Hypothesis> find_hypotheses(const Unit& unit, std::span<const OptionText> settings,
                                                       std::span<const ObservedExchange> exchanges);
 
-/// Returns the indices of the unit's numeric options that change the number of bits of a position.
+/// Returns the indices of those numeric options, with a maximum of 64 or less, that change the number of bits of
+/// position or turns.
 [[nodiscard]] std::vector<std::size_t> resolution_options(const Unit& unit);
 
 /// Returns the options of every model with the given settings, then the unit's defaults with the settings, without a

@@ -77,7 +77,8 @@ std::pair<unsigned, int> bits_of(const Unit& unit, const Hypothesis& hypothesis)
   return {resolution.singleturn_bits, -static_cast<int>(resolution.multiturn_bits)};
 }
 
-// Sets the option with which the encoder sends unsolicited frames, to their rate per second if the option is a rate.
+// Sets the first option that makes the encoder send unsolicited frames, unless `options` do so already. The value is
+// the number of frames per second, but from 1 to the option's largest value.
 void set_streaming(const Unit& unit, Options& options, double frames_per_second) {
   if (unit.streams == nullptr || unit.streams(options)) return;
   for (std::size_t i = 0; i < unit.options.size(); ++i) {

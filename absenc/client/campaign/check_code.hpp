@@ -33,10 +33,10 @@ struct Estimated {
 /// of its bits is 0. Bits of a frame are numbered in the order of the bytes, from the most significant bit.
 class CheckCode {
  public:
-  /// Derives the code from the decoder. The last independent bits of the frame are the check bits; for every other bit,
-  /// the check bits that compensate its error are its syndrome. Returns nothing if the check has more than 16 bits,
-  /// covers at most half of the frame (each channel has a check of its own), or is not linear (a sum, digits as text),
-  /// or if the replies differ in length. `replies` must not be empty.
+  /// Derives the code from the decoder. The last independent bits of the frame are the check bits; for every other
+  /// covered bit, the check bits that compensate its error are its syndrome. Returns nothing if the check has more than
+  /// 16 bits, covers at most half of the frame (each channel has a check of its own), or is not linear (a sum, digits
+  /// as text), or if the replies differ in length. `replies` must not be empty.
   [[nodiscard]] static std::optional<CheckCode> learn(const Unit& unit, const Options& options,
                                                       std::span<const GoodReply> replies);
 

@@ -81,9 +81,8 @@ TEST_P(Confirmed, IsWrongLessOftenWithALowerLimit) {
 
 INSTANTIATE_TEST_SUITE_P(Models, Confirmed, ::testing::ValuesIn(encoders()), name_of);
 
-// Checks that confirmation at least halves the rate of wrong words, to the computed rate. The words have no check: the
-// 4 counts of noise, and the counts that a shaft at the speed limit moves between two readings, hide only damage of the
-// lowest bits. Other damage passes only if the next word has the same damage.
+// Checks that confirmation at least halves the rate of wrong words, and that as many are confirmed as computed. The
+// words have no check: only the distance to the word before shows damage.
 TEST(ConfirmedWords, WithoutACheckOnlyTheLimitTells) {
   CampaignChoices choices{.faults = {"corrupt=0.1"}, .exchanges = 20'000};
   choices.rpm = 0;

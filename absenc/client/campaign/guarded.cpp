@@ -18,7 +18,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Returns the difference of two positions of `bits` bits, which lie on a circle, as a signed number.
+// Returns `difference`, of two positions on a circle of 2^bits counts, as a signed number.
 std::int64_t wrapped(std::uint64_t difference, unsigned bits) {
   const unsigned unused = 64 - bits;
   return static_cast<std::int64_t>(difference << unused) >> unused;

@@ -71,11 +71,11 @@ struct Possible final : EvidenceSink {
 
 }  // namespace
 
-// Selects what the user left open, except for standard input. Baud rate: the unit's own, if it gives a good frame and
-// at the beginning of the capture at least as many as the rate that the level changes suggest, or if `reads_silence`;
-// few level changes fit many rates, but only one rate gives right checksums. Parity, if characters are damaged or
-// neither a good frame nor an unanswered request is found: the one with most good frames, because a parity bit taken
-// for a stop bit is wrong half of the time.
+// Selects baud rate and parity where the user left them open, except for standard input. Takes the unit's own baud rate
+// if it gives a good frame and, at the beginning of the capture, no fewer good frames than the rate that the level
+// changes suggest, or if `reads_silence`: few level changes fit many rates, but only one rate gives right checksums.
+// Tries other parities if characters are damaged, or if neither a good frame nor an unanswered request is found, and
+// takes one that gives more good frames.
 CaptureRun::Speed CaptureRun::likely_speed(const Lines& lines) const {
   constexpr std::size_t enough_characters = 20'000;
   Speed best{choices_.how.baud, choices_.how.parity.value_or(line_.parity)};
@@ -108,8 +108,8 @@ CaptureRun::Speed CaptureRun::likely_speed(const Lines& lines) const {
 }
 
 // A clock has pauses of several lengths: between words, and between the bytes of a host that sends eight clocks at a
-// time. Only one pause length divides the clocks into the right words. Lengths of pauses are preferred to changes of
-// the data line, because the data line may also change in a long pause inside a word.
+// time. Takes the reading with the most good words, the first of several. If no checksum confirms it and the pauses are
+// in doubt, a reading without bad words that shows the encoder's timeouts is preferred.
 std::size_t CaptureRun::likely_pause(std::span<const capture::PauseReading> readings,
                                      std::vector<std::string>& notes) const {
   struct Words final : capture::AnnotationSink {

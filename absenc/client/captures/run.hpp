@@ -53,9 +53,9 @@ class CaptureRun {
   [[nodiscard]] const Options& options() const { return options_; }
   /// Returns the number of ticks per second of the capture; 0: the capture has no times.
   [[nodiscard]] std::uint64_t ticks_per_second() const;
-  /// Returns the options, completed by values that a live host would read from the encoder and that the frames of the
-  /// capture report. Runs before decoding: where only a checksum determines a length, the first length that fits may be
-  /// chance. For standard input, which can be read only once, returns the options unchanged.
+  /// Returns the options, completed by values that a live host would read from the encoder, if the frames of the
+  /// capture report them. Call it before `run`. For standard input, which can be read only once, returns the options
+  /// unchanged.
   const Options& settle_options();
   /// Decodes the whole capture into `all` and returns the outcome. Calls `progress` from time to time with the tick
   /// that is reached. Throws UsageError, Failure and the exceptions of `all` and `progress`.

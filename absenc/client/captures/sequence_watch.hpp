@@ -10,11 +10,10 @@
 
 namespace absenc::client {
 
-/// Forwards annotations to a sink. A reply becomes `sequence_mismatch`, as for a live host, in two cases: its first
-/// field with the role sequence equals that of the encoder's last reply, or a field with the role life_counter is not
-/// one more, modulo 64, than in the frame before. After damaged frames a life counter may have advanced by any number,
-/// but must have advanced. An equal counter is right after 100 frames, because it may have wrapped (a life counter:
-/// after 64 frames with a damaged one among them).
+/// Forwards annotations to a sink. A reply becomes `sequence_mismatch` if its first field with the role sequence equals
+/// that of the encoder's last reply, or if a field with the role life_counter is not one more, modulo 64, than in the
+/// frame before. After damaged frames a life counter may also have advanced by more. After many frames an equal counter
+/// is accepted, because it may have wrapped.
 class SequenceWatch final : public capture::AnnotationSink {
  public:
   /// Forwards to `sink`, which must outlive the object.

@@ -123,8 +123,8 @@ class Stage {
     }
   }
 
-  // Takes the smallest or the greatest value of each required argument, because the encoder may not accept numbers in
-  // between, and the default of every other argument.
+  // Returns two sets of arguments to try: required ones have their smallest or their greatest value, because the
+  // encoder may not accept numbers in between, and others their defaults.
   static std::vector<std::vector<std::int64_t>> arguments_of(const Command& command) {
     std::vector<std::vector<std::int64_t>> all(2);
     for (const Argument& argument : command.arguments) {

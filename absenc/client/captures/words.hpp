@@ -43,9 +43,8 @@ class TickClock {
 /// documented.
 [[nodiscard]] bool has_fields(const capture::Annotation& annotation);
 
-/// Returns the remark of an annotation in words, such as that the frame is cut off (of a CAN error frame, its meaning);
-/// without a remark, its error, with advice if there is a reply; for a good composed frame, that the last exchanges
-/// carried it; otherwise "".
+/// Returns the remark of an annotation in words (of a CAN error frame, its meaning) or, without a remark, its error,
+/// with advice if there is a reply; "" if it has neither. A good composed frame has a text of its own.
 [[nodiscard]] std::string message_of(const Unit& unit, const Options& options, const capture::Annotation& annotation);
 
 }  // namespace absenc::client

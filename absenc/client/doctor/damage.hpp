@@ -36,14 +36,14 @@ template <class Is>
 /// characters.
 [[nodiscard]] bool is_cut(const Case& one, const Attempted& attempt);
 
-/// Returns how many of the first 24 damaged replies become good if one bit is flipped. Returns 0 on CAN, for fewer than
-/// five replies, and if the number is not above an eighth of them plus twice the number of random replies of the same
-/// length that become good, because a short checksum accepts many by chance.
+/// Returns how many of the first 24 of these replies that have bytes become good if one bit is flipped. Returns 0 on
+/// CAN, for fewer than five replies, and if so many random replies of the same lengths become good as well that chance
+/// may be the reason.
 [[nodiscard]] std::size_t mended_by_one_bit(const Case& one, const All& all);
 
-/// Finds a change of bytes that an adapter, a driver or a device server made to nearly all these damaged replies, or
-/// bytes that it added to, or 8th bits that it removed from, the good replies of the examination. Returns nothing if no
-/// change explains the replies, or if chance may do so. Only for lines of characters.
+/// Finds a change of bytes by an adapter, a driver or a device server, in these damaged replies or in the good replies
+/// of the examination. Returns nothing if no change explains them, or if chance may do so. Only for lines of
+/// characters.
 [[nodiscard]] std::optional<Finding> damage_by_adapter(const Case& one, const All& all);
 
 /// Finds text of a modem, a console or a GPS receiver in the bytes: a word such as "login:" or "NO CARRIER", or, if the
@@ -61,8 +61,8 @@ template <class Is>
 /// Returns options as the settings that give them, "model=23-bit", or "the usual settings".
 [[nodiscard]] std::string said_settings(const Unit& unit, const Options& options);
 
-/// Finds a checksum of another kind than the unit's that is right in all these damaged replies. Returns nothing if
-/// there is none, or if less than 80 % of the replies have the error bad_checksum.
+/// Finds a checksum of another kind than the unit's that explains these damaged replies. Returns nothing if there is
+/// none, if chance may be the reason, or if less than 80 % of the replies have the error bad_checksum.
 [[nodiscard]] std::optional<Finding> other_checksum(const Case& one, const All& all);
 
 }  // namespace absenc::client

@@ -252,8 +252,8 @@ std::vector<Fault> other_faults() {
   return faults;
 }
 
-/// Returns faults of replies that are cut, have bytes before them, contradict their request or refuse it, and faults
-/// that good or late replies show.
+/// Returns faults of replies that are cut, have bytes before them, contradict themselves or refuse their request, and
+/// faults that good or late replies show.
 std::vector<Fault> partial_faults() {
   std::vector<Fault> faults;
   faults.push_back({"extra_bytes", [] {

@@ -44,7 +44,7 @@ TEST(Doctor, AShaftThatFollowsTheHandGivesNoFinding) {
   EXPECT_THAT(ids(judged(turned_by_hand(less_than_a_turn, [](std::size_t) { return 3; }))), IsEmpty());
 }
 
-/// Single replies that are late by no more than this computer's own delay are no evidence against the encoder.
+/// A few replies that are late by no more than this computer's own delay are no evidence against the encoder.
 TEST(Doctor, ALatenessOfThisComputerIsNotTheEncoders) {
   Observations seen = positions([](std::size_t) { return 5; });
   for (Attempted& one : seen.readings) one.limit = 3ms;
@@ -151,8 +151,8 @@ TEST(Doctor, AComputerThatStoodStillExplainsSilence) {
   EXPECT_THAT(ids(judged(seen)), Contains("sometimes_silent"));
 }
 
-/// Judges a cut reply and a lost one on a computer that was late: it may read the rest of a reply too late, but it
-/// does not change bytes.
+/// Judges a cut reply, and one with a changed byte, on a computer that was late: it may read the rest of a reply too
+/// late, but it does not change bytes.
 TEST(Doctor, AComputerThatStoodStillExplainsACutReply) {
   Observations seen = positions([](std::size_t) { return 5; });
   for (Attempted& one : seen.readings) one.exchange.reply.bytes = good_reply();

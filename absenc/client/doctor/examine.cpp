@@ -103,7 +103,7 @@ class Doctor {
     if (is_serial(address_)) count_damage();
   }
 
-  // Reads the driver's error counters again, after the port was closed, and stores how much they have grown.
+  // Reads the facts of the port again, after it was closed, and stores how much the driver's error counters have grown.
   void count_damage() {
     const os::PortFacts now = surroundings_.facts(address_.path);
     if (now.counts && seen_.facts.counts) seen_.damage = now.counts->since(*seen_.facts.counts);
@@ -191,8 +191,8 @@ class Doctor {
     try_each<Item>(other_addresses(address_), addresses_limit);
   }
 
-  // Tries settings until one of them helps, or until the encoder replies with the user's own settings. Returns true
-  // then, so that the search ends; false if nothing helped within `limit`.
+  // Tries settings until one is far better than the user's, or until the user's settings give mostly good readings
+  // again. Returns true then, so that the search ends; false if neither happens within `limit`.
   template <class Item>
   bool try_each(const std::vector<Other>& others, Time limit) {
     Time spent{};
@@ -208,8 +208,8 @@ class Doctor {
     return false;
   }
 
-  // Compares a setting with the user's by reading with both in turns; otherwise an encoder that was silent for a while
-  // would make the later one look better. Returns whether the search is over.
+  // Reads in turns with a setting and with the user's, because an encoder that was silent for a while would otherwise
+  // make the later one look better. Stores the trial if the setting is far better. Returns whether the search is over.
   template <class Item>
   bool compare(const EncoderAddress& other, Trial& trial) {
     std::vector<Attempted> theirs;
@@ -231,7 +231,8 @@ class Doctor {
     return true;
   }
 
-  // Reads once more with the user's settings, because the encoder may have been powered on meanwhile.
+  // Reads twice more with the user's settings, and takes the readings again if both are good: the encoder may have been
+  // powered on meanwhile.
   void ask_once_more() {
     std::vector<Attempted> attempts;
     ask<std::uint8_t>(address_, first_readings, attempts);

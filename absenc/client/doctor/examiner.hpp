@@ -54,15 +54,15 @@ class Examiner {
   /// Listens once more, for 100 ms, so that a reply later than its timeout is recorded.
   void listen_for_late() { runner_.listen(pieces * piece_time); }
 
-  /// Takes up to `count` readings within `limit` and adds them to `into`. Ends early if the first ones bring no good
-  /// reply. Throws the exceptions of the port.
+  /// Takes up to `count` readings, begins none after `limit`, and adds them to `into`. Ends early if the first ones
+  /// bring no good reply. Throws the exceptions of the port.
   void read(const Command& command, std::size_t count, Time limit, std::vector<Attempted>& into) {
     runner_.repeat(
         series(count, limit), [&] { return attempt_reading(command); }, into);
   }
 
-  /// Takes readings as `read` does and adds them to `seen`; except on CAN, with the failed requests that a reading
-  /// repeated, or with what a stream shows beside its good frames.
+  /// Takes readings as `read` does and adds them to `seen`. On a line of characters it also adds the failed requests
+  /// that a reading repeated, and what a stream shows beside its good frames.
   void observe(const Command& command, std::size_t count, Time limit, Observations& seen) {
     if constexpr (std::is_same_v<Item, CanFrame>) {
       read(command, count, limit, seen.readings);

@@ -88,7 +88,7 @@ std::string inversion(const Case& one) {
   std::size_t zeros = 0;
   for (const Attempted& attempt : seen.readings) {
     const auto& reply = attempt.exchange.reply.bytes;
-    // Ignores a frame of zeros that was cut after its first bytes: it may be the beginning of a good frame.
+    // Ignores a cut frame of a few zeros: it may be the beginning of a good frame.
     constexpr std::size_t many = 8;
     if (!reply.empty() && all_are(reply, 0) && (reply.size() >= many || !is_cut(one, attempt))) ++zeros;
   }
@@ -97,7 +97,7 @@ std::string inversion(const Case& one) {
   return {};
 }
 
-// Finds the reason for missing replies if no reading received anything and no other finding explains that.
+// Adds the finding about missing replies if no reading received anything, unless another observation explains that.
 void judge_silence(const Case& one, std::vector<Finding>& findings) {
   const Observations& seen = one.seen;
   if (seen.readings.empty() || count(seen.readings, was_heard) != 0 || seen.never_silent) return;
@@ -120,8 +120,8 @@ void judge_lateness(const Case& one, std::vector<Finding>& findings) {
   const std::size_t tried = seen.readings.size();
   // Skips CAN: encoders there send unsolicited frames, so a frame after an unanswered request is no late reply to it.
   if (seen.late == 0 || one.unit.link == LinkKind::can) return;
-  // Single late replies may be due to this busy computer. The verdict of the examination counts the failed readings
-  // nevertheless.
+  // If late replies are rare, a single one is no finding, and a few are none if this computer was busy. The verdict of
+  // the examination counts the failed readings nevertheless.
   const bool nothing_else = one.good == 0 && count(seen.readings, was_heard) * 10 < tried;
   const bool often = seen.late * 10 >= tried || nothing_else;
   if (!often && (seen.late < 2 || may_be_the_computer(seen, seen.late))) return;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds changes of bytes by adapters, drivers and device servers. Most changes are found because undoing them makes
-// damaged replies good, some by their traces in good replies.
+// Finds changes that adapters, drivers and device servers make to the bytes of replies: by undoing them in damaged
+// replies, or by their traces in good replies.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -29,14 +29,14 @@ constexpr std::uint8_t xoff = 0x13;
 constexpr std::uint8_t lf = 0x0A;
 constexpr std::uint8_t cr = 0x0D;
 
-/// A received reply, with functions that undo a change of its bytes and return whether the reply is then good.
+/// A received reply, with functions that return whether it would be good if a change of its bytes were undone.
 class Mender {
  public:
   // longest reply for which all combinations of 8th bits are tried, in bytes
   static constexpr std::size_t most_bytes = 12;
 
-  /// Takes a damaged reply. With `random`, the functions undo random changes instead, to measure how often chance makes
-  /// the reply good; null: they undo the change.
+  /// Takes a damaged reply. With `random` the functions make random changes, to measure how often chance makes the
+  /// reply good; null: they undo the suspected change.
   Mender(const Case& one, const Attempted& attempt, sim::Random* random)
       : one_(one), request_(attempt.exchange.request.frame()), raw_(attempt.raw), random_(random) {}
 
@@ -74,8 +74,8 @@ class Mender {
     return is_good(rest);
   }
 
-  /// Returns whether the reply is good with up to `most` of these values inserted anywhere, and stores their number in
-  /// `put`. Gives up after 5000 decodings. With `random`, inserts other values.
+  /// Returns whether inserting up to `most` of these values makes the reply good; `put` is then their number. Gives up
+  /// after 5000 decodings. With `random`, inserts random values instead.
   [[nodiscard]] bool with(Bytes values, std::size_t most, std::size_t& put) const {
     ByteList used(values.begin(), values.end());
     if (random_ != nullptr) {
@@ -92,8 +92,9 @@ class Mender {
     return false;
   }
 
-  /// Returns whether the reply is good with the 8th bit of some bytes set, and stores their number; a reply of more
-  /// than 12 bytes need only be complete. With `random`, also flips two random other bits.
+  /// Returns whether setting the 8th bit of some bytes makes the reply good, and stores their number in `set`. A reply
+  /// of more than 12 bytes is only checked for completeness, and `set` is its length. With `random`, first flips up to
+  /// two of the other bits.
   [[nodiscard]] bool with_eighth_bits(std::size_t& set) const {
     ByteList bytes = raw_;
     if (random_ != nullptr && bytes.size() > 2) {
@@ -121,8 +122,8 @@ class Mender {
  private:
   static constexpr std::size_t most_tries = 5000;  // limit of the decodings of one reply
 
-  // Tries to insert `count` of the values at indexes from `from` on, in all ways until one result is good or `tries` is
-  // 0. Returns whether a result is good.
+  // Returns whether inserting `count` of the values at indexes from `from` on makes the bytes good. Each decoding
+  // decrements `tries`; at 0 it gives up.
   [[nodiscard]] bool insert(ByteList& bytes, const ByteList& values, std::size_t from, std::size_t count,
                             std::size_t& tries) const {
     if (count == 0) {
@@ -158,7 +159,8 @@ bool contains(const ByteList& bytes, std::uint8_t value) {
 struct Suspicion {
   FindingKind finding_kind;
   bool (*fits)(const ByteList& raw);  // returns false if this reply, good or not, proves that the change is not made
-  /// Undoes the change, returns whether that makes the reply good, and stores in `count` the number of changed bytes.
+  /// Returns whether undoing the change makes the reply good, and stores in `count` the number of bytes that it
+  /// concerns.
   bool (*undo)(const Mender& mender, std::size_t& count);
   std::size_t most_tried;      // greatest number of replies for which undoing the change is tried
   bool of_each_reply = false;  // whether the change affects each reply, independent of its bytes
@@ -168,7 +170,7 @@ struct Suspicion {
 
 bool fits_any(const ByteList&) { return true; }
 
-// Removes the first `size` bytes of the reply. If they equal the request, they are an echo and no change.
+// Undoes `size` bytes before the reply. Returns false if they are the whole request, because that is an echo.
 template <std::size_t size>
 bool undo_bytes_before(const Mender& mender, std::size_t& count) {
   count = size;
@@ -238,8 +240,7 @@ bool undo_seven_bits(const Mender& mender, std::size_t& count) { return mender.w
 constexpr std::size_t cheap = 24;  // number of replies to try
 constexpr std::size_t dear = 10;   // number of replies to try if each is decoded thousands of times
 
-// Bytes added at any index precede bytes added at one end, because they are more specific. Changes that need many
-// decodings come last.
+// The first change that is found is reported: more specific ones come first, and those that need many decodings last.
 constexpr auto suspicions = std::to_array<Suspicion>({
     {FindingKind::telnet_doubled, fits_telnet, undo_telnet, cheap},
     {FindingKind::newline_translated, fits_newline, undo_newline, cheap},
@@ -267,15 +268,15 @@ std::size_t variety(const All& all) {
   return sum;
 }
 
-// Returns the finding of this change if no reply contradicts it, and undoing it makes at least 8 of 10 of the tried
-// damaged replies good, far more than chance would; otherwise nothing. Lost 8th bits need no comparison with chance if
-// the replies vary enough.
+// Returns the finding of this change, or nothing. Undoing it must make at least 8 of 10 tried damaged replies good, and
+// at least half of them more than random changes do; lost 8th bits need no comparison with random changes if the
+// replies vary enough.
 std::optional<Finding> suspected(const Case& one, const All& all, const Suspicion& suspicion) {
   constexpr std::size_t enough = 4;
   const bool of_nearly_all = all.size() * 10 >= one.seen.readings.size() * 8;
   if (suspicion.of_each_reply && !of_nearly_all) return {};
-  // Longer replies are rarely good without 8th bits. If some are good, the damage has another cause, except in replies
-  // of text.
+  // A longer reply is hardly ever good without its 8th bits: if more than one reading in five is undamaged, the damage
+  // has another cause.
   const auto is_long = [](const Attempted* attempt) { return attempt->raw.size() > Mender::most_bytes; };
   if (suspicion.finding_kind == FindingKind::seven_bits && !of_nearly_all && std::ranges::any_of(all, is_long))
     return {};
@@ -312,8 +313,8 @@ std::optional<Finding> suspected(const Case& one, const All& all, const Suspicio
                   to_hex(Bytes(example->raw).first(std::min<std::size_t>(example->raw.size(), 24)))});
 }
 
-// Finds 8th bits that are lost although replies are good: an XOR checksum can be right without them. Then a byte of the
-// reply jumps between values from 60 to 7F and values below 20, at least twice.
+// Finds lost 8th bits in good replies, because an XOR checksum can be right without them: no byte has its 8th bit set,
+// and at one index the byte jumps at least twice between 0x60 or more and less than 0x20.
 std::optional<Finding> seven_bits_of_good(const Case& one) {
   constexpr std::size_t enough = 40;
   constexpr std::size_t least_wraps = 2;

@@ -96,8 +96,7 @@ std::optional<Finding> two_frames(const Case& one, const All& all) {
   return finding(FindingKind::two_answer, {fmt::format("{}", two), fmt::format("{}", all.size()), shown(**first)});
 }
 
-// Reports that two encoders reply at the same address if a scan found that. Flipping a single bit does not make such
-// replies good.
+// Reports that two encoders reply at the same address, if a scan found that.
 std::optional<Finding> same_address(const Case& one, const All&) {
   if (one.seen.clash.empty()) return {};
   return finding(FindingKind::same_address, {one.seen.clash});
@@ -134,8 +133,7 @@ bool is_contradiction(const Attempted& attempt) {
          attempt.error == Error::unexpected_reply;
 }
 
-// Makes the finding for errors that are detected after a good checksum, so that neither the line nor another protocol
-// is the cause.
+// Returns the finding for those attempts of `all`, at least one, whose error is detected after a good checksum.
 Finding contradiction(const Case& one, const All& all) {
   std::size_t count = 0;
   const Attempted* last = nullptr;
@@ -168,9 +166,8 @@ std::optional<Finding> refusal(const Case&, const All& all) {
                                         last.advice.empty() ? std::string(text.advice) : last.advice});
 }
 
-// Finds a sender at another rate, by characters without a stop bit that the UART counted, or by the bytes of a sender
-// that is several times slower than the receiver: these have long runs of equal bits, with at most one level change
-// each, unlike the bytes of a frame with a checksum.
+// Finds a sender at another rate: by characters without a stop bit that the UART counted, or by received bytes that
+// have at most one level change each, because the sender is several times slower than the receiver.
 std::optional<Finding> stretched(const Case& one, const All& all) {
   if (one.unit.link != LinkKind::half_duplex && one.unit.link != LinkKind::full_duplex) return {};
   if (const auto& damage = one.seen.damage; damage && damage->framing > 0) {
@@ -214,8 +211,8 @@ std::optional<Damage> compare(const ByteList& reply, const ByteList& good) {
   return damage;
 }
 
-// Returns the reply that at least 9 of 10 good replies equal; empty if there is none, as while the shaft moves or if
-// frames have a counter, or if fewer than 8 replies are good.
+// Returns the reply that at least 9 of 10 good replies equal; empty if there is none, or if fewer than 8 replies are
+// good.
 ByteList usual_reply(const std::vector<Attempted>& readings) {
   std::map<ByteList, std::size_t> counts;
   std::size_t good = 0;
@@ -230,7 +227,7 @@ ByteList usual_reply(const std::vector<Attempted>& readings) {
   return is_usual ? usual->first : ByteList{};
 }
 
-// Returns the number of damaged frames that no reading reports: reading a stream continues to its next good frame.
+// Returns the number of damaged frames of a stream that no reading reports: a reading goes on to the next good frame.
 std::size_t unreported(const std::vector<Attempted>& readings) {
   std::size_t count = 0;
   for (const Attempted& one : readings) {
@@ -256,9 +253,9 @@ bool is_cut(const Observations& seen, const Attempted& attempt) {
   });
 }
 
-// Returns the damaged replies to requests that were repeated, without good replies beside other bytes, and without
-// replies in which the encoder refuses a request. Returns none if as many or more requests were not answered: a late
-// reply may collide with the reply to the next request.
+// Returns the damaged replies to requests that were repeated, without refusals and without good replies beside other
+// bytes. Returns none if as many or more of the repeated requests were not answered: a late reply may collide with the
+// reply to the next request.
 All damaged_requests(const Case& one) {
   All all = damaged(one.seen.repeated);
   std::erase_if(all, [&](const Attempted* attempt) { return is_refusal(*attempt) || has_good_part(one, *attempt); });
@@ -329,7 +326,7 @@ Finding finding_of(const Unit& unit, const Options& options, PortKind place, con
     return suited(last.heard ? finding(FindingKind::sometimes_damaged, {"", "", ""})
                              : finding(FindingKind::sometimes_silent, {"", "", ""}));
   }
-  // A single frame can show that another model is connected, like the many frames of an examination.
+  // Even a single frame can show that another model is connected.
   const auto& [request, reply] = last.exchange;
   if (last.error != Error::none && !reply.frame().empty()) {
     const std::string setting = diagnose(unit, options, request.frame(), reply.frame()).setting;
@@ -345,7 +342,7 @@ Finding finding_of(const Unit& unit, const Options& options, PortKind place, con
 void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
   All all = damaged(one.seen.readings);
   const All repeated = damaged_requests(one);
-  // The reading of a stream goes on to the next good frame, so its damaged frames are those between the pauses.
+  // A reading of a stream goes on to the next good frame, so its damaged frames are stored separately.
   const All of_stream = damaged(one.seen.damaged_frames);
   // A reading that repeats its requests is good, although an adapter damages some replies.
   All by_adapter = one.seen.is_stream ? of_stream : all;
@@ -380,7 +377,7 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
     });
     return taken;
   };
-  // Takes a data line that never changes for silence, because a clocked line always delivers bits.
+  // A data line that never changes counts as silence, because a clocked line always delivers bits.
   const All stuck = take([](const Attempted& attempt) { return attempt.error == Error::line_stuck; });
   const auto is_misheard = [&](const Attempted& attempt) {
     return is_refusal(attempt) || (!has_good_part(one, attempt) && answers_another(one, attempt));
@@ -391,8 +388,8 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
                                 refused.back()->detail.empty() ? std::string(text_of(refused.back()->error).description)
                                                                : refused.back()->detail}));
   }
-  // If other replies are damaged as well, replies with these errors may be damage that the checksum missed; if not,
-  // they are reported.
+  // Contradictions are reported only if all remaining damaged replies are such: otherwise they may be damage that the
+  // checksum missed.
   if (!all.empty() && std::ranges::all_of(all, [](const Attempted* attempt) { return is_contradiction(*attempt); })) {
     findings.push_back(contradiction(one, all));
     all.clear();

@@ -94,7 +94,7 @@ void judge_noise(const Walk& walk, std::vector<Finding>& findings) {
 }
 
 // Returns how many counts the position can change in the time `pause`, with a margin of a quarter and the variation at
-// rest. The movement between two readings is at most half of the range, beyond which its direction is ambiguous.
+// rest.
 double reach(const Walk& walk, Time pause, const host::SpeedLimit& limit) {
   const double seconds = std::chrono::duration<double>(pause).count();
   const double counts =
@@ -102,10 +102,9 @@ double reach(const Walk& walk, Time pause, const host::SpeedLimit& limit) {
   return 1.25 * counts * seconds + static_cast<double>(quiet(walk));
 }
 
-// Finds positions that the shaft cannot have reached. `damaged` is the number of readings that failed by damage. A sum
-// of 8 bits misses one of 20 errors of three bits, and each missed error causes two jumps; so up to `damaged` jumps are
-// taken for damage. `computer_late`: a pause may have been this much longer, because this computer read the first of
-// two positions late.
+// Finds positions that the shaft cannot have reached. Up to `damaged` jumps, the number of readings that failed by
+// damage, are no finding: a checksum misses some damage. `computer_late`: a pause may have been this much longer,
+// because this computer read the first of two positions late.
 void judge_jumps(const Walk& walk, const host::SpeedLimit& limit, Time computer_late, std::size_t damaged,
                  std::vector<Finding>& findings) {
   std::size_t jumps = 0;
@@ -121,7 +120,7 @@ void judge_jumps(const Walk& walk, const host::SpeedLimit& limit, Time computer_
   findings.push_back(finding(FindingKind::position_jumps, {fmt::format("{}", jumps), fmt::format("{}", furthest)}));
 }
 
-// Judges a shaft that is turned by hand: its position must move, and its number of turns must change if the position
+// Judges a shaft that is turned by hand: its position must move, and valid numbers of turns must change if the position
 // covers a whole turn.
 void judge_turning(const Walk& walk, std::vector<Finding>& findings) {
   constexpr std::size_t enough = 20;

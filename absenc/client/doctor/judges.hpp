@@ -18,11 +18,9 @@ struct Case {
   std::size_t good = 0;
 };
 
-/// Returns whether this busy computer may be the cause of `some` late or missing replies; it also delays an emulator or
-/// an adapter's driver. It may be if it was at least 1 ms late once, and the replies are a single one of at least 20,
-/// less than one in a thousand, or, if it stood still, less than one in a hundred. It stood still if it was late by as
-/// long as the timeout, or by 50 ms and a quarter of the timeout: os::DelayWatch measures other ways through the kernel
-/// than that of the replies, and each is late for itself.
+/// Returns whether this busy computer may be the cause of `some` late or missing replies. That is so if it was at least
+/// 1 ms late once, and they are one of 20 or more readings, or less than one reading in 1000; or less than one in 100,
+/// if the computer was late by the timeout, or by the greater of 50 ms and a quarter of the timeout.
 [[nodiscard]] inline bool may_be_the_computer(const Observations& seen, std::size_t some) {
   constexpr Time busy = std::chrono::milliseconds(1);
   constexpr Time very_late = std::chrono::milliseconds(50);

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks doctor in virtual time with every unit: in every readable mode healthy, with each alarm and with each
-// condition at the ends of its range, and in a polled and an unsolicited mode with each fault at 1, 10 and 100 %.
-// Doctor must not call an encoder good that reports a defect or whose frames are damaged, and no finding may name
-// another cause. docs/doctor.md has the tables of first findings; `./dev tables` updates them.
+// Checks doctor in virtual time with every unit: healthy, with alarms and extreme conditions, and with faults of the
+// line. Doctor must report every defect that a reply shows and every fault that has an effect, and must name no other
+// cause. docs/doctor.md has the tables of first findings; `./dev tables` updates them.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <gmock/gmock-more-matchers.h>
@@ -34,7 +33,7 @@ constexpr std::size_t readings = 200;
 /// Setting of a position other than 0: with zeros only, the rest of a truncated frame could be a good frame.
 constexpr std::string_view at_no_zero = "singleturn=1383&";
 
-/// The result of an examination, and the virtual encoder that was examined, whose faults can be read afterwards.
+/// The result of an examination, and the virtual encoder that was examined, which counts its injected faults.
 struct Watched {
   std::shared_ptr<VirtualDevice> device;
   Examination examination{};
@@ -147,7 +146,7 @@ std::uint64_t defects_of(const Unit& unit, const Reading& reading) {
 /// Ids of the findings that may result from a state that the encoder reports.
 const Ids of_state{"starting", "alarm", "status", "position_invalid", "contradictory", "counter_stands", "refused"};
 
-/// Returns the findings that may result from this kind of fault; damage appears differently in each frame format.
+/// Returns the ids of the findings that may result from this kind of fault.
 const Ids& causes_of(const Unit& unit, sim::FaultKind kind) {
   using enum sim::FaultKind;
   static const Ids damage{"damaged_bits",   "damaged_bursts", "sometimes_damaged", "always_damaged", "bytes_missing",
@@ -168,8 +167,8 @@ const Ids& causes_of(const Unit& unit, sim::FaultKind kind) {
        {"requests_damaged", "sometimes_silent", "no_answer", "refused", "damaged_bits", "damaged_bursts",
         "sometimes_damaged", "always_damaged", "bytes_missing", "contradictory", "position_jumps"}},
   };
-  // On a clocked line the host always receives bits, so a missing reply appears as damage, or as a level that never
-  // changes.
+  // On a clocked or SPI line the host always receives bits, so a missing reply appears as damage, or as a level that
+  // never changes.
   static const Ids clocked = [] {
     Ids all = damage;
     all.insert({"miso_stuck", "sometimes_silent", "contradictory", "requests_damaged", "other_checksum"});
@@ -199,8 +198,8 @@ class Matrix : public ::testing::TestWithParam<const Unit*> {
   const Unit& unit() const { return *GetParam(); }
 };
 
-/// Returns the settings of `modes_of` with which a virtual encoder can be read; of settings with the same bytes on the
-/// wire only the first.
+/// Returns the settings of `modes_of` with which a virtual encoder can be read; of settings whose reading has the same
+/// bytes on the wire only the first.
 std::vector<std::string> readable_modes(const Unit& unit) {
   std::vector<std::string> modes;
   std::set<std::string> known;
@@ -232,8 +231,8 @@ TEST_P(Matrix, AHealthyEncoderIsGoodAndItsVerdictSaysWhatWasLookedAt) {
   }
 }
 
-/// Returns each alarm that replies can report with the default options, and each condition at both ends of its range
-/// except its normal value, as settings of a virtual encoder.
+/// Returns each alarm that replies can report with the default options, and each condition at each end of its range
+/// that is not its normal value, as settings of a virtual encoder.
 std::vector<std::string> states_of(const Unit& unit) {
   std::vector<std::string> states;
   const Options options = parse_address("sim:" + std::string(unit.id)).options;
@@ -287,8 +286,8 @@ TEST_P(Matrix, WhatTheEncoderReportsIsNeverGood) {
   std::printf("%s: %zu states reported, %zu not\n", std::string(unit().id).c_str(), reported, unreported);
 }
 
-/// Returns one mode in which the encoder is polled and one in which it sends unsolicited, as far as the unit has them:
-/// damage depends on that, not on the content of the frames.
+/// Returns the first readable mode in which the encoder is polled, and the first in which it sends unsolicited, as far
+/// as the unit has them.
 std::vector<std::string> damaged_modes(const Unit& unit) {
   std::vector<std::string> modes;
   std::set<bool> known;
@@ -326,8 +325,8 @@ std::string first_of(const Examination& examination) {
   return first == nullptr ? "good" : std::string(first->id);
 }
 
-/// Returns the table with a row for each unit and a column for each fault. A cell has the first findings at 1, 10 and
-/// 100 %, without one that equals the finding before it.
+/// Returns the table with a row for each unit and a column for each fault. A cell has the first finding at each of 1,
+/// 10 and 100 %, without one that equals the finding before it.
 std::string fault_table() {
   std::string table = "| protocol |";
   for (const std::string_view name : sim::fault_names) table += fmt::format(" {} |", name);
@@ -351,7 +350,7 @@ std::string fault_table() {
 }
 
 /// Returns the table with a row for each state of `states_of` that the default options allow, with the first finding
-/// and its evidence.
+/// and its evidence, or the verdict if there is no finding.
 std::string state_table() {
   std::string table = "| protocol | state of the encoder | first finding | evidence |\n|---|---|---|---|\n";
   for (const Unit* unit : all_units()) {
@@ -380,8 +379,8 @@ std::vector<std::string> lines_of(const std::string& text) {
 /// Returns the first cell of a row, which names the protocol, with the bar before it.
 std::string protocol_of(const std::string& row) { return row.substr(0, row.find('|', 1)); }
 
-/// Replaces the table of the document between the marks `<!-- name -->` and `<!-- end -->`. Expects of the former table
-/// that the rows of each protocol in it are those of `table`; a new protocol may have none.
+/// Replaces the table of the document between the marks `<!-- name -->` and `<!-- end -->`. The test fails if the
+/// former table has other rows for a protocol that it contains.
 void replace_table(std::string& text, const std::string& name, const std::string& table) {
   const std::string begin = fmt::format("<!-- {} -->\n", name);
   const std::size_t from = text.find(begin);

@@ -65,7 +65,7 @@ inline bool has_weak_check(const Pair& pair) {
   return capture::acceptance(*asked.unit, asked.options, one.exchange, 1u << 10) > 0.05;
 }
 
-/// Returns a fault in which an adapter makes `change` of each reply. The shaft swings a little about a position that
+/// Returns a fault in which an adapter applies `change` to each reply. The shaft swings a little about a position that
 /// contains one of these byte values, and with which at least half of the replies change. Units without such a
 /// position, with a weak checksum, or with characters of more than 8 bits, which no serial adapter transfers, cannot
 /// have the fault.
@@ -157,7 +157,7 @@ inline PathFault of_encoder_fault(const std::string& name, const std::string& fa
 inline PathFault of_talker(const std::string& name, const std::string& text, Time period, bool answers, Ids causes) {
   return {name, [=](const Unit& unit, const std::string& mode, const std::string& rate) {
             Pair pair = pair_of(unit, mode, rate);
-            // A unit with a weak checksum takes the first bytes of the text for its reply, so it is skipped.
+            // A unit with a weak checksum may take the first bytes of the text for its reply, so it is skipped.
             if (has_weak_check(pair)) return std::optional<Outcome>();
 
             pair.far.other = [=] {

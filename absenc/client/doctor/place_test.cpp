@@ -41,7 +41,7 @@ TEST(DoctorAdvice, NamesNothingThatThePlaceHasNot) {
 }
 
 /// Advice about late or missing replies names the setting `latency` for serial ports and TCP, but not for virtual
-/// encoders and SPI, which do not have it.
+/// encoders and SPI.
 TEST(DoctorAdvice, ProposesALatencyOnlyWhereItCanBeSet) {
   for (const FindingKind finding_kind :
        {FindingKind::reply_late, FindingKind::sometimes_late, FindingKind::sometimes_silent}) {

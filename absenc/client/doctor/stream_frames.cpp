@@ -43,8 +43,8 @@ std::vector<PausedBytes> pieces_of(const StreamBytes& stream, Time pause) {
   return pieces;
 }
 
-// Returns the share of the pieces that have the most frequent length; 0 if there are too few pieces, or if most are
-// single bytes.
+// Returns the share of the pieces that have the most frequent length; 0 if there are too few pieces, or if that length
+// is one byte.
 double evenness(const std::vector<PausedBytes>& pieces) {
   if (pieces.size() < enough) return 0;
   std::map<std::size_t, std::size_t> lengths;

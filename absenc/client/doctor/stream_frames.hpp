@@ -26,16 +26,15 @@ struct StreamBytes {
   void append(const LineExchange<std::uint8_t>& line);
 };
 
-/// Returns the stream's bytes between two pauses, good or damaged, as replies without a request. The least pause that
-/// ends a frame is estimated from the bytes: it is one with which at least half of the pieces are equally long. Returns
-/// nothing if there is none.
+/// Returns the pieces of the stream between pauses, without the first and the last one, as replies without a request.
+/// The pause that ends a frame is estimated: with it at least half of the pieces are equally long. Returns nothing if
+/// there is no such pause.
 [[nodiscard]] std::vector<Attempted> frames_between_pauses(const Unit& unit, const Options& options,
                                                            const StreamBytes& stream);
 
 /// Inserts a failed reading (Error::timeout) for each frame that did not come, if the frames come at a regular rate and
-/// at least two did not come; a gap before one of the last two readings does not count. `arrivals` are the times at
-/// which the frames of `readings` arrived. Frames that were received but damaged (Attempted::discarded) are not
-/// missing, nor is a late one.
+/// at least two did not come. `arrivals` are the times at which the frames of `readings` arrived. A gap with damaged
+/// frames (Attempted::discarded), or before one of the last two readings, does not count, nor does a late frame.
 void insert_missing_frames(std::vector<Attempted>& readings, const std::vector<Time>& arrivals);
 
 /// Returns the number of good frames that arrived twice, directly one after the other, although the position changes; 0

@@ -36,7 +36,7 @@ struct Other {
 /// encoders that send unsolicited, and for virtual encoders.
 [[nodiscard]] std::vector<Other> other_addresses(const EncoderAddress& address);
 
-/// Returns the search that `identify` runs to find encoders of other protocols. Only for lines of characters.
+/// Returns a search on the port of `address`, as `identify` runs it. Only for lines of characters.
 [[nodiscard]] LineSearch search_of(const EncoderAddress& address);
 
 /// Returns whether at least 80 % of the `tried` readings are good, and significantly more than of the readings with the

@@ -220,7 +220,7 @@ constexpr auto table = std::to_array<Words>({
      "the resolution is another one, or codes are missing", "check the resolution of the model; replace the encoder"},
 });
 
-/// Replaces texts of a finding at a kind of port other than `serial`; "": the text is not replaced.
+/// Texts that replace those of a finding at a kind of port other than `serial`; "": the text is not replaced.
 struct Elsewhere {
   FindingKind finding_kind;
   PortKind place;

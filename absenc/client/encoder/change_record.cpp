@@ -78,8 +78,8 @@ void ChangeRecord::look_at_memory() {
   }
 }
 
-// Finds the old value of the integer field that the command's only required argument sets: after a confirmed write the
-// field that now equals the argument, otherwise the only one. Stores nothing if several fields are possible.
+// Finds the old value of the integer field that the command's only required argument sets: after a confirmed write a
+// field that now equals the argument, otherwise any integer field. Stores nothing unless exactly one field is possible.
 void ChangeRecord::find_old_value(bool good) {
   if (!old_ || arguments_.empty()) return;
   if (std::ranges::count_if(command_.arguments, &Argument::required) != 1) return;

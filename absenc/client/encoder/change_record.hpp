@@ -17,8 +17,8 @@ class Connection;
 
 class ChangeRecord {
  public:
-  /// Reads the value that the command will overwrite, if the command writes a setting that can be read, or the memory,
-  /// and there is a journal; not if the value is `known`. Throws the exceptions of the port.
+  /// If there is a journal, reads the value that the command will overwrite, which must be a setting that can be read,
+  /// or a byte of the memory; not if it is `known`. Throws the exceptions of the port.
   ChangeRecord(Connection& connection, const Command& command, Arguments arguments, std::optional<std::int64_t> known);
 
   /// Appends the change to the journal if there is one and the request of the change was sent. `way` is the encoder's

@@ -113,8 +113,8 @@ class ConnectionOn final : public Connection {
     const Command* command = uri().reads != nullptr ? uri().reads : find_command(unit(), Verb::read);
     if (command == nullptr) throw UsageError(fmt::format("{} has no command that reads the position", unit().id));
     Outcome ended = read_once(*command, take);
-    // Reads again before an unchanged counter is an error: another host may have read 64 frames, so that the counter
-    // wrapped.
+    // Reads again before an unchanged counter is an error: another host may have read so many frames that the counter
+    // wrapped to the same value.
     if (life_counters_.stand()) ended = read_once(*command, take);
     if (!life_counters_.stand()) return ended;
     session_.refuse_last(Error::sequence_mismatch);

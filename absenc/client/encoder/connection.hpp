@@ -37,8 +37,8 @@ class Connection {
   [[nodiscard]] static std::unique_ptr<Connection> open(const EncoderAddress& uri);
   virtual ~Connection() = default;
 
-  /// Opens the port, also again after `disconnect`; counters and statistics then continue. Throws os::Failure,
-  /// UsageError.
+  /// Opens the port, or shares the open port of another connection on the same line; also again after `disconnect`:
+  /// counters and statistics continue. Throws os::Failure, UsageError.
   virtual void connect() = 0;
   virtual void disconnect() = 0;
   [[nodiscard]] virtual bool connected() const = 0;
@@ -49,25 +49,26 @@ class Connection {
   // exceptions of the port, and UsageError if the unit cannot run the command with these options.
 
   /// Reads the position, or runs the command that the address names instead. `take` selects which frame is used if the
-  /// encoder sends positions unsolicited. Throws UsageError if the unit has no command that reads the position.
+  /// encoder sends positions unsolicited. Throws UsageError if there is no such command.
   virtual Outcome read(host::Take take = host::Take::newest) = 0;
   /// Runs a command and returns its outcome. Calls `on_emit` for each result but the last; during the call, `report`
-  /// passes on the fields of that result. If the command succeeds in setting a value by which the encoder is reached,
-  /// the connection uses the new value from then on.
+  /// passes on the fields of that result. If the command succeeds in setting an option of the unit, the connection uses
+  /// the new value from then on.
   virtual Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit = {}) = 0;
-  /// Passes the value that the next changing command overwrites to the journal, so that the journal need not read it.
+  /// Stores the value that the next changing command overwrites, so that the journal need not read it from the encoder.
   void know_before(std::int64_t value) { known_before_ = value; }
   /// Returns the state of the last changing command, also if the command threw an exception.
   [[nodiscard]] virtual const Change& change() const = 0;
   /// Passes the fields of the last outcome, and its reading, to `sink`.
   virtual void report(FieldSink& sink) const = 0;
-  /// After an exception of `run`, passes the values that the encoder was left with to `sink`; most commands have none.
+  /// After an exception of `run`, passes the settings that the command left changed in the encoder to `sink`.
   virtual void report_left(FieldSink& sink) const = 0;
   /// Returns a description of the failure `outcome`, which must be the last outcome.
   [[nodiscard]] virtual Trouble trouble(const Outcome& outcome) const = 0;
-  /// Returns the computed bounds, by the port's clock, of the time at which the encoder latched the last position.
+  /// Returns the computed bounds, by the port's clock, of the time at which the encoder latched the position that
+  /// `read` returned last.
   [[nodiscard]] virtual host::LatchTime latch_time() const = 0;
-  /// Returns whether the last position was compared with another one and the fastest shaft can have moved between them.
+  /// Returns whether the position that `read` returned last agrees with the one before it (host::FirstReading).
   [[nodiscard]] virtual bool confirmed() const = 0;
   [[nodiscard]] virtual const host::Counters& counters() const = 0;
   [[nodiscard]] virtual const host::Latencies& latencies() const = 0;
@@ -84,7 +85,7 @@ class Connection {
   /// is never silent. Empty: none.
   virtual void end_when(std::function<bool()> over) = 0;
 
-  /// Uses these options from now on without opening the port again, after a change of the encoder's own settings.
+  /// Uses these options from the next command on, without opening the port again.
   virtual void set_options(const Options& options);
 
   [[nodiscard]] const EncoderAddress& uri() const { return uri_; }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that life counters are compared from one live reading to the next, for each clocked unit that has them, with
-// an encoder that repeats frames.
+// Checks that a life counter that stands still from one reading to the next is an error, for each clocked unit that has
+// one, with an encoder that repeats frames.
 #include "absenc/client/encoder/connection.hpp"
 
 #include <gtest/gtest.h>

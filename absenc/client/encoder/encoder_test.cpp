@@ -130,8 +130,8 @@ TEST(ClientEncoder, GoesOnAtTheRateThatItWasSetTo) {
   }
 }
 
-// Aborts a change of the rate at different points. Afterwards the encoder must be read if, and only if, it has the rate
-// of its connection's address.
+// Aborts a change of the rate at different points. Afterwards the encoder must be readable if, and only if, it has the
+// rate of its connection's address.
 TEST(ClientEncoder, IsReadAtItsRateWhenAChangeOfItsRateWasBrokenOff) {
   unsigned whole = 0;
   unsigned there = 0;

@@ -132,8 +132,8 @@ class Busy {
 
   [[nodiscard]] bool is_unsolicited() const { return host::sends_unsolicited(*address_.unit, address_.options); }
 
-  /// Reads `count` times with a pause before each reading, calls `use(reading, bounds)` for each good reading, and
-  /// returns the number of good readings.
+  /// Reads `count` times with a pause before each reading, calls `use(reading, bounds)` for each valid position, and
+  /// returns their number.
   template <class Use>
   std::size_t read(std::size_t count, Time pause, const Use& use) {
     std::size_t good = 0;

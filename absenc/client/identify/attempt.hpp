@@ -134,8 +134,8 @@ class Attempt {
     }
   }
 
-  /// Reads the identity of a found encoder with these options and returns it. Runs the unit's commands for the
-  /// identity, if they change nothing and need no argument.
+  /// Runs, with these options, the unit's commands of the verb `info` that change nothing and need no argument, and
+  /// returns the identity that the encoder reports.
   Introduction introduce(const Options& options) {
     Introduction all;
     IdentitySink identity;
@@ -165,7 +165,8 @@ class Attempt {
     bool understood = false;  // whether a good reply has arrived in this conversation
   };
 
-  // Checks each step of the conversation and extends its timeout if replies were late; throws TryEnd to abort it.
+  // Checks a step of the conversation: throws TryEnd to abort the conversation, and extends the step's timeout if
+  // replies were late.
   void look_at(Step<Item>& step, Time now, Talk& talk) {
     using Kind = typename Step<Item>::Kind;
     if (step.kind == Kind::pulse && step.wire == ExtraWire::clear) throw TryEnd::harmful;
@@ -198,8 +199,8 @@ class Attempt {
     std::string detail{};  // the unit's explanation of `error`
   };
 
-  // Runs one conversation and stores its exchanges in `exchanges`. If a reply was late, which can happen only on lines
-  // of characters, repeats the conversation with a longer timeout, until the timeout is extended by `most_allowance`.
+  // Runs one conversation and stores its exchanges in `exchanges`. On a line of characters it repeats the conversation
+  // with a longer timeout while replies are late, until the timeout is extended by `most_allowance`.
   Conversed converse(const Command& command, const Options& options, std::vector<ObservedExchange>& exchanges,
                      FieldSink* sink = nullptr) {
     for (;;) {
@@ -262,7 +263,8 @@ class Attempt {
     exchanges.insert(exchanges.end(), talk.exchanges.begin(), talk.exchanges.end());
   }
 
-  // Returns whether an encoder sent the reply: a clocked host also receives bits, all equal, from an undriven line.
+  // Returns false if all bits of a reply on a clocked or SPI line are equal: a host receives such bits from an undriven
+  // line too.
   [[nodiscard]] bool is_alive(const ObservedExchange& exchange) const {
     if (unit_.link != LinkKind::clocked && unit_.link != LinkKind::spi) return true;
     const auto& bytes = exchange.reply.bytes;
@@ -272,8 +274,8 @@ class Attempt {
     return !same_as(0x00) && !same_as(0xFF);
   }
 
-  // Scans the line; returns, for each encoder that replies, `settings` with its address. Empty if the unit has no scan,
-  // or one that changes or disturbs encoders, or if no encoder replies.
+  // Scans the line; returns, for each address at which one encoder replies, `settings` with this address. Empty if the
+  // unit has no scan, or one that changes or disturbs encoders, or if the scan finds none.
   std::vector<SettingTexts> scanned(const SettingTexts& settings, const Options& options) {
     std::vector<SettingTexts> targets;
     const Command* command = find_command(unit_, Verb::scan);

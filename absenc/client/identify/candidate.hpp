@@ -26,15 +26,15 @@ struct Candidate {
 /// Returns whether the candidate's evidence is too strong for chance.
 [[nodiscard]] bool is_found(const Candidate& candidate);
 
-/// Returns whether `one` explains the frames as well as `best`, so that the frames cannot distinguish them.
+/// Returns whether the evidence for `one` is about as strong as that for `best`, or stronger, and both are proven or
+/// neither is.
 [[nodiscard]] bool is_as_likely(const Candidate& one, const Candidate& best);
 
 /// Sorts the candidates, the likeliest first. `searches` is the number of searches that could each find a candidate by
 /// chance; it weakens the evidence of each candidate.
 void rank(std::vector<Candidate>& candidates, std::size_t searches);
 
-/// Returns a short list of settings ("name=value") that give these options, empty for the defaults: with a model unless
-/// that takes more settings, or all options if fewer settings would yield another model.
+/// Returns a short list of settings ("name=value") that give these options; empty for the defaults.
 [[nodiscard]] std::vector<std::string> settings_for(const Unit& unit, const Options& options);
 
 /// Returns the settings that follow ? in the candidate's address: those of the options and of the port.

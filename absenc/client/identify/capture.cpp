@@ -88,8 +88,8 @@ std::vector<Options> bases(const Unit& unit) {
   return all;
 }
 
-// Searches again with the options that were found: the division into frames depends on the options, and the options
-// depend on the frames.
+// Searches with the options of `bases`, and again with options that were found, because the division into frames
+// depends on the options.
 std::vector<Hypothesis> search_unit(const Unit& unit, const CaptureChoices& choices, std::size_t& searches,
                                     Sentences& damages) {
   std::vector<Hypothesis> best;

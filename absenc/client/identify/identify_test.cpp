@@ -130,8 +130,7 @@ TEST_P(Found, TheFirstCandidateIsTheEncoderOfEachModelAndNumber) {
   const Unit& unit = *GetParam();
   if (unit.link == LinkKind::clocked || unit.link == LinkKind::spi) GTEST_SKIP() << "an SPI controller is needed";
   std::vector<std::string> settings{""};
-  // Tests addresses and models only of encoders that are polled: unsolicited frames have no address, and finding them
-  // takes seconds.
+  // Tests addresses and models only of encoders that send nothing unsolicited, because others take seconds to find.
   if (!host::sends_unsolicited(unit, parse_address(fmt::format("sim:{}", unit.id)).options)) {
     settings.push_back(at_last_number(unit));
     for (const Model& model : unit.models) settings.push_back(fmt::format("model={}", model.name));

@@ -136,8 +136,8 @@ class Search {
     return alike;
   }
 
-  // Drops candidates whose options the reported identity contradicts, if it agrees with those of another candidate;
-  // otherwise adds a note if the identity contradicts the likeliest candidate.
+  // Stores the reported identities. Drops candidates whose options the identity contradicts, if it agrees with those of
+  // another candidate; otherwise adds a note if the identity contradicts the likeliest candidate.
   void judge(const std::vector<std::size_t>& alike, const std::vector<Introduction>& said) {
     const bool known = std::any_of(said.begin(), said.end(), [](const Introduction& one) { return one.agrees; });
     for (std::size_t i = 0; i < alike.size(); ++i) {

@@ -40,8 +40,8 @@ enum class Medium : std::uint8_t { serial, tcp, spi, can };
 [[nodiscard]] std::vector<SettingTexts> settings_to_try(const Unit& unit, const SettingTexts& settings,
                                                         const Command& read);
 
-/// Returns the requests, with default options and arguments, that would change an encoder of another unit, of those
-/// that may be on the line at `rate`. Requests of `unit` must not begin with one of them.
+/// Returns requests, with default options and arguments, that would change an encoder of another unit that may be on
+/// the line at `rate`. Requests of `unit` must not begin with one of them.
 [[nodiscard]] std::vector<std::vector<std::uint8_t>> harmful_to_others(const Unit& unit, std::uint32_t rate,
                                                                        const LineSearch& search);
 

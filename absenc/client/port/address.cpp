@@ -40,8 +40,8 @@ void set_pulse_wire(os::PulseWire& wire, std::string_view what, const OptionText
   }
 }
 
-// Returns the command, which can be run again and again. Throws UsageError if there is none, or if it changes the
-// encoder or takes arguments.
+// Returns the command of this name. Throws UsageError if there is none, or if it changes the encoder or takes
+// arguments.
 const Command& reading_command(const Unit& unit, std::string_view name) {
   const Command& command = require_command(unit, name);
   if (command.changes_encoder || !command.arguments.empty()) {
@@ -134,8 +134,8 @@ void check_speed_limit(const EncoderAddress& uri) {
   }
 }
 
-// Applies all settings: link parameters to the link, the others as options of the unit. The rate is an option if the
-// unit's conversations depend on it.
+// Applies all settings: the unit's options, among them the rate if the unit has an option for it, and then the link
+// parameters.
 void take_settings(EncoderAddress& uri, std::span<const OptionText> settings) {
   std::vector<OptionText> options;
   std::vector<OptionText> of_link;

@@ -26,7 +26,7 @@ inline constexpr std::array<std::string_view, 6> port_kind_names{"serial", "tcp"
 /// Name of the setting for the rate of an asynchronous line.
 inline constexpr std::string_view rate_setting = "baud";
 
-/// A setting of an address besides the options of the protocol: of the port, the line, the drive or a virtual encoder.
+/// A setting of an address that is no option of the protocol.
 struct LinkParameter {
   std::string_view name;
   std::string_view value;
@@ -82,8 +82,7 @@ inline constexpr std::array<LinkParameter, 30> link_parameters{{
 }};
 
 /// Returns the option that a setting of this name sets; null if there is none. If a unit on a serial line has an option
-/// for the rate, because its silences are measured in characters, `rate_setting` sets that option, whatever the
-/// option's name is.
+/// for the rate, `rate_setting` sets that option, whatever the option's name is.
 [[nodiscard]] const Option* find_option(const Unit& unit, std::string_view name);
 
 /// Returns the link parameter of this name; null if there is none.

@@ -17,7 +17,7 @@ struct Diagnosis {
   std::string setting{};  // setting "NAME=VALUE" with which the reply would be good; "": there is none
 };
 
-/// Explains a bad reply: an echo, a good reply with other bytes around it, or a good reply of another model or option.
+/// Explains a bad reply: an echo, a good reply after or before other bytes, or a good reply of another model or option.
 [[nodiscard]] Diagnosis diagnose(const Unit& unit, const Options& options, const Frame& request, const Frame& reply);
 
 /// The frame of an exchange that an error is about.

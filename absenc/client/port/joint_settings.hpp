@@ -13,8 +13,7 @@ namespace absenc::client {
 /// value.
 bool set_joint(Joint& joint, const OptionText& setting);
 
-/// Checks that settings fit the kind of encoder. Throws UsageError for a setting of linear encoders given to a rotary
-/// one, or the reverse, because it would be ignored.
+/// Throws UsageError if a setting of linear encoders is given to a rotary one, or the reverse.
 void check_joint(std::span<const OptionText> settings, bool is_linear);
 
 }  // namespace absenc::client

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The journal of changes: one line for each changing command that the command line, a program, Python or serve sent to
-// an encoder other than sim:. Fields are separated by tabs: time (UTC), encoder, what, old value, new value, result,
-// command that restores the old value. An unknown value is empty.
+// The journal of changes: one line for each changing command that was sent to an encoder other than sim:, except by
+// conformance tests. Fields are separated by tabs: time (UTC), encoder, what, old value, new value, result, command
+// that restores the old value. An unknown value is empty.
 #pragma once
 
 #include <cstddef>

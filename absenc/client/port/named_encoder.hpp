@@ -26,9 +26,8 @@ struct NamedEncoder {
 class NamedEncoders {
  public:
   /// Takes the content of a file and checks the names of settings, protocols and buses in all sections but
-  /// [serve.NAME], used or not, so that a misspelt name is reported. Other values are checked when they are used,
-  /// because they may depend on more than the file: the model behind `?`, a motion file. Throws UsageError, which names
-  /// the position in the file.
+  /// [serve.NAME]. Other values are checked when they are used. Throws UsageError, which names the position in the
+  /// file.
   explicit NamedEncoders(SettingsFile file);
   NamedEncoders(NamedEncoders&&) noexcept = default;
   NamedEncoders& operator=(NamedEncoders&&) noexcept = default;
@@ -37,7 +36,8 @@ class NamedEncoders {
   ~NamedEncoders() = default;
 
   [[nodiscard]] const SettingsFile& file() const { return file_; }
-  /// Returns the encoder of this name. If there is none, throws UsageError, which suggests a similar name or lists all.
+  /// Returns the encoder of this name. Throws UsageError if its rate_hz is wrong, or if there is none; then the text
+  /// suggests a similar name or lists all.
   [[nodiscard]] NamedEncoder require(std::string_view name) const;
 
  private:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs the commands of a unit on a port and stores each exchange as it was on the line, for readings, doctor, conform
-// and identify. All times are those of the port's clock.
+// Runs the commands of a unit on a port and keeps the last exchange as it was on the line. All times are those of the
+// port's clock.
 #pragma once
 
 #include <algorithm>
@@ -48,8 +48,8 @@ struct Attempted {
   [[nodiscard]] bool is_late() const { return answered && limit > Time{} && answered_after > limit; }
 };
 
-/// Returns a request and its reply, without echo, as an exchange. `clocks` is the number of clocks of a clocked link.
-/// Takes the last of several received CAN frames for the reply, and the earlier ones for frames of other nodes.
+/// Returns a request and its reply as an exchange. `clocks` is the number of clocks of a clocked link. Of several CAN
+/// frames in `reply` the last one counts as the reply.
 template <class Item>
 [[nodiscard]] capture::ObservedExchange observed_exchange(std::span<const Item> request, std::span<const Item> reply,
                                                           std::size_t clocks) {
@@ -252,7 +252,8 @@ class Runner {
   void listen(Time time) {
     listen(time, [](std::span<const Item>) { return true; });
   }
-  /// Waits until nothing has been received for `quiet`, at most for `longest`. Returns whether anything was received.
+  /// Waits until nothing has been received for `quiet`; begins no new wait once `longest` has passed. Returns whether
+  /// anything was received.
   bool settle(Time quiet, Time longest) {
     bool heard = false;
     const Time end = port_.now() + longest;
@@ -270,8 +271,8 @@ class Runner {
 
   /// Returns the last exchange, with what was received since its request.
   [[nodiscard]] const LineExchange<Item>& last() const { return port_.last; }
-  /// Returns the number of late replies: replies that began after their time limit, or that answered an earlier request
-  /// than the last one.
+  /// Returns the number of late replies that arrived before the next request, or the number that sessions dropped,
+  /// whichever is greater.
   [[nodiscard]] std::uint64_t late() const {
     const std::uint64_t seen = late_ + (lateness_of(last()) != Time{} ? 1 : 0);
     return std::max(seen, late_before_ + session_->counters().late);
@@ -279,7 +280,7 @@ class Runner {
   /// Returns the longest time between a request and its late reply; 0 if no reply was late.
   [[nodiscard]] Time lateness() const { return std::max({lateness_, lateness_of(last()), session_->lateness()}); }
 
-  /// Returns the number of good replies with further bytes after them that no request explains; 0 on a CAN bus.
+  /// Returns how often a command ended well and further bytes arrived before the next request; 0 on a CAN bus.
   [[nodiscard]] std::uint64_t overfull() const { return overfull_; }
   /// Returns the greatest number of further items that followed a good reply.
   [[nodiscard]] std::size_t most_behind() const { return most_behind_; }
@@ -403,7 +404,8 @@ class Runner {
   std::uint64_t late_ = 0;         // number of late replies before the last exchange
   std::uint64_t late_before_ = 0;  // number of late replies that earlier sessions discarded
   Time lateness_{};
-  std::size_t answered_ = 0;  // number of items that were received when the last exchange ended well; 0 if it failed
+  std::size_t answered_ = 0;  // number of items received when the last command ended well; 0: it failed, or a new
+                              // request followed
   std::uint64_t overfull_ = 0;
   std::size_t most_behind_ = 0;
   std::vector<Item> overfull_example_;

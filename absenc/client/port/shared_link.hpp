@@ -42,14 +42,14 @@ class Turns {
   std::uint64_t current_ = 0;
 };
 
-/// An open port that several encoders share: only one conversation uses the line at a time. Each encoder has its own
-/// session and statistics, and a silent encoder delays the others only by its own conversation.
+/// An open port, which several encoders can share: only one conversation uses the line at a time.
 class SharedLink {
  public:
   explicit SharedLink(Link link) : link_(std::move(link)) {}
 
   /// Runs `work`, one conversation, with exclusive use of the line, and returns its result. If `work` throws an
-  /// os::Failure, the port counts as lost: it is closed, and every other user gets the os::Failure at its next turn.
+  /// os::Failure, the port counts as lost: it is closed, and every later call throws an os::Failure of the same kind
+  /// and text.
   template <class Work>
   auto take_turn(const Work& work) {
     const std::lock_guard turn(turns_);

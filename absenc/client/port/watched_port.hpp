@@ -57,7 +57,7 @@ struct LineExchange {
 /// Thrown when a wait reaches the port's deadline.
 struct OutOfTime {};
 
-/// A port around another port, which stores the exchanges and ends waits. After Ctrl-C, a conversation that must
+/// A port around another port, which stores the last exchange and ends waits. After Ctrl-C, a conversation that must
 /// restore the encoder first may finish.
 template <class Item>
 class WatchedPort final : public Port<Item> {

@@ -91,8 +91,7 @@ void Receiver::receive() {
   }
 }
 
-// Receives bytes, and reports silence. The port checks for bytes once more before it reports the timeout, because a
-// thread that did not run has not seen silence.
+// Receives bytes, and reports silence.
 void Receiver::receive_from_port() {
   Time quiet_at = link_.bytes->now() + quiet();
   for (;;) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Receives the bytes of a port in a thread of its own, because the caller may be slow. Never sends anything.
+// Receives the bytes of a port or of standard input in a thread of its own, because the caller may be slow. Never sends
+// anything.
 #pragma once
 
 #include <condition_variable>

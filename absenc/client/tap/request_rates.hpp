@@ -56,8 +56,8 @@ class RequestRates final : public capture::AnnotationSink {
     kind.errors += annotation.error != Error::none ? 1 : 0;
   }
 
-  /// Returns the kinds of requests, the most frequent first. A request that no command sends is a kind of its own as
-  /// long as there are fewer than `most_kinds`.
+  /// Returns the kinds of requests, at most `most_kinds`, the most frequent first. The requests of a command are one
+  /// kind; requests that no command sends are one kind if their bytes are equal.
   [[nodiscard]] std::vector<RequestKind> kinds() const {
     std::vector<RequestKind> all = kinds_;
     std::stable_sort(all.begin(), all.end(),

@@ -32,7 +32,7 @@ inline constexpr LineSettings line_settings{.rate = 1'000'000, .spi_mode = 3};
 inline constexpr Time shortest_period = 100ns;
 /// Longest fixed BiSS timeout: after the last clock, SLO stays low for 12.5 to 40 us.
 inline constexpr Time timeout_maximum = 40us;
-/// Number of pulses of MA in the start sequence after power on, with 40 us before and after them.
+/// Number of pulses of MA in the start sequence after power on.
 inline constexpr unsigned start_pulses = 2;
 
 /// BiSS timeout, the time for which SLO stays low after the last clock: fixed, or one and a half periods of MA
@@ -45,8 +45,8 @@ class Timeout {
   /// Returns the timeout that adapts to the clock: one and a half periods of MA.
   static constexpr Timeout adaptive() { return Timeout(is_adaptive); }
 
-  /// Returns the pause that the host leaves between frames with this period of MA. An encoder that measures the period
-  /// may be late by three of its own samples (iC-PVS, table 50); 1 us is more than that for all known encoders.
+  /// Returns the pause that the host leaves between frames with this period of MA. An adaptive timeout gets 1 us more,
+  /// because an encoder may end it up to three of its own samples late (iC-PVS, table 50).
   [[nodiscard]] constexpr Time of_host(Time period) const {
     if (code_ == is_adaptive) return Time(static_cast<std::int32_t>(one_and_a_half(period) + 1000));
     return Time(static_cast<std::int32_t>((code_ != 0 ? code_ : 80u) * 500u));
@@ -99,7 +99,7 @@ struct Format {
   /// Virtual encoder: whether SLO stays idle after power on until the start sequence.
   bool start_sequence = false;
   Timeout timeout{};  ///< BiSS timeout: how long the encoder holds SLO low after the last clock.
-  /// The longest time that the encoder needs for a position, up to 1 ms; it decides the number of clocks.
+  /// The longest time that the encoder needs for a position, up to 1 ms.
   Time latency = 10us;
   // ---- Members for the virtual encoder
   StopBit stop_bit = StopBit::next;  ///< The bit P that the virtual encoder sends after each register.
@@ -121,16 +121,15 @@ struct Format {
 /// Returns the number of bits after the CDS bit: word, life counter and CRC.
 [[nodiscard]] constexpr unsigned data_bits(const Format& format) { return format.word.bits() + format.check.bits(); }
 
-/// Returns the number of ACK bits of an encoder whose position is ready `latency` after the second rising edge of MA.
-/// Both arguments are at most a second, so that a small processor divides 32 bits.
+/// Returns the number of ACK bits, at least 1, of an encoder whose position is ready `latency` after the second rising
+/// edge of MA. Both arguments are at most a second, because the result is computed in 32 bits.
 [[nodiscard]] constexpr unsigned ack_bits(Time latency, Time period) {
   const auto needed = static_cast<std::uint32_t>(latency.count());
   const auto clock = static_cast<std::uint32_t>(period.count());
   return std::max(1u, static_cast<unsigned>((needed + clock - 1) / clock));
 }
 
-/// Returns the number of clocks that the slaves between an encoder and the host add to the ACK: each passes the start
-/// bit on one clock later. 0 for all formats but ChainFormat, which has a function of its own.
+/// Returns 0: no slave delays the start bit on its way to the host. ChainFormat has a function of its own.
 template <class AnyFormat>
 [[nodiscard]] constexpr unsigned relay_bits(const AnyFormat&) {
   return 0;
@@ -236,9 +235,8 @@ struct Head {
   [[nodiscard]] constexpr unsigned delay_bits() const { return idle > idle_bits ? idle - idle_bits : 0; }
 };
 
-// Finds the data, `size` bits, of a frame whose start bit and CDS are in the first machine word, as they nearly always
-// are. Returns false for any other frame, for samples of fewer bytes than a machine word, and for a frame that is cut
-// or has a CDS that is not accepted.
+// Finds the data, `size` bits, of a frame whose start bit and CDS are in the first machine word. Returns false if the
+// samples have no such frame, or too few bytes, or a CDS that is not accepted.
 [[nodiscard, gnu::always_inline]] constexpr bool find_data(const BitView& samples, std::size_t size, Cds cds,
                                                            Head& head) {
   if (samples.bytes.size() < sizeof(std::size_t)) return false;
@@ -320,7 +318,7 @@ constexpr bool append_head(const ReplyType& head, std::size_t size, BitBuffer<Ca
 /// argument. The array `values` of the word is empty if the format has no fields with Meaning::value.
 template <const Format& format>
 [[nodiscard]] constexpr Result<ReplyTo<format>> decode(const BitView& samples, Cds cds = Cds::zero) {
-  // A small processor has no use for two ways: its numbers of 64 bits are no faster, and its memory is small.
+  // Processors without registers of 64 bits have one way only, to save memory.
   if constexpr (BitView::register_bits >= 64 && detail::known_channel<format>.is_possible()) {
     return detail::decode_compiled<typename Known<format>::Word>(
         detail::known_channel<format>, samples, cds, [&] { return detail::decode_known<format>(samples, cds); });
@@ -338,7 +336,7 @@ constexpr bool encode(const Format& format, const Reply& reply, BitBuffer<Capaci
   return true;
 }
 
-/// Sets word and life counter of a virtual encoder's reply from the state of its shaft and its alarms.
+/// Sets the word of a virtual encoder's reply from the state of its shaft and its alarms, and sets its life counter.
 constexpr void show(const Format& format, const ShaftState& state, std::uint32_t alarms, std::uint8_t life_counter,
                     Reply& reply) {
   reply.word = word_of(format.word, state, alarms);
@@ -386,7 +384,7 @@ template <class ReplyType>
   return first < samples.size && !samples[first] && samples.end_of_run(first) == samples.size;
 }
 
-/// Returns whether the samples ended before the frame did, as when encoder or line need longer than expected.
+/// Returns whether the samples end within the frame, as when encoder or line need longer than expected.
 [[nodiscard]] constexpr bool ended_early(Error error, BitView samples) {
   if (error == Error::truncated) return true;
   return error == Error::bad_framing && samples.end_of_run(samples.end_of_run(0)) == samples.size;

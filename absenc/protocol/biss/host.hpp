@@ -11,8 +11,8 @@
 
 namespace absenc::biss {
 
-/// Longest extra delay of encoder and line, beyond the expected delay, with which a host still finds the frame, if
-/// ProtocolOf::most_clocks suffice.
+/// Longest extra delay of encoder and line, beyond the expected delay, for which a host that searches the frame clocks,
+/// if ProtocolOf::most_clocks suffice.
 inline constexpr Time longest_delay = 80us;
 
 /// A conversation that reads positions and meanwhile carries control frames; dialog.hpp defines it.
@@ -72,12 +72,12 @@ template <const Format& format>
   return format.check.life_counter ? reply.life_counter : -1;
 }
 
-/// Confirms frames that begin later than expected, by accepting a delay that occurs twice in a row. A single late frame
-/// may have lost its start bit: its CRC is then still valid once in 64 times.
+/// Confirms frames that begin later than expected: two in a row must have about the same delay. A single late frame may
+/// have lost its start bit, which a CRC of 6 bits misses once in 64 times.
 class LateFrames {
  public:
-  /// Returns whether the frame before had the same delay. `head`: clocks between the idle samples and the start bit. A
-  /// difference of one clock is accepted, because the delay may be near a whole clock.
+  /// Returns whether the delay differs by at most one clock from that of the call before. `head`: clocks between the
+  /// idle samples and the start bit.
   [[nodiscard]] bool is_again(unsigned head) {
     const unsigned before = std::exchange(seen_, head);
     return before != 0 && head + 1 - before <= 2;
@@ -87,9 +87,8 @@ class LateFrames {
   unsigned seen_ = 0;
 };
 
-/// Decides when to send the start sequence. After power on, an encoder may stay idle until it receives two pulses of
-/// MA, with 40 us before and after them. A host does not know when the encoder was powered on, so it sends the pulses
-/// once, if its first frame is stuck.
+/// Decides when to send the start sequence: once, if the first frame is stuck. After power on, an encoder may stay idle
+/// until it receives two pulses of MA.
 class StartSequence {
  public:
   /// Processes the error of a frame and returns whether the start sequence must be sent next.
@@ -113,8 +112,7 @@ template <class F, bool finds>
 class PositionReader : public author::ClockedHostOf<ProtocolOf<F>> {
   using Base = author::ClockedHostOf<ProtocolOf<F>>;
   using P = ProtocolOf<F>;
-  // greatest number of frames that are read after a first late one, until the delays of two in a row differ by at most
-  // one clock
+  // greatest number of times that a conversation reads a frame again because the frame was late or cut
   static constexpr unsigned most_late = 4;
 
  public:

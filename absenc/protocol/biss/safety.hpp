@@ -114,7 +114,8 @@ template <std::size_t size>
   return difference <= 2;
 }
 
-/// Returns whether the life counter of a frame follows that of the frame before; true if either is unknown.
+/// Returns whether the life counter of a frame follows `previous_life_counter`; true if that is unknown or the check
+/// has no life counter.
 [[nodiscard]] constexpr bool life_counter_follows(const SafetyFormat& format, unsigned life_counter) {
   if (!format.spw.check.life_counter || format.previous_life_counter < 0) return true;
   return life_counter == (static_cast<unsigned>(format.previous_life_counter + 1) & low_mask(life_counter_bits));

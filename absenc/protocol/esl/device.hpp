@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual QS35 encoder (ESL): answers as the document states, computes both channels independently, and records the
-// rules that its host breaks. Several such encoders can share a line.
+// A virtual QS35 encoder (ESL) with two channels. It records the rules that its host breaks. Several such encoders can
+// share a line.
 #pragma once
 
 #include <array>
@@ -12,7 +12,8 @@
 
 namespace absenc::esl {
 
-/// Indexes of `conditions`: the virtual encoder's environment, and faults inside one channel, whose CRC stays right.
+/// Indexes of `conditions`: the virtual encoder's environment, and faults inside it. The CRCs of a faulty channel stay
+/// right.
 namespace condition {
 /// Index of a condition in `conditions`.
 enum Index : std::size_t {
@@ -163,9 +164,9 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     }
     return false;
   }
-  // The parity bit is ignored here, because a wrong one may be reported in the reply. Within the first bytes of a
-  // request for another address, and after a wrong CRC, the search for a request continues: "Else, it will continue to
-  // search for the next available logic of low state."
+  // A wrong parity bit is ignored here, because the reply may report it. After a wrong CRC, and within the first bytes
+  // of a request for another address, the search for a request continues: "Else, it will continue to search for the
+  // next available logic of low state."
   [[nodiscard]] std::size_t request_size(Bytes begin) const override {
     const std::optional<DataId> id = data_id(begin[0]);
     if (!id) return 0;
@@ -206,8 +207,9 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   void refuse(Time at, ByteBuffer<64>& reply) override {
     report_bad_request(refused_field_, status::stop_error, at, reply);
   }
-  // Returns whether the encoder replies to a request with a wrong parity or stop bit: Table 5 demands a report in SF,
-  // the overview demands silence. A memory reply has no SF.
+  // Returns whether the encoder replies to a request with a wrong parity or stop bit, as `bad_request` chooses: Table 5
+  // demands a report in SF, the overview demands silence. A memory request gets no such reply, because memory replies
+  // have no SF.
   [[nodiscard]] bool is_reported(std::uint8_t field) const {
     return profile_.bad_request == BadRequest::report && !is_memory_access(*data_id(field));
   }
@@ -346,8 +348,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     counters_.fill(0);
   }
   void stopped(Time) override {
-    // Alarms about turns survive power off, and resets by IDs C and D end them; all other latched alarms end with the
-    // power.
+    // Alarms about turns survive power off; other latched alarms end with the power.
     latches_ &= alarms::turns_wrong;
     turns_cleared_ = false;
     forget_rows();

@@ -93,8 +93,8 @@ struct Shown {
 };
 
 namespace detail {
-// Returns the member of the reply that `part` carries in this channel; nothing if the reply's data ID does not have the
-// part.
+// Returns the member of the reply that `part` carries in this channel; nothing without a reply, or if this channel of
+// the reply does not have the part.
 template <Channel channel, unsigned part, auto member>
 constexpr auto in(const Shown& all) {
   const Reply reply = all.reply.value_or(Reply{});

@@ -319,7 +319,8 @@ struct ChannelReply {
   std::uint8_t encoder_id = 0;  ///< Encoder id (ENID).
 };
 
-/// A decoded reply; members that its data ID does not carry are 0. Without channel 2 `two.status` is status::channel_2.
+/// A reply. In a decoded one, members that its data ID does not carry are 0, and `two.status` is status::channel_2 if
+/// there is no channel 2.
 struct Reply {
   DataId id = DataId::position;                   ///< Data ID of the reply.
   std::uint8_t encoder_address = 0;               ///< Address of the encoder on the line (EAD), 0 to 7.

@@ -12,8 +12,8 @@ using author::Procedure;
 
 namespace {
 
-// Greatest number of times that a read or a page select is sent until a reply is valid. Resets and ID 8 are never
-// repeated, and writes only after a busy reply.
+// Greatest number of times that a request is sent until its reply is valid, where a procedure repeats it. Resets, ID 8
+// and writes of a byte are not repeated after an invalid reply.
 constexpr unsigned attempts = 3;
 constexpr unsigned safe_attempts = 6;
 
@@ -89,7 +89,7 @@ std::string_view what_remains(Sentence& words, unsigned remaining) {
   return words.view();
 }
 
-// Returns what the reset with the data ID `id` failed to do, as the reply `now` shows; empty if it did everything.
+// Returns how the reply `now` contradicts a reset with the data ID `id`; empty if it shows what the reset demands.
 Explanation failed_part(Sentence& words, DataId id, const Reply& before, const Reply& now) {
   const unsigned remaining = now.one.alarms | now.two.alarms;
   if (id == DataId::clear_alarms) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of ESL: procedures with several exchanges, which README.md describes. The template author::ReadPosition,
-// with the Protocol of reply.hpp, reads a single position.
+// Host side of ESL: its procedures. The template author::ReadPosition, with the Protocol of reply.hpp, reads a single
+// position.
 #pragma once
 
 #include <array>
@@ -14,7 +14,8 @@ namespace absenc::esl {
 /// The conversation through which ESL procedures send requests.
 using Dialog = author::DialogOf<Protocol>;
 
-/// Result of an ESL procedure: the values of its fields, its reading, and the data to which they refer.
+/// Result of an ESL procedure other than `scan`: the values of its fields, its reading, and the data to which they
+/// refer.
 struct ProcedureResult : Shown {
   Reading reading{};                     ///< Reading of the last reply; empty in procedures that read no position.
   ByteBuffer<last_address + 1> bytes{};  ///< memory bytes to which the field `data` refers
@@ -29,15 +30,14 @@ author::Procedure read_encoder_id(Dialog& dialog, ProcedureResult& found);
 struct SafePositionResult : ProcedureResult {
   static constexpr bool streams = true;  ///< Marks that the procedure delivers results without end.
 };
-/// Reads safe positions without end. It sends IDs 1 and 2 until the monitor trusts the line, which takes two exchanges
-/// without errors, then one request for each position, so that the sequence counter is compared from reading to
-/// reading. Errors: that of the failed check, or of an exchange.
+/// Reads safe positions until an error. The first one takes two exchanges, with IDs 1 and 2 (see SafetyMonitor); each
+/// further one takes one exchange. Errors: that of the failed check, or of an exchange.
 author::Procedure read_safely(Dialog& dialog, SafePositionResult& found);
 
 /// Resets by the data ID B (single-turn zero here), C (alarms) or D (turns): makes sure that the shaft stands still,
 /// sends eight requests, and verifies the result. Errors: invalid_argument (the encoder is not ready or, for B, its
-/// position is invalid), not_still (the shaft turns), cross_check_failed (the encoder did not execute it, which the
-/// detail describes, or D moved the zero), or that of an exchange.
+/// position is invalid), not_still (the shaft turns), cross_check_failed (position, turns or alarms are not as the
+/// reset demands; the detail says which), or that of an exchange.
 author::Procedure reset(Dialog& dialog, ProcedureResult& found, DataId id);
 
 // ---- Memory (Tables 9 to 11, Figures 14 and 15); only with one encoder on the line
@@ -46,9 +46,9 @@ author::Procedure reset(Dialog& dialog, ProcedureResult& found, DataId id);
 /// busy, or that of an exchange.
 author::Procedure read_memory(Dialog& dialog, ProcedureResult& found, Arguments arguments);
 
-/// Reads a byte of the memory, writes it if it differs, waits, and reads it back. Arguments: address, value, page,
-/// force. Errors: invalid_argument (not in Table 11, or protected and without force), busy, cross_check_failed (another
-/// value was read back), or that of an exchange.
+/// Reads a byte of the memory and, if it differs from `value`, writes it and reads it back. Arguments: address, value,
+/// page, force. Errors: invalid_argument (not in Table 11, or protected and without force), busy, cross_check_failed
+/// (another value was read back), or that of an exchange.
 author::Procedure write_memory(Dialog& dialog, ProcedureResult& found, Arguments arguments);
 
 /// Selects a memory page and leaves it selected, for users who send memory requests themselves. Arguments: page.
@@ -72,10 +72,8 @@ struct Nodes {
   /// For each address, the check that a complete but invalid reply failed; `passed`: there was no such reply.
   std::array<Check, most_encoders> troubles{};
 };
-/// Finds the encoders on the line: sends ID 5 to every address, never ID 8, because eight consecutive IDs 8 are
-/// "dynamic addressing". A reply that is damaged every time comes from two encoders with one address, or from a bad
-/// line. A complete reply comes from one encoder, even if it refuses or differs from the drawing. Errors: timeout (no
-/// address answers), or that of a line that is never silent.
+/// Finds the encoders on the line by an ID 5 to every address. It never sends ID 8, because eight consecutive IDs 8 are
+/// "dynamic addressing". Errors: timeout (no address answers), or that of a line that is never silent.
 author::Procedure scan(Dialog& dialog, Nodes& found);
 
 }  // namespace absenc::esl

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Options of ESL: one for each property that the QS35 document leaves open; those for the address, the turns, the line
-// and the checks of an encoder; and one for the reaction of a virtual encoder to faulty requests. README.md states
-// how hardware shows each alternative that the document leaves open; probe.hpp finds these in captured frames.
+// Options of ESL: the properties that the QS35 document leaves open, address, turns and line of an encoder, how
+// strictly it is checked, and the reaction of a virtual encoder to faulty requests. README.md states how hardware shows
+// the open properties; probe.hpp finds most of them in captured frames.
 #pragma once
 
 #include <algorithm>
@@ -40,13 +40,11 @@ enum class ParityScope : std::uint8_t { command, all };
 enum class FieldOrder : std::uint8_t { document, tformat };
 /// Number of bits of the redundant position in replies to ID 6.
 enum class Id6Redundant : std::uint8_t { bits_16, bits_9 };
-/// Reaction of the virtual encoder to a request with a wrong parity or stop bit: it reports the error in SF, or is
-/// silent.
+/// Reaction of the virtual encoder to a wrong parity or stop bit in a request that is no memory access: it reports the
+/// error in SF, or is silent.
 enum class BadRequest : std::uint8_t { report, silent };
 
-/// Properties of an encoder: those that the document leaves open, its address, whether it counts turns and shares the
-/// line, how strictly it is checked, and how a virtual one reacts to faulty requests. Its members are the options of
-/// ESL.
+/// Properties of an encoder, and how its replies are checked. The members are the options of ESL.
 struct Profile {
   CrcBitOrder crc_bit_order = CrcBitOrder::lsb;       ///< Order in which bits enter the CRCs.
   CrcByteOrder crc16_byte_order = CrcByteOrder::low;  ///< Order of the bytes of 16-bit CRCs.
@@ -93,8 +91,7 @@ constexpr auto open_option(std::string_view name, std::string_view meaning, cons
 }
 }  // namespace detail
 
-/// Table of the options of ESL. Those for properties that the document leaves open come first (test
-/// EslProbe.OpenOptionsAreFirst).
+/// Table of the options of ESL. Those that `probe` finds come first (test EslProbe.OpenOptionsAreFirst).
 inline constexpr auto options = author::OptionsOf{
     detail::open_option<&Profile::crc_bit_order>(
         "crc_bit_order", "which bit of a byte enters the CRC first; word: 16-bit words, MSB first",

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Decodes ESL requests and replies: all checks in their order, with their texts; the reading of a valid reply; and
-// Protocol, the functions that the engine and virtual encoders of absenc/protocol/author require.
+// Protocol, the functions that the templates of absenc/protocol/author require.
 #pragma once
 
 #include <array>
@@ -115,8 +115,7 @@ inline constexpr std::array<Error, check_texts.size()> check_errors = [] {
 
 namespace detail {
 // Returns the content of a request with this data ID, or of the request that a reply echoes, without checking it.
-// Address and value of a memory access are set only if there are at least three bytes. `busy` is set if the busy bit
-// is.
+// Memory address, value and `busy` (the busy bit) are taken from memory accesses of at least three bytes.
 constexpr Request split_request(const Profile& profile, DataId id, Bytes bytes, bool& busy) {
   Request request{id, address_of(bytes[0])};
   if (!is_memory_access(id) || bytes.size() < 3) return request;
@@ -133,8 +132,8 @@ constexpr Request split_request(const Profile& profile, DataId id, Bytes bytes, 
   return checksum8(profile.crc_bit_order, bytes.first(bytes.size() - 1)) == bytes.back();
 }
 
-/// Decodes a request. Errors: wrong_length; unsupported (an ID that Table 3 does not list); bad_checksum (parity or
-/// CRC); out_of_range (the busy bit is set, which is 0 in requests).
+/// Decodes a request. Errors: wrong_length; unsupported (unknown ID); bad_checksum (parity or CRC); out_of_range (the
+/// busy bit is set, which is 0 in requests).
 [[nodiscard]] constexpr Result<Request> decode_request(const Profile& profile, Bytes bytes) {
   if (bytes.empty()) return Error::wrong_length;
   const std::optional<DataId> id = data_id(bytes[0]);
@@ -277,17 +276,16 @@ constexpr Check check_reply_to(const Profile& profile, const Request& request, s
 }
 }  // namespace detail
 
-/// Checks a reply in this order: length, checksums, echo, refusal, fixed bits and range, cross checks. Returns the
-/// first check that failed. `reply` gets the content once the checksums are right; use it only if the result is
-/// `passed`. A busy memory reply passes.
+/// Checks length, checksums and content of a reply, in this order. Returns the first check that failed. `reply` gets
+/// the content once the checksums are right; use it only if the result is `passed`. A busy memory reply passes.
 [[nodiscard]] constexpr Check check_reply(const Profile& profile, const Request& request, Bytes bytes, Reply& reply) {
   const std::uint8_t asked = control_field(profile, request.encoder_address, request.id);
   return detail::check_reply_to(profile, request, asked, bytes, reply);
 }
 
 /// Returns the refusal (parity_reported or stop_reported) in a reply to a request whose parity bit alone is wrong;
-/// `passed` if the request or the reply is something else. If `request` is empty, its bytes are taken from the reply,
-/// which echoes them.
+/// `passed` if the request or the reply is something else. If `request` is empty, the control field of the reply gives
+/// it.
 [[nodiscard]] constexpr Check check_refusal(const Profile& profile, Bytes request, Bytes bytes) {
   if (bytes.empty()) return Check::passed;
   const Bytes sent = request.empty() ? bytes : request;
@@ -311,8 +309,8 @@ constexpr Check check_reply_to(const Profile& profile, const Request& request, s
 }
 
 namespace detail {
-// Returns the alarms of a channel that make the position within the turn unsafe. LED and Lissajous errors share an
-// alarm bit, which SF distinguishes: a Lissajous error is a non-safety error (Table 5), and the position stays valid.
+// Returns the alarms of a channel that make the position within the turn unsafe. If SF reports a non-safety error
+// alone, led_or_lissajous_error is a Lissajous error (Table 5), which does not make it unsafe.
 constexpr unsigned unsafe_alarms(const ChannelReply& channel) {
   constexpr std::uint8_t errors = status::safety_error | status::non_safety_error;
   const bool lissajous = (channel.status & errors) == status::non_safety_error;
@@ -321,8 +319,8 @@ constexpr unsigned unsafe_alarms(const ChannelReply& channel) {
 }  // namespace detail
 
 /// Returns the position and turns of a valid reply to `id` with their validity; in status and alarms the flags of
-/// channel 2 are above those of channel 1. Replies to IDs 4, 5 and 6 carry no alarms, so SF alone decides, which does
-/// not show whether a non-safety error concerns the turns. This is not a safe position (safety.hpp).
+/// channel 2 are above those of channel 1. Without alarms in the reply SF alone decides; it does not show whether a
+/// non-safety error concerns the turns. This is not a safe position (safety.hpp).
 [[nodiscard]] constexpr Reading to_reading(DataId id, const Reply& reply) {
   const Layout& layout = layout_of(id);
   const std::uint8_t second = layout.has_two() ? reply.two.status : reply.one.status;
@@ -372,8 +370,7 @@ inline constexpr author::InARow reset_row{
     .interval_rule = "reset sent too fast: much less than 40 us after the one before",
 };
 
-/// The functions of ESL that the engine and virtual encoders of absenc/protocol/author require (dialog.hpp,
-/// device.hpp).
+/// The functions of ESL that the templates of absenc/protocol/author require.
 struct Protocol {
   /// Format of the encoder: the values of its options.
   using Format = Profile;
@@ -387,9 +384,8 @@ struct Protocol {
   static constexpr author::HostTimes host_times(const Profile&) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit, .pause = request_pause};
   }
-  /// Returns how a request is sent: once, unless the procedure demands repetitions. After a page change without a valid
-  /// reply, or while an EEPROM byte is being fetched, the encoder is busy, and no repetition or next request may be
-  /// sent.
+  /// Returns how a request is sent. After a memory request without a good reply the encoder may be busy, so a
+  /// repetition, or the next request, must wait.
   static constexpr author::Manner manner(const Profile&, const Request& request) {
     const Time busy = selects_page(request) ? page_time : is_memory_access(request.id) ? eeprom_read_pause : Time{};
     return {.pause = busy, .hold = busy};

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Campaign of faults against safe positions: stuck values and bits of one channel, one or two wrong bits, swapped or
-// missing bytes, replays, delays and noise. The number of accepted positions is printed for each kind; README.md states
-// which faults the checks cannot detect, and why.
+// Tests of SafetyMonitor and a campaign of faults against it, which prints how many positions were accepted. README.md
+// states which faults the checks cannot detect.
 #include "absenc/protocol/esl/safety.hpp"
 
 #include <gtest/gtest.h>
@@ -146,7 +145,8 @@ TEST(EslSafety, OtherRepliesAreCountedAsTheProfileSays) {
 
 // ---- The campaign
 
-// Returns the number of accepted replies while one channel is wrong, and raises `off` to their largest error.
+// Returns the number of accepted replies while the condition `index` has the value `value`; raises `off` to their
+// largest error if that is greater.
 unsigned accepted_with(condition::Index index, std::int64_t value, unsigned exchanges, std::int64_t& off) {
   Monitored pair;
   pair.trust();
@@ -199,8 +199,7 @@ TEST(EslSafetyCampaign, StuckCountersAndPositionsOfOneChannel) {
   EXPECT_EQ(accepted, 0u);
 }
 
-// The bytes of a reply to ID 1 without its CRCs, and the bits of each byte that the checks detect when they are stuck
-// before the CRC is computed.
+// A byte of a reply to ID 1, and which of its bits the checks detect if they are stuck before the CRC is computed.
 struct StuckField {
   const char* name;
   std::size_t byte;

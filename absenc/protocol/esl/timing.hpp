@@ -68,8 +68,7 @@ inline constexpr std::uint32_t registers = 0;       ///< registers have no limit
 }  // namespace life
 
 /// Areas of the memory as in Table 11, in the order of pages. The document gives the user area 512 bytes but one page
-/// of 127, so pages 1 to 3 are assumed. Users must not write later pages: they hold tables, tests, calibration or lock
-/// bits.
+/// of 127, so pages 1 to 3 are assumed. Writing later pages can spoil the encoder.
 inline constexpr std::array<MemoryArea, 12> memory_map = [] {
   const auto area = [](unsigned page, unsigned first, unsigned last, std::uint32_t life, std::string_view meaning) {
     return MemoryArea{.page = page,

@@ -112,8 +112,7 @@ void put_nodes(FieldSink& sink, const Profile&, const Nodes& nodes) {
     if (reply) sink.put_reading(to_reading(*reply));
   }
 }
-// Writes an explanation of the failed last exchange of `host`, and a profile under which its reply would be valid, if
-// `find_change` finds one.
+// Writes an explanation of the failed last exchange of `host`, and the changes of options that `find_change` finds.
 void tell(Sentence& words, const HostOf<Protocol>& host) {
   const Profile& profile = host.format();
   const Bytes request = host.exchange().sent;

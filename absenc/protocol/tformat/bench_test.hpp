@@ -54,8 +54,7 @@ struct Bench : author::testing::UnitBench<17> {
   VirtualEncoder& encoder = static_cast<VirtualEncoder&>(device);
 };
 
-/// Sends `times` requests of a reset, each 40 us after the end of the exchange before it, and checks that each is
-/// answered.
+/// Sends `times` requests of a reset, with a pause of 40 us after each exchange, and checks that each is answered.
 inline void reset(Bench& bench, DataId id, unsigned times = reset_requests) {
   for (unsigned i = 0; i < times; ++i) {
     EXPECT_EQ(bench.raw({control_field(id)}).size(), 6u);

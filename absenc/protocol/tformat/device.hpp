@@ -63,7 +63,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     if (is_on(now)) update(now);
     if (off_) watch_battery();
   }
-  /// Returns the reply to a request with data ID 3 at `now`: position, turns, encoder id, status and alarms.
+  /// Returns position, turns, encoder id, status and alarms at `now` as a reply to data ID 3. Does not update the
+  /// alarms that change with time: each request does.
   [[nodiscard]] Reply everything(Time now) const {
     const std::uint64_t mask = low_mask(format_.singleturn_bits);
     const std::uint8_t almc = alarms_now();
@@ -147,9 +148,9 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     reply.append(encode_reply(*made).view());
     return Answer::sent;
   }
-  // Returns whether a flawed request gets a refusal when the line is silent. An undamaged byte without the sync code
-  // gets none: the encoder searches for a request at the next byte (8.1). The length of a refused frame is unknown, so
-  // a missing start bit ends the frame (8.2, 9.2).
+  // Returns whether a flawed request gets a refusal when the line is silent, and stores the communication alarms of the
+  // refusal. Undamaged bytes that begin without the sync code get none: the encoder searches for a request at the next
+  // byte (8.1). The length of a refused frame is unknown, so a missing start bit ends the frame (8.2, 9.2).
   bool is_refused(Flaw flaw, Bytes heard) override {
     if (flaw == Flaw::unknown && !has_sync_code(heard[0])) return false;
     if (flaw == Flaw::unknown && heard[0] != control_field(heard[0] >> 3)) refused_status_ |= status::parity_error;

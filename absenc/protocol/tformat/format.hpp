@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Constants of Tamagawa's T-format (RS-485, 2.5 Mbps, 8N1, LSB first): times, memory map, status and alarm bits; and
-// Format, the differences between models. Paragraph numbers are those of the TS5700N8500 specification.
+// Format, the options of an encoder. Paragraph numbers are those of the TS5700N8500 specification.
 #pragma once
 
 #include <array>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames of the T-format: encoding, decoding, all checks, and the reading of a valid reply. Paragraph numbers are those
-// of the TS5700N8500 specification; README.md draws the frames.
+// Frames of the T-format: encoding, decoding, checks, and the reading of a valid reply. Paragraph numbers are those of
+// the TS5700N8500 specification; README.md draws the frames.
 #pragma once
 
 #include <algorithm>
@@ -32,8 +32,8 @@ using RequestBytes = ByteBuffer<request_capacity>;
 /// Bytes of a reply.
 using ReplyBytes = ByteBuffer<reply_capacity>;
 
-/// Parameters of the CRC (6.3.4). Its polynomial X^8 + 1 makes it the exclusive OR of all bytes. `checksum` computes it
-/// by `reduce`, whose order is free, because a loop would wait for each byte in turn.
+/// Parameters of the CRC (6.3.4). Its polynomial X^8 + 1 makes it the exclusive OR of all bytes, so `checksum` needs
+/// neither a table nor an order of the bytes.
 inline constexpr CrcParameters crc_parameters{8, 0x01, 0, true, true, 0};
 
 /// Returns the CRC of `bytes` (6.3.4); 0 if `bytes` is a frame with its right CRC.
@@ -68,7 +68,7 @@ inline constexpr author::InARow reset_row{
     .number_rule = "reset not sent ten times in a row",
     .interval_rule = "reset sent too fast: less than 40 us after the one before",
 };
-/// Returns whether ten requests with this data ID reset something: alarms, the zero, or the turns.
+/// Returns whether ten requests with this data ID clear the alarms, set the zero, or reset the turns.
 [[nodiscard]] constexpr bool is_reset(DataId id) {
   return id == DataId::clear_alarms || id == DataId::zero || id == DataId::reset_multiturn;
 }
@@ -99,7 +99,8 @@ inline constexpr std::array<Lengths, 16> lengths = [] {
   return detail::lengths[static_cast<std::size_t>(id)].reply;
 }
 
-/// Returns the data ID in a control field, whatever its parity; nothing for an ID that Table 1 does not list.
+/// Returns the data ID in a control field, whose sync code and parity are not checked; nothing for an ID that Table 1
+/// does not list.
 [[nodiscard]] constexpr std::optional<DataId> data_id(std::uint8_t field) {
   const auto id = static_cast<DataId>((field >> 3) & 0xF);
   return request_length(id) != 0 ? std::optional(id) : std::nullopt;
@@ -117,8 +118,8 @@ struct Request {
   return request.id == DataId::write_memory && request.address == page_select_address;
 }
 
-/// A decoded reply; members that its data ID does not carry are 0. The order of the members makes the struct four words
-/// long.
+/// A reply. `decode_reply` leaves the members 0 that the data ID does not carry. The order of the members makes the
+/// struct four words long.
 struct Reply {
   DataId id = DataId::everything;  ///< Data ID of the reply.
   std::uint8_t status = 0;         ///< Status field (SF): bits of the namespace `status`.
@@ -261,9 +262,9 @@ constexpr Error check_reply(const Format& format, const Request& request, const 
 
 }  // namespace detail
 
-/// Checks a reply in this order: length, checksum, control field, refusal, fixed bits and ENID, range, cross checks; of
-/// a memory access, address and value follow the control field. Returns the decoded reply, or the error of the first
-/// failed check. A busy memory reply is no error: its member `busy` is set.
+/// Checks and decodes a reply to `request`. Errors: wrong_length; bad_checksum; request_rejected; unexpected_reply
+/// (control field, memory address or value, fixed bits, ENID); out_of_range; cross_check_failed (SF against ALMC). The
+/// valid reply of a busy memory is no error: its member `busy` is set.
 [[nodiscard]] constexpr Result<Reply> decode_reply(const Format& format, const Request& request, Bytes bytes) {
   Error error = detail::check_frame(request, bytes);
   if (error != Error::none) return error;
@@ -273,12 +274,13 @@ constexpr Error check_reply(const Format& format, const Request& request, const 
   return reply;
 }
 
-/// Returns the bits of ALMC that are no alarms of this encoder: those of the battery, if none is connected.
+/// Returns the bits of ALMC that are no faults of this encoder: the battery's alarms if no battery is connected,
+/// otherwise none.
 [[nodiscard]] constexpr unsigned expected_alarms(const Format& format) {
   return format.battery ? 0u : alarms::without_battery;
 }
 
-/// Alarms (bits of ALMC) that are known from replies since power on. SF alone does not report every alarm.
+/// Alarms (bits of ALMC) whose state is known from earlier replies. SF alone does not report every alarm.
 struct KnownAlarms {
   std::uint8_t reported = 0;  ///< Mask of the alarms whose state is known.
   std::uint8_t raised = 0;    ///< Alarms that are known to be raised.
@@ -287,11 +289,10 @@ struct KnownAlarms {
   [[nodiscard]] static constexpr KnownAlarms all(std::uint8_t almc) { return {0xFF, almc}; }
 };
 
-/// Returns the known alarms after a reply that carries SF and no ALMC. SF has a bit for counting_error, and one bit for
-/// over_heat, multiturn_error, battery_error and battery_alarm together. If that one bit is 0, all four are clear. If
-/// it is 1 and none of the four is known to be raised, one or more of them are raised, but it is unknown which.
-/// `sf_reported`: bits of SF that this encoder reports. Without a battery the one bit is always 1, and the known state
-/// of the four stays.
+/// Returns the known alarms after a reply that carries SF and no ALMC. SF has one bit for counting_error, and one for
+/// the four alarms of `shown_in_status`. If that one bit is 0, all four are clear. If it is 1 and none of the four was
+/// known to be raised, all four become unknown. `sf_reported`: valid bits of SF; without the bit `alarm` the known
+/// state of the four stays.
 [[nodiscard]] constexpr KnownAlarms known_after(KnownAlarms before, std::uint8_t sf, unsigned sf_reported) {
   constexpr unsigned together = alarms::shown_in_status;
   unsigned reported = before.reported | alarms::counting_error;
@@ -310,8 +311,8 @@ struct KnownAlarms {
 
 namespace detail {
 
-// Sets which parts of the position and turns in `reading` are valid. Unless there is a counting error, the top 5 bits
-// of the position are valid, and further bits only if full_absolute_status is known to be clear.
+// Sets the alarms in `reading`, and which parts of its position and turns are valid. With a counting error no bit of
+// the position is valid, otherwise the top 5 bits, and further bits only if full_absolute_status is known to be clear.
 constexpr void judge(Reading& reading, const KnownAlarms& known) {
   reading.alarms = known.raised;
   reading.alarms_reported = known.reported;
@@ -329,8 +330,8 @@ constexpr void judge(Reading& reading, const KnownAlarms& known) {
   reading.multiturn_known = reading.multiturn_bits == 0 || all_reported || lost;
 }
 
-// Returns SF as a reading shows it. Without a battery, the bit `alarm` is always set in SF, so it is computed from
-// ALMC, or cleared in a reply without ALMC.
+// Returns SF as a reading shows it. Without a battery the encoder always sets the bit `alarm`: here it is computed from
+// the other alarms of ALMC, or cleared in a reply without ALMC.
 [[nodiscard]] constexpr std::uint8_t status_of(const Format& format, bool has_alarms, const Reply& reply) {
   if (format.battery) return reply.status;
   const bool other = has_alarms && (reply.alarms & alarms::shown_in_status & ~expected_alarms(format)) != 0;
@@ -342,9 +343,9 @@ constexpr unsigned reported_status(const Format& format, bool has_alarms) {
 
 }  // namespace detail
 
-/// Returns the position and turns of a valid reply to `id`, with their validity. ALMC decides the validity, and only a
-/// reply to ID 3 carries ALMC. `known_alarms`: the last ALMC since power on; without it, SF of a reply to another ID
-/// can show parts as invalid, but mostly not as valid, because it hides over_speed and full_absolute_status.
+/// Returns the position and turns of a valid reply to `id`, with their validity. A reply to ID 3 carries ALMC, so that
+/// its validity is known. For other replies `known_alarms` is the last ALMC since power on; without it at most the top
+/// 5 bits of the position are valid, and the turns are not.
 [[nodiscard]] constexpr Reading to_reading(const Format& format, DataId id, const Reply& reply,
                                            std::optional<std::uint8_t> known_alarms = std::nullopt) {
   const bool has_all = id == DataId::everything;
@@ -381,8 +382,7 @@ constexpr unsigned reported_status(const Format& format, bool has_alarms) {
 
 // ---- Protocol, for the engine and the virtual encoder
 
-/// The functions of the T-format that the engines and virtual encoders of absenc/protocol/author require (dialog.hpp,
-/// device.hpp).
+/// The types, times and functions of the T-format that templates of absenc/protocol/author use.
 struct Protocol {
   /// Format of the encoder: the values of its options.
   using Format = tformat::Format;

@@ -71,8 +71,8 @@ Explanation failed_part(DataId id, const Reply& now, unsigned bits) {
   return {};
 }
 
-// Resets by data ID 7 (latched alarms), 8 (single-turn zero here) or C (turns and latched alarms): makes sure that the
-// shaft stands still, sends ten requests, and verifies the result.
+// Resets by data ID 7 (latched alarms), 8 (single-turn zero here) or C (turns and latched alarms): checks that the
+// shaft stands still and that no alarm forbids the reset, sends ten requests, and verifies the result.
 Procedure reset(Dialog& dialog, ProcedureResult& found, DataId id) {
   const Reply first = co_await dialog.ask({DataId::everything});
   const Reply second = co_await dialog.ask({DataId::everything}).after(between_looks);
@@ -99,8 +99,8 @@ constexpr Time busy_pause = 1ms;              // pause between two requests to a
 
 constexpr std::uint8_t byte(std::int64_t argument) { return static_cast<std::uint8_t>(argument); }
 
-// Repeats a memory request until the encoder executes it, and returns the reply or the error. A page change must not be
-// disturbed by requests that ask whether it is over.
+// Repeats a memory request until the encoder executes it, and returns the reply; or the error, `busy` after
+// `busy_limit`. The longer pause after a page select keeps the page change undisturbed.
 Part<Result<Reply>> when_ready(Dialog& dialog, const Request& request) {
   return until_ready<Protocol>(dialog, request,
                                {.limit = busy_limit,
@@ -389,8 +389,8 @@ constexpr std::size_t size_of_reply(const Format&, Bytes begin) {
   const std::optional<DataId> of = data_id(begin[0]);
   return of && begin[0] == control_field(*of) ? reply_length(*of) : 0;
 }
-/// Returns the request that a reply shows: its control field has the data ID; address and value of a memory access are
-/// those of the reply. Error: unexpected_reply (unknown ID).
+/// Returns the request that a reply shows: its control field has the data ID; a memory access whose reply has the right
+/// length also has the reply's address and value. Error: unexpected_reply (unknown ID).
 constexpr Result<Request> guess_request(const Format&, Bytes reply) {
   const std::optional<DataId> asked = data_id(reply[0]);
   if (!asked) return Error::unexpected_reply;

@@ -82,7 +82,7 @@ std::string speed_text(const Snapshot& snapshot) {
 }
 
 // Returns speed and unit as "12.0 +/- 0.3 rpm", with `sign` before the uncertainty ("+/-" for the screen, which only
-// draws ASCII); "- rpm" if the speed is unknown.
+// draws ASCII); "- rpm" without a live speed.
 std::string measured_speed_text(const Snapshot& snapshot, std::string_view sign) {
   const Sample& last = snapshot.last;
   const std::string value =
@@ -90,8 +90,8 @@ std::string measured_speed_text(const Snapshot& snapshot, std::string_view sign)
   return fmt::format("{} {}", value, speed_unit(last.reading));
 }
 
-// Returns whether an alarm of the encoder is raised. If not all alarms are reported, a status flag that has an advice
-// counts as an alarm.
+// Returns whether an alarm of the encoder is raised. Unless the reading reports all alarms, a raised status flag that
+// has an advice counts as an alarm.
 bool has_alarm(const MonitoredEncoder& shown) {
   const Unit& unit = *shown.watch->uri().unit;
   const Reading& reading = shown.snapshot.last.reading;

@@ -34,7 +34,7 @@ struct Snapshot {
   bool has_reading = false;
   Sample last{};          // last reading; valid if `has_reading`, and the present position only in the state `live`
   std::string message{};  // reason of the states failing, lost, opening and ended
-  std::string notice{};   // message to the user: the result of the last command, or that the command still runs
+  std::string notice{};   // message to the user, such as the result of the last command
   host::Counters counters{};
   std::uint64_t readings = 0;
   std::uint64_t losses = 0;
@@ -43,19 +43,18 @@ struct Snapshot {
   Time median{};               // median of the latencies from request to reply
   Time percentile_99{};
   Time longest{};
-  // Last readings, failures, losses and returns of the port, restarts of the position, and results of commands as text,
-  // the newest last; empty unless details were asked for.
+  // Lines of text about the last readings and events, the newest last; empty unless details were asked for.
   std::vector<std::string> trace{};
   std::vector<BadExchangeText> bad{};  // last bad exchanges, the newest first; empty unless details were asked for
-  // "name value" of each field of the last reply that the line of the reading lacks; empty unless details were asked
+  // "name value" of the fields of a recent reply that the line of the reading lacks; empty unless details were asked
   // for.
   std::vector<std::string> fields{};
 };
 
 [[nodiscard]] std::string_view name_of(Snapshot::State state);
 
-/// Watches one encoder in a thread of its own: ports block, which keeps their code simple, and 64 threads cost less
-/// processor time per reading than one (docs/benchmarks.md). The screen gets copies, so that it never waits for a line.
+/// Watches one encoder in a thread of its own, because its port blocks. The screen gets copies, so that it never waits
+/// for a line.
 class Watch {
  public:
   /// `name` is the encoder's name or address as the user wrote it. The first reading is `offset` after the start;
@@ -64,8 +63,7 @@ class Watch {
   Watch(const Watch&) = delete;
   Watch& operator=(const Watch&) = delete;
 
-  /// Ends the thread and waits for it: for the present reading, or for a running command, which is not aborted. The
-  /// destructor does the same.
+  /// Ends the thread and waits for its end; a running command is not aborted. The destructor does the same.
   void stop();
 
   [[nodiscard]] Snapshot snapshot(bool details) const;
