@@ -15,7 +15,7 @@ enum class Role : std::uint8_t {
   // Roles in a reading
   position,  ///< field: counts of the position, or the place of a linear encoder
   turns,     ///< field: turns
-  /// Field: another form of the position, valid only while the position is: in degrees, or of a second channel.
+  /// Field: valid only while the position is, as the position in degrees or that of a second channel.
   of_position,
   sequence,      ///< field: counts the replies, so that a repeated reply can be detected
   life_counter,  ///< field: counts the frames, 0 to 63 and again from 0, by one for each frame

@@ -50,7 +50,7 @@ struct LatencyFigures {
   Time median{};
   Time percentile_99{};
   Time longest{};
-  // cumulative histogram: number of latencies up to each of `latency_limits`
+  // cumulative histogram for `latency_limits`, as of Latencies::within
   std::array<std::uint64_t, latency_limits.size()> within{};
   std::uint64_t count = 0;
   Time sum{};

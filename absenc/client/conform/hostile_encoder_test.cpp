@@ -25,7 +25,8 @@ namespace {
 using capture::ObservedExchange;
 using capture::ObservedFrame;
 
-/// A port that stores all exchanges: each request with everything received until the next request.
+/// A port that stores all exchanges: each request with everything received until the next request, after a first entry
+/// with what was received before.
 template <class Item>
 class TapPort final : public Port<Item> {
  public:

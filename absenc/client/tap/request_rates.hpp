@@ -72,7 +72,7 @@ class RequestRates final : public capture::AnnotationSink {
   struct SampleRequest {
     std::string_view command;
     std::vector<std::uint8_t> bytes;
-    bool varies;  // whether the command has arguments, which change its request
+    bool varies;  // whether the command has arguments, which may change its request
   };
 
   // Returns the command of a request; "" if there is none. Assumes that all requests of a command with arguments begin

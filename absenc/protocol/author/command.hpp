@@ -71,7 +71,7 @@ struct Report {
   void (*put_request)(FieldSink&, const Format&, const Request&) = nullptr;
   /// Puts the fields of a valid reply to the request into the sink.
   void (*put_reply)(FieldSink&, const Format&, const Request&, const Reply&) = nullptr;
-  /// Returns the document's explanation of an invalid or missing reply, for errors that a procedure has not explained
+  /// Returns the unit's explanation of an invalid or missing reply, for errors that a procedure has not explained
   /// itself. Null: none.
   Explanation (*explain)(const Format&, Error, Items request, Items reply) = nullptr;
   /// Returns the explanation of the error of a conversation. If set, conversations use it instead of `explain`.

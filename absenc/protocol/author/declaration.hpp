@@ -88,7 +88,7 @@ struct Declaration {
   bool (*is_answered)(const Options&, Frame request) = nullptr;
   /// Returns whether the checks must detect that this bit of a valid reply was flipped; null: every bit.
   bool (*is_checked)(const Options&, Frame request, Frame reply, std::size_t bit) = nullptr;
-  /// Returns the bits of a valid reply that carry a field; null: unknown.
+  /// Returns the bits of a valid reply that carry a field. Without this function they are unknown.
   BitRanges (*bits)(const Options&, Frame request, Frame reply, const FieldInfo&) = nullptr;
   /// Finds the values of options that fit captured frames; null: frames do not show option values.
   bool (*probe)(Options&, std::span<const Capture>, EvidenceSink&) = nullptr;

@@ -73,7 +73,7 @@ class Routine {
   /// Notes that the encoder has not changed since `changes` was called: it refused the request, or reading back shows
   /// it.
   void refused() { change_ = ChangeSent::refused; }
-  /// Returns whether a request that changes the encoder was sent, as `changes` and `refused` have noted it.
+  /// Returns what `changes` or `refused` noted last; `no` if neither was called.
   [[nodiscard]] ChangeSent change() const { return change_; }
 
   /// Returns an awaitable that ends the procedure, also from within a part: `co_await dialog.stop({Error::busy,

@@ -276,7 +276,7 @@ struct Descriptor {
     }
   }
 
-  /// Returns the document's explanation of an invalid or missing reply, whose error is `error`.
+  /// Returns the unit's explanation of an invalid or missing reply, whose error is `error`; without texts: it has none.
   static Explanation explain(const Options& values, Error error, Frame asked, Frame reply) {
     return declared.report.explain(declared.format(values), error, items(asked), items(reply));
   }

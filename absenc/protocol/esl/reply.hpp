@@ -52,7 +52,7 @@ enum class Check : std::uint8_t {
   sequence_unknown,
   sequence_still,
   sequence_jumped,
-  // Check of a probe (probe.hpp)
+  // Reported by `probe` (probe.hpp) only: an encoder of this profile would not have answered the request
   request_not_accepted,
 };
 

@@ -95,7 +95,7 @@ Procedure reset(Dialog& dialog, ProcedureResult& found, DataId id) {
 // ---- Memory (6.3.5, 9.1)
 
 constexpr Time busy_limit = 2 * memory_time;  // longest wait for a busy memory: twice the document's maximum
-constexpr Time busy_pause = 1ms;              // pause between two requests to a busy encoder
+constexpr Time busy_pause = 1ms;              // pause between two requests to a busy encoder, except page selects
 
 constexpr std::uint8_t byte(std::int64_t argument) { return static_cast<std::uint8_t>(argument); }
 
