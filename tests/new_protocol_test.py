@@ -3,7 +3,6 @@
 every unit pass that are run here; only the unit's own test fails until it is written."""
 
 import os
-import re
 import shlex
 import shutil
 import subprocess
@@ -63,15 +62,6 @@ class NewProtocol(Copy):
     def test_compiles_with_optimisation_without_warning(self):
         for source in self.unit.glob("*.cpp"):
             run(*COMPILE, "-O2", "-I", self.root, "-c", source, "-o", self.root / "object.o")
-
-    def test_example_in_contributing_is_from_template(self):
-        """The example in CONTRIBUTING.md must be code of the template, because only the template is compiled."""
-        text = (SOURCE / "CONTRIBUTING.md").read_text(encoding="utf-8")
-        template = (SOURCE / "docs/protocol-template/unit.cpp").read_text(encoding="utf-8")
-        examples = re.findall(r"^( *)```cpp\n(.*?)^ *```", text, re.MULTILINE | re.DOTALL)
-        self.assertTrue(examples)
-        for indent, example in examples:
-            self.assertIn(re.sub(f"^{indent}", "", example, flags=re.MULTILINE), template)
 
     def test_refuses_invalid_or_existing_names(self):
         self.assertEqual(self.refused("tformat"), 1)

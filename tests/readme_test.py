@@ -16,7 +16,7 @@ from python_support import PACKAGE
 
 SOURCE = Path(os.environ["ABSENC_SOURCE_DIR"])
 PAGES = ["README.md", *(f"docs/{name}.md" for name in ("read", "set-up", "record", "serve", "decode", "test-a-drive", "doctor", "cpp",
-                                                        "python", "add-an-encoder"))]
+                                                        "python", "add-an-encoder", "write-a-unit"))]
 PORT = "/dev/ttyUSB0"
 # Languages of code blocks that this test does not run: commands that change the computer, texts, settings of other
 # programs, and programs that other tests run.
@@ -137,6 +137,16 @@ class Readme(unittest.TestCase):
         for name, block in zip(examples, shown):
             example = (SOURCE / "examples" / name).read_text(encoding="utf-8")
             self.assertEqual(textwrap.dedent(example.split("// [readme]\n")[1].rsplit("\n", 1)[0]).strip(), block.strip())
+
+    def test_code_of_unit_equals_source(self):
+        """The code in docs/write-a-unit.md must be code of the unit nikon, which is compiled."""
+        def stripped(text):
+            return "\n".join(line.strip() for line in text.strip().splitlines())
+        sources = [stripped(path.read_text(encoding="utf-8")) for path in (SOURCE / "absenc/protocol/nikon").glob("*.?pp")]
+        shown = [block for language, block in blocks((SOURCE / "docs/write-a-unit.md").read_text(encoding="utf-8")) if language == "cpp"]
+        self.assertGreater(len(shown), 10)
+        for block in shown:
+            self.assertTrue(any(stripped(block) in source for source in sources), block)
 
     def test_first_firmware_program_equals_source(self):
         shown = next(block for language, block in blocks((SOURCE / "docs/firmware.md").read_text(encoding="utf-8")) if language == "cpp")

@@ -22,7 +22,7 @@ CONTENTS = {
     "Use": ["docs/read", "docs/set-up", "docs/record", "docs/serve", "docs/mqtt", "docs/tap", "docs/decode", "docs/doctor",
             "docs/test-a-drive", "man/absenc.1"],
     "Program": ["docs/cpp", "cpp-reference", "docs/python", "python-reference", "docs/firmware"],
-    "Encoders": ["docs/encoders", "absenc/protocol/*/README", "docs/add-an-encoder", "docs/line-faults", "docs/dump-format"],
+    "Encoders": ["docs/encoders", "absenc/protocol/*/README", "docs/add-an-encoder", "docs/write-a-unit", "docs/line-faults", "docs/dump-format"],
     "Project": ["docs/architecture", "docs/benchmarks", "CONTRIBUTING", "tests/abuse/README"],
 }
 
