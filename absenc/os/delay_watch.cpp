@@ -24,39 +24,39 @@ constexpr Time wakeup_interval = 1ms;
 // Time between two bytes through one terminal: the kernel's worker threads must have slept before each of them.
 constexpr Time byte_interval = 5ms;
 // More terminals see a delay sooner, because the worker threads are late independently of each other.
-constexpr std::size_t terminal_count = 4;
+constexpr std::size_t loop_count = 4;
 
 }  // namespace
 
 DelayWatch::DelayWatch(bool terminals) {
-  for (std::size_t i = 0; terminals && i < terminal_count; ++i) {
-    if (Terminal terminal = open_terminal(); terminal.to) terminals_.push_back(std::move(terminal));
+  for (std::size_t i = 0; terminals && i < loop_count; ++i) {
+    if (ByteLoop loop = open_loop(); loop.to) loops_.push_back(std::move(loop));
   }
   thread_ = std::jthread([this](const std::stop_token& stop) { watch(stop); });
 }
 
 // Returns a terminal without descriptors if none can be opened.
-DelayWatch::Terminal DelayWatch::open_terminal() {
-  Terminal terminal{.from = Descriptor(::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC))};
+DelayWatch::ByteLoop DelayWatch::open_loop() {
+  ByteLoop loop{.from = Descriptor(::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC))};
   std::array<char, 64> name{};
   termios settings{};
-  if (!terminal.from || ::grantpt(terminal.from.get()) != 0 || ::unlockpt(terminal.from.get()) != 0 ||
-      ::ptsname_r(terminal.from.get(), name.data(), name.size()) != 0)
+  if (!loop.from || ::grantpt(loop.from.get()) != 0 || ::unlockpt(loop.from.get()) != 0 ||
+      ::ptsname_r(loop.from.get(), name.data(), name.size()) != 0)
     return {};
-  terminal.to = Descriptor(::open(name.data(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
-  if (!terminal.to || ::tcgetattr(terminal.to.get(), &settings) != 0) return {};
+  loop.to = Descriptor(::open(name.data(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
+  if (!loop.to || ::tcgetattr(loop.to.get(), &settings) != 0) return {};
   ::cfmakeraw(&settings);
-  return ::tcsetattr(terminal.to.get(), TCSANOW, &settings) == 0 ? std::move(terminal) : Terminal{};
+  return ::tcsetattr(loop.to.get(), TCSANOW, &settings) == 0 ? std::move(loop) : ByteLoop{};
 }
 
 void DelayWatch::watch(const std::stop_token& stop) {
   std::vector<pollfd> watched;
-  for (const Terminal& terminal : terminals_) watched.push_back({terminal.to.get(), POLLIN, 0});
+  for (const ByteLoop& loop : loops_) watched.push_back({loop.to.get(), POLLIN, 0});
   Time due = now() + wakeup_interval;
   while (!stop.stop_requested()) {
     const timespec pause{0, std::max(due - now(), Time{}).count()};
     ::ppoll(watched.data(), watched.size(), &pause, nullptr);
-    for (Terminal& terminal : terminals_) exchange(terminal);
+    for (ByteLoop& loop : loops_) exchange(loop);
     const Time late = now() - due;
     if (late < Time{}) continue;
     note(late);
@@ -65,15 +65,15 @@ void DelayWatch::watch(const std::stop_token& stop) {
 }
 
 // Receives the byte that is on its way, or sends the next one if it is due.
-void DelayWatch::exchange(Terminal& terminal) {
+void DelayWatch::exchange(ByteLoop& loop) {
   char byte = 'x';
-  if (terminal.is_out) {
-    note(now() - terminal.sent_at);
-    if (::read(terminal.to.get(), &byte, 1) != 1) return;
-    terminal = {std::move(terminal.from), std::move(terminal.to), now() + byte_interval, false};
-  } else if (now() >= terminal.sent_at) {
-    terminal.sent_at = now();
-    terminal.is_out = ::write(terminal.from.get(), &byte, 1) == 1;
+  if (loop.is_out) {
+    note(now() - loop.sent_at);
+    if (::read(loop.to.get(), &byte, 1) != 1) return;
+    loop = {std::move(loop.from), std::move(loop.to), now() + byte_interval, false};
+  } else if (now() >= loop.sent_at) {
+    loop.sent_at = now();
+    loop.is_out = ::write(loop.from.get(), &byte, 1) == 1;
   }
 }
 

@@ -25,19 +25,19 @@ class DelayWatch {
 
  private:
   /// A pseudo-terminal through which one byte at a time is sent.
-  struct Terminal {
+  struct ByteLoop {
     Descriptor from{};
     Descriptor to{};
     Time sent_at{};  // if `is_out`: when the byte was sent; else when the next one is due
     bool is_out = false;
   };
 
-  static Terminal open_terminal();
+  static ByteLoop open_loop();
   void watch(const std::stop_token& stop);
-  void exchange(Terminal& terminal);
+  void exchange(ByteLoop& loop);
   void note(Time delay);
 
-  std::vector<Terminal> terminals_{};
+  std::vector<ByteLoop> loops_{};
   std::atomic<Time::rep> latest_{0};
   std::jthread thread_;
 };

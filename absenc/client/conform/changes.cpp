@@ -241,7 +241,7 @@ void ChangeTester::test_direction(const Clause& clause, ClauseResult& result) {
 
 void ChangeTester::test_pace(const Clause& clause, ClauseResult& result) {
   // long enough for two frames at the lowest rate, one frame per second
-  constexpr Time heard_for = std::chrono::milliseconds(2200);
+  static constexpr Time heard_for = std::chrono::milliseconds(2200);
   const Command& start = *find_command(unit_, clause.command);
   const Command& stop = *find_command(unit_, clause.stop);
   const auto look = [this] { return line_.count_unsolicited(heard_for).per_second(); };
