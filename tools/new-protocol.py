@@ -47,8 +47,8 @@ def main():
         print(f"absenc/protocol/{name}/{target.name}")
     all_cpp.write_text(listed, encoding="utf-8")
     print("absenc/protocol/all.cpp: one line more")
-    print(f"Next: ./dev unit {name} tries it, and fails until the document's own frames are in it; CONTRIBUTING.md says in "
-          "which order to write it.")
+    print(f"Next: ./dev unit {name} tries it, and fails until the document's own frames are in it; docs/write-a-unit.md "
+          "says in which order to write it.")
 
 
 if __name__ == "__main__":
