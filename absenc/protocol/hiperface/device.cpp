@@ -66,7 +66,7 @@ author::Responder::Answer VirtualEncoder::respond(Bytes bytes, Time at, ByteBuff
     return Answer::none;
   }
   Reply made{.address = address()};
-  const StatusCode refused = execute(*request, at, made);
+  const Code refused = execute(*request, at, made);
   made.has_error = alarms_now() != 0;
   const ReplyBytes sent =
       refused != 0 ? encode_refusal(format_, made.address, refused) : encode_reply(format_, *request, made);
@@ -94,7 +94,7 @@ void VirtualEncoder::refuse(Time, ByteBuffer<64>& reply) {
 }
 
 // Executes a request: fills in the reply and returns 0, or returns the status code that refuses it.
-VirtualEncoder::StatusCode VirtualEncoder::execute(const Request& request, Time at, Reply& reply) {
+VirtualEncoder::Code VirtualEncoder::execute(const Request& request, Time at, Reply& reply) {
   switch (request.command) {
     case CommandCode::position:
       reply.value = position(at);
@@ -160,7 +160,7 @@ std::uint32_t VirtualEncoder::position(Time at) const {
   return static_cast<std::uint32_t>((counts + offset) & low_mask(format_.position_bits()));
 }
 
-VirtualEncoder::StatusCode VirtualEncoder::set_position(const Request& request, Time at) {
+VirtualEncoder::Code VirtualEncoder::set_position(const Request& request, Time at) {
   if (request.code != access_code(0)) return refusal::access_code;
   if (std::uint64_t{request.position} >> format_.position_bits() != 0) return refusal::argument;
   const std::uint64_t offset = load_little_endian(Bytes(memory_).subspan(offset_at, 4));
@@ -169,7 +169,7 @@ VirtualEncoder::StatusCode VirtualEncoder::set_position(const Request& request, 
   return 0;
 }
 
-VirtualEncoder::StatusCode VirtualEncoder::clear_counter(const Request& request) {
+VirtualEncoder::Code VirtualEncoder::clear_counter(const Request& request) {
   if (request.code != access_code(0)) return refusal::access_code;
   store_little_endian(MutableBytes(memory_).subspan(counter_at, 4), 0);
   change_memory();
@@ -193,16 +193,16 @@ std::size_t VirtualEncoder::free_memory() const {
 }
 
 // Returns why a request to read or store bytes of a data field with this status is refused, or 0.
-VirtualEncoder::StatusCode VirtualEncoder::access(const Request& request, std::uint8_t status) const {
+VirtualEncoder::Code VirtualEncoder::access(const Request& request, std::uint8_t status) const {
   if (field_size(status) == 0) return refusal::no_field;
   const std::size_t size = request.subject == description_field ? description_size : field_size(status);
   const std::size_t number = (status & field_status::code_number) >> 4;
   if ((status & field_status::needs_code) != 0 && request.code != access_code(number)) return refusal::access_code;
-  return std::size_t{request.first} + request.count > size ? refusal::outside : StatusCode{0};
+  return std::size_t{request.first} + request.count > size ? refusal::outside : Code{0};
 }
 
-VirtualEncoder::StatusCode VirtualEncoder::read_data(const Request& request, Reply& reply) const {
-  if (const StatusCode refused = access(request, status_of(request.subject)); refused != 0) return refused;
+VirtualEncoder::Code VirtualEncoder::read_data(const Request& request, Reply& reply) const {
+  if (const Code refused = access(request, status_of(request.subject)); refused != 0) return refused;
   if (request.count > most_read) return refusal::argument;
   std::array<std::uint8_t, description_size> description{};
   store_big_endian(MutableBytes(description).subspan(2, 4),
@@ -215,9 +215,9 @@ VirtualEncoder::StatusCode VirtualEncoder::read_data(const Request& request, Rep
   return 0;
 }
 
-VirtualEncoder::StatusCode VirtualEncoder::store_data(const Request& request) {
+VirtualEncoder::Code VirtualEncoder::store_data(const Request& request) {
   const std::uint8_t status = status_of(request.subject);
-  if (const StatusCode refused = access(request, status); refused != 0) return refused;
+  if (const Code refused = access(request, status); refused != 0) return refused;
   if ((status & field_status::writable) == 0) return refusal::not_writable;
   const std::size_t first = fields_at + request.subject * field_stride + 1 + request.first;
   std::copy_n(request.data.view().begin(), request.count, memory_.begin() + static_cast<std::ptrdiff_t>(first));
@@ -225,7 +225,7 @@ VirtualEncoder::StatusCode VirtualEncoder::store_data(const Request& request) {
   return 0;
 }
 
-VirtualEncoder::StatusCode VirtualEncoder::create_field(const Request& request) {
+VirtualEncoder::Code VirtualEncoder::create_field(const Request& request) {
   if (request.subject >= user_fields) return refusal::no_field;
   if ((request.new_value & field_status::exists) == 0) return refusal::argument;
   if (request.code != access_code((request.new_value & field_status::code_number) >> 4)) return refusal::access_code;
@@ -248,7 +248,7 @@ std::uint8_t VirtualEncoder::interface_setting() const {
   return static_cast<std::uint8_t>(memory_[interface_at] ^ ((interface_at_shipping & ~rate_bits) | format_.rate));
 }
 
-VirtualEncoder::StatusCode VirtualEncoder::change_access_code(const Request& request) {
+VirtualEncoder::Code VirtualEncoder::change_access_code(const Request& request) {
   if (request.subject > 3) return refusal::argument;
   if (request.code != access_code(request.subject)) return refusal::access_code;
   const std::uint8_t at_shipping = access_code(request.subject) ^ memory_[codes_at + request.subject];
@@ -256,14 +256,14 @@ VirtualEncoder::StatusCode VirtualEncoder::change_access_code(const Request& req
   return 0;
 }
 
-VirtualEncoder::StatusCode VirtualEncoder::set_address(const Request& request) {
+VirtualEncoder::Code VirtualEncoder::set_address(const Request& request) {
   if (request.code != access_code(0)) return refusal::access_code;
   if (request.subject < first_address || request.subject > last_address) return refusal::argument;
   change(address_at, request.subject ^ format_.address);
   return 0;
 }
 
-VirtualEncoder::StatusCode VirtualEncoder::set_interface(const Request& request) {
+VirtualEncoder::Code VirtualEncoder::set_interface(const Request& request) {
   if (request.code != access_code(0)) return refusal::access_code;
   const std::uint8_t rate = request.subject & rate_bits;
   if (rate >= rates.size()) return refusal::argument;
@@ -280,7 +280,7 @@ std::uint32_t VirtualEncoder::alarms_now() const {
 }
 
 // Returns the status code of one alarm. Each request gets the next one, after the last one the first again.
-VirtualEncoder::StatusCode VirtualEncoder::status_now() {
+VirtualEncoder::Code VirtualEncoder::status_now() {
   const std::uint32_t now = alarms_now() & all_alarms;
   if (now == 0) return 0;
   if ((now & ~sent_) == 0) sent_ = 0;

@@ -45,7 +45,7 @@ class VirtualEncoder final : public author::Responder {
       field_status::exists | field_status::writable | 0x10 | field_status::needs_code | field_status::size;
 
   // Result of a request: a status code that refuses it, or 0.
-  using StatusCode = std::uint8_t;
+  using Code = std::uint8_t;
 
   [[nodiscard]] std::size_t request_size(Bytes begin) const override { return request_length(format_, begin); }
   [[nodiscard]] std::size_t others_reply_size(Bytes request) const override;
@@ -55,17 +55,17 @@ class VirtualEncoder final : public author::Responder {
   void refuse(Time at, ByteBuffer<64>& reply) override;
   void started(Time at) override;
 
-  StatusCode execute(const Request& request, Time at, Reply& reply);
-  StatusCode set_position(const Request& request, Time at);
-  StatusCode read_data(const Request& request, Reply& reply) const;
-  StatusCode store_data(const Request& request);
-  StatusCode create_field(const Request& request);
-  StatusCode change_access_code(const Request& request);
-  StatusCode set_address(const Request& request);
-  StatusCode set_interface(const Request& request);
-  StatusCode clear_counter(const Request& request);
-  [[nodiscard]] StatusCode access(const Request& request, std::uint8_t status) const;
-  [[nodiscard]] StatusCode status_now();
+  Code execute(const Request& request, Time at, Reply& reply);
+  Code set_position(const Request& request, Time at);
+  Code read_data(const Request& request, Reply& reply) const;
+  Code store_data(const Request& request);
+  Code create_field(const Request& request);
+  Code change_access_code(const Request& request);
+  Code set_address(const Request& request);
+  Code set_interface(const Request& request);
+  Code clear_counter(const Request& request);
+  [[nodiscard]] Code access(const Request& request, std::uint8_t status) const;
+  [[nodiscard]] Code status_now();
   [[nodiscard]] std::uint32_t alarms_now() const;
 
   [[nodiscard]] std::uint8_t address() const { return memory_[address_at] ^ format_.address; }
