@@ -23,6 +23,8 @@ WEAK_CHECK = {"amt21"}
 ALSO = {
     # Byte 00 of channel 2 is outside the checksum: a frame without it is a good frame of has_ch2=false.
     ("encolink", "NUL lost"): "wrong_settings",
+    # A late reply to `v`, in front of the next reply, is no frame of `4`: its bytes look like extra ones.
+    ("e201", "randomly late"): "extra_bytes",
 }
 
 # Each row: name, fault, ids of the findings of which the verdict must name one. "good" means that doctor finds no

@@ -72,7 +72,7 @@ class Nikon(Case):
         self.assertAlmostEqual(fields["singleturn"] * 360 / 2**17, 237.961120605)
 
     def scanned(self, line):
-        found = absenc("scan", f"nikon:{line}", "--json")
+        found = absenc("scan", f"nikon:{line}?latency=50", "--json")  # a busy machine has 50 ms for a reply
         self.assert_good(found)
         return [encoder["encoder_address"] for encoder in json_lines(found.stdout)[0]["encoders"]]
 
@@ -80,7 +80,7 @@ class Nikon(Case):
         line = self.file("line")
         with Emulator(self.directory, "--also", "address=3", "--also", "address=7&singleturn=1000", protocol="nikon", name="line"):
             self.assertEqual(self.scanned(line), [0, 3, 7])
-            shown = absenc("run", f"nikon:{line}", "all-positions").stdout
+            shown = absenc("run", f"nikon:{line}?latency=50", "all-positions").stdout
             self.assertEqual([text.split()[1] for text in shown.splitlines() if text.startswith(("encoder_address", "singleturn"))],
                              ["0", "0", "3", "0", "7", "1000"])
             refused = absenc("config", "set", f"nikon:{line}", "address", "2", "--yes")

@@ -25,7 +25,6 @@
   one(biss, safety_unit) \
   one(biss, chain_unit) \
   one(nikon, unit) \
-  one(hiperface, unit) \
 
 #endif
 // clang-format on

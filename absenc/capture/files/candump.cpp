@@ -138,8 +138,8 @@ class CandumpReader final : public ParsedReader {
       const bool zero = parsed.at.seconds == 0 && parsed.at.picoseconds == 0;
       constexpr std::int64_t day = 86400;
       if (last && !zero && parsed.at.seconds < day) {
-        const std::int64_t passed = ticks_between(*last, parsed.at, nanosecond).value_or(-1);
-        rises = rises && (passed > 0 || (passed == 0 && parsed.channel != last_channel));
+        const std::optional<Tick> passed = ticks_between(*last, parsed.at, nanosecond);
+        rises = rises && passed && (*passed != 0 || parsed.channel != last_channel);
       }
       last = parsed.at;
       last_channel = parsed.channel;
