@@ -175,9 +175,11 @@ class DoctorFaults(Case):
     def examine_protocol(self, unit, other):
         with Emulator(self.directory, "--motion", "rpm=20", protocol=unit, name=f"{unit}-as-{other}") as emulator:
             found = self.examine(f"{other}:{emulator.path}?{PATIENT}")
-            # The two-bit check of AMT21 proves too little in the time that doctor may search for other protocols.
-            self.assert_first(found, "no_answer" if unit == "amt21" else "other_protocol", f"{unit} read as {other}")
-            self.assertIn("absenc identify" if unit == "amt21" else f"{unit}:", found["verdict"])
+            # Time in which doctor may search for other protocols: too short to prove the two-bit check of AMT21, and,
+            # with this latency, to come to nikon, whose characters no serial port carries.
+            is_unproven = unit in ("amt21", "nikon")
+            self.assert_first(found, "no_answer" if is_unproven else "other_protocol", f"{unit} read as {other}")
+            self.assertIn("absenc identify" if is_unproven else f"{unit}:", found["verdict"])
             return f"{unit:14} read as {other}: {found['verdict'][:100]}"
 
     def test_tcp(self):

@@ -83,7 +83,7 @@ class Stream(RaaCase):
         self.assert_good(absenc("record", f"raa38:{emulator.path}", "--output", path, "--rate", "0", "--for", "1"))
         with open(path, encoding="utf-8") as file:
             rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
-        self.assertGreater(len(rows), 100)
+        self.assertGreater(len(rows), 50)  # of 200, on a busy machine fewer
         self.assertEqual({row["singleturn"] for row in rows if not row["event"]}, {"383"})
 
     def test_other_frame_sizes(self):
