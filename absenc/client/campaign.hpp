@@ -45,10 +45,10 @@ struct CampaignChoices {
 struct CheckWorth {
   unsigned check_bits = 0;     ///< Width of the check in bits; 0: none.
   std::size_t frame_bits = 0;  ///< Length of a reply, in bits.
-  unsigned distance = 0;  ///< Hamming distance of the code: fewer wrong covered bits are all detected; 0: over 8.
-  double words = 0;       ///< Number of undetected error patterns of `distance` bits.
-  double unseen = 0;      ///< Rate of replies with damage only in covered bits and yet a correct checksum.
-  double taken = 0;       ///< Rate of damaged replies that the decoder accepts with a wrong position.
+  unsigned distance = 0;       ///< Hamming distance of the code: fewer wrong covered bits are all detected; 0: over 8.
+  double words = 0;            ///< Number of undetected error patterns of `distance` bits.
+  double unseen = 0;           ///< Rate of replies with damage only in covered bits and yet a correct checksum.
+  double taken = 0;            ///< Rate of damaged replies that the decoder accepts with a wrong position.
   double taken_deviation = 0;  ///< Standard deviation of `taken`, which is estimated from random samples.
 };
 

@@ -73,7 +73,7 @@ struct Event {
     timer,     ///< the time `at` of the last wait step was reached
     /// Device side: chip select or first clock edge. The next step should be the reply that the device drives.
     selected,
-    triggered,   ///< device side: a pulse on `wire` has begun
+    triggered,  ///< device side: a pulse on `wire` has begun
     /// A damaged character (stop bit, parity, other rate) or CAN frame was received, or a CAN frame could not be sent.
     line_error,
   };

@@ -52,8 +52,8 @@ struct Line<Item>::State {
   ExtraWire pulse_wire{};              ///< wire of the pulse
   Time start{};                        ///< start of the transfer, or of its present frame
   std::size_t index = 0;               ///< index of the item of `out` that is being sent, or is sent next
-  std::size_t on_wire = 0;  ///< characters: number of items of the present or last frame of `out`; 0: none
-  Time each{};              ///< duration of one byte
+  std::size_t on_wire = 0;             ///< characters: number of items of the present or last frame of `out`; 0: none
+  Time each{};                         ///< duration of one byte
 
   /// Returns whether a transfer of this node has begun and has items left to send.
   [[nodiscard]] bool frame_pending() const {
