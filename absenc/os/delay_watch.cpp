@@ -1,17 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/os/delay_watch.hpp"
 
-#include <fcntl.h>
 #include <poll.h>
-#include <stdlib.h>
-#include <termios.h>
 #include <time.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
-#include <utility>
 
+#include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
 
 namespace absenc::os {
@@ -30,28 +26,18 @@ constexpr std::size_t loop_count = 4;
 
 DelayWatch::DelayWatch(bool terminals) {
   for (std::size_t i = 0; terminals && i < loop_count; ++i) {
-    if (ByteLoop loop = open_loop(); loop.to) loops_.push_back(std::move(loop));
+    try {
+      loops_.push_back({.terminal = open_terminal_pair()});
+    } catch (const Failure&) {
+      break;
+    }
   }
   thread_ = std::jthread([this](const std::stop_token& stop) { watch(stop); });
 }
 
-// Returns a terminal without descriptors if none can be opened.
-DelayWatch::ByteLoop DelayWatch::open_loop() {
-  ByteLoop loop{.from = Descriptor(::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC))};
-  std::array<char, 64> name{};
-  termios settings{};
-  if (!loop.from || ::grantpt(loop.from.get()) != 0 || ::unlockpt(loop.from.get()) != 0 ||
-      ::ptsname_r(loop.from.get(), name.data(), name.size()) != 0)
-    return {};
-  loop.to = Descriptor(::open(name.data(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
-  if (!loop.to || ::tcgetattr(loop.to.get(), &settings) != 0) return {};
-  ::cfmakeraw(&settings);
-  return ::tcsetattr(loop.to.get(), TCSANOW, &settings) == 0 ? std::move(loop) : ByteLoop{};
-}
-
 void DelayWatch::watch(const std::stop_token& stop) {
   std::vector<pollfd> watched;
-  for (const ByteLoop& loop : loops_) watched.push_back({loop.to.get(), POLLIN, 0});
+  for (const ByteLoop& loop : loops_) watched.push_back({loop.terminal.slave.get(), POLLIN, 0});
   Time due = now() + wakeup_interval;
   while (!stop.stop_requested()) {
     const timespec pause{0, std::max(due - now(), Time{}).count()};
@@ -67,13 +53,14 @@ void DelayWatch::watch(const std::stop_token& stop) {
 // Receives the byte that is on its way, or sends the next one if it is due.
 void DelayWatch::exchange(ByteLoop& loop) {
   char byte = 'x';
+  const Time time = now();
   if (loop.is_out) {
-    note(now() - loop.sent_at);
-    if (::read(loop.to.get(), &byte, 1) != 1) return;
-    loop = {std::move(loop.from), std::move(loop.to), now() + byte_interval, false};
-  } else if (now() >= loop.sent_at) {
-    loop.sent_at = now();
-    loop.is_out = ::write(loop.from.get(), &byte, 1) == 1;
+    note(time - loop.sent_at);
+    loop.is_out = ::read(loop.terminal.slave.get(), &byte, 1) != 1;
+    loop.due = time + byte_interval;
+  } else if (time >= loop.due) {
+    loop.sent_at = time;
+    loop.is_out = ::write(loop.terminal.master.get(), &byte, 1) == 1;
   }
 }
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "absenc/core/time.hpp"
-#include "absenc/os/descriptor.hpp"
+#include "absenc/os/terminal_pair.hpp"
 
 namespace absenc::os {
 
@@ -24,15 +24,14 @@ class DelayWatch {
   [[nodiscard]] Time latest() const { return Time(latest_.load()); }
 
  private:
-  /// A pseudo-terminal through which one byte at a time is sent.
+  /// A pseudo-terminal through which one byte at a time is sent, from its master to its slave.
   struct ByteLoop {
-    Descriptor from{};
-    Descriptor to{};
-    Time sent_at{};  // if `is_out`: when the byte was sent; else when the next one is due
+    TerminalPair terminal{};
+    Time due{};      // when the next byte is sent, if none is on its way
+    Time sent_at{};  // when the byte that is on its way was sent
     bool is_out = false;
   };
 
-  static ByteLoop open_loop();
   void watch(const std::stop_token& stop);
   void exchange(ByteLoop& loop);
   void note(Time delay);

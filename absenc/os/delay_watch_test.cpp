@@ -1,12 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/os/delay_watch.hpp"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
+#include <filesystem>
+#include <set>
+#include <string>
+#include <vector>
 
 #include "absenc/os/signals.hpp"
 
@@ -39,11 +45,35 @@ TEST(DelayWatch, MeasuresHowLongTheProcessStoodStill) {
   EXPECT_EQ(measured_while_stopped(true), 0);
 }
 
-TEST(DelayWatch, BytesTakeTimeThroughTerminals) {
+// Returns the paths of the pseudo-terminals' slaves that this process has open.
+std::set<std::string> open_slaves() {
+  std::set<std::string> paths;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
+    std::error_code closed;  // the directory's own descriptor is closed when its link is read
+    const std::string path = std::filesystem::read_symlink(entry.path(), closed);
+    if (path.starts_with("/dev/pts/")) paths.insert(path);
+  }
+  return paths;
+}
+
+/// Takes a byte away from one of the terminals: it is on its way for ever, although the thread is woken in time.
+TEST(DelayWatch, ByteThatDoesNotArriveIsLate) {
+  const std::set<std::string> before = open_slaves();
   const DelayWatch watch(true);
+  std::vector<Descriptor> slaves;
+  for (const std::string& path : open_slaves()) {
+    if (!before.contains(path)) slaves.emplace_back(::open(path.c_str(), O_RDONLY | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
+  }
+  ASSERT_EQ(slaves.size(), 4u);
+  const auto take = [](const Descriptor& slave) {
+    char byte = 0;
+    return ::read(slave.get(), &byte, 1) == 1;
+  };
   const Time end = now() + 10s;
-  while (watch.latest() == Time{} && now() < end) sleep_until(now() + 1ms);
-  EXPECT_GT(watch.latest(), Time{});
+  while (std::ranges::none_of(slaves, take) && now() < end) continue;
+  const Time taken = now();
+  while (now() < taken + 300ms) sleep_until(now() + 1ms);
+  EXPECT_GE(watch.latest(), 250ms);
 }
 
 }  // namespace

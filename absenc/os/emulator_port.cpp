@@ -69,7 +69,7 @@ EmulatorPort::EmulatorPort(std::string link, std::optional<std::uint16_t> tcp_po
   set_read_at_once(true);
   open_terminal();
   if (tcp_port) listen_on(*tcp_port);
-  for (const Descriptor* end : {&master_, &watch_, &listener_}) {
+  for (const Descriptor* end : {&terminal_.master, &watch_, &listener_}) {
     if (*end) poller().add(end->get());
   }
   link_ = std::move(link);
@@ -79,26 +79,15 @@ EmulatorPort::EmulatorPort(std::string link, std::optional<std::uint16_t> tcp_po
 
 EmulatorPort::~EmulatorPort() {
   std::error_code ignored;
-  if (!link_.empty() && fs::read_symlink(link_, ignored) == terminal_) fs::remove(link_, ignored);
+  if (!link_.empty() && fs::read_symlink(link_, ignored) == terminal_.path) fs::remove(link_, ignored);
 }
 
 void EmulatorPort::open_terminal() {
-  const std::string what = "making a pseudo-terminal";
-  master_ = Descriptor(::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
-  check(static_cast<bool>(master_) && ::grantpt(master_.get()) == 0 && ::unlockpt(master_.get()) == 0, what);
-  std::array<char, 64> name{};
-  check(::ptsname_r(master_.get(), name.data(), name.size()) == 0, what);
-  terminal_ = name.data();
-  slave_ = Descriptor(::open(terminal_.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
-  check(static_cast<bool>(slave_), what);
-  termios settings{};
-  check(::tcgetattr(slave_.get(), &settings) == 0, what);
-  ::cfmakeraw(&settings);  // with the terminal's echo, the host's requests would be sent back to it
-  check(::tcsetattr(slave_.get(), TCSANOW, &settings) == 0, what);
+  terminal_ = open_terminal_pair();
   // The watch is added after this port has opened the slave itself, so it reports only other programs. If inotify is
   // missing, bytes and settings that a program leaves behind are not cleared for the next program.
   watch_ = Descriptor(::inotify_init1(IN_NONBLOCK | IN_CLOEXEC));
-  if (watch_) ::inotify_add_watch(watch_.get(), terminal_.c_str(), IN_OPEN | IN_CLOSE);
+  if (watch_) ::inotify_add_watch(watch_.get(), terminal_.path.c_str(), IN_OPEN | IN_CLOSE);
 }
 
 void EmulatorPort::listen_on(std::uint16_t port) {
@@ -138,7 +127,7 @@ void EmulatorPort::make_link() {
     }
     fs::remove(link_, error);
   }
-  fs::create_symlink(terminal_, link_, error);
+  fs::create_symlink(terminal_.path, link_, error);
   if (error) throw system_failure("making the link " + link_, error.value());
 }
 
@@ -154,10 +143,10 @@ std::size_t EmulatorPort::read_some(MutableBytes into, std::span<const int> read
       continue;
     }
     const ssize_t size = ::read(descriptor, into.data() + filled, into.size() - filled);
-    if (size > 0 && descriptor == master_.get() && !rate_matches_terminal()) continue;
+    if (size > 0 && descriptor == terminal_.master.get() && !rate_matches_terminal()) continue;
     if (size > 0) {
       filled += static_cast<std::size_t>(size);
-    } else if (descriptor != master_.get() && (size == 0 || (errno != EAGAIN && errno != EINTR))) {
+    } else if (descriptor != terminal_.master.get() && (size == 0 || (errno != EAGAIN && errno != EINTR))) {
       drop_client(descriptor);
     }
   }
@@ -182,7 +171,7 @@ Time EmulatorPort::lateness() {
 bool EmulatorPort::rate_matches_terminal() const {
   constexpr std::uint32_t unset = 38'400;
   if (device_rate_ == 0) return true;
-  const std::uint32_t rate = terminal_rate(slave_.get());
+  const std::uint32_t rate = terminal_rate(terminal_.slave.get());
   return rate == unset || rates_agree(device_rate_, rate);
 }
 
@@ -209,9 +198,9 @@ void EmulatorPort::users_changed() {
   std::array<std::byte, 4096> events;
   while (::read(watch_.get(), events.data(), events.size()) > 0) {
   }
-  ::ioctl(slave_.get(), TIOCNXCL);
+  ::ioctl(terminal_.slave.get(), TIOCNXCL);
   if (os::now() - sent_at() < 200ms) return;
-  ::tcflush(slave_.get(), TCIFLUSH);
+  ::tcflush(terminal_.slave.get(), TCIFLUSH);
 }
 
 void EmulatorPort::write_all(Bytes bytes) {
@@ -223,7 +212,7 @@ void EmulatorPort::write_all(Bytes bytes) {
 }
 
 void EmulatorPort::write_terminal(Bytes bytes) {
-  const ssize_t size = ::write(master_.get(), bytes.data(), bytes.size());
+  const ssize_t size = ::write(terminal_.master.get(), bytes.data(), bytes.size());
   dropped_ += bytes.size() - static_cast<std::size_t>(std::max<ssize_t>(size, 0));
 }
 

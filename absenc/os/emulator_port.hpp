@@ -10,6 +10,7 @@
 
 #include "absenc/os/process.hpp"
 #include "absenc/os/stream_port.hpp"
+#include "absenc/os/terminal_pair.hpp"
 
 namespace absenc::os {
 
@@ -31,7 +32,7 @@ class EmulatorPort final : public StreamPort {
   ~EmulatorPort() override;
 
   /// Returns the path for other programs to open: the link if there is one, otherwise the pseudo-terminal.
-  [[nodiscard]] const std::string& path() const { return link_.empty() ? terminal_ : link_; }
+  [[nodiscard]] const std::string& path() const { return link_.empty() ? terminal_.path : link_; }
   /// Returns the TCP port, or 0 when the port does not listen.
   [[nodiscard]] std::uint16_t tcp_port() const { return tcp_port_; }
   /// Returns the number of bytes that were lost because a terminal or TCP client did not read them.
@@ -53,13 +54,11 @@ class EmulatorPort final : public StreamPort {
   void drop_client(int descriptor);
   void write_terminal(Bytes bytes);
 
-  Descriptor master_;
-  Descriptor slave_;          // kept open: the master fails while no program has the slave open
+  TerminalPair terminal_;     // the slave is kept open: the master fails while no program has it open
   Descriptor in_use_marker_;  // bound socket that marks the link as in use
   Descriptor watch_;          // inotify descriptor: reports programs that open or close the slave
   Descriptor listener_;
   std::vector<Descriptor> clients_;
-  std::string terminal_;
   std::string link_;
   std::uint16_t tcp_port_ = 0;
   RunDelay delay_;

@@ -41,8 +41,8 @@ bool Connections::end_oldest_idle(Id excluded, const std::function<bool(const Op
   return true;
 }
 
-// Of the connections outside the reserve, closes the one that is idle for longest at the address with the most idle
-// ones, so that addresses with fewer keep theirs. Returns false if none is idle.
+// Finds the address with the most idle connections outside the reserve, and closes the one that is idle for longest
+// there: addresses with fewer keep theirs. Returns false if no connection is idle.
 bool Connections::end_oldest_idle_of_busiest(Id excluded) {
   std::unordered_map<std::string, std::size_t> idle;
   for (const auto& [id, one] : open_) {

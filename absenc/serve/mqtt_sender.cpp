@@ -227,8 +227,9 @@ void MqttSender::clear_unserved(MqttClient& client, const Fleet::Watches& watche
     std::vector<std::string> topics{topic_of(settings_->prefix, name, "state")};
     if (!settings_->home_assistant.empty())
       std::ranges::move(home_assistant_topics(*settings_, name), std::back_inserter(topics));
-    const auto clear = [&](const std::string& topic) { return send_retained(client, {topic, "", ""}); };
-    if (std::ranges::count_if(topics, clear) == std::ssize(topics)) {
+    bool are_sent = true;
+    for (const std::string& topic : topics) are_sent = send_retained(client, {topic, "", ""}) && are_sent;
+    if (are_sent) {
       for (const std::string& topic : topics) retained_.erase(topic);
       spool_->forget(name);
     } else {

@@ -137,7 +137,8 @@ TEST(ParseMotion, ErrorStatesProblemAndAllowedValues) {
             "motion `still=1`: unknown; allowed are still, rpm=R, sine=DEGREES,HZ and file=CSV");
   EXPECT_EQ(refusal([] { return parse_motion("rpm=fast", 0); }),
             "motion `rpm=fast`: rpm= needs a number, for example `rpm=3000`");
-  EXPECT_NE(refusal([] { return parse_motion("rpm=+-5", 0); }), "");
+  EXPECT_EQ(refusal([] { return parse_motion("rpm=+-5", 0); }),
+            "motion `rpm=+-5`: rpm= needs a number, for example `rpm=3000`");
   EXPECT_EQ(refusal([] { return parse_motion("rpm=nan", 0); }),
             "motion `rpm=nan`: rpm= needs a number, for example `rpm=3000`");
   EXPECT_EQ(refusal([] { return parse_motion("rpm=1e7", 0); }),

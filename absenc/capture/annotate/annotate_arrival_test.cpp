@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "absenc/capture/annotate/annotate.hpp"
+#include "absenc/capture/annotate/annotated_bytes_test.hpp"
 #include "absenc/capture/annotate/conversation_test.hpp"
 #include "absenc/protocol/all.hpp"
 #include "absenc/sim/random.hpp"
@@ -22,27 +23,6 @@ using Kind = Annotation::Kind;
 using Wire = std::vector<std::uint8_t>;
 
 constexpr Tick gap = 20;
-
-struct FoundAnnotation {
-  Kind kind;
-  Remark remark;
-  Error error;
-  Wire request;
-  Wire reply;
-
-  [[nodiscard]] bool is_good_exchange() const { return kind == Kind::exchange && error == Error::none; }
-};
-
-struct AnnotationCollector final : AnnotationSink {
-  void put(const Annotation& one) override {
-    found.push_back({one.kind,
-                     one.remark,
-                     one.error,
-                     {one.request.bytes.begin(), one.request.bytes.end()},
-                     {one.reply.bytes.begin(), one.reply.bytes.end()}});
-  }
-  std::vector<FoundAnnotation> found;
-};
 
 /// A request with its reply; `reply` is empty if the encoder sent none.
 struct Exchange {
@@ -111,7 +91,7 @@ class Arrival : public ::testing::TestWithParam<const Unit*> {
 
   [[nodiscard]] std::vector<Exchange> good() const {
     std::vector<Exchange> all;
-    for (const FoundAnnotation& one : collector.found) {
+    for (const testing::AnnotatedBytes& one : collector.found) {
       if (one.is_good_exchange()) all.push_back({one.request, one.reply});
     }
     return all;
@@ -120,7 +100,7 @@ class Arrival : public ::testing::TestWithParam<const Unit*> {
 
   const Unit& unit = *GetParam();
   Options options = testing::options_of(unit);
-  AnnotationCollector collector;
+  testing::BytesCollector collector;
   std::unique_ptr<Annotator> annotator;
   Tick now = 1000;
 };
@@ -192,7 +172,7 @@ TEST_P(Arrival, CaptureBeginsWithinAnExchange) {
     for (std::size_t i = 1; i <= found.size(); ++i) {
       ASSERT_EQ(found[found.size() - i], exchanges[exchanges.size() - i]) << from;
     }
-    for (const FoundAnnotation& one : collector.found) {
+    for (const testing::AnnotatedBytes& one : collector.found) {
       EXPECT_TRUE(one.error == Error::none) << from << ": cut, not bad: " << text_of(one.error).name;
     }
   }
@@ -225,7 +205,7 @@ TEST_P(Arrival, ADamagedReplyCostsNoOtherExchange) {
   annotator->report_after_silence();
   EXPECT_EQ(difference(good(), whole), "");
   std::size_t bad = 0;
-  for (const FoundAnnotation& one : collector.found) bad += one.error != Error::none ? 1u : 0u;
+  for (const testing::AnnotatedBytes& one : collector.found) bad += one.error != Error::none ? 1u : 0u;
   EXPECT_GE(bad, damaged);
 }
 
@@ -296,7 +276,7 @@ TEST(ArrivalOfCommands, ReplyHasUsualLengthOfItsCommand) {
   settings.begins_silent = settings.by_arrival = true;
   settings.gap = gap;
   settings.ticks.limit = LineTicks::never;
-  AnnotationCollector collector;
+  testing::BytesCollector collector;
   const auto annotator =
       std::make_unique<Annotator>(unit, testing::options_of(unit, {{"bits", "14"}}), settings, collector);
   Tick now = 1000;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "absenc/capture/annotate/annotate.hpp"
+#include "absenc/capture/annotate/annotated_bytes_test.hpp"
 #include "absenc/capture/annotate/conversation_test.hpp"
 #include "absenc/protocol/all.hpp"
 
@@ -24,25 +25,6 @@ Wire joined(const Wire& first, const Wire& second) {
   return both;
 }
 
-struct FoundAnnotation {
-  Annotation::Kind kind;
-  Remark remark;
-  Error error;
-  Wire request;
-  Wire reply;
-};
-
-struct AnnotationCollector final : AnnotationSink {
-  void put(const Annotation& one) override {
-    found.push_back({one.kind,
-                     one.remark,
-                     one.error,
-                     {one.request.bytes.begin(), one.request.bytes.end()},
-                     {one.reply.bytes.begin(), one.reply.bytes.end()}});
-  }
-  std::vector<FoundAnnotation> found;
-};
-
 /// Annotates a good exchange, the bytes of `runs` and a good exchange. The bytes of each run follow without a pause.
 /// Checks that the three annotations are the two exchanges with the refused request between them.
 void expect_refusal(const std::vector<Wire>& runs, Remark remark) {
@@ -53,7 +35,7 @@ void expect_refusal(const std::vector<Wire>& runs, Remark remark) {
   Annotator::Settings settings;
   settings.begins_silent = true;
   settings.ticks = {.pause = length, .character = length};
-  AnnotationCollector collector;
+  testing::BytesCollector collector;
   Annotator annotator(*find_unit("raa38-modbus"), testing::options_of(*find_unit("raa38-modbus"), {{"bits", "14"}}),
                       settings, collector);
   Tick now = 0;
@@ -65,7 +47,7 @@ void expect_refusal(const std::vector<Wire>& runs, Remark remark) {
     now += 5 * length;
   }
   annotator.finish(now);
-  const std::vector<FoundAnnotation>& found = collector.found;
+  const std::vector<testing::AnnotatedBytes>& found = collector.found;
   ASSERT_EQ(found.size(), 3u);
   EXPECT_EQ(found[0].error, Error::none);
   EXPECT_EQ(found[1].kind, Annotation::Kind::exchange);

@@ -80,8 +80,9 @@ std::string Conformance::junit() const {
     text += "</testcase>\n";
   }
   if (errors != 0) {
-    text += fmt::format("  <testcase classname=\"{}\" name=\"all clauses\"><error message=\"{}\"/></testcase>\n",
-                        xml(protocol), why);
+    const std::string how = left.empty() ? "" : fmt::format("; to put it back: {}", fmt::join(left, "; "));
+    text += fmt::format("  <testcase classname=\"{}\" name=\"all clauses\"><error message=\"{}{}\"/></testcase>\n",
+                        xml(protocol), why, xml(how));
   }
   return text + "</testsuite>\n";
 }

@@ -125,10 +125,8 @@ inline std::vector<PathFault> faults_of_bytes() {
   faults.push_back(of_bytes("nul_lost", {0x00},
                             [](const ByteList&, const ByteList& reply) { return without(reply, {0x00}); },
                             {"bytes_missing"}));
-  // If the doubled byte is the last one of the frame, it is an extra byte.
   faults.push_back(of_bytes("telnet_doubled", {0xFF},
-                            [](const ByteList&, const ByteList& reply) { return with_before(reply, 0xFF, 0xFF); },
-                            {"extra_bytes"}));
+                            [](const ByteList&, const ByteList& reply) { return with_before(reply, 0xFF, 0xFF); }));
   return faults;
 }
 

@@ -93,7 +93,7 @@ inline constexpr std::uint16_t position_lost = over_speed | singleturn_error | p
 inline constexpr std::uint16_t turns_lost = multiturn_error | over_speed | ps_error | busy;
 }  // namespace alarm
 
-/// Which bit of a word of the EEPROM, and of the identification, is sent first. Sources differ.
+/// Order in which the bits of an EEPROM word, and of the identification, are sent. Sources differ.
 enum class BitOrder : std::uint8_t { low_first, high_first };
 
 /// Properties of the encoder that its frames depend on.

@@ -391,7 +391,8 @@ export class EncoderPage {
       ["readings", `${live ? numberText(encoder.rate_hz, encoder.rate_hz < 10 ? 1 : 0) : 0} /s`],
       ["reply after", encoder.readings === 0 || latency.max === 0 ? noLatency(encoder) : `${microseconds(latency.p50)}, at most ${microseconds(latency.max)}`],
       ["errors, last minute", numberText(encoder.errors_last_minute)],
-      ["failed attempts", `${numberText(Object.values(encoder.errors).reduce((sum, count) => sum + count, 0))} beside ${numberText(encoder.readings)} good readings`],
+      ["good readings", numberText(encoder.readings)],
+      ["failed attempts", numberText(Object.values(encoder.errors).reduce((sum, count) => sum + count, 0))],
       ["requests repeated", numberText(encoder.repeated)],
       ["port lost", encoder.losses === 1 ? "once" : `${numberText(encoder.losses)} times`],
     ]));
