@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures the time per character of a fully loaded T-format line, from the line decoder's characters to the decoded
-// exchange.
+// Measures the time per character of a loaded T-format line, from characters to exchanges.
 #include <benchmark/benchmark.h>
 
 #include <memory>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decodes an asynchronous line of 2.5 Mbit/s, sampled at 20 MS/s, from a raw file to characters. Compares the time with
-// that of a plain read of the file, of two threads, of larger files, and of sigrok-cli's decoder.
+// Measures the decoding of an asynchronous line of 2.5 Mbit/s, sampled at 20 MS/s.
 #include <fcntl.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -98,7 +97,7 @@ class File {
   }
 
  private:
-  // Writes the samples: channel 0 has characters without pauses, the other channels have arbitrary levels.
+  // Channel 0 has characters without pauses; the other channels have arbitrary levels.
   void write() const {
     const int out = open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
     if (out < 0) fail("open");
@@ -151,7 +150,7 @@ class RawReader final : public Reader {
   std::vector<Damage> damages_;
 };
 
-// Decodes the whole file and returns the cost. More than 20 wrong or missing characters end the program.
+// Ends the program if too much is wrong.
 Cost decode(const File& file, unsigned threads) {
   RawReader reader(file);
   std::uint64_t count = 0;
@@ -166,7 +165,7 @@ Cost decode(const File& file, unsigned threads) {
       return true;
     });
   });
-  // The first character of the capture has no falling edge, and the decoder may mistake edges within it for start bits.
+  // The decoder may mistake edges within the first character of the capture for start bits.
   if (!outcome.problem.empty() || wrong > 20 || count + 20 < file.characters()) {
     std::fprintf(stderr, "%llu of %llu characters, %llu wrong: %s\n", static_cast<unsigned long long>(count),
                  static_cast<unsigned long long>(file.characters()), static_cast<unsigned long long>(wrong),
@@ -194,8 +193,7 @@ Cost plain_read(const File& file) {
   return cost;
 }
 
-// Decodes the file twice at once, with one thread each, and returns half the elapsed time: the least time per file that
-// a second core can give under the current load.
+// Returns half the time of two decodings at once, the limit of what a second core can give.
 double two_independent(const File& file) {
   return cost_of([&] {
            std::jthread other([&] { decode(file, 1); });
@@ -218,7 +216,7 @@ void throughput(bool quick) {
       median(one), median(plain));
 }
 
-// Measures the gain of a second thread from the shortest of many runs, because only some runs find both cores free.
+// The shortest of many runs counts, because only some runs find both cores free.
 void two_threads(bool quick) {
   const File file(50 * megabyte);
   std::vector<double> alone;
@@ -259,8 +257,6 @@ void against_sigrok(bool quick) {
               median(ours) / theirs);
 }
 
-// Compares the cost per character of a small and a large file. Each round decodes the small file 20 times and
-// the large file once.
 void compare_file_sizes(bool quick) {
   const std::uint64_t most = (quick ? 100 : 4000) * megabyte;
   const File small(10 * megabyte);

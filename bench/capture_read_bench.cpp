@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compares reading of captures with the minimum of work: raw samples with std::fread, a sigrok session with a libzip
-// loop as in its manual. Value change dump and CSV are measured without a comparison. Files have 64 MiB of samples, the
-// dump and the CSV file the first half of them.
+// Measures reading of captures: raw samples against std::fread, sigrok sessions against libzip.
 #include <zip.h>
 
 #include <array>
@@ -33,8 +31,7 @@ struct Files {
   Files()
       : folder(std::filesystem::temp_directory_path() / ("absenc-bench-" + std::to_string(std::random_device()()))) {
     std::filesystem::create_directory(folder);
-    // Samples of eight lines: about every 32 samples one of them changes, like a line that is sampled at 10 or more
-    // times its bit rate.
+    // Samples of eight lines, of which one changes about every 32 samples.
     std::mt19937 random(1);
     std::vector<char> samples(samples_size);
     unsigned levels = 0xFF;
@@ -132,8 +129,7 @@ void raw_samples(benchmark::State& state) {
 }
 BENCHMARK(raw_samples)->Unit(benchmark::kMillisecond);
 
-// Reads the file in pieces of 1 MiB into one buffer, without the C library's own buffer: the reference of
-// `raw_samples`.
+// The reference of `raw_samples`, without the C library's own buffer.
 void raw_samples_reference(benchmark::State& state) {
   std::vector<char> buffer(1 << 20);
   const std::string path = files().raw();

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures decoding and checking of frames: T-format compared with the same work and a bitwise CRC, BiSS compared with
-// the method of a motor controller. With bissc_extract.h of mjbots/moteus in an include folder, its decoder is the
-// reference, otherwise that of sampled_peer.hpp.
+// Measures decoding of T-format and BiSS frames. If bissc_extract.h of mjbots/moteus is found, it is the reference for
+// BiSS.
 #include <algorithm>
 #include <array>
 #include <span>
@@ -56,15 +55,12 @@ void tformat_everything_reference(benchmark::State& state) {
 }
 BENCHMARK(tformat_everything_reference);
 
-// ---- BiSS: formats of 19, 32 and 57 bits. Each is decoded as a format known at compile time, compiled when it is
-// chosen, with its fields looked up for each frame, and by the motor controller's decoder, which is the reference of
-// all three.
+// ---- BiSS: three ways to decode formats of 19, 32 and 57 bits, with one reference for all.
 
 template <unsigned bits>
 constexpr biss::Format format_of{.word = biss::word_with_status({.position = bits})};
 
-// Samples of SLO with a frame: packed bits, as from an SPI controller or an E201-9S, and one byte per sample, as from a
-// port that a timer samples.
+// Samples of SLO: packed bits, as from an SPI controller, and one byte each, as from a port.
 constexpr std::size_t samples_size = 96;
 struct Samples {
   std::array<std::uint8_t, samples_size / 8> packed;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures decoding and checking of the 18 bytes of an ESL safety reply by the function for hosts, compared with the
-// two CRCs of such a reply alone, computed bit by bit.
+// Measures decoding of an ESL safety reply against its two CRCs alone, computed bit by bit.
 #include <array>
 
 #include "absenc/protocol/esl/reply.hpp"

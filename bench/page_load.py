@@ -1,8 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Measures the load of the page of `absenc serve` on a browser: the overview of 100 encoders, with the server's updates
-and with 30 updates per second: bench/page_load.py [SECONDS [UPDATES]]. Chromium runs without a graphics processor, so
-that its processor time includes drawing."""
+"""Measures the load of the page of `absenc serve` on a browser, with 100 encoders: bench/page_load.py [SECONDS
+[UPDATES]]"""
 import os
 import sys
 import tempfile
@@ -17,8 +16,7 @@ SECONDS = float(sys.argv[1]) if len(sys.argv) > 1 else 10
 UPDATES = float(sys.argv[2]) if len(sys.argv) > 2 else 30
 TICK = os.sysconf("SC_CLK_TCK")
 
-# RECORD stores states of the server as text, so that the measurement includes parsing. FORCE shows them with current
-# times.
+# States are stored as text, so that the measurement includes parsing.
 RECORD = """
 const done = arguments[arguments.length - 1];
 (async () => {

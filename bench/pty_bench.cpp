@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures readings per second through a pseudo-terminal with the whole stack on both sides, compared with a bare loop
-// of ppoll, read and write on both sides: 40 interleaved blocks of each, and a second bare block each time to measure
-// the noise.
+// Measures readings per second over a pseudo-terminal, against bare ppoll, read and write.
 #include <fcntl.h>
 #include <poll.h>
 #include <stdlib.h>
@@ -55,8 +53,7 @@ int open_raw(const char* path) {
   return descriptor;
 }
 
-/// A child process, which the destructor or `end` ends by SIGKILL to its id. `end` returns its user CPU time in
-/// seconds.
+/// A child process. `end` returns its user CPU time in seconds.
 class Child {
  public:
   explicit Child(const std::function<void()>& body) : pid_(fork()) {
@@ -79,7 +76,7 @@ class Child {
   pid_t pid_;
 };
 
-/// Exchanges by bare system calls: the encoder's side in a child process, the host's side in this process.
+/// Exchanges by bare system calls; the encoder's side is a child process.
 class BareLoop {
  public:
   BareLoop() : master_(open_raw(nullptr)), child_([this] { answer(); }) {
@@ -115,8 +112,7 @@ class BareLoop {
   Child child_;
 };
 
-/// Exchanges through the whole stack: virtual encoder and EmulatorPort in a child process, SerialPort and Session in
-/// this process.
+/// Exchanges through the whole stack; the encoder's side is a child process.
 class Stack {
  public:
   explicit Stack(std::string link)
@@ -202,8 +198,7 @@ int main(int argc, char** argv) {
   double bare_user = 0;
   double stack_user = 0;
   for (int i = 0; i < blocks; ++i) {
-    // The two bare runs swap their parts in every second block, so that neither part always has the run before the
-    // stack.
+    // The bare runs swap parts, so that neither part always has the run before the stack.
     const Block first = run(bare, exchanges);
     const Block measured = run(stack, exchanges);
     const Block second = run(bare, exchanges);

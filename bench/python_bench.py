@@ -1,9 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Compares the cost of the Python package with that of the command: bench/python_bench.py [build folder]
-
-Decodes a capture of 100 million samples and reads in a loop. The sides run in turn; times include their start. Prints
-medians."""
+"""Compares the cost of the Python package with that of the command: bench/python_bench.py [build folder]"""
 import os
 import pathlib
 import statistics
@@ -26,7 +23,7 @@ def program(text):
 
 
 def measured(arguments):
-    """Runs a process and returns its time, processor time and peak memory. It must exit with status 0."""
+    """Returns time, processor time and peak memory of a process. It must exit with status 0."""
     start = time.monotonic()
     with open(os.devnull, "wb") as nowhere:
         process = subprocess.Popen(arguments, stdout=nowhere, env=ENVIRONMENT)

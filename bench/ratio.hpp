@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Extends Google Benchmark by an additional line for each pair NAME and NAME_reference: how many times faster NAME is.
+// Prints for each pair of benchmarks NAME and NAME_reference how many times faster NAME is.
 #pragma once
 
 #include <benchmark/benchmark.h>
@@ -12,8 +12,7 @@
 
 namespace absenc::bench {
 
-/// Hides the value of `object` from the compiler. benchmark::DoNotOptimize may give g++ a register for a small object
-/// that is not constant, which then has another value.
+/// Hides the value of `object` from the compiler; benchmark::DoNotOptimize may change it.
 template <class Object>
 void hide(Object& object) {
   asm volatile("" : : "r"(&object) : "memory");
@@ -44,8 +43,7 @@ class RatioReporter : public benchmark::ConsoleReporter {
   std::map<std::string, double> medians_;
 };
 
-/// Runs all benchmarks with repetitions interleaved at random, so that changes of the machine's speed affect all alike.
-/// Returns the exit status.
+/// Runs all benchmarks with repetitions interleaved at random. Returns the exit status.
 inline int run_with_ratios(int argc, char** argv) {
   std::vector<std::string> arguments(argv, argv + argc);
   arguments.insert(arguments.begin() + 1, {"--benchmark_enable_random_interleaving=true", "--benchmark_repetitions=9",

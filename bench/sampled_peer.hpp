@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decoder of a motor controller that samples SLO with a timer, one byte of a port per clock of MA. It is our own
-// implementation of the method of mjbots' moteus for BiSS frames, used only to compare it with our decoder.
+// The method of mjbots' moteus for BiSS frames, implemented here only for comparison.
 #pragma once
 
 #include <array>
@@ -45,11 +44,10 @@ inline std::uint32_t four_samples(const std::uint8_t* samples, unsigned pin) {
   return four >> pin & every_byte;
 }
 
-// Returns one bit of each of the four bytes in `four`, gathered by a multiplication; the first byte gives the highest
-// bit.
+// The first byte gives the highest bit.
 inline std::uint32_t gathered(std::uint32_t four) { return four * 0x0804'0201 >> 24; }
 
-// Returns the CRC of `data`, computed with six bits per step, in as many steps as 30 or 60 bits need.
+// Six bits of the data make one step.
 inline unsigned checksum(std::uint64_t data, unsigned bits) {
   unsigned rest = 0;
   const auto step = [&](unsigned shift) { rest = six_bits[(data >> shift & 0x3F) ^ rest]; };
@@ -68,7 +66,7 @@ Register gather(const std::uint8_t* samples, unsigned bits, unsigned pin) {
 
 }  // namespace detail
 
-/// Decodes the frame in `samples`, of which there must be at least 28. The start bit is searched in the first 25.
+/// Decodes the frame in `samples`, at least 28, with its start bit among the first 25.
 inline SampledPosition take(const SampledPeer& peer, std::span<const std::uint8_t> samples) {
   using Error = SampledPosition::Error;
   constexpr std::size_t searched = 25;

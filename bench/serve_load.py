@@ -1,11 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Measures the cost of readings in `absenc serve` for several numbers of encoders, and their lateness with many
-clients: bench/serve_load.py [SECONDS [ENCODERS...]]
+"""Measures the cost and the lateness of readings in `absenc serve`: bench/serve_load.py [SECONDS [ENCODERS...]]
 
-Each encoder is a separate `absenc emulate` behind TCP, read 100 times per second; 200 event streams are open, each with
-the points of one encoder. A reading is late if more than the period has passed since the previous one, by the server's
-times. A late emulator also counts, if all processes together need more than the processors provide."""
+A reading is late if more than the period has passed since the previous one, by the server's times."""
 import contextlib
 import json
 import os
@@ -82,7 +79,7 @@ class Server:
 
 
 class Streams:
-    """Open event streams of the server. All data is read from each; times of readings are stored for some streams."""
+    """Open event streams of the server. Times of readings are stored for some of them."""
 
     def __init__(self, server, encoders):
         self.selector = selectors.DefaultSelector()

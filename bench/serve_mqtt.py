@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measures the cost of MQTT in `absenc serve`, and how fast it sends a full spool: bench/serve_mqtt.py [absenc]
 
-Needs mosquitto, python3-paho-mqtt. The encoders are virtual ones within the server; a run without sending shows their
-cost."""
+Needs mosquitto, python3-paho-mqtt."""
 import json
 import os
 import pathlib

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures Unit::decode of every unit that has a valid vector with a reply, and Unit::decoder if the unit has one. The
-// time per frame is compared with that of one CRC over the reply's bytes, computed bit by bit.
+// Measures the decoding of every unit that has a valid reply vector, against a bitwise CRC.
 #include <algorithm>
 #include <array>
 #include <cstdio>

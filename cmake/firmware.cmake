@@ -79,7 +79,7 @@ add_custom_target(firmware DEPENDS firmware_vectors-m0plus firmware_drive-microb
                   firmware_encoder-microbit firmware_encoder-m0plus)
 add_custom_target(firmware-all DEPENDS firmware firmware_vectors-m4f firmware_drive-m4f firmware_encoder-m4f)
 
-# Programs that each read one position, measured by firmware/figures.py. They need only a small part of the library.
+# Programs that each read one position, measured by firmware/figures.py.
 set(reading_sources ${m4f_sources})
 list(FILTER reading_sources INCLUDE REGEX "(engine|/host)\\.cpp$")
 foreach(cpu IN ITEMS m0plus m4f)

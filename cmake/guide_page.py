@@ -1,8 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Writes a page of the guide as a man page of section 7: guide_page.py VERSION PAGE.md OUTPUT.7
-
-It knows the Markdown of docs/: headings, paragraphs, lists, tables, code blocks, pictures, links, code and emphasis."""
+"""Writes a page of the guide as a man page of section 7: guide_page.py VERSION PAGE.md OUTPUT.7"""
 import re
 import sys
 from pathlib import Path
@@ -12,7 +10,7 @@ GITHUB_COMMENT = re.compile(r"<!--.*?-->\n?", re.DOTALL)
 
 
 def escaped(text):
-    """Returns `text` escaped for roff; characters that groff's ASCII input lacks are written by their names."""
+    """Returns `text` escaped for roff, in ASCII."""
     text = text.replace("\\", "\\e").replace("-", "\\-").replace("'", "\\(aq").replace("`", "\\(ga").replace("^", "\\(ha").replace("~", "\\(ti")
     return "".join(one if ord(one) < 128 else f"\\[u{ord(one):04X}]" for one in text)
 
@@ -23,7 +21,7 @@ def line_of(text):
 
 
 def target_of(address, page):
-    """Returns the target shown after a link: the man page of another guide page, or the path in the repository."""
+    """Returns the target to show after a link; "" for a part of the same page."""
     path, _, _ = address.partition("#")
     if re.match(r"https?:", address):
         return address
@@ -35,7 +33,7 @@ def target_of(address, page):
 
 
 def inline(text, page):
-    """Returns Markdown text as roff: code and strong text in bold, emphasis in italics, links as text and target."""
+    """Returns inline Markdown as roff."""
     parts = re.split(r"(`[^`]+`|\*\*[^*]+\*\*|\*[^*\s][^*]*\*|!?\[[^\]]*\]\([^)]+\))", text)
     out = ""
     for part in parts:
@@ -54,7 +52,7 @@ def inline(text, page):
 
 
 def breakable(text, length):
-    """Returns `text` with words of at least `length` characters breakable at punctuation and before a capital."""
+    """Returns `text` in which words of at least `length` characters can be broken."""
     return re.sub(rf"\S{{{length},}}", lambda word: broken(word[0]), text)
 
 
@@ -74,7 +72,7 @@ def longest_word(text):
 
 
 def paragraphs(head, body, page):
-    """Returns a table that is too wide for a terminal as paragraphs: each row's first cell with the others below."""
+    """Returns a table that is too wide for a terminal as paragraphs, one for each row."""
     out = []
     for row in body:
         rest = "; ".join(f"{inline(name, page)}: {inline(cell, page)}" for name, cell in zip(head[1:], row[1:]) if cell)

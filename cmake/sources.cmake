@@ -2,12 +2,11 @@
 # Lists of sources, for this build and for other build systems that use a part of the repository (packages/).
 get_filename_component(absenc_root "${CMAKE_CURRENT_LIST_DIR}/.." ABSOLUTE)
 
-# Folders that need no operating system, and compiler flags that keep firmware small by linking only functions in use.
+# Folders that need no operating system, and compiler flags that keep firmware small.
 set(absenc_firmware_folders absenc/core absenc/link absenc/protocol absenc/host)
 set(absenc_firmware_flags -ffunction-sections -fdata-sections -fno-exceptions -fno-rtti -fno-threadsafe-statics)
 
-# Returns the sources of folders, given by their paths from the root, without tests, fuzzers and benchmarks; and sources
-# that are given themselves.
+# Returns the sources in folders and the given ones, without tests, fuzzers and benchmarks.
 function(absenc_sources result)
   set(found)
   foreach(path IN LISTS ARGN)
@@ -24,8 +23,6 @@ function(absenc_sources result)
   set(${result} "${found}" PARENT_SCOPE)
 endfunction()
 
-# Returns what every protocol needs: the folders of core, link, host and of what protocols are made from, and the sources
-# beside these.
 function(absenc_base result)
   file(GLOB beside CONFIGURE_DEPENDS RELATIVE "${absenc_root}" "${absenc_root}/absenc/protocol/*.cpp")
   list(REMOVE_ITEM beside absenc/protocol/all.cpp)
@@ -40,7 +37,7 @@ function(absenc_all_protocols result)
   set(${result} "${folders}" PARENT_SCOPE)
 endfunction()
 
-# Returns the protocols whose code the protocol `name` uses: those in the line "Built on:" of its README.md.
+# Returns the protocols in the line "Built on:" of a README.md.
 function(absenc_built_on result name)
   set(readme "${absenc_root}/absenc/protocol/${name}/README.md")
   set(line)
@@ -53,7 +50,7 @@ function(absenc_built_on result name)
   set(${result} "${others}" PARENT_SCOPE)
 endfunction()
 
-# Returns the folders of protocols of this build: those in ABSENC_UNITS and those that they are built on, or all.
+# Returns the folders of protocols of this build, with those that they are built on.
 function(absenc_protocols result)
   absenc_all_protocols(all)
   if(NOT ABSENC_UNITS)

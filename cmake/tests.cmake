@@ -5,8 +5,7 @@ find_package(GTest REQUIRED)
 find_package(rapidcheck REQUIRED)
 include(GoogleTest)
 
-# Tests with the label `long` take more than some seconds, or need programs or packages that no other test needs.
-# `./dev test` skips them; `./dev test --all` runs them.
+# Tests with the label `long`: `./dev test` skips them, `./dev test --all` runs them.
 set(absenc_long_python_tests
     can_peers modbus_peers wave  # use clients, nodes and decoders of other projects
     doctor_faults doctor_healthy identify speed  # many faults, loaded machines, repetitions on every line
@@ -20,7 +19,6 @@ set(absenc_long_kit_tests)
 foreach(series RANGE 1 9)
   list(APPEND absenc_long_kit_tests "Seeds/*/${series}_*")
 endforeach()
-# Every model on a bad line, every clause with its mutants, every command drawn and decoded, healthy encoders again and again.
 set(absenc_long_client_tests Models/Confirmed.* Units/ChangingClauses.* Units/LiveAndCaptured.* Units/HealthyEncoder.*
     Units/Matrix.* Units/HostileEncoders.* Encoders/LatchTimes.*)
 set(absenc_long_capture_tests Seeds/RandomStream.*)
@@ -29,9 +27,7 @@ foreach(name IN ITEMS kit client capture host)
   list(JOIN absenc_long_${name}_tests ":" absenc_long_${name}_tests)
 endforeach()
 
-# GoogleTest's headers are compiled once for all tests. Tests are not optimised, so they compile in half the time. Of
-# the long campaigns, sanitizer builds run one series of faults (CMakePresets.json), and only a share of it
-# (tests/cases.hpp).
+# Tests are not optimised, so that they compile in half the time.
 function(absenc_test_settings target)
   absenc_settings(${target})
   target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}")
@@ -42,7 +38,7 @@ function(absenc_test_settings target)
   target_link_libraries(${target} PRIVATE absenc::absenc absenc::os absenc::capture rapidcheck GTest::gtest_main GTest::gmock)
 endfunction()
 
-# Only this test reads a source file of the repository; the path would make compiler caches useless for all others.
+# The path is defined for this test alone: it would make compiler caches useless for others.
 set_source_files_properties(absenc/protocol/raa38/serial/modes_test.cpp PROPERTIES
                             COMPILE_DEFINITIONS ABSENC_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
 file(CONFIGURE OUTPUT "${CMAKE_CURRENT_BINARY_DIR}/test_headers.cpp" CONTENT "")
@@ -91,8 +87,7 @@ function(absenc_keep_tests_for_every_unit list_of_sources)
   set(${list_of_sources} "${kept}" PARENT_SCOPE)
 endfunction()
 
-# GLOB: only tests of the folder itself; GLOB_RECURSE: also those of subfolders. ABSENC_SPLIT_TESTS builds one
-# executable per source for host and protocol, because tests/mutants.py runs only those that it needs.
+# ABSENC_SPLIT_TESTS builds one executable per source, because tests/mutants.py runs only some.
 function(absenc_folder_test name folder glob)
   file(${glob} sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/${folder}/*_test.cpp")
   if(ABSENC_UNITS AND NOT folder MATCHES "^absenc/protocol/")
@@ -154,11 +149,10 @@ endif()
 file(GLOB kit_sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/tests/kit/*.cpp")
 absenc_test(kit ${kit_sources})
 list(FILTER kit_sources EXCLUDE REGEX "_test\\.cpp$")
-# The kit runs a million exchanges per unit, so it is optimised and cannot use the precompiled headers.
+# The kit runs many exchanges, so it is optimised and cannot use the precompiled headers.
 set_source_files_properties(${kit_sources} PROPERTIES COMPILE_OPTIONS -O2 SKIP_PRECOMPILE_HEADERS ON)
 
-# Runs every fuzz function as a plain test, on all vectors, on variations of them, and on noise. In fuzzer builds the
-# fuzzers do the same.
+# Runs fuzz functions as plain tests; in fuzzer builds the fuzzers do that.
 if(ABSENC_LIBRARY_TESTS AND NOT ABSENC_FUZZ)
   add_library(fuzz_seeds_main OBJECT tests/fuzz_seeds_main.cpp)
   absenc_settings(fuzz_seeds_main)

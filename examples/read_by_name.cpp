@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads any encoder by the address that the command uses: tformat:/dev/ttyUSB0, ssi:spi:/dev/spidev0.0, sim:esl, elbow.
+// Reads any encoder by an address of the command: tformat:/dev/ttyUSB0, sim:esl, elbow.
 #include <cstdio>
 #include <exception>
 #include <optional>

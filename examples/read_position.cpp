@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The library in 15 lines: reads a Smart-Abs once, at the port in the argument, or on a simulated line without one.
+// Reads a Smart-Abs once, at the port in the argument or on a simulated line.
 #include <cstdio>
 
 #include "absenc/host/drive.hpp"

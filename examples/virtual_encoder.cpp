@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual encoder in the test of a drive: its port opens like that of a real encoder, and it fails on request.
+// A virtual encoder in the test of a drive. Its port opens like that of a real encoder.
 #include <cstdio>
 
 #include "absenc/client/emulate.hpp"

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A plugin for QEMU that counts instructions. For each pair of calls of count_begin and count_end it prints the nesting
-// depth and the number of instructions between the two calls. The arguments begin=ADDRESS and end=ADDRESS are the
-// addresses of these functions. Debian's QEMU supports plugins but lacks their header, so the functions in use
-// (interface version 1) are declared here.
+// A plugin for QEMU that counts the instructions between calls of count_begin and count_end, whose addresses are the
+// arguments begin and end. Debian's QEMU lacks the header of plugins, so the functions in use are declared here.
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>

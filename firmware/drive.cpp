@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A drive with a T-format encoder: a timer requests positions, the UART's interrupts run the conversations, and the
-// main program evaluates the readings. Between two series of readings it clears an alarm and writes to the encoder's
-// memory.
+// A drive with a T-format encoder: a timer requests positions, the UART's interrupts run the conversations.
 //
 //   drive POSITIONS SINGLETURN MULTITURN LATENCY_MS: number of confirmed readings, the position that each
 //   must report, and the latency of the line
@@ -22,9 +20,7 @@ using namespace std::chrono_literals;
 
 constexpr Time tick_period = 500us;  // one position per tick while the line is free
 constexpr tformat::Format format{.singleturn_bits = 17, .multiturn_bits = 16, .encoder_id = 0x11};
-// Highest speed of the axis, not of the encoder. The XOR checksum of T-format does not detect two flipped bits at the
-// same place of two bytes. In two bytes of the position they change it by 255 or more counts or by turns, which so
-// slow an axis cannot do between two readings.
+// Highest speed of the axis; low, so that undetected errors of the XOR checksum are implausible.
 constexpr std::uint32_t axis_rpm = 1;
 
 struct Result {
@@ -32,8 +28,7 @@ struct Result {
   Reading reading;
 };
 
-// The axis of the drive, used by the interrupts: runs one conversation at a time, either a position or a command of the
-// main program.
+// Runs one conversation at a time, from the interrupts.
 class Axis {
  public:
   explicit Axis(Time latency) : carrier_(*this, latency) {}
@@ -120,8 +115,6 @@ class Axis {
 alignas(Axis) std::byte axis_memory[sizeof(Axis)];
 Axis* axis = nullptr;
 
-// Checks each confirmed reading against the expected position, and counts readings by their result. A plausible reading
-// that nothing confirms yet is not counted.
 class ReadingCheck {
  public:
   ReadingCheck(std::uint32_t singleturn, std::uint32_t multiturn) : singleturn_(singleturn), multiturn_(multiturn) {}
@@ -188,8 +181,7 @@ void read(ReadingCheck& check, std::uint32_t until) {
   while (axis->take(result)) check.take(result);
 }
 
-// Runs a command of the unit until it succeeds, up to ten times, and returns whether it did. Clearing alarms or writing
-// the same byte twice does no harm.
+// Tries up to ten times. Returns whether it succeeded.
 bool command(std::string_view name, Arguments arguments) {
   alignas(std::max_align_t) static std::array<std::byte, 4096> storage;
   const Unit& unit = tformat::unit;

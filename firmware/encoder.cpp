@@ -4,7 +4,7 @@
 //   encoder SINGLETURN MULTITURN RPM LATENCY_MS: position at the start, speed, and the latency of the
 //   line
 //
-// It runs until the emulator ends, and prints the rules of the document that its host violates.
+// It runs until the emulator ends, and prints rules that its host violates.
 #include <new>
 
 #include "absenc/core/bytes.hpp"
@@ -17,8 +17,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// The period of the tick is long, because a tick that the emulator delivers too late is lost, with its time. The main
-// program reads the clock instead.
+// The main program reads the clock itself: a tick that the emulator delivers late is lost.
 constexpr Time tick_period = 500ms;
 constexpr tformat::Format format{.singleturn_bits = 17, .multiturn_bits = 16, .encoder_id = 0x11};
 
@@ -56,8 +55,7 @@ class Encoder {
 
   // ---- Functions called by the carrier
 
-  // Starts to send a reply. It copies the reply, because the device overwrites its own buffer when a host sends during
-  // the reply, in violation of the document.
+  // The reply is copied, because the device may overwrite its buffer during the reply.
   void begin(const ByteStep& step) {
     reply_.clear();
     reply_.append(step.out);
@@ -107,8 +105,7 @@ int main() {
   for (std::uint32_t reported = 0;;) {
     const machine::InterruptLock lock;
     encoder->tick(machine::now());
-    // Waits for an interrupt if the carrier has nothing due; a pending interrupt ends `wfi` at once. A busy loop would
-    // keep the emulator from serving its socket.
+    // A busy loop would keep the emulator from serving its socket.
     if (encoder->is_at_rest()) asm volatile("wfi");
     if (encoder->broken_rules() == reported) continue;
     reported = encoder->broken_rules();

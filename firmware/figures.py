@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """usage: figures.py FOLDER FIGURES.json [--check]
 
-Measures the cost of reading a position in firmware: sizes of the programs reader-*.elf in FOLDER minus those of the base,
-and their instructions and stack on an emulated machine. Writes FIGURES.json and the table in docs/firmware.md. With
---check it compares instead: every figure must be within 3 % of that in FIGURES.json, and the compiler must be the
-same."""
+Measures the cost of reading a position in firmware, for FIGURES.json and the table in docs/firmware.md. With --check it
+compares instead; figures may differ by 3 %."""
 import json
 import os
 import re
@@ -31,7 +29,7 @@ def sizes(program):
 
 
 def marks(program):
-    """Returns the addresses of count_begin and count_end as arguments of the plugin. Thumb functions have bit 0 set."""
+    """Returns the arguments of the plugin. Thumb functions have bit 0 of their address set."""
     symbols = {name: int(address, 16) for address, _, name in
                re.findall(r"^([0-9a-f]+) (\w) (\w+)$", output("arm-none-eabi-nm", program), re.MULTILINE)}
     return f"begin={symbols['count_begin'] & ~1:#x},end={symbols['count_end'] & ~1:#x}"
@@ -64,8 +62,7 @@ def measured(folder):
                 program = os.path.join(folder, f"reader-{reader}-{cpu}.elf")
                 every[reader] = sizes(program) | run(plugin, program, machine)
             base = every.pop("base")
-            # The base program reads nothing between its two marks, so the instructions that it counts are the cost of
-            # the marks. They are subtracted from all three counts of instructions.
+            # The base program reads nothing between its marks: it counts the instructions of the marks.
             base["character"] = base["reply"] = base["reading"]
             for reader, figures in every.items():
                 above = {name: None if figures[name] is None else figures[name] - base[name] for name in FIGURES}

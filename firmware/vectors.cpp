@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decodes every vector of every unit on the machine, both the units' own vectors and those of tests/*.json, and
-// compares fields and errors.
+// Decodes every vector of every unit on the machine and compares fields and errors.
 #include <algorithm>
 #include <array>
 
@@ -14,8 +13,7 @@ namespace {
 
 using machine::print;
 
-// Returns the part of `text` before `end`, and removes that part and `end` from `text`. Does not use substr(), which
-// may throw.
+// Works without substr(), which may throw.
 std::string_view cut(std::string_view& text, char end) {
   const std::size_t size = std::min(text.find(end), text.size());
   const std::string_view front(text.data(), size);
@@ -23,7 +21,6 @@ std::string_view cut(std::string_view& text, char end) {
   return front;
 }
 
-// Resolves options from a text "name=value name=value"; returns false if one is invalid or they are too many.
 bool resolve(const Unit& unit, std::string_view text, Options& options) {
   Buffer<OptionText, maximum_options> settings;
   while (!text.empty()) {
@@ -34,8 +31,7 @@ bool resolve(const Unit& unit, std::string_view text, Options& options) {
   return resolve_options(unit, {}, settings, options).kind == OptionError::Kind::none;
 }
 
-// Compares decoded fields with a vector of tests/*.json: flags by names, bytes in hexadecimal, texts and lists as text,
-// numbers by value.
+// Compares decoded fields with a vector of tests/*.json.
 class ReferenceCheck final : public FieldSink {
  public:
   explicit ReferenceCheck(std::span<const ExpectedField> expected) : expected_(expected) {}
@@ -47,8 +43,7 @@ class ReferenceCheck final : public FieldSink {
       if (!matches(one, value)) wrong_ = true;
     }
   }
-  // Returns whether all expected fields had their expected value. A field that is expected as an empty text may be
-  // missing.
+  // Fields that are expected as "" may be missing.
   [[nodiscard]] bool all() const {
     const auto needed = std::count_if(expected_.begin(), expected_.end(), [](const ExpectedField& one) {
       return one.kind != ExpectedField::Kind::text || !one.text.empty();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The vectors of tests/*.json, which vectors.py converts to tables, because the machine has no files.
+// The vectors of tests/*.json as tables, because the machine has no files.
 #pragma once
 
 #include <cstdint>

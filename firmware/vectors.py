@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """usage: vectors.py OUTPUT.cpp VECTORS.json...
 
-Writes the vectors as tables for firmware/vectors.cpp. This script converts names and forms that differ between a vector
-and its unit: control frames of BiSS are two rows of bits, channels have prefixes, lists of numbers are texts."""
+Writes the vectors as tables for firmware/vectors.cpp."""
 import json
 import sys
 

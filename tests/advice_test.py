@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks that every command in backquotes in a string of the sources exists and names the tool, and that commands with
-sudo stand in backquotes. tests/kit/advice.cpp follows the advice for alarms and errors."""
+"""Checks the commands that strings of the sources name in backquotes."""
 
 import os
 import re
@@ -15,7 +14,7 @@ TWO_WORDS = {"config", "memory", "crc"}
 
 
 def literals(source):
-    """Returns the string literals of a C++ source file, with adjacent literals joined as by the compiler."""
+    """Returns the string literals of a C++ source file, with those of adjacent lines joined."""
     text = source.read_text(encoding="utf-8")
     text = re.sub(r"(?m)^\s*//.*$", "", text)
     text = re.sub(r'"\s*\n\s*"', "", text)
@@ -62,7 +61,7 @@ class NamedCommands(unittest.TestCase):
                 self.assertNotIn(quoted.split(" ")[0], verbs)
 
     def test_shell_commands_stand_in_backquotes(self):
-        """Commands with `sudo`, which users copy, must stand in backquotes, unless they are the whole text."""
+        """Commands with `sudo` must stand in backquotes, unless they are the whole text."""
         for source in sources():
             for text in literals(source):
                 rest = re.sub(r"`[^`]*(`|$)", "", text)

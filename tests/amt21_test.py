@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc` with AMT21 encoders: turns have a sign in text, JSON, CSV, decoded captures and recordings, and a
-scan finds the encoder."""
+"""Tests `absenc` with AMT21 encoders: the sign of turns, and a scan."""
 import csv
 import io
 import unittest

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests BiSS with the absenc command: frames of several encoders, safety words, chains, control frames and
-registers."""
+"""Tests BiSS with the absenc command."""
 import bisect
 import json
 import os
@@ -29,8 +28,7 @@ def numbers(text):
 
 
 class Vectors(Case):
-    """Compares every BiSS vector with the output of `decode`, which prints lists as text and prefixes the fields of a
-    channel or of a safety word."""
+    """Compares every BiSS vector with the output of `decode`."""
 
     def check(self, vector, answer, fields):
         if "error" in vector:
@@ -155,7 +153,7 @@ class Registers(Case):
             self.assertEqual((info["slave_id"], info["serial_number"], info["slaves"]), (slave, slave + 1, 3))
 
     def test_reads_emulates_and_decodes_eight_encoders(self):
-        """A BiSS frame carries data of eight encoders at most. Each of the eight has a different word length."""
+        """A BiSS frame carries data of eight encoders at most."""
         bits = {index: 12 + index for index in range(8)}
         chain = "slaves=8&" + "&".join(f"channel{index}_singleturn_bits={count}" for index, count in bits.items())
         for slave in (0, 4, 7):
@@ -200,14 +198,12 @@ class Registers(Case):
 
 
     def test_sigrok_decodes_same_positions(self):
-        """sigrok's SPI decoder reads the bits of a waveform with a register access. This test then splits the bits into
-        frames, as a motor controller that knows only position frames."""
+        """sigrok's SPI decoder reads the same bits."""
         with tempfile.TemporaryDirectory() as directory:
             path = os.path.join(directory, "drive.vcd")
             self.assert_good(absenc("wave", "biss?motion=rpm=600", path, "--command", "memory-read 68 0 4"))
             rows = json_lines(absenc("decode", "biss", path, "--json").stdout)
-            # A line of sigrok's output, such as "146500-146500 spi-1: 01", is one bit with its time. The clock pauses
-            # for 40 us after each frame.
+            # A line of output is one bit with its time; the clock pauses after each frame.
             seen = subprocess.run(["sigrok-cli", "-I", "vcd", "-i", path, "--protocol-decoder-samplenum", "-P",
                                    "spi:clk=clock:miso=data:cpol=1:cpha=1:wordsize=1", "-A", "spi=miso-data"],
                                   capture_output=True, text=True, timeout=60, check=True).stdout.splitlines()
@@ -266,7 +262,7 @@ class Settings(Case):
 
 
 def crc(bits, polynomial, width):
-    """Returns the inverted CRC of a text of bits "0" and "1", implemented from the BiSS document alone."""
+    """Returns the inverted CRC of a text of bits."""
     remainder = 0
     for bit in bits:
         top = (remainder >> (width - 1) & 1) != int(bit)
@@ -275,7 +271,7 @@ def crc(bits, polynomial, width):
 
 
 def safety_words(position, counter):
-    """Returns a position's control position word (CPW, 24 bits) and safety position word (SPW, 16 bits)."""
+    """Returns a position's control position word (CPW) and safety position word (SPW)."""
     cpw = format(position, "024b") + "11"
     spw = format(position >> 8, "016b") + "11" + format(counter, "06b")
     return cpw + crc(cpw, 0x03, 6) + spw + crc(spw, 0x90D9, 16)
@@ -291,8 +287,7 @@ def control_crc(bits):
 
 
 def register_frame(slave, address, data, write=False, delays=None):
-    """Returns the CDM and CDS bits of the control frame of one register access, one bit per position frame, as in
-    drawing D2. `delays`: number of position frames before each start bit."""
+    """Returns the CDM and CDS bits of a register access. `delays`: frames before each start bit."""
     delays = delays or [0] * len(data)
     header = "1" + format(slave, "03b") + format(address, "07b")
     cdm = "0" * 14 + "1" + header + control_crc(header) + ("011" if write else "101")
@@ -305,7 +300,7 @@ def register_frame(slave, address, data, write=False, delays=None):
 
 
 def command_frame(slaves, command):
-    """Returns the CDM and CDS bits of the control frame of a command, which every addressed encoder acknowledges."""
+    """Returns the CDM and CDS bits of a command."""
     header = "0" + "".join("1" if slaves >> i & 1 else "0" for i in range(8)) + format(command, "02b")
     there = max(slaves.bit_length(), 1)
     cdm = "0" * 14 + "1" + header + control_crc(header) + "1"
@@ -326,8 +321,7 @@ def plain_word(position):
 
 
 def draw_frames(words, cdm="", cds=""):
-    """Returns a VCD of position frames at 1 MHz with a timeout of 20 us. `cdm` and `cds` are bits of control frames,
-    one per position frame."""
+    """Returns a VCD of position frames at 1 MHz, with one bit of `cdm` and `cds` per frame."""
     lines = ["$timescale 1 ns $end", "$var wire 1 c clock $end", "$var wire 1 d data $end", "$enddefinitions $end",
              "#0", "1c", "1d"]
     now = 100_000
@@ -345,7 +339,7 @@ def draw_frames(words, cdm="", cds=""):
 
 
 def wires_of(path):
-    """Returns the changes of clock and data in a VCD of `wave`, each as (time in nanoseconds, level)."""
+    """Returns the changes of clock and data in a VCD, each as (time in nanoseconds, level)."""
     wires = {'!': [], '"': []}
     now = 0
     with open(path, encoding="utf-8") as file:
@@ -363,9 +357,7 @@ def level_at(wire, time):
 
 
 def read_frames(path):
-    """Decodes the position frames of a VCD's two wires as the document describes them, and returns position, CDM and
-    CDS of each. SLO is sampled at the rising edges of MA. A frame ends where SLO rises without an edge of MA; the
-    inverted level of MA there is the CDM bit."""
+    """Returns position, CDM and CDS of each frame in a VCD."""
     clock, data = wires_of(path)
     ends = [at for at, level in data[1:] if level == "1"]
     edges = [at for at, level in clock[1:] if level == "1"]
@@ -386,8 +378,7 @@ def read_frames(path):
 
 
 def registers_in(frames):
-    """Returns the register accesses in the control bits of position frames: (slave, address, bytes, whether they were
-    written)."""
+    """Returns the register accesses in position frames: (slave, address, bytes, whether written)."""
     cdm, cds = ("".join(frame[which] for frame in frames) for which in (1, 2))
     found, at = [], cdm.find("0" * 14 + "1")
     while at >= 0:
@@ -457,8 +448,7 @@ class Waveforms(Case):
                 self.assertEqual((clock[-1][1], data[-1]), ("1", (last_edge + low, "1")))
 
     def test_slo_is_low_after_crc(self):
-        """SLO must be low after the CRC until the timeout. The line delay of this test needs many more clocks than the
-        frame has."""
+        """SLO must be low after the CRC until the timeout."""
         path = self.file("wires.vcd")
         self.assert_good(absenc("wave", "biss?line_delay_ns=4300&singleturn=275087", path))
         rows = json_lines(absenc("decode", "biss", path, "--json").stdout)
@@ -493,8 +483,7 @@ class StartSequence(Case):
             rows = json_lines(absenc("decode", "biss", path, "--json").stdout)
         self.assertEqual([(len(row["reply"]), row["ok"]) for row in rows],
                          [(41, False), (2, False), (41, True), (41, True)])
-        # The waveform's idle time before and after the pulses is 40 us. SLO is sampled half a clock after the rising
-        # edge.
+        # Idle time before and after the pulses is 40 us; SLO is sampled half a clock after an edge.
         for before, after in zip(rows[:2], rows[1:]):
             self.assertAlmostEqual(after["time_s"] - before["end_s"], 40.5e-6, delta=0.1e-6)
 
@@ -563,8 +552,7 @@ class Requests(Case):
 
 
 class ControlFrames(Case):
-    """Compares the control frames that the absenc command encodes, decodes and draws with frames that this test
-    builds and reads from the document alone."""
+    """Compares control frames of the absenc command with frames made from the document alone."""
 
     def control(self, cdm, cds):
         return decode("biss", "--request", cdm, "--hex", cds)

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests absenc on CAN against python-can, an independent implementation: python-can reads a virtual node, plays a node
-that absenc reads, and reads absenc's log."""
+"""Tests absenc on CAN against python-can, an independent implementation."""
 import os
 import sys
 import threading
@@ -82,7 +81,7 @@ class Reader(Case):
     def test_node_ignores_extended_and_remote_frames(self):
         self.bus.send(message(0x220, 0x80, 0x20, is_extended_id=True))
         self.bus.send(can.Message(arbitration_id=0x220, is_remote_frame=True, dlc=8, is_extended_id=False))
-        # Node 0x21 answers this standard request, which is sent after the frames that node 0x20 must ignore.
+        # Node 0x21 answers this request, which is sent after the frames that 0x20 must ignore.
         self.bus.send(message(0x221, 0x80, 0x21))
         while True:
             received = self.bus.recv(PATIENCE)
@@ -105,7 +104,7 @@ class Reader(Case):
 
 
 class Node(threading.Thread):
-    """A fake RAA38S6, implemented from its manual with python-can, behind an emulated slcan adapter."""
+    """A fake RAA38S6, implemented from its manual, behind an emulated slcan adapter."""
 
     def __init__(self):
         super().__init__()
@@ -123,8 +122,7 @@ class Node(threading.Thread):
         self.crossing = threading.Thread(target=self.cross)
 
     def cross(self):
-        """Thread between absenc and the fake node: forwards the frames of each to the other, accepts commands for the
-        slcan adapter, and acknowledges frames."""
+        """Forwards frames between absenc and the fake node, and plays the slcan adapter."""
         import select
         rest = {self.master: b"", self.inner: b""}
         while not self.ended.is_set():

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reduces the number of cases of a long test in builds where each case is slow, such as one with a sanitizer.
+// Reduces the number of cases of a long test in builds where each case is slow.
 #pragma once
 
 #include <algorithm>
@@ -7,8 +7,8 @@
 
 namespace absenc {
 
-/// Returns `all` times the percentage in ABSENC_CASES_PERCENT (0 to 100, default 100), at least 1. Only for the number
-/// of similar cases: a test that must cover each kind of case must not reduce the kinds.
+/// Returns `all` times the percentage in ABSENC_CASES_PERCENT (default 100), at least 1. Only for numbers of similar
+/// cases.
 inline unsigned test_cases(unsigned all) {
   const char* const percent = std::getenv("ABSENC_CASES_PERCENT");
   if (percent == nullptr) return all;

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests that a command which changes an encoder reports the state of the change, in text and as one word in JSON."""
+"""Tests that a command which changes an encoder reports the state of the change."""
 import json
 import os
 import shlex
@@ -49,7 +49,7 @@ class ChangeStates(Case):
         self.assertNotIn("change", json.loads(absenc("run", "sim:tformat", "temperature", "--json").stdout))
 
     def test_every_change_on_bad_line_has_state(self):
-        """Covers changes whose value cannot be read back, because the encoder has moved to another baud rate."""
+        """Covers changes whose value cannot be read back at the old baud rate."""
         seen = set()
         for seed in range(100, 124):
             with Emulator(self.directory, "--fault", "truncate=0.4", "--seed", str(seed), protocol="raa38-modbus",

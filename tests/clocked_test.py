@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc` with encoders on clocked links: virtual encoders (`sim:`), and addresses of real encoders on an SPI
-controller."""
+"""Tests `absenc` with encoders on clocked links."""
 import csv
 import json
 import os

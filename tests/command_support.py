@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shared by the tests of the absenc command: runs the command, emulator processes, and fake encoders on
-pseudo-terminals."""
+"""Shared by the tests of the absenc command."""
 import contextlib
 import itertools
 import json
@@ -19,19 +18,19 @@ import unittest
 
 ABSENC = os.path.abspath(os.environ.get("ABSENC", "build/release/bin/absenc"))
 os.environ.setdefault("ABSENC_CHANGES", "none")  # tests do not write to the user's journal of changes
-# Usual time limit of a wait, in seconds. Only a hang takes that long. A test in a virtual machine sets a longer limit.
+# Usual time limit of a wait, in seconds.
 PATIENCE = float(os.environ.get("ABSENC_PATIENCE", "60"))
 
 
 def absenc(*arguments, **settings):
-    """Runs the absenc command and returns its completed process: exit status, standard output and standard error."""
+    """Runs the absenc command and returns its completed process."""
     settings.setdefault("stdin", subprocess.DEVNULL)
     settings.setdefault("timeout", PATIENCE)
     return subprocess.run([ABSENC, *arguments], capture_output=True, text=True, **settings)
 
 
 def read_line(stream, deadline):
-    """Returns one line of an unbuffered binary stream, or None at the deadline or at the end of the stream."""
+    """Returns one line of an unbuffered binary stream; None at the deadline or the end."""
     line = b""
     while not line.endswith(b"\n"):
         left = deadline - time.monotonic()
@@ -45,7 +44,7 @@ def read_line(stream, deadline):
 
 
 def end(process, number=signal.SIGTERM):
-    """Sends the signal and returns the exit status, standard output and standard error of the process."""
+    """Sends a signal and returns exit status, standard output and standard error."""
     if process.poll() is None:
         process.send_signal(number)
     out, err = process.communicate(timeout=PATIENCE)
@@ -64,7 +63,7 @@ def wait_for_handler(process):
 
 
 def character_units():
-    """Returns a dictionary from the name of each unit with a character link to its entry in `absenc list --json`."""
+    """Returns the units with a character link: from name to entry in `absenc list --json`."""
     return {unit["protocol"]: unit for unit in json_lines(absenc("list", "--json").stdout)
             if unit["link"] in ("half_duplex", "full_duplex")}
 
@@ -85,7 +84,7 @@ class Busy:
 
 
 class Emulator:
-    """A process of `absenc emulate`. `path` is its port; the process is ready when the constructor returns."""
+    """A process of `absenc emulate`, which is ready. `path` is its port."""
 
     def __init__(self, directory, *arguments, protocol="tformat", name="encoder", line="--pty",
                  stdin=subprocess.DEVNULL):
@@ -103,8 +102,7 @@ class Emulator:
         return end(self.process, number)
 
     def kill(self):
-        """Kills the emulator as `kill -9` does, and removes the link to its terminal: a later test may get a terminal
-        with the same number, to which the link would lead."""
+        """Kills the emulator and removes its link."""
         os.unlink(self.path)
         self.process.kill()
 
@@ -116,8 +114,7 @@ class Emulator:
 
 
 class FakeLine:
-    """A pseudo-terminal whose far end is a thread of the test. Derived classes define `serve`, which runs in that
-    thread until `wake` can be read."""
+    """A pseudo-terminal whose far end is a thread, in which `serve` of a derived class runs."""
 
     def __init__(self):
         self.master, self.slave = os.openpty()
@@ -138,8 +135,7 @@ class FakeLine:
 
 
 class FakeEncoder(FakeLine):
-    """A fake encoder that sends a fixed reply for the first byte of a request. `replies` is a dictionary from first
-    byte to reply, or only the reply to 1A."""
+    """A fake encoder with fixed replies, by the first byte of a request."""
 
     def __init__(self, replies=b""):
         super().__init__()
@@ -157,8 +153,7 @@ class FakeEncoder(FakeLine):
 
 
 class BabblingLine(FakeLine):
-    """A line that is never silent: sends one of `pieces` every `period` seconds, in turn, whatever the host requests.
-    With a period of 0 it sends as fast as the line allows. Bytes that no program reads are lost."""
+    """A line that sends one of `pieces` every `period` seconds, in turn; 0: as fast as possible."""
 
     def __init__(self, period=0.005, pieces=(b"\x55",)):
         super().__init__()
@@ -196,8 +191,7 @@ class Case(unittest.TestCase):
         return path
 
     def watch(self, *arguments, until, **settings):
-        """Runs `monitor --json` until `until(readings)` is true, and returns `readings`: a dictionary from encoder name
-        to its last live reading. The only time limit is PATIENCE."""
+        """Runs `monitor --json` until `until(readings)` is true; returns the live readings by encoder."""
         process = subprocess.Popen([ABSENC, "monitor", *arguments, "--json", "--interval", "0.1"], bufsize=0,
                                    stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **settings)
         self.addCleanup(lambda: end(process, signal.SIGKILL) if process.poll() is None else None)
@@ -218,8 +212,7 @@ class Case(unittest.TestCase):
         self.assertEqual(result.returncode, 0, f"{result.stdout}\n{result.stderr}")
 
     def assert_wrong_usage(self, result, *words):
-        """Expects that the command ended with exit status 2, an error message that contains these words, and an empty
-        standard output."""
+        """Expects exit status 2, an error message with these words, and no standard output."""
         self.assertEqual(result.returncode, 2, f"{result.stdout}\n{result.stderr}")
         self.assertEqual(result.stdout, "")
         self.assert_sentence(result.stderr, *words)

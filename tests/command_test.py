@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests the verbs of absenc that need no encoder: decode, encode, list, vectors and help; and wrong usage."""
+"""Tests decode, encode, list, vectors and help, and wrong usage."""
 import json
 import os
 import subprocess

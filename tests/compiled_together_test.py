@@ -1,8 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests that no two sources of a folder define a local function of the same name, because the sources of a folder are
-compiled as one file. The compiler would accept a function with other parameters as an overload, and a call might reach
-the function of the wrong file."""
+"""The sources of a folder are compiled as one file: names of local functions must differ."""
 
 import re
 import unittest
@@ -23,8 +21,7 @@ def own_functions(text):
 
 
 def shared_names():
-    """Returns a line "folder: name in one.cpp, other.cpp" for each name of a local function that two sources of a
-    folder define."""
+    """Returns a line for each name of a local function that two sources of a folder define."""
     found = []
     folders = defaultdict(list)
     for top in ("absenc", "python/src", "tools/absenc"):

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests the configuration file absenc.toml: names of encoders, where the file is searched, which setting overrides
-which, and errors in the file."""
+"""Tests the configuration file absenc.toml."""
 import json
 import os
 import resource
@@ -103,7 +102,7 @@ class Overriding(ConfigCase):
         self.config('[defaults]\nlatency = 5\nbaud = 9600\necho = "auto"\nmultiturn = 4\nstrict = false\n' + SIM)
         self.assertEqual(self.json("read", "elbow")["multiturn"], 4)
         self.assertEqual(self.json("info", "elbow")["options"]["strict"], False)
-        # A setting of a bus or of an encoder must suit protocol and port. A setting in [defaults] need not.
+        # Settings of a bus or an encoder must suit protocol and port; those in [defaults] need not.
         self.config(SIM + "latency = 5\n")
         self.assert_wrong_usage(self.absenc("read", "elbow"), "absenc.toml:4:1: latency cannot be set here", "tcp")
 
@@ -159,8 +158,7 @@ class ManyEncoders(ConfigCase):
         return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
     def test_file_is_parsed_once(self):
-        """If the file is parsed once, the processor time grows in proportion to the number of encoders, not with its
-        square."""
+        """The processor time must not grow with the square of the number of encoders."""
         self.assertLess(self.processor_time(2000), 30 * max(self.processor_time(200), 0.01))
 
     def test_serve_with_many_encoders_ends_by_signal(self):

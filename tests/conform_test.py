@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests the output of `absenc conform` and `absenc conform-host`. The tests in client/conform cover each clause and its
-mutants."""
+"""Tests the output of `absenc conform` and `absenc conform-host`."""
 import json
 import select
 import signal
@@ -25,8 +24,7 @@ class Conform(EncoderCase):
         answer = json.loads(result.stdout)
         self.assertEqual((answer["ok"], answer["protocol"], answer["left"]), (True, "tformat", []))
         for clause in answer["clauses"]:
-            # For this clause the request is sent at another rate. The reply arrives before the port has its former rate
-            # again, so the clause stays untested.
+            # The reply arrives before the port has its former rate again, so the clause is untested.
             expected = "untested" if clause["id"] == "bad-delimiter" else "kept"
             self.assertEqual(clause["verdict"], expected, clause)
             self.assertTrue(clause["document"] and clause["paragraph"] and clause["evidence"], clause)
@@ -112,15 +110,13 @@ class ConformHost(EncoderCase):
         end(host, signal.SIGTERM)
         answer = json.loads(out)
         verdicts = {one["id"]: one["verdict"] for one in answer["clauses"]}
-        # The clauses about reset and memory requests stay untested, because a host that only reads positions sends no
-        # such request.
+        # A host that only reads positions sends no request for a reset or for memory.
         read = {"asks", "silence", "damage", "turn", "refusal"}
         self.assertEqual(verdicts, {name: "kept" if name in read else "untested" for name in verdicts}, err)
         self.assertEqual((judge.returncode, answer["ok"]), (0, True))
 
     def verdicts_of(self, host):
-        """Returns the exit status of `conform-host`, its JSON output, and its verdicts by clause. `host` is a function
-        that plays the host on the line and then sends nothing more."""
+        """Returns exit status, JSON output and verdicts by clause. `host` plays the host on the line."""
         path = self.file("encoder")
         judge = self.start("conform-host", "tformat", "--pty", path, "--answers", "2", "--patience", "1", "--json")
         self.assertIn("ready: ", read_line(judge.stderr, time.monotonic() + PATIENCE))

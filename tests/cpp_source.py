@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Splits a C++ source formatted by clang-format into tokens, and finds the bounds of its operands and statements."""
+"""Splits a C++ source into tokens, and finds the bounds of its operands and statements."""
 
 import bisect
 import re
@@ -28,7 +28,7 @@ class Token(NamedTuple):
 
 
 class Source:
-    """A C++ source as a list of tokens, without comments and directives, and the pairs of matching brackets."""
+    """A C++ source as a list of tokens, and its pairs of matching brackets."""
 
     def __init__(self, text):
         self.text = text
@@ -102,7 +102,7 @@ class Source:
         return index
 
     def statement(self, index):
-        """Returns the index after the semicolon or brace that ends the statement which begins at the token `index`."""
+        """Returns the index behind the statement that begins at the token `index`."""
         while index < len(self.tokens) and self[index] not in CLOSING:
             if self[index] == ";":
                 return index + 1

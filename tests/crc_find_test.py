@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc crc find`, which determines the checksum of an undocumented encoder from its frames."""
+"""Tests `absenc crc find`, which determines a checksum from frames."""
 import functools
 import json
 import operator
@@ -11,7 +11,7 @@ from command_support import Case, absenc
 
 
 def crc(data, width, poly, init, xorout, reflected=False):
-    """Returns the CRC, computed bit by bit, independently of the library. `reflected` sets refin and refout."""
+    """Returns the CRC, computed bit by bit. `reflected` sets refin and refout."""
     remainder = init
     for byte in data:
         for bit in range(8) if reflected else range(7, -1, -1):

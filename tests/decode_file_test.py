@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc decode` with captures: texts and logs, waveforms, raw samples and sigrok sessions."""
+"""Tests `absenc decode` with captures."""
 import csv
 import functools
 import io
@@ -41,8 +41,7 @@ class Wave:
                 self.now += bit
 
     def word(self, bits, half=2500):
-        """Appends a word on a clocked link: the first edge of the clock latches the position, then each rising edge
-        shifts out a bit. `half` is half a clock period in nanoseconds."""
+        """Appends a word on a clocked link. `half` is half a clock period in nanoseconds."""
         self.level("clock", 0, self.now)
         for bit in bits:
             self.now += half
@@ -215,8 +214,7 @@ class Text(Case):
                         "--bits", "--json")
         self.assert_good(result)
         self.assertEqual(json.loads(result.stdout)["bits"]["singleturn"], [{"first": 0, "count": 13}])
-        # Bits that are active low are marked as inverted. Except on clocked lines, bit numbers count from the lowest
-        # bit of each byte.
+        # Except on clocked lines, bit numbers count from the lowest bit of each byte.
         for arguments, field, places in (
             (["encolink", "--hex", "003e825200"], "warning", [{"first": 16, "count": 1, "inverted": True}]),
             (["raa38-modbus", "--hex", "0103021234B533"], "singleturn",

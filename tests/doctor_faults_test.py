@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests that the verdict of `absenc doctor` names the cause of a fault between the command and an encoder, in real time
-on pseudo-terminals. Each fault is tested with one unit; with --all, with every unit that can have it."""
+"""Tests in real time that the verdict of `absenc doctor` names the cause of a fault; with --all, with more units."""
 import concurrent.futures
 import contextlib
 import json
@@ -16,19 +15,18 @@ from command_support import Case, Emulator, absenc, character_units
 ALL = "--all" in sys.argv
 PATIENT = "latency=40"  # milliseconds that a busy machine may add to a reply
 
-# The check bits of these protocols accept so many damaged replies that they do not show how the bytes were changed.
+# Check bits of these protocols accept many damaged replies.
 WEAK_CHECK = {"amt21"}
 
-# By protocol and fault: a further finding that explains the frames that the fault makes of the protocol's frames.
+# By protocol and fault: a further finding that explains the damaged frames.
 ALSO = {
-    # Byte 00 of channel 2 is outside the checksum: a frame without it is a good frame of has_ch2=false.
+    # Byte 00 of channel 2 is outside the checksum.
     ("encolink", "NUL lost"): "wrong_settings",
-    # A late reply to `v`, in front of the next reply, is no frame of `4`: its bytes look like extra ones.
+    # A late reply to `v`, in front of the next reply, looks like extra bytes.
     ("e201", "randomly late"): "extra_bytes",
 }
 
-# Each row: name, fault, ids of the findings of which the verdict must name one. "good" means that doctor finds no
-# fault.
+# Each row: name, fault, ids that the verdict may name. "good": doctor finds no fault.
 PROXIED = [
     ("healthy", faults.Fault, "good"),
     ("split in packets", faults.Split, "good"),
@@ -87,9 +85,7 @@ class DoctorFaults(Case):
         return names if ALL else [names[number % len(names)]]
 
     def side_by_side(self, examine, cases):
-        """Calls `examine` for all cases, four at a time, because most of the time is waiting for missing replies.
-        Failed cases run once more, alone: a busy machine delays the proxy and the emulator, which is a fault of its
-        own."""
+        """Calls `examine` for all cases, four at a time. Failed cases run once more, alone."""
         def one(case):
             try:
                 print(examine(*case), flush=True)
@@ -123,8 +119,7 @@ class DoctorFaults(Case):
         with Emulator(self.directory, "--motion", "rpm=20", protocol=unit, name=name) as emulator, \
              faults.FaultProxy(make(), emulator.path) as proxy:
             found = self.examine(f"{unit}:{proxy.path}?{PATIENT}")
-            # A fault that changed no byte (because no reply contained the byte) cannot be found. Fewer than ten changed
-            # replies only prove that replies are damaged, not how; a single one may be due to a busy computer.
+            # A fault that changed few replies may not be found, or not its kind.
             also = "good sometimes_damaged" if proxy.changed <= 1 else "sometimes_damaged" if proxy.changed < 10 else ""
             if unit in WEAK_CHECK and wanted in BYTE_CHANGES:
                 also += " sometimes_damaged damaged_bits damaged_bursts"
@@ -135,8 +130,7 @@ class DoctorFaults(Case):
             return f"{unit:14} {what:24} {first_of(found)} ({proxy.changed} changed)"
 
     def test_another_model(self):
-        """Reads an encoder with the wrong model selected, in both directions. The verdict must be wrong_settings,
-        good where the replies of both models are equal, or stuck_bits; the test accepts each of them."""
+        """Reads an encoder with the wrong model selected."""
         cases = []
         for unit, about in character_units().items():
             models = [model["name"] for model in about["models"]]
@@ -175,8 +169,7 @@ class DoctorFaults(Case):
     def examine_protocol(self, unit, other):
         with Emulator(self.directory, "--motion", "rpm=20", protocol=unit, name=f"{unit}-as-{other}") as emulator:
             found = self.examine(f"{other}:{emulator.path}?{PATIENT}")
-            # Time in which doctor may search for other protocols: too short to prove the two-bit check of AMT21, and,
-            # with this latency, to come to nikon, whose characters no serial port carries.
+            # In its time, doctor cannot prove AMT21's two-bit check, nor come to nikon.
             is_unproven = unit in ("amt21", "nikon")
             self.assert_first(found, "no_answer" if is_unproven else "other_protocol", f"{unit} read as {other}")
             self.assertIn("absenc identify" if is_unproven else f"{unit}:", found["verdict"])

@@ -1,8 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests that `absenc doctor` reports no fault of a healthy encoder, in real time: each model of each serial unit once;
-with --all, twenty times beside four busy processes. absenc/client/doctor/healthy_test.cpp is the same test in virtual
-time."""
+"""Tests in real time that `absenc doctor` reports no fault of a healthy encoder; with --all, twenty times beside four
+busy processes."""
 import concurrent.futures
 import json
 import sys
@@ -13,7 +12,7 @@ from command_support import Busy, Case, Emulator, absenc, character_units
 ALL = "--all" in sys.argv
 RUNS, BUSY = (20, 4) if ALL else (1, 0)
 USUAL = {"name": "", "maximum_rpm": None}
-# Latency in milliseconds. The emulator may wait for the processor, which a real encoder never does.
+# Latency in milliseconds: the emulator may wait for the processor.
 PATIENT = "latency=300"
 
 
@@ -27,7 +26,7 @@ class Healthy(Case):
         self.assertEqual(ill, [], "\n".join(ill))
 
     def examine(self, unit, model, number):
-        """Returns doctor's verdict and findings for a healthy encoder, or an empty text if the verdict is "good"."""
+        """Returns doctor's verdict and findings for a healthy encoder; "" if the verdict is good."""
         name = model["name"]
         motion = "still" if model["maximum_rpm"] == 0 else "rpm=20"  # a linear encoder has no speed in rpm
         with Emulator(self.directory, *(["--model", name] if name else []), "--motion", motion, protocol=unit,

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc doctor` on pseudo-terminals and failing ports: each fault must be named, and a healthy encoder must be
-reported as good."""
+"""Tests `absenc doctor` on pseudo-terminals and failing ports."""
 import fcntl
 import json
 import os
@@ -29,7 +28,7 @@ def ids(found):
 
 
 class TurnedRate(FakeLine):
-    """A fake encoder that replies correctly at one baud rate of the port, and with random bytes at any other."""
+    """A fake encoder that replies correctly at one baud rate, and with random bytes at others."""
 
     def __init__(self, rate, reply):
         super().__init__()
@@ -131,7 +130,7 @@ class Named(EncoderCase):
                 return
             setpriv = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"]
             command = [ABSENC, "doctor", f"tformat:{line.path}", "--json"]
-            # A user without access to the folder of the command cannot run it, so the test is skipped then.
+            # A user without access to the folder of the command cannot run it.
             probe = subprocess.run([*setpriv, ABSENC, "list"], capture_output=True, check=False)
             if probe.returncode != 0:
                 self.skipTest("another user cannot run the command here")
@@ -217,8 +216,7 @@ class Named(EncoderCase):
         self.assertIn("replace the battery", found["findings"][0]["action"])
 
     def test_encoder_without_battery_is_healthy(self):
-        """Without a battery, battery_error and battery_alarm are always set (paragraph 2 (1)). Doctor must ignore these
-        two, and report other alarms."""
+        """Without a battery, battery_error and battery_alarm are always set (paragraph 2 (1))."""
         result, found = doctor("sim:tformat?battery=false")
         self.assert_good(result)
         self.assertEqual((found["ok"], found["findings"]), (True, []))
@@ -234,8 +232,7 @@ class Named(EncoderCase):
         self.assertEqual(ids(found), ["reply_late"])
 
     def test_sends_no_changing_request(self):
-        """Doctor also tries requests of other protocols. None may begin with the first byte of a request that changes a
-        T-format encoder."""
+        """Doctor also tries requests of other protocols."""
         requests = set()
 
         class Listening(FakeEncoder):

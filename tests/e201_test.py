@@ -14,7 +14,7 @@ import unittest
 from command_support import ABSENC, PATIENCE, Case, Emulator, FakeEncoder, absenc
 
 CR = b"\r"
-# Each row: reply of the interface to the command `4`, expected error, evidence in the message, advice.
+# Each row: reply to the command `4`, expected error, evidence in the message, advice.
 FRAMES = [
     (b"0" * 16 + CR, "line_stuck", "never changed", "supply-on"),
     (b"f" * 16 + CR, "line_stuck", "never changed", "supply-on"),
@@ -173,8 +173,7 @@ class Failures(InterfaceCase):
 
 class ClockSweep(InterfaceCase):
     def start(self, path, frames):
-        """Starts the sweep command with a terminal for its messages. Returns the process and the test's end of the
-        terminal."""
+        """Starts the sweep with a terminal for its messages. Returns the process and the terminal."""
         ours, terminal = pty.openpty()
         self.addCleanup(os.close, ours)
         process = subprocess.Popen([ABSENC, "run", f"e201:{path}", "clock-sweep", str(frames)],
@@ -183,8 +182,7 @@ class ClockSweep(InterfaceCase):
         return process, ours
 
     def read_until(self, descriptor, words=None):
-        """Returns the terminal's text up to and including `words`, or, if `words` is None, until the process closes the
-        terminal."""
+        """Returns the terminal's text up to `words`; None: until the process closes the terminal."""
         deadline = time.monotonic() + PATIENCE
         text = ""
         while words is None or words not in text:

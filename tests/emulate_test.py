@@ -101,8 +101,7 @@ class Client:
         return self.exchange(0x6, address, value)
 
     def wait_until_written(self, address):
-        """Polls the busy bit until a write has ended. Returns whether the busy bit was ever set, and the value of the
-        last reply."""
+        """Polls the busy bit until a write has ended. Returns whether it was ever set, and the value."""
         deadline = time.monotonic() + PATIENCE
         was_busy = False
         while time.monotonic() < deadline:
@@ -138,8 +137,7 @@ class Gap(EmulateCase):
     """Tests of the pause that ends a request (--gap)."""
 
     def trickle(self, client, request, pause):
-        """Sends the request byte by byte with pauses. Returns the received bytes: as many as the request has, or fewer
-        after PATIENCE."""
+        """Sends the request byte by byte and returns the received bytes."""
         for byte in request:
             client.send([byte])
             select.select([], [], [], pause)
@@ -156,7 +154,7 @@ class Gap(EmulateCase):
         present = {"esl": ("0875", 18), "raa38-modbus": ("010300000001840a", 7)}
         for protocol, gap in itertools.product(absent, ("2", "10000")):
             with self.subTest(protocol=protocol, gap=gap):
-                # On a busy machine the emulator may receive several requests as one; only the gap separates them.
+                # On a busy machine the emulator may receive several requests as one.
                 self.assertTrue(any(self.answers(protocol, gap, number, absent[protocol], *present[protocol])
                                     for number in range(10)))
 
@@ -189,7 +187,7 @@ class DataIds(EmulateCase):
         self.assert_reply(client.exchange(3), 3, 0, [0xFF, 0xFF, 0x7F, 0x17, 0xFF, 0xFF, 0x00, 0x00])
 
     def reset(self, client, data_id, times):
-        """Sends the request `times` times, at least 100 us apart, as a reset demands. Returns the last reply."""
+        """Sends the request `times` times, at least 100 us apart. Returns the last reply."""
         reply = b""
         for _ in range(times):
             reply = client.exchange(data_id)
@@ -268,7 +266,7 @@ class DataIds(EmulateCase):
         self.assertEqual(client.exchange(3)[9], 0x10)
 
     def test_invalid_requests(self):
-        """The encoder answers most invalid requests like a request for ID 3, and a wrong sync code not at all."""
+        """The encoder answers most invalid requests like a request for ID 3."""
         client = self.client()
         everything = client.exchange(3)
         self.assertEqual(client.exchange(0x4, length=11), everything)  # an unknown data ID
@@ -303,7 +301,7 @@ class Behaviour(EmulateCase):
             replies = [client.exchange(3) for _ in range(20)]
         good = bytes([0x1A, 0, 0, 0, 0, 0x11, 0, 0, 0, 0, 0x0B])
         self.assertTrue(all(len(reply) == 11 and reply != good for reply in replies))
-        # The checksum of T-format is the XOR of the bytes, so two flipped bits in the same column cancel out.
+        # The checksum is the XOR of the bytes, so two flipped bits in the same column cancel out.
         self.assertGreater(sum(crc(reply[:-1]) != reply[-1] for reply in replies), 10)
         self.assertIn("faults injected: 20 corrupt\n  replies with faults: 20\n", emulator.end()[2])
 
@@ -371,7 +369,7 @@ class Console(EmulateCase):
     """Tests of commands for a running emulator, which it reads as lines from its standard input."""
 
     def console(self, *arguments, **settings):
-        """Returns an emulator, and a function that sends a line to its standard input and returns the answer."""
+        """Returns an emulator, and a function that sends it a line and returns the answer."""
         emulator = self.emulator(*arguments, stdin=subprocess.PIPE, **settings)
 
         def send_line(line):
@@ -715,8 +713,7 @@ class Lifecycle(EmulateCase):
                 self.assertFalse(os.path.lexists(emulator.path))
 
     def test_refused_request_counts_once(self):
-        """A request for ID D with a wrong parity bit, written at once, is refused once, after its end, and violates no
-        rule."""
+        """A request for ID D with a wrong parity bit is refused once, after its end."""
         emulator = self.emulator()
         with Client.open(emulator.path) as client:
             client.send([0x6A, 0x05, 0xEF])
@@ -744,8 +741,7 @@ class Lifecycle(EmulateCase):
         self.assertRegex(err, r"rules that the host broke: 1\n    at \d+\.\d{6} s: memory access before the page is ready")
 
     def test_reports_every_host_that_does_not_wait(self):
-        """The host sends three requests at once. The emulator excuses a request before the reply at most twice in a
-        row, because a delay of the machine may be the cause."""
+        """The emulator excuses requests before the reply at most twice in a row."""
         emulator = self.emulator()
         with Client.open(emulator.path) as client:
             for _ in range(5):

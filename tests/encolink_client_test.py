@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests the virtual AksIM-2 encoder over a pseudo-terminal with an independent EncoLink client, byte by byte."""
+"""Tests the virtual AksIM-2 encoder with an independent EncoLink client."""
 import os
 import select
 import tty
@@ -17,7 +17,7 @@ STATUSES = {OK, 0x26, 0x56, ACCESS_DENIED, 0xEE, LOCKED, BAD_WRITE_CRC, *BAD_REA
 
 
 def inverted_crc(data):
-    """Returns the inverted CRC of the polynomial x^8 + x^7 + x^4 + x^2 + x + 1, most significant bit first."""
+    """Returns the inverted CRC of x^8 + x^7 + x^4 + x^2 + x + 1, most significant bit first."""
     register = 0
     for byte in data:
         register ^= byte
@@ -27,7 +27,7 @@ def inverted_crc(data):
 
 
 class Client:
-    """An EncoLink client that sends position frames and decodes channels 2 and 3 from bytes in the replies."""
+    """An EncoLink client that sends position frames and decodes channels 2 and 3."""
 
     def __init__(self, case, path, turns):
         self.case = case
@@ -35,8 +35,8 @@ class Client:
         self.port = os.open(path, os.O_RDWR | os.O_NOCTTY)
         case.addCleanup(os.close, self.port)
         tty.setraw(self.port)
-        self.pending = b""  # bytes for channel 3 that are still to be sent, one in each frame
-        # Bytes of channel 2 since its current cycle began; None before the first reset of the channels.
+        self.pending = b""  # bytes for channel 3, still to be sent
+        # Bytes of channel 2 in its current cycle.
         self.cycle = None
         self.cycles = []  # complete cycles of channel 2: (turns, position, status, byte of channel 3)
 
@@ -87,8 +87,7 @@ class Client:
         return self.next_cycle()[3]
 
     def access(self, kind, address, data=b"", size=0, spoil=False):
-        """Accesses a register through channel 3. Returns the status of the access, and the data that follow the
-        status."""
+        """Accesses a register through channel 3. Returns the status and the data."""
         body = (size or len(data)).to_bytes(2, "big") + address.to_bytes(4, "big") + data
         self.pending = KEYS + bytes([kind]) + body + bytes([inverted_crc(body) ^ (1 if spoil else 0)])
         while self.pending:
@@ -174,7 +173,7 @@ class Encolink(Case):
         self.assertEqual(client.access(READ, 0x00, size=4), (OK, bytes(4)))
 
     def test_identity_as_vendor_library_reads_it(self):
-        """The vendor's library reads twenty bytes in reply to the identify frame, and again in the next frame."""
+        """The vendor's library reads twenty bytes in reply to the identify frame."""
         client = self.client(*self.options(True), "--option", "identity_bytes=20")
         for config in (IDENTIFY, POSITION):
             os.write(client.port, bytes([config, 0]))

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests EncoLink encoders with the absenc command: over a pseudo-terminal (UART), and over UART and SPI in the
-simulator."""
+"""Tests EncoLink encoders with the absenc command."""
 import csv
 import json
 import os

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests QS35 ESL encoders on a pseudo-terminal, with an independent client and with the absenc command."""
+"""Tests QS35 ESL encoders with an independent client and with the absenc command."""
 import json
 import os
 import select
@@ -16,8 +16,7 @@ LENGTH = {POSITION: 18, QUICK: 6, TEMPERATURE: 4, READ: 4, WRITE: 4}
 READY, CHANNEL_2 = 0x40, 0x20
 REQUEST = "0875"  # request with ID 1 to address 0
 REPLY = "084000efcdab34125646b3086000abd6cd84"
-# Request and reply of another profile (crc_bit_order=msb), and a reply with one wrong bit in channel 2. Both replies
-# have another sequence counter than REPLY.
+# Frames of another profile (crc_bit_order=msb), and a reply with one wrong bit in channel 2.
 MSB_REQUEST, MSB_REPLY = "0857", "084000efcdab341255277e086000abd57f67"
 WRONG_CHANNEL_2 = "084000efcdab3412553b5e086000afd5b069"
 
@@ -97,8 +96,7 @@ class EslCase(EncoderCase):
 
 class VirtualEncoder(EslCase):
     def check_position(self, reply, singleturn, multiturn, address=0, alarms=0):
-        """Checks both channels of a position reply, each alone and against the other. Returns the sequence counters of
-        channels 1 and 2."""
+        """Checks both channels. Returns the sequence counters of channels 1 and 2."""
         self.assertEqual(len(reply), 18, reply.hex(" "))
         one, two = reply[:11], reply[11:]
         self.assertEqual(one[9:], crc16(one[:9], 0x0000), reply.hex(" "))
@@ -131,8 +129,7 @@ class VirtualEncoder(EslCase):
         self.assertEqual((reply[0], reply[1], reply[3:]), (0xC8, READY, crc8(reply[:3])))
 
     def read_memory(self, client, address):
-        """Reads one EEPROM byte. The first replies have the busy flag, and the byte is in the next one. Returns the
-        byte."""
+        """Reads one EEPROM byte, which follows replies with the busy flag."""
         was_busy = False
         deadline = time.monotonic() + PATIENCE
         while time.monotonic() < deadline:
@@ -207,8 +204,7 @@ class Command(EslCase):
         encoder = self.encoder("--singleturn", "0x500000", "--multiturn", "5", "--alarm", "multiturn_error")
         self.assert_wrong_usage(absenc("zero", encoder), "--yes")
         for verb in ["zero", "reset-multiturn", "clear-alarms"]:
-            # On a busy machine the eight requests of a reset may arrive faster than the encoder allows. The encoder
-            # then changes nothing, and the command reports that.
+            # On a busy machine the requests of a reset may arrive faster than the encoder allows.
             results = [absenc(verb, encoder, "--yes")]
             while results[-1].returncode != 0 and len(results) < 4:
                 results.append(absenc(verb, encoder, "--yes"))
@@ -260,8 +256,7 @@ class Command(EslCase):
         self.assert_sentence(result.stderr, "two encoders share the address")
 
     def test_scan_finds_encoder_that_refuses(self):
-        """The replies of an encoder that refuses requests are intact, so scan must not report that two encoders share
-        its address."""
+        """Scan must not report that two encoders share an address if one refuses requests."""
         encoder = self.encoder("--condition", "ch1_status_set=1")
         result = absenc("scan", encoder, "--json")
         self.assertEqual(result.returncode, 1)
@@ -311,8 +306,7 @@ class DecodeReasons(EslCase):
         self.assertEqual((second["ok"], second["error"]), (False, "sequence_mismatch"))
 
     def test_reports_refusal(self):
-        """The check of this request is right, so `decode` must report the refusal in the reply's status as the
-        error."""
+        """The check of this request is right, but the reply's status reports a refusal."""
         good = absenc("encode", "esl", "position").stdout.strip()
         field = control_field(POSITION) ^ 0x80
         refused = bytes([field]) + crc8([field])
@@ -501,14 +495,13 @@ class Doctor(EslCase):
 
 
 class TwoChannels(EslCase):
-    """Tests that flags which only one channel reports are shown by `read`, `info`, `alarms` and `monitor`, in CSV
-    and in recordings."""
+    """Tests that flags which only one channel reports are shown."""
 
     NONE = {"ch1_status": ["ready"], "ch1_alarms": [], "ch2_status": ["channel_2", "ready"], "ch2_alarms": [],
             "alarms": []}
 
     def fake(self, status_2=READY | CHANNEL_2, alarms_2=0):
-        """Returns the address of a fake encoder whose replies to IDs 1 and 2 have these flags in channel 2 only."""
+        """Returns the address of a fake encoder with these flags in channel 2 only."""
         replies = {}
         for data_id, turns in ((POSITION, b"\x34\x12"), (0x2, b"")):
             field = control_field(data_id)
@@ -609,8 +602,7 @@ class SharedLine(EslCase):
         self.assertEqual([live[name]["singleturn"] for name in ("shoulder", "elbow")], [0, 70000])
 
     def test_memory_is_refused_on_shared_line(self):
-        """An encoder that knows of others on its line does not answer memory requests. The host sends none if the
-        configuration file names several encoders on the line."""
+        """An encoder that knows of others on its line does not answer memory requests."""
         emulator = self.emulator("--also", "address=3")
         encoder = f"esl:{emulator.path}?latency=20"
         self.assert_failed(absenc("memory", "read", encoder, "0"), "timeout", "others share its line")

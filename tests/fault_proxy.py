@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A proxy between a host and an encoder, each on a pseudo-terminal of its own. It causes the faults of adapters,
-cables, drivers and foreign devices, for tests of doctor."""
+"""A proxy between a host and an encoder that causes faults, for tests of doctor."""
 import heapq
 import os
 import random
@@ -9,14 +8,13 @@ import time
 
 from command_support import FakeLine
 
-GAP = 0.003  # seconds of silence that end a reply; even a busy emulator mostly pauses for less within a reply
+GAP = 0.003  # seconds of silence that end a reply
 
 
 class Fault:
-    """Forwards all bytes unchanged. Each derived class is one fault and overrides the methods that it needs. Times are
-    in seconds of time.monotonic()."""
+    """Forwards all bytes unchanged; each derived class is one fault. Times are in seconds."""
 
-    whole = False  # True: `reply` gets whole replies, collected until a pause of GAP; False: pieces as they arrive
+    whole = False  # whether `reply` gets whole replies, collected until a pause of GAP
     chatter = None  # (period in seconds, bytes) of unsolicited bytes sent to the host; None: no such bytes
 
     def request(self, data, now):  # pylint: disable=unused-argument
@@ -28,14 +26,12 @@ class Fault:
         return b""
 
     def reply(self, data, now):  # pylint: disable=unused-argument
-        """Yields (delay in seconds, bytes) for each piece that the host receives instead of the encoder's bytes
-        `data`."""
+        """Yields (delay in seconds, bytes) for each piece that the host receives instead of `data`."""
         yield 0, data
 
 
 class FaultProxy(FakeLine):
-    """A pseudo-terminal for the host. Bytes pass through `fault` to and from the encoder at the path `encoder`; None:
-    the line has no encoder."""
+    """A pseudo-terminal for the host, with `fault` before the encoder at the path `encoder`."""
 
     def __init__(self, fault, encoder=None):
         super().__init__()
@@ -152,7 +148,7 @@ class Modem(Dead):
 
 
 class Nmea(Dead):
-    """A satellite navigation receiver in place of the encoder sends NMEA sentences, whatever the host requests."""
+    """A satellite receiver in place of the encoder sends NMEA sentences."""
 
     chatter = (0.02, b"$GPGGA,092750.000,5321.6802,N,00630.3372,W,1,8,1.03,61.7,M,55.2,M,,*76\r\n")
 
@@ -262,7 +258,7 @@ class Corrupt(Lost):
 
 
 class Bursts(Lost):
-    """Half of the bytes of one reply of ten are random, as from a motor's bridge that switches nearby."""
+    """Half of the bytes of one reply of ten are random."""
 
     def reply(self, data, now):
         changed = bytearray(data)
@@ -301,7 +297,7 @@ class Twice(Fault):
 
 
 class Split(Fault):
-    """Every reply arrives in two parts, 2 ms apart, as USB packets split it. Doctor must not report this as a fault."""
+    """Every reply arrives in two parts, as USB packets split it. This is no fault."""
 
     whole = True
 
@@ -382,7 +378,7 @@ class FlowControl(Fault):
 
 
 class SevenBits(Fault):
-    """The port clears the highest bit of each byte of a reply, because it is set to seven data bits."""
+    """The port clears the highest bit of each byte of a reply."""
 
     def reply(self, data, now):
         yield 0, bytes(byte & 0x7F for byte in data)

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the first program of docs/firmware.md: it reads a position, and retains the previous position if a reply is
-// missing.
+// Tests the first program of docs/firmware.md.
 #include "firmware/hookup/first_reading.cpp"
 
 #include <gtest/gtest.h>

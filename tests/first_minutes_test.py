@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Follows a new user from a serial port to a reading: each step runs the command that the output of the previous step
-recommends."""
+"""Tests the first steps of a new user, from a serial port to a reading."""
 import json
 import re
 import shlex
@@ -124,8 +123,7 @@ class FirstMinutes(Case):
                 self.assertIn(unit["protocol"], named)
 
     def test_settings_have_same_form_in_every_verb(self):
-        """Settings after `?` in an address have the same form and meaning in the tested verbs, which take a
-        protocol or an encoder."""
+        """Settings after `?` have the same form in the tested verbs."""
         settings = "model=23-bit"
         capture = self.file("capture.vcd")
         for arguments in [["read", f"sim:tformat?{settings}"], ["wave", f"tformat?{settings}", capture],

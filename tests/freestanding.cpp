@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Instantiates the templates of the freestanding layers, so that the ARM build shows which library functions they need.
+// Instantiates templates of the freestanding layers, to show which library functions they need.
 #include <array>
 #include <cstdint>
 
@@ -34,7 +34,7 @@ template class host::Statistics<CanFrame>;
 template class host::Session<std::uint8_t>;
 template class host::Session<CanFrame>;
 
-// The functions of this file are not static, because the compiler would drop unused static ones.
+// These functions are not static, because the compiler would drop unused static ones.
 bool drive_bytes(Machine<std::uint8_t>& machine, Port<std::uint8_t>& port) {
   return host::drive(machine, port, [] { return true; });
 }

@@ -7,7 +7,7 @@ set -euo pipefail
 nm=${NM:-arm-none-eabi-nm}
 size=${SIZE:-arm-none-eabi-size}
 
-# A global destructor needs __aeabi_atexit; the other __aeabi_ symbols are arithmetic, memcpy and stack unwinding tables.
+# __aeabi_atexit stands for a global destructor.
 forbidden='^__aeabi_atexit$'
 allowed=(
   memcpy memmove memset memcmp strlen

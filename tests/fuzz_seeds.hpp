@@ -12,8 +12,7 @@ namespace absenc {
 
 using Seed = std::vector<std::uint8_t>;
 
-/// Returns the request, the reply, and both together, of every vector. Both together also occur after the three bytes
-/// with which units_fuzz.cpp selects unit, options and command.
+/// Returns seeds for fuzzers, from the vectors of all units.
 inline std::vector<Seed> fuzz_seeds() {
   std::vector<Seed> seeds;
   std::uint8_t number = 0;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Main program that runs a fuzz target as a plain test: with all seeds, with every truncation and single-bit flip of
-// each seed, and with random bytes.
+// Main program that runs a fuzz target as a plain test.
 #include "tests/fuzz_seeds.hpp"
 
 #include <algorithm>
@@ -14,8 +13,7 @@ namespace {
 
 std::size_t runs = 0;
 
-// Runs the fuzz target on a copy of exactly the input's size, so that the address sanitizer detects a read beyond the
-// input's end.
+// The copy has exactly the input's size, so that the address sanitizer detects reads beyond it.
 void run(absenc::Bytes input) {
   const absenc::Seed copy(input.begin(), input.end());
   LLVMFuzzerTestOneInput(copy.data(), copy.size());

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the firmware adapters in docs/firmware.md (UART, SPI, CAN) with stubs of the hardware: the host reads a
-// position through each adapter; over UART also if the reply arrives in pieces.
+// Tests the firmware adapters in docs/firmware.md with stubs of the hardware.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -139,7 +138,7 @@ TEST(SpiDmaTest, ReadsBiss) {
   ASSERT_NE(read.reading(), nullptr) << static_cast<int>(read.error());
 }
 
-// The bits of the word exclude the idle level of the first clock, which the stub delivers itself.
+// `bits` does not contain the idle level of the first clock.
 TEST(SpiDmaTest, ReadsSsiAfterIdleClock) {
   constexpr auto bits = std::to_array<std::uint8_t>({0x1E, 0xF0, 0x00, 0x00});
   ssi::ReadPosition read{ssi::Format{}};

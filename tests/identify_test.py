@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc identify` with virtual encoders on pseudo-terminals, silent and noisy lines, and captured frames."""
+"""Tests `absenc identify`."""
 import concurrent.futures
 import json
 import os
@@ -29,8 +29,7 @@ def another(option):
 
 
 def cases(unit):
-    """Yields (settings of the emulated encoder, options that identify must find) for each variant of the unit to be
-    tested."""
+    """Yields (settings of the emulated encoder, options that identify must find)."""
     yield {}, {}
     model = unit["models"][-1] if unit["models"] else {"options": {}}
     if model["options"]:
@@ -43,14 +42,13 @@ def cases(unit):
 
 
 def usual(unit, settings):
-    """Returns these settings, but with the default rate, in the form in which they follow a port in an address."""
+    """Returns the settings with the default rate, as they follow a port in an address."""
     rates = {option["name"]: option["default"] for option in with_role(unit["options"], "rate")}
     texts = [f"{name}={value}" for name, value in {**settings, **rates}.items()]
     return "?" + "&".join(texts) if texts else ""
 
 
-# Encoders to identify: (unit, settings, options to find). Clocked and SPI encoders need an SPI controller, so they are
-# excluded.
+# Clocked and SPI encoders are excluded: they need an SPI controller.
 ENCODERS = [(unit, *case) for unit in UNITS if unit["link"] not in ("exchange", "clocked") for case in cases(unit)]
 
 # Time limit of an identify search in seconds, long enough for a busy machine.
@@ -58,7 +56,7 @@ SEARCH = 300
 
 
 def identify(*arguments, **settings):
-    """Returns the result of `absenc identify` and its parsed JSON output, None if the output is empty."""
+    """Returns the result of `absenc identify` and its parsed JSON output, if any."""
     result = absenc("identify", *arguments, "--json", **settings)
     return result, json.loads(result.stdout) if result.stdout else None
 
@@ -76,8 +74,7 @@ class IdentifyOnLine(EncoderCase):
             # The added latency allows for a busy machine that delays the emulator.
             verb, encoder = found["candidates"][0]["command"].replace('"', "").split()[1:3]
             again = absenc(verb, encoder + ("&" if "?" in encoder else "?") + "latency=1000", "--json")
-            # A pseudo-terminal has no baud rate. Another rate is only visible if it makes replies later than a host at
-            # the default rate expects.
+            # A pseudo-terminal has no baud rate, so a read at the default rate may succeed too.
             at_usual_rate = absenc("read", f"{protocol}:{place}{usual(unit, settings)}", "--json").returncode == 0
             return found["candidates"], again, at_usual_rate
 
@@ -94,8 +91,7 @@ class IdentifyOnLine(EncoderCase):
                 self.assertTrue(json_lines(again.stdout)[0]["ok"])
 
     def check(self, unit, wanted, best, shown):
-        """Checks the best candidate. `shown`: the options that the encoder's replies reveal; any value of the other
-        options is correct."""
+        """Checks the best candidate. `shown`: the options that the encoder's replies reveal."""
         self.assertEqual(best["protocol"], unit["protocol"])
         self.assertTrue(best["found"])
         self.assertGreater(best["explained"], 0.9 * best["tried"])

@@ -1,8 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Checks that include lines follow the layers: core <- link <- protocol <- {host, sim, capture} <- client <- serve <-
-tools; os needs core and link. A public (installed) header may include public ones only, and may declare only types that
-a public header defines. Folders of client must not include each other in a circle."""
+"""Checks the layers of include lines, circles within client, and types in public headers."""
 
 import graphlib
 import os
@@ -32,7 +30,7 @@ FREESTANDING_HEADERS = set(
 )
 # Layers all of whose headers are public.
 WHOLLY_PUBLIC = {"core", "link", "protocol", "host", "sim"}
-# Headers of other libraries that cost seconds of compile time in every file that includes them.
+# Headers of other libraries that are slow to compile.
 HEAVY = ("CLI/", "toml++/", "nlohmann/", "microhttpd.h", "sqlite3.h", "mosquitto.h")
 LIGHT = {"nlohmann/json_fwd.hpp"}
 OS_HEADER = re.compile(
@@ -40,8 +38,7 @@ OS_HEADER = re.compile(
     r"^(unistd|fcntl|termios|poll|pty|utmp|pwd|grp|netdb|dirent|gpiod|spawn|sched|pthread|signal)\.h(pp)?$"
 )
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
-# DECLARED and DEFINED match types at namespace scope, which clang-format puts at the beginning of a line. They do not
-# match indented types inside a class, except `friend` declarations, which may introduce a name.
+# clang-format puts types at namespace scope at the beginning of a line.
 NAMESPACE = re.compile(r"^namespace ([\w:]+) \{", re.MULTILINE)
 DECLARED = re.compile(r"^(?: +friend )?(?:class|struct|union|enum class|enum) (\w+)(?: : [\w:]+)?;", re.MULTILINE)
 DEFINED = re.compile(r"^(?:class|struct|union|enum class|enum) (\w+)[^;{()]*\{", re.MULTILINE)
@@ -53,8 +50,7 @@ def is_test(path):
 
 
 def unit_of(path):
-    """Returns the protocol unit of a file, such as "tformat" for protocol/tformat/frame.hpp, or None for headers shared
-    by the units, such as protocol/unit.hpp."""
+    """Returns the protocol unit of a file, such as "tformat", or None."""
     is_unit = path.parts[:2] == ("absenc", "protocol") and len(path.parts) > 3 and path.parts[2] != "author"
     return path.parts[2] if is_unit else None
 
@@ -74,7 +70,7 @@ def is_public(path):
 
 
 def layer_fault(root, path, target):
-    """Returns the reason why the file at `path` must not include the project's header `target`, or None."""
+    """Returns why the file must not include the project's header `target`, or None."""
     layer = path.parts[1] if path.parts[0] == "absenc" else path.parts[0]
     if not (root / target).is_file():
         return "is no path from the repository root"
@@ -107,8 +103,7 @@ def system_fault(path, header):
 
 
 def client_circles(root):
-    """Returns the circles in which folders of client include each other, directly or indirectly, as "captures ->
-    identify -> captures"."""
+    """Returns circles of folders of client that include each other."""
     client = Path("absenc/client")
     included = {}
     for file in sorted((root / client).rglob("*.[ch]pp")):
@@ -127,7 +122,7 @@ def client_circles(root):
 
 
 def names_with_namespace(pattern, text):
-    """Yields the qualified name, such as "absenc::client::Encoder", of each type that the pattern finds in the text."""
+    """Yields the qualified names of types, such as "absenc::client::Encoder"."""
     namespaces = [(match.start(), match[1]) for match in NAMESPACE.finditer(text)]
     for match in pattern.finditer(text):
         before = [name for start, name in namespaces if start < match.start()]
@@ -135,8 +130,7 @@ def names_with_namespace(pattern, text):
 
 
 def hidden_types(root):
-    """Returns the types that a public header declares but no public header defines. A user of the library could not use
-    such a type."""
+    """Returns texts about types that public headers declare but do not define."""
     headers = [path for path in sorted((root / "absenc").rglob("*.hpp")) if is_public(path.relative_to(root))]
     texts = {path.relative_to(root): path.read_text(encoding="utf-8") for path in headers}
     defined = {name for text in texts.values() for name in names_with_namespace(DEFINED, text)}
@@ -175,8 +169,7 @@ class IncludeDirection(unittest.TestCase):
 
 
 class SelfTest(unittest.TestCase):
-    """Tests this file's check of include lines: on a small correct tree, and on that tree with one wrong line added at
-    a time."""
+    """Tests the checks of this file on small trees."""
 
     GOOD = {
         "absenc/core/bits.hpp": "#include <cstdint>\n",

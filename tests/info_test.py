@@ -15,7 +15,7 @@ class EncoderCase(Case):
 
 
 def questions():
-    """Returns the names of tformat's commands that `info` runs, in its order; none of them has a required argument."""
+    """Returns the names of the commands that `info` runs with tformat, in its order."""
     commands = json_lines(absenc("list", "tformat", "--json").stdout)[0]["commands"]
     free = [command for command in commands if not any(one["required"] for one in command["arguments"])]
     return [command["name"] for verb in ("info", "temperature", "config_get", "read")
@@ -39,8 +39,7 @@ class Info(EncoderCase):
         self.assertEqual(places, sorted(places))
 
     def test_summary_as_text(self):
-        """The summary shows identity, options and state. It omits options at their defaults, raw fields and
-        settings."""
+        """The summary omits raw fields."""
         result = absenc("info", self.encoder("--singleturn", "74565", "--multiturn", "4660"))
         self.assert_good(result)
         for row in [r"^model +TS5700N8500: ", r"^options +all at their defaults$", r"^encoder id +0x11$",
@@ -108,8 +107,7 @@ class Info(EncoderCase):
         self.assertEqual({answer["error"] for answer in answers.values()}, {"timeout"})
 
     def test_one_failure_does_not_stop_the_rest(self):
-        # The option encoder_id differs from the encoder's ID. Replies to memory requests are accepted nevertheless,
-        # because they have no encoder ID.
+        # Replies to memory requests are accepted, because they have no encoder ID.
         result = absenc("info", self.encoder(more="&encoder_id=23"), "--all")
         self.assert_failed(result, "unexpected_reply", "set model=TS5700N8500")
         self.assertRegex(result.stdout, r"(?m)^encoder-id +FAILED +unexpected_reply: ")

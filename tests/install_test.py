@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests the installation and the packages: they are complete, contain no other files, work from another folder, and
-other projects can use them."""
+"""Tests the installation and the packages."""
 import gzip
 import json
 import os
@@ -24,7 +23,7 @@ GUIDE = {f"share/man/man7/absenc-{page.stem}.7" for page in (SOURCE / "docs").gl
 BY_NAME = SOURCE / "examples/read_by_name.cpp"
 # The example prints the speed as soon as its averaging window is full.
 BY_NAME_SAYS = r"^(0\.0000 degrees\n)+0\.0 rpm, within \d"
-# A program like a firmware: a conversation with a virtual encoder, whose shaft is at 7.25 turns.
+# A program like firmware, with a virtual encoder whose shaft is at 7.25 turns.
 FIRMWARE = """
 #include <cstdint>
 #include <cstdio>
@@ -53,8 +52,7 @@ int main() {
 """
 FIRMWARE_SAYS = "90.0000 degrees, 7 turns\n"
 
-# A program that catches several errors of the library as std::exception, as the examples do, and prints a line for
-# each.
+# A program that catches errors of the library as std::exception.
 ENDINGS = r"""
 #include <cstdio>
 #include <chrono>
@@ -228,7 +226,7 @@ class Installed(Case):
         for header in (self.root / "include").rglob("*.hpp"):
             text = header.read_text()
             for included in re.findall(r"^#include <(.+)>", text, re.MULTILINE):
-                # The headers include standard C++ headers only, none of another library or of the operating system.
+                # The headers include none of another library or of the operating system.
                 self.assertRegex(included, r"^(\w+|bits/chrono\.h)$", header)
             for included in re.findall(r'^#include "(.+)"', text, re.MULTILINE):
                 self.assertTrue((self.root / "include" / included).is_file(), f"{header}: {included}")

@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests the angles of joint and motor (a gear ratio is set) in the output of the absenc command, in recordings and in
-`serve`."""
+"""Tests angles of joint and motor in the output of absenc, in recordings and in `serve`."""
 import csv
 import json
 import os

@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests that each quantity has the same name in JSON, in CSV, in recordings of each format, and in samples of the
-Python package."""
+"""Tests that a quantity has the same name in JSON, CSV, recordings and the Python package."""
 import csv
 import json
 import os
@@ -44,8 +43,7 @@ class Keys(Case):
         shown = header(absenc("read", encoder, "--count", "1", "--csv").stdout)
         with open(self.recorded(encoder, "csv"), encoding="utf-8") as file:
             columns = header(file.read())
-        # A recording has the columns of `read` in the same order, and further columns for continued position, speed and
-        # lost readings.
+        # A recording has the columns of `read` in the same order, and further ones.
         self.assertEqual([name for name in columns if name in shown], shown)
         with open(self.recorded(encoder, "jsonl"), encoding="utf-8") as file:
             # Rows without `ok` describe events, not readings.
@@ -57,8 +55,7 @@ class Keys(Case):
         for suffix in ("csv", "jsonl", "h5"):
             self.assertEqual(list(library.load(self.recorded(encoder, suffix)).keys()), columns, suffix)
 
-        # In Python, computed values are members of a sample, and transmitted values are members of its reading. There,
-        # flags and alarms are lists whose elements name their channel.
+        # In Python, the flags of a channel are elements of lists, not members.
         with library.open(encoder) as opened:
             sample = next(iter(opened.samples(rate=200)))
         for name in set(columns) - ONLY_IN_ROWS | json_keys - ONLY_IN_JSON:

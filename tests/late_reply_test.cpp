@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests that no host takes a late reply for the reply to a newer request. Replies are delayed by various times on the
-// units that `kinds` lists. The shaft turns steadily, so that a position shows the time at which it was sampled.
+// Tests that no host takes a late reply for the reply to a newer request.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -66,8 +65,7 @@ class DelayedSession {
         port(line, std::move(delay)),
         session(unit, options, port, host_storage, host::EchoMode::automatic) {}
 
-  /// Runs one command that reports a position, and adds its outcome to `outcomes`. If `confirmed`, an unconfirmed
-  /// reading does not count.
+  /// Runs one command that reports a position. If `confirmed`, unconfirmed readings do not count.
   void read(const Command& command, bool confirmed, Outcomes& outcomes) {
     const Conversation<Item>* ended = confirmed ? session.read(command) : session.run(command);
     if (ended->error() != Error::none) {
@@ -82,8 +80,7 @@ class DelayedSession {
     if (age > 3ms) ++outcomes.stale;
   }
 
-  /// Returns how far the reading's timestamp is from the time at which its position was really sampled, by the true
-  /// motion of the shaft, less the time of one count; at least 0.
+  /// Returns by how much more than one count the reading's timestamp is wrong, or 0.
   Time age_of(const Reading& reading) const {
     const auto fraction = static_cast<std::uint32_t>(reading.singleturn << (32 - reading.singleturn_bits));
     const auto truth = static_cast<std::uint32_t>(shaft.at(reading.latched).position);
@@ -130,7 +127,7 @@ double fraction(sim::Random& random) { return static_cast<double>(random.below(1
 
 bool is_on_can(const Kind& kind) { return find_unit(kind.unit)->link == LinkKind::can; }
 
-/// Reads the position with the period `period` while a share of the replies is late. Returns the outcomes.
+/// Reads at most every `period` while a share of the replies is late.
 template <class Item>
 Outcomes run_at_period(const Kind& kind, const Lateness& lateness, Time period, unsigned count) {
   sim::Random random(1);
@@ -151,8 +148,7 @@ Outcomes run(const Kind& kind, const Lateness& lateness, Time period, unsigned c
                          : run_at_period<std::uint8_t>(kind, lateness, period, count);
 }
 
-/// Runs random commands that report a position and change nothing, with random pauses, while some replies are late by
-/// 10 us to 10 s. Returns the outcomes.
+/// Runs random commands that read, with random pauses, while some replies are late.
 template <class Item>
 Outcomes run_random_commands(const Kind& kind, unsigned count, std::uint64_t seed) {
   sim::Random random(seed);
@@ -180,7 +176,7 @@ class LateReply : public ::testing::TestWithParam<std::size_t> {
   const Kind& kind = kinds()[GetParam()];
 };
 
-// Covers delays from 0 to 5 s. With some of them a late reply arrives exactly when the next reply is due.
+// With some delays a late reply arrives exactly when the next reply is due.
 TEST_P(LateReply, NeverAnswersLaterRequest) {
   constexpr unsigned readings = 40;
   for (const Time period : {Time{}, Time{1ms}, Time{10ms}, Time{100ms}, Time{500ms}, Time{2s}}) {
@@ -227,9 +223,7 @@ TEST_P(LateReply, WithRandomDelayNeverAnswersLaterRequest) {
   EXPECT_GT(all.good, all.failed / 10);
 }
 
-/// Reads over a line that stalls for two seconds every seven seconds, first after seven. After a stall, all delayed
-/// replies arrive, or only the first if `only_first_arrives`. Returns the outcomes, and in `longest_silence` the
-/// longest time between two good readings.
+/// Reads over a line that stalls. `longest_silence` is the longest time between good readings.
 template <class Item>
 Outcomes run_with_stalls(const Kind& kind, bool only_first_arrives, Time& longest_silence) {
   constexpr Time stall = 2s;

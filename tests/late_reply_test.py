@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests late replies with the absenc command, on pseudo-terminals and over TCP. A relay between the command and a
-virtual encoder delays replies. Every reported position must belong to the last request that was sent before its reply
-arrived."""
+"""Tests late replies with the absenc command, through a relay that delays replies."""
 import json
 import os
 import re
@@ -15,7 +13,7 @@ import unittest
 
 from command_support import Emulator, absenc, end
 
-ENCODERS = {  # each entry: unit and options of a turning encoder, bytes in a position request and in its reply
+ENCODERS = {  # unit, options, bytes in a position request and in its reply
     "tformat": ("tformat", "", 1, 11),
     "esl": ("esl", "", 2, 18),
     "e201": ("e201", "", 1, 17),
@@ -25,16 +23,14 @@ ENCODERS = {  # each entry: unit and options of a turning encoder, bytes in a po
 
 
 class DelayingRelay(threading.Thread):
-    """Forwards bytes between a host and an encoder in order. The n-th reply arrives `delay(n)` seconds late."""
+    """Forwards bytes in order. The n-th reply arrives `delay(n)` seconds late."""
 
     def __init__(self, host, encoder, delay):
         super().__init__(daemon=True)
         self.host, self.encoder, self.delay = host, encoder, delay
         self.requests = 0  # number of bursts (requests) received from the host so far
-        # Forwarded replies: (number of the burst that the reply answers, number of bursts received when the reply was
-        # forwarded, bytes).
-        self.forwarded = []
-        self.delayed = []  # replies that are still delayed: (time at which to forward, number of the burst, bytes)
+        self.forwarded = []  # replies: (number of the burst answered, bursts received by then, bytes)
+        self.delayed = []  # replies: (time at which to forward, number of the burst, bytes)
         self.replies = 0
         self.stop, self.wake = os.pipe()
 
@@ -143,7 +139,7 @@ class LateReplyTest(unittest.TestCase):
         return len(shown)
 
     def test_one_late_reply(self):
-        """One reply is 60 ms late. Without protection, each later reading would then show the previous position."""
+        """Without protection, each later reading would show the previous position."""
         for encoder in ENCODERS:
             with self.subTest(encoder):
                 relay, address = self.pty_relay(encoder, lambda n: 0.06 if n == 6 else 0)
@@ -152,8 +148,7 @@ class LateReplyTest(unittest.TestCase):
                 self.assertGreater(self.check(encoder, relay, rows), 10)
 
     def test_all_replies_late(self):
-        """Every reply arrives after its timeout. The command must report an error with advice, and no position of
-        an earlier request."""
+        """The command must report an error with advice, and no position of an earlier request."""
         for encoder in ("tformat", "esl", "e201"):
             with self.subTest(encoder):
                 relay, address = self.pty_relay(encoder, lambda n: 0.25)

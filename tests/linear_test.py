@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc` with linear encoders, whose positions are in millimetres instead of degrees: read, info, record and
-monitor."""
+"""Tests `absenc` with linear encoders, whose positions are in millimetres."""
 import csv
 import json
 import os
@@ -127,8 +126,7 @@ class SpeedLimit(Case):
         self.assertIn("set max_rpm=RPM", result.stderr)
 
     def test_pause_names_option(self):
-        """After a pause the position on a scale of 67 m is ambiguous if the carriage may move at up to 1000 m/s. The
-        message must name the option that limits the speed."""
+        """The message must name the option that limits the speed."""
         log = os.path.join(self.directory, "pause.csv")
         result = absenc("record", "sim:biss?model=linear-26-1um&max_mm_s=1000000", "--output", log, "--rate", "10", "--for", "0.5")
         self.assertIn("at up to 1000000 mm/s", result.stderr)

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc memory` and `absenc config` over a pseudo-terminal: with faults of the line, interruptions, and good
-and bad files."""
+"""Tests `absenc memory` and `absenc config`."""
 import json
 import os
 import pty
@@ -29,7 +28,7 @@ def crc(text):
 
 
 def parse(dump):
-    """Returns the bytes of a dump as a dictionary by page and address, after checking the dump's checksum."""
+    """Checks a dump's checksum. Returns its bytes by page and address."""
     lines = [line for line in dump.splitlines() if line and not line.startswith("#")]
     assert lines.pop() == "checksum: " + crc("".join(line + "\n" for line in lines)), dump
     image = {}
@@ -41,7 +40,7 @@ def parse(dump):
 
 
 def addresses(words):
-    """Returns the (page, address) pairs in a text such as "page 0 to 2: 0x05 to 0x07, 0x10; page 3: 0x00"."""
+    """Returns the (page, address) pairs in a text such as "page 0 to 2: 0x05 to 0x07, 0x10"."""
     found = set()
     for part in words.split("; "):
         first, last, ranges = re.fullmatch(r"page (\d+)(?: to (\d+))?: (.*)", part).groups()
@@ -75,7 +74,7 @@ class MemoryCase(Case):
         return parse(result.stdout)
 
     def partial(self, image):
-        """Writes a dump with only these bytes of the memory, like one edited by hand, and returns the dump's path."""
+        """Writes a dump of these bytes alone, and returns its path."""
         lines = [f"page {page} address {address}: {value:02x}\n" for (page, address), value in image.items()]
         return self.file("partial.dump", HEADER + "".join(lines) + "checksum: edited\n")
 
@@ -145,8 +144,7 @@ class Bytes(MemoryCase):
             self.assertEqual((answer["ok"], answer["error"]), (False, "timeout"))
 
     def ask(self, address, answer):
-        """Runs `memory write` on a terminal and answers its question with `answer`. Returns the exit status and the
-        terminal's text."""
+        """Runs `memory write` on a terminal and gives `answer`. Returns the exit status and the text."""
         terminal, ours = pty.openpty()
         process = subprocess.Popen([ABSENC, "memory", "write", address, "5", "0x5A"], stdin=ours,
                                    stdout=subprocess.DEVNULL, stderr=ours)
@@ -314,8 +312,7 @@ class Interruptions(MemoryCase):
     wanted = {(page, address): 1 + address for page in (0, 4) for address in range(30)}
 
     def progress_of(self, err):
-        """Returns the sets of addresses that the message of an interrupted load reports as written, unknown and not
-        written."""
+        """Returns the addresses that an interrupted load calls written, unknown and not written."""
         listed = []
         for words in ("written and read back", "not known whether written", "not written"):
             found = re.search(rf"^  {words}: (.*)$", err, re.MULTILINE)
@@ -323,8 +320,7 @@ class Interruptions(MemoryCase):
         return listed
 
     def assert_progress_is_true(self, err, image):
-        """Checks that no address is in two lists of the message, and that `image`, the encoder's memory, agrees with
-        the lists. Returns the lists."""
+        """Checks that the lists of the message are disjoint and agree with `image`. Returns them."""
         written, unknown, left = self.progress_of(err)
         self.assertEqual({at for at in written if image[at] != self.wanted[at]}, set(), err)
         self.assertEqual({at for at in left if image[at] == self.wanted[at]}, set(), err)
@@ -416,8 +412,7 @@ class Interruptions(MemoryCase):
         self.assertGreater(counts[0], 0)
 
     def test_load_over_bad_line(self):
-        """The line damages almost every second reply. A load may fail on it, but repeated loads must succeed in the
-        end."""
+        """A load over a bad line may fail, but repeated loads must succeed in the end."""
         emulator = self.emulator("--fault", "corrupt=0.25", "--fault", "drop=0.25", "--seed", "3")
         address = f"tformat:{emulator.path}?latency=30"
         self.wanted = {(2, at): 0xA0 + at for at in range(40, 52)}
@@ -462,7 +457,7 @@ class Config(MemoryCase):
         self.assertEqual(absenc("memory", "read", address, "4", "--page", "7").stdout, "0x04  00  .\n")
 
     def test_refuses_threshold_of_zero_degrees(self):
-        """The threshold may be 1 to 127 degC, or off. `memory write` must refuse 0 degC, as `config set` does."""
+        """`memory write` must refuse 0 degC, as `config set` does."""
         address = self.encoder()
         refused = absenc("memory", "write", address, "4", "0x80", "--page", "7", "--yes")
         self.assertEqual(refused.returncode, 1)

@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests Modbus RTU against independent implementations over pseudo-terminals: libmodbus as client and server, and
-mbpoll."""
+"""Tests Modbus RTU against libmodbus and mbpoll."""
 import ctypes
 import errno
 import json
@@ -124,7 +123,7 @@ class LibmodbusClient(PeerCase):
                            ("Illegal data address", lambda: client.read(0, 3))):
             with self.assertRaisesRegex(OSError, words):
                 ask()
-        # libmodbus refuses to send this invalid request (of no register), so the test sends its bytes as a raw request.
+        # libmodbus refuses to send this invalid request, so the test sends its bytes.
         client.check(MODBUS.modbus_send_raw_request(client.context, bytes([1, 3, 0, 0, 0, 0]), 6))
         reply = ctypes.create_string_buffer(260)
         size = client.check(MODBUS.modbus_receive_confirmation(client.context, reply))
@@ -156,8 +155,7 @@ class LibmodbusServer:
     def __init__(self, registers, address=1):
         self.master, self.slave = os.openpty()
         tty.setraw(self.slave)
-        # libmodbus needs a path to open, so it gets one end of a second pseudo-terminal. A thread forwards bytes
-        # between both pseudo-terminals.
+        # libmodbus needs a path to open, so it gets one end of a second pseudo-terminal.
         self.inner, self.inner_slave = os.openpty()
         tty.setraw(self.inner_slave)
         self.path = os.ttyname(self.slave)
@@ -216,8 +214,7 @@ class ReadsLibmodbus(PeerCase):
             self.assertEqual(self.position(server.path, "&registers=2&address=17"), 383)
 
     def test_replies_that_end_with_zero(self):
-        """If the last byte of the CRC is 00, the frame without that byte also has a valid CRC. The host must not end
-        such a reply one byte early."""
+        """If the CRC ends with 00, the frame without that byte has a valid CRC too."""
         positions = [low for low in range(2048) if crc(bytes([1, 3, 4, 0, 0x10, low >> 8, low & 0xFF])) < 0x100]
         self.assertGreater(len(positions), 3)
         with LibmodbusServer([0x0010, 0]) as server:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc monitor`: its screen in a terminal emulated by tmux, and its lines without a terminal."""
+"""Tests `absenc monitor`, on a screen emulated by tmux and without a terminal."""
 import json
 import os
 import re
@@ -63,7 +63,7 @@ class Terminal:
 
 class MonitorCase(EncoderCase):
     def assert_screen(self, screen, *patterns):
-        """Checks the screen line by line. Each pattern must match the whole line, apart from trailing spaces."""
+        """Checks the first lines of the screen, apart from trailing spaces."""
         lines = [line.rstrip() for line in screen.splitlines()]
         for number, pattern in enumerate(patterns):
             self.assertRegex(lines[number], f"^{pattern}$", f"line {number} of\n{screen}")
@@ -219,7 +219,7 @@ class Screen(MonitorCase):
         self.assertEqual(screen.splitlines()[15].rstrip(), KEYS)
 
     def test_long_names_stay_distinguishable(self):
-        """At 64, 80 and 100 columns the screen must show the part in which long names differ, and the alarm mark."""
+        """The screen must show the part in which long names differ, and the alarm mark."""
         path = self.emulator_of_two().path
         addresses = [f"esl:{path}?latency=300&address={number}" for number in (0, 3)]
         terminal = Terminal(self, *addresses, columns=64, rows=20)
@@ -246,8 +246,7 @@ class Screen(MonitorCase):
         self.assertNotRegex(screen, r"(?m)^  .*\bsingleturn \d")
         terminal.resize(64, 16)
         screen = terminal.wait_for(rf"\A(.*\n){{15}}{KEYS}")
-        # Even on the smallest screen, the line above the keys is one of the trace, which begins with its time in
-        # seconds.
+        # Even the smallest screen has a line of the trace above the keys.
         self.assertRegex(screen.splitlines()[14], r"^ +\d+\.\d{3}  ")
         terminal.press("e")
         terminal.wait_for("no exchange has failed")
@@ -287,7 +286,7 @@ class Screen(MonitorCase):
 
 class Lines(MonitorCase):
     def test_summary_lines_agree(self):
-        """The summary lines of several encoders have the same form, also that of an encoder with occasional errors."""
+        """The summary lines of several encoders have the same form."""
         result = absenc("monitor", "sim:tformat", "sim:esl?fault=corrupt=0.05", "sim:ssi", "--rate", "0", "--for", "0.73",
                         "--json", "--interval", "0.2")
         closing = re.findall(r"^absenc: (sim:\S+): (\d+) readings; (\d+) good(.*)", result.stderr, re.MULTILINE)

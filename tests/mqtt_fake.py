@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A fake MQTT broker (5 and 3.1.1) for clients that publish with QoS 0 or 1 and subscribe to nothing. It follows the
-protocol unless a test supplies other replies."""
+"""A fake MQTT broker (5 and 3.1.1) for clients that publish with QoS 0 or 1."""
 import json
 import socket
 import threading
@@ -69,8 +68,7 @@ class Connection:
 
 
 def published(flags, body, old=False):
-    """Returns (topic, packet number or None, payload) of a PUBLISH packet without properties. `old`: the packet is of
-    MQTT 3.1.1."""
+    """Returns (topic, packet number or None, payload) of a PUBLISH packet without properties."""
     size = int.from_bytes(body[:2], "big")
     topic, rest = body[2:2 + size].decode(), body[2 + size:]
     number = None
@@ -80,8 +78,7 @@ def published(flags, body, old=False):
 
 
 class FakeBroker:
-    """An MQTT broker in a thread. The optional function `answer(broker, connection, kind, flags, body, usual)` returns
-    the bytes to send in reply to a packet; `usual` is the reply that the protocol demands."""
+    """An MQTT broker in a thread. `answer` may replace the bytes that it sends in reply."""
 
     def __init__(self, answer=None):
         self.answer = answer
@@ -147,8 +144,7 @@ class FakeBroker:
                     for payload in payloads]
 
     def after(self, topic, count):
-        """Returns the payloads received in the topic, without the first `count`, so that a polling test gets only new
-        ones."""
+        """Returns the payloads received in the topic, without the first `count`."""
         with self.lock:
             return self.payloads.get(topic, [])[count:]
 

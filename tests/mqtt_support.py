@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shared by the MQTT tests of `absenc serve`: starts real brokers, and collects the messages that they forward."""
+"""Shared by the MQTT tests of `absenc serve`: brokers, and clients that collect messages."""
 import json
 import os
 import pathlib
@@ -33,8 +33,7 @@ def answers(port):
 
 
 class Daemon:
-    """A process of a server other than `absenc serve`. The constructor starts it and, if `wait`, waits until its port
-    accepts connections."""
+    """A server process other than `absenc serve`. The constructor starts it."""
 
     def __init__(self, command, port, log, wait=True):
         self.command, self.port, self.log = command, port, log
@@ -85,8 +84,7 @@ class Broker(Daemon):
 
 
 class Receiver:
-    """A client that collects the messages of a topic filter in the order of arrival: (topic, payload as JSON or
-    None, retained)."""
+    """A client that collects messages: (topic, payload as JSON or None, retained)."""
 
     def __init__(self, port, topics="#", version=paho.MQTTv5, client_id="", login=None):
         self.messages = []
@@ -127,8 +125,7 @@ class Receiver:
 
 
 def numbers(messages, encoder):
-    """Returns the numbers of an encoder's readings in these messages, in the order of arrival. Repeated messages are
-    skipped."""
+    """Returns the numbers of an encoder's readings, without those of repeated messages."""
     found, seen = [], set()
     for one in messages:
         if one["encoder"] == encoder and one["id"] not in seen:
@@ -143,7 +140,7 @@ def twice(messages):
 
 
 def waiting_in(spool):
-    """Returns the payloads in the files of a spool folder (absenc/serve/spool_file.hpp), which wait to be sent."""
+    """Returns the payloads that wait in a spool folder (absenc/serve/spool_file.hpp)."""
     found = []
     for path in sorted(pathlib.Path(spool).glob("*.part")):
         data, at = path.read_bytes(), 0

@@ -1,31 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finds the mutants of a C++ source: each is one wrong change of a behaviour that a protocol's document demands.
+"""Finds the mutants of a C++ source that clang-format has formatted.
 
-The rules work on the tokens of sources formatted by clang-format, where a binary operator has spaces around it and a
-template's bracket has none. The coarse rules, by the name in a mutant's id:
+The coarse rules, by the name in a mutant's id:
 
-  never        a check never refuses: its condition, or one of its terms joined by || or &&, counts as having the value
-               with which nothing is refused; a final error becomes Error::none; a protocol rule counts as kept
+  never        a check never refuses
   skip         leaves out a step of a procedure whose result is not used
-  half, twice  changes a time in a header, where the document's times are
-  zero, ten    changes a time in a source, which its author chose, to zero or to ten times its value
+  half, twice  changes a time in a header
+  zero, ten    changes a time in a source
 
 The fine rules:
 
-  drop         leaves out one term of a condition; there is no rule that replaces `||` by `&&`, because any test that
-               detects such a change detects this one
+  drop         leaves out one term of a condition
   edge         swaps `<` and `<=`, or `>` and `>=`, in a condition
-  true, false  fixes the result of a predicate that compares with `==` or `!=`
-  number       adds one to a constant or to a number that a function returns; doubles it from 256 on; inverts the lowest
-               set bit of a hexadecimal or binary constant
+  true, false  fixes the result of a predicate
+  number       changes a constant
   bit          clears the lowest set bit of a mask
   shift        shifts by one bit more
-  sign         swaps + 1 and - 1
-
-A check is one of these: an `if` that refuses, with an error or with nothing (`return false`, `return std::nullopt`);
-the condition of `expect` or `note`; `good ? value : Error::x`; an error that is returned after all cases. Drop and edge
-also apply to returned and assigned values.
-"""
+  sign         swaps + 1 and - 1"""
 
 import hashlib
 import re
@@ -34,22 +25,21 @@ from typing import NamedTuple
 from cpp_source import CLOSING, OPENING, Source
 
 ASSIGNMENT = {"=", "+=", "-=", "*=", "/=", "%=", "&=", "|=", "^=", "<<=", ">>="}
-# Tokens that bound an operand of `&&` or `||` on either side, besides brackets and these operators.
+# Tokens that bound an operand of `&&` or `||`, besides brackets and these operators.
 ENDS_OPERAND = {";", ",", "?", ":", "return", "co_return", "case", "else"} | ASSIGNMENT
 COARSE = {"never", "skip", "half", "twice", "zero", "ten"}
 ARITHMETIC = {"bit", "shift", "sign"}  # rules on arithmetic, of which at most one mutant is made for a line
 EDGE = {"<": "<=", "<=": "<", ">": ">=", ">=": ">"}
 REFUSES = re.compile(r"fail|failed|refuse\w*|reject\w*|settle\w*")
 NOTHING = {"returnfalse;", "returnstd::nullopt;", "returnnullptr;", "return{};", "std::nullopt", "nullptr"}
-# Words in the declaration of a table: the table's numbers, which stand beside texts, are not mutated.
+# Words in the declaration of a table, whose numbers are not mutated.
 TABLES = {"array", "to_array", "Option", "option", "Argument", "Command", "Fields"}
 DURATION = re.compile(r"[\d'.]+(ns|us|ms|s|min|h)")
 INTEGER = re.compile(r"(0[xX][\da-fA-F']+|0[bB][01']+|[\d']+)(?:u|U|l|L|ul|UL|z|uz)?")
 
 
 class Switch(NamedTuple):
-    """The mutant as a choice at run time: the texts to insert before and behind the tokens from `start` to `end`. `IS`
-    in these texts becomes the condition that this mutant is chosen."""
+    """A choice at run time: texts to insert at `start` and `end`. `IS` stands for the condition."""
 
     start: int
     end: int
@@ -67,8 +57,7 @@ class Mutant(NamedTuple):
     after: str
     id: str
     switch: "Switch | None"
-    # Name of the constant outside functions that the mutant changes, None or empty for any other mutant. The mutant is
-    # switched only if the constant can become a function (as_functions).
+    # Name of the constant outside functions that the mutant changes, if any.
     constant: "str | None" = None
 
     def applied_to(self, text):
@@ -76,10 +65,8 @@ class Mutant(NamedTuple):
 
 
 def with_switches(text, numbered):
-    """Returns `text` with the switches of all mutants inserted. `numbered`: pairs of number and mutant.
-    `chosen_mutant(N)` returns in C++ whether mutant N is chosen."""
-    # The switch of a nested mutant is inside that of the outer one. If several mutants are at the same place, the
-    # switch of the first is the outermost.
+    """Returns `text` with the switches inserted. `numbered`: pairs of number and mutant."""
+    # The switch of a nested mutant is inside that of the outer one.
     inserted = []
     for order, (number, mutant) in enumerate(numbered):
         start, end, before, behind = mutant.switch
@@ -93,8 +80,7 @@ def with_switches(text, numbered):
 
 
 def as_functions(text, names):
-    """Returns `text` with the constants `names` of type Time as functions, which are called where the constants were.
-    Returns None if one of the names also has another meaning in the text."""
+    """Returns `text` with these constants as functions, or None if that is not possible."""
     source = Source(text)
     inserted = []
     for i, token in enumerate(source.tokens):
@@ -180,8 +166,7 @@ class Finder:
             if line in self._calculating:
                 return
             self._calculating.add(line)
-        # The id of a mutant depends on its file, its rule and the code of its lines, not on their numbers or comments.
-        # Mutants that are equal in these are numbered.
+        # The id depends on the code of the lines, not on their numbers or comments.
         begin, behind = self.source.tokens_of_lines(line, self.source.line_of(end - 1))
         context = [token.text for token in tokens[begin:behind]]
         description = "\n".join([rule, after, str(first - begin), *context])
@@ -209,8 +194,7 @@ class Finder:
                 self._refusal(i)
 
     def _mark(self, first, last):
-        """Marks the tokens from `first` to `last`, exclusive, as conditions of a check, except inside braces, such
-        as those of lambdas."""
+        """Marks tokens as conditions of a check, except inside braces."""
         i = first
         while i < last:
             if self.source[i] == "{":
@@ -219,8 +203,7 @@ class Finder:
             i += 1
 
     def _refuses(self, first, last):
-        """Returns whether a statement or block refuses something by an error or an empty result. Inner blocks of a
-        block are ignored."""
+        """Returns whether a statement or block refuses something, outside its inner blocks."""
         source = self.source
         body = "".join(source[i] for i in range(first, last))
         if body in NOTHING or body[1:-1] in NOTHING:
@@ -274,8 +257,7 @@ class Finder:
             self._never(first, index, *(("||", "false") if is_error[0] else ("&&", "true")))
 
     def _never(self, first, last, operator, harmless):
-        """Adds a mutant for each term joined by `operator`, as if the term were a check of its own. `harmless` is the
-        value, true or false, with which a term refuses nothing."""
+        """Adds a mutant for each term joined by `operator`. A `harmless` term refuses nothing."""
         source = self.source
         ends = ENDS_OPERAND | {operator} | ({"||"} if operator == "&&" else set())
         switch = ("(!IS && (", "))") if harmless == "false" else ("(IS || (", "))")
@@ -311,8 +293,7 @@ class Finder:
         return any(self.source.partner.get(i, 0) > index for i in range(outer, index) if self.source[i] in OPENING)
 
     def _rule(self, index):
-        """Adds mutants of the condition `kept` in a call `expect(kept, rule, at)` or `note(kept, ...)`, but not in the
-        declaration of these functions."""
+        """Adds mutants of the condition `kept` in calls of `expect` and `note`."""
         source = self.source
         first = index + 2
         last = source.right(first, {","})
@@ -329,8 +310,7 @@ class Finder:
             if source[i] != "Time" or source[i + 2] != "=" or source.tokens[i + 1].kind != "word" or self.left_alone[i]:
                 continue
             end = source.right(i + 3, {";", ","})
-            # The declaration must be that of a constant or a member's default value, not of a value that a function
-            # computes.
+            # A value that a function computes is left alone.
             is_member = source[i - 1] in (";", "{", "}") and source.tokens[i + 3].kind == "number" and end == i + 4
             if source[i - 1] == "constexpr" or is_member:
                 self._times(i + 3, end, "" if is_member or self._is_local(i) else source[i + 1])
@@ -364,8 +344,7 @@ class Finder:
         return source[outer] == "{" and not {"namespace", "class", "struct"} & {source[i] for i in range(begin, outer)}
 
     def _times(self, first, last, constant=None):
-        """Adds the mutants of each time in the tokens from `first` to `last`. `constant` is the name of the constant
-        with this value, or empty if the mutant cannot be switched."""
+        """Adds the mutants of the time in the tokens from `first` to `last`, exclusive."""
         before = f"Time({self.source.span(first, last)})"
         if self.file.endswith(".hpp"):
             changes = {"half": f"{before} / 2", "twice": f"{before} * 2"}
@@ -405,8 +384,7 @@ class Finder:
         return f"({number} + 1)" if value < 256 else f"({number} * 2)"
 
     def _is_constant(self, index):
-        """Returns whether the token `index` is in the value of an enumerator or of a constant, such as the polynomial
-        of a CRC."""
+        """Returns whether the token `index` is in the value of an enumerator or of a constant."""
         source = self.source
         outer = self._around(index)
         if source[index - 1] == "=" and source.tokens[index - 2].kind == "word" and source[outer] == "{":
@@ -437,5 +415,5 @@ class Finder:
 
 
 def find(file, text):
-    """Returns the mutants of the source with the content `text`. `file` is the first part of their ids."""
+    """Returns the mutants of `text`. `file` is the first part of their ids."""
     return Finder(file, text).mutants()

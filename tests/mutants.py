@@ -2,12 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Breaks the units in one place at a time and checks whether a test fails.
 
-tests/mutant_rules.py finds the places. In a copy of the sources (build/mutants) most mutants of a unit are compiled
-together, each behind a switch. For each mutant, the generic tests that concern its unit, the seeds of its fuzzer
-and its own tests run until one fails, the fastest first. Mutants that cannot be switched (those of the fine rules,
-and a few constants) and those that survive are compiled one at a time, which includes the checks at compile time. A
-mutant that survives means that a test is missing, or that the mutant changes nothing: tests/mutants_survivors.txt
-lists those with a reason."""
+tests/mutant_rules.py finds the places. tests/mutants_survivors.txt lists mutants that may survive, with a reason."""
 
 import argparse
 import fcntl
@@ -30,9 +25,9 @@ import mutant_rules
 ROOT = Path(__file__).resolve().parent.parent
 COPIED = ("CMakeLists.txt", "absenc", "cmake", "tests")
 NO_SOURCE = re.compile(r"_(test|fuzz|bench)\.|^(test_|testing|vectors|fields|explain|texts)")
-# Matches errors of the compiler that come from checks at compile time, such as a static_assert about a vector.
+# Matches errors of the compiler from checks at compile time, such as a static_assert.
 STATIC_CHECK = re.compile(r"static.assert|constant.expression|non-constant|non-.constexpr|duplicate case value")
-# Switched mutants run only the first series of faults. Survivors are compiled alone and run all series (tests/kit).
+# Switched mutants run only the first series of faults (tests/kit).
 FIRST_SERIES = "-" + ":".join(f"*/{series}_*" for series in range(1, 10))
 HANGS = (-signal.SIGXCPU, -signal.SIGKILL)
 SWITCH_HEADER = Path("absenc/chosen_mutant.hpp")
@@ -53,15 +48,14 @@ class Program(NamedTuple):
 
 
 def unit_folders():
-    """Returns a dictionary from name to folder: every unit, and the layers that all units depend on (author, host)."""
+    """Returns a dictionary from name to folder: units, author and host."""
     protocol = ROOT / "absenc" / "protocol"
     folders = {folder.name: folder for folder in sorted(protocol.iterdir()) if folder.is_dir()}
     return folders | {"host": ROOT / "absenc" / "host"}
 
 
 def generic_programs():
-    """Returns the names of the programs that test every unit: one for each source in tests/, and one for each folder
-    there (cmake/tests.cmake)."""
+    """Returns the names of the programs that test every unit (cmake/tests.cmake)."""
     tests = ROOT / "tests"
     names = []
     for path in [*sorted(tests.glob("*_test.cpp")), *sorted(tests.glob("*/*_test.cpp"))]:
@@ -86,7 +80,7 @@ def find_mutants(folder):
 
 
 def shown(mutant, path, text):
-    """Returns a text with the place of a mutant in its source, and its lines before and after the change."""
+    """Returns the place of a mutant, and its lines before and after the change, as a text."""
     last = text.count("\n", 0, mutant.end) + 1
     changed = mutant.applied_to(text).splitlines()
     end = last + len(changed) - len(text.splitlines())
@@ -136,7 +130,7 @@ class Tree:
         for path in self.source.rglob("*"):
             if path.is_file() and path.relative_to(self.source) not in wanted:
                 path.unlink()
-        # _GLIBCXX_ASSERTIONS detects reads beyond the end of a container. The option -w disables warnings.
+        # _GLIBCXX_ASSERTIONS detects reads beyond the end of a container.
         options = ["-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -w -D_GLIBCXX_ASSERTIONS"]
         options += ["-DABSENC_TESTS=ON", "-DABSENC_SPLIT_TESTS=ON", "-DABSENC_COMMAND=OFF", "-DABSENC_INSTALL=OFF"]
         options += ["-DABSENC_UNITY=OFF"]
@@ -168,8 +162,7 @@ class Tree:
         return None if done.returncode == 0 else done.stdout + done.stderr
 
     def switch_in(self, numbered):
-        """Writes sources that contain these numbered mutants behind switches. Removes from `numbered` the mutants of
-        constants that cannot be switched."""
+        """Writes sources with switched mutants. Removes those without a switch from `numbered`."""
         self.write(self.source / SWITCH_HEADER, SWITCH.encode())
         functions = self.constants_as_functions(numbered)
         for number, (mutant, path, _) in list(numbered.items()):
@@ -185,8 +178,7 @@ class Tree:
 
     @staticmethod
     def constants_as_functions(numbered):
-        """Returns, for each source, the constants that become functions, so that their mutants can be switched. Every
-        source in the folder that uses such a constant must still compile with the function."""
+        """Returns, for each source, the constants that can become functions."""
         functions = {}
         for path, name in {(path, mutant.constant) for mutant, path, _ in numbered.values() if mutant.constant}:
             # Every unit depends on the folder author, so users of its constants are searched in all units.
@@ -207,8 +199,7 @@ class Tree:
             self.write(self.source / path.relative_to(ROOT), text.encode())
 
     def run(self, program, cpu_limit, number=0):
-        """Runs a test program with mutant `number` chosen, 0 for none. Returns its exit status and its processor time
-        in seconds. `cpu_limit` is a limit of processor time, which excludes time used by other processes."""
+        """Runs a program. Returns its exit status and its processor time in seconds."""
         limits = ["prlimit", f"--cpu={cpu_limit}:{cpu_limit + 1}", f"--as={4 << 30}", "--core=0"]
         tests = program.tests + (FIRST_SERIES if number else "")
         environment = {**self.environment, "GTEST_FILTER": tests, "CHOSEN_MUTANT": str(number)}
@@ -228,8 +219,7 @@ class Tree:
         return running.returncode, usage.ru_utime + usage.ru_stime
 
     def concerning(self, program, unit):
-        """Returns a generic program with the filter of its tests that concern a unit: those whose name contains the
-        unit, and those for all units. Returns None if no test names the unit."""
+        """Returns a generic program with a filter for tests that concern the unit, or None."""
         listed = self.run_or_exit([self.build / "tests" / program.name, "--gtest_list_tests"])
         suite, chosen, is_named = "", [], False
         for line in listed.splitlines():
@@ -245,8 +235,7 @@ class Tree:
         return program._replace(tests=":".join(chosen)) if is_named else None
 
     def programs(self, unit, folders):
-        """Returns the programs that may kill a unit's mutants, the fastest first. Exits with an error if one of them
-        fails without a mutant."""
+        """Returns the programs that may kill a unit's mutants, the fastest first."""
         kit = [Program(name, False) for name in generic_programs()]
         owners = list(folders) if unit == "author" else [unit]
         seeds = [f"{p.stem}_seeds" for owner in owners for p in sorted(folders[owner].rglob("*_fuzz.cpp"))]
@@ -272,18 +261,16 @@ class Tree:
         return "" if status == 0 else "time" if status in HANGS else "own" if program.is_own else "kit"
 
     def switched_outcome(self, number, programs):
-        """Returns the outcome of a switched mutant, and the name of the program that killed it, or ("survived", "")."""
+        """Returns the outcome of a switched mutant and the program that killed it, if any."""
         for program in programs:
             if outcome := self.killed(program, number):
                 return outcome, program.name
         return "survived", ""
 
     def outcome(self, mutant, path, text, programs):
-        """Returns the outcome of a mutant that is compiled alone, and the name of the program or file that killed it.
-        Does not restore the mutated source."""
+        """Returns the outcome of a mutant that is compiled alone, and what killed it."""
         self.write(self.source / path.relative_to(ROOT), mutant.applied_to(text).encode())
-        # The unit's vectors are checked when its unit.cpp is compiled, so compiling unit.cpp alone already reveals most
-        # faults in a header.
+        # The unit's vectors are checked when its unit.cpp is compiled.
         unit = path.relative_to(ROOT).with_name("unit.cpp")
         library = "absenc-" + unit.relative_to("absenc/protocol").parts[0] if (ROOT / unit).exists() else ""
         first = [f"CMakeFiles/{library}.dir/{unit}.o"] if library else []
@@ -303,7 +290,7 @@ class Tree:
 
 
 class Campaign:
-    """A run over the chosen mutants. Their units are distributed to the trees, one thread for each tree."""
+    """A run over the chosen mutants, with one thread for each tree."""
 
     def __init__(self, known, folders, verbose, quick):
         self.known = known
@@ -351,8 +338,7 @@ class Campaign:
             self.stopping = True
 
     def switch(self, tree, unit, mutants):
-        """Runs the tests with each switched mutant of a unit. Returns the mutants that are still to be compiled
-        alone."""
+        """Runs the tests with switched mutants. Returns the mutants that are to be compiled alone."""
         numbered = dict(enumerate([one for one in mutants if one[0].switch], start=1))
         left = []
         if numbered:
@@ -374,8 +360,7 @@ class Campaign:
         return left
 
     def switched_programs(self, tree, unit, numbered):
-        """Builds the test programs with the unit's mutants switched in, and returns the programs. If they cannot be
-        built with constants as functions, removes the mutants of constants from `numbered`."""
+        """Builds the test programs with switched mutants, if need be without those of constants."""
         try:
             tree.switch_in(numbered)
             return self.programs(tree, unit)

@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests tests/mutant_rules.py and tests/mutants.py: the mutants that are found in a source, the places that have none,
-and ids that remain the same if lines are moved."""
+"""Tests tests/mutant_rules.py and tests/mutants.py."""
 
 import os
 import sys

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests that every command of every unit with a character link ends in bounded time on a line that is never silent, and
-// with an error unless the line repeats the request.
+// Tests that commands end in bounded time on a line of characters that is never silent.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -18,7 +17,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// Function that returns the next byte on the line. Its argument is the last request of the host.
+/// Function that returns the next byte on the line. `request` is the last one of the host.
 using ByteSource = std::function<std::uint8_t(Bytes request)>;
 
 struct Outcome {
@@ -26,9 +25,7 @@ struct Outcome {
   Time duration{};
 };
 
-/// Runs the conversation on a line with a byte every `period`, which is shorter than any silence that the port would
-/// report. If a byte and a timer are due together, the byte comes first. Returns whether the conversation ended, and
-/// its duration.
+/// Runs the conversation on a line with a byte every `period`.
 Outcome run(Conversation<std::uint8_t>& conversation, Time period, const ByteSource& byte_source) {
   constexpr unsigned most_bytes = 2'000'000;
   Time now = 1s;
@@ -82,8 +79,7 @@ Options defaults_of(const Unit& unit, std::span<const OptionText> settings = {})
   return options;
 }
 
-/// Returns option sets of a unit: the defaults, and each choice of each option with choices, one option changed at a
-/// time.
+/// Returns the defaults, and variants of them in one option with choices.
 std::vector<Options> all_options(const Unit& unit) {
   std::vector<Options> all{defaults_of(unit)};
   for (const Option& option : unit.options) {
@@ -106,8 +102,7 @@ std::vector<std::int64_t> least_arguments(const Command& command) {
 
 class NeverSilent : public ::testing::TestWithParam<const Unit*> {
  protected:
-  // Runs each command with these options on a line that is never silent: it must end within 30 s, and with an error
-  // unless the line repeats the request.
+  // Runs each command on a line that is never silent; it must end within 30 s.
   void expect_ends(const Options& options, Time period, const Kind& kind) {
     for (const Command& command : unit.commands) {
       const Any<Conversation> made = unit.host(options, command, least_arguments(command), storage_);

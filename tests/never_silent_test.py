@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests verbs of absenc on a pseudo-terminal that is never silent: each must end by itself and report the problem."""
+"""Tests that verbs of absenc end by themselves on a pseudo-terminal that is never silent."""
 import concurrent.futures
 import json
 import time
@@ -8,7 +8,7 @@ import unittest
 
 from command_support import BabblingLine, Case, absenc
 
-LIMIT = 40.0  # time limit of a command in seconds, for a busy machine; on an idle one the slowest takes about ten
+LIMIT = 40.0  # seconds, for a busy machine
 AT_ONCE = 8  # number of commands that run in parallel: they mostly wait
 
 
@@ -23,8 +23,7 @@ def least(argument):
 
 
 def invocations(unit, encoder):
-    """Yields command lines that communicate with an encoder: of verbs that end by themselves, and of each command of
-    the unit."""
+    """Yields command lines that communicate with an encoder and end by themselves."""
     verbs = {command["verb"] for command in unit["commands"]}
     yield "read", encoder
     yield "read", encoder, "--count", "2"
@@ -49,8 +48,7 @@ def invocations(unit, encoder):
 
 class NeverSilentTest(Case):
     def run_all(self, period, pieces, wanted):
-        """Runs each command line for which `wanted` is true, each on a line of its own that sends `pieces` with this
-        period."""
+        """Runs each wanted command line on a line of its own that sends `pieces` with this period."""
         def one(unit, number):
             with BabblingLine(period, pieces) as line:
                 arguments = list(invocations(unit, f"{unit['protocol']}:{line.path}"))[number]
@@ -65,7 +63,7 @@ class NeverSilentTest(Case):
                 with self.subTest(arguments=arguments):
                     self.assertLess(duration, LIMIT)
                     self.assertIn(result.returncode, (0, 1), result.stderr)
-                    # A command that only sends, and expects no reply, may succeed if no byte arrives at that moment.
+                    # A command that expects no reply may succeed.
                     if arguments[0] != "run":
                         self.assert_failed(result)
 

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests that `./dev new-protocol` creates a unit with one changed line outside its folder, for which those tests of
-every unit pass that are run here; only the unit's own test fails until it is written."""
+"""Tests the unit that `./dev new-protocol` creates."""
 
 import os
 import shlex

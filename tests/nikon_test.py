@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests of what only Nikon's A-format has: characters of 16 bits in captures, requests of several frames, a memory of
-words, alarms with a second request, several encoders that answer one request."""
+"""Tests Nikon's A-format with the absenc command."""
 
 import os
 import unittest
@@ -11,7 +10,7 @@ from command_support import Case, Emulator, absenc, json_lines
 
 class Nikon(Case):
     def test_waveform_decodes_to_what_was_read(self):
-        """A waveform of wide characters decodes to the same frames, at every rate and in every format of file."""
+        """A waveform of wide characters decodes to the same frames."""
         for rate in ("2500000", "6666667", "16000000"):
             for ending in ("vcd", "sr", "csv"):
                 file = self.file(f"{rate}.{ending}")
@@ -54,7 +53,7 @@ class Nikon(Case):
         self.assertIn("words of four hexadecimal digits", absenc("memory", "load", "sim:nikon", str(dump), "--yes").stderr)
 
     def test_alarms_complete_later_readings_of_a_capture(self):
-        """The first reading has a status that names no alarm; with the reply that does it is shown once more."""
+        """The status of the first reading names no alarm."""
         file = self.file("alarm.vcd")
         self.assert_good(absenc("wave", "nikon?alarm=singleturn_error", file, "--count", "3"))
         rows = json_lines(absenc("decode", "nikon", file, "--json").stdout)
@@ -65,7 +64,7 @@ class Nikon(Case):
         self.assertEqual([row["alarms"] for row in positions], [None] + [["singleturn_error"]] * 5)
 
     def test_reads_the_replies_that_others_print(self):
-        """TI's sample output shows ABS 1526F, which is 237.961120605 degrees of 17 bits, and 51200 turns."""
+        """TI's sample output shows ABS 1526F: 237.961120605 degrees of 17 bits, and 51200 turns."""
         decoded = absenc("decode", "nikon", "--option", "singleturn_bits=17", "--request", "e244", "--hex", "04a16f5201900185", "--json")
         fields = json_lines(decoded.stdout)[0]["fields"]
         self.assertEqual((fields["singleturn"], fields["multiturn"]), (0x1526F, 51200))

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finds the npm tools for the tests of `absenc serve`. ./dev test --all installs them from tests/npm/package-lock.json into
-build/npm."""
+"""Finds the npm tools for the tests of `absenc serve`."""
 import os
 import pathlib
 import unittest
@@ -10,8 +9,7 @@ MODULES = SOURCE / "build/npm/node_modules"
 
 
 def tool(path):
-    """Returns the path of a file in node_modules. The file may only be missing, which skips the test, if ./dev found
-    npm's registry unreachable."""
+    """Returns the path of a file in node_modules, or skips or fails the test."""
     if (MODULES / path).exists():
         return MODULES / path
     if os.environ.get("ABSENC_NO_NPM"):

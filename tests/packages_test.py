@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests the library as a package of firmware build systems. Each package must build the same sources; it is tested as
-far as possible without the vendor's tools. The manifests may have only documented keys."""
+"""Tests the library as a package of firmware build systems."""
 import glob
 import json
 import os
@@ -50,7 +49,7 @@ class Case(unittest.TestCase):
 
 
 class PlatformIO(Case):
-    # Keys of library.json and of its entry `build`, from https://docs.platformio.org/en/latest/manifests/library-json/
+    # From https://docs.platformio.org/en/latest/manifests/library-json/
     KEYS = {"$schema", "name", "version", "description", "keywords", "license", "frameworks", "platforms", "headers",
             "export", "build"}
     BUILD_KEYS = {"includeDir", "srcDir", "srcFilter", "flags", "unflags", "libArchive"}
@@ -71,7 +70,7 @@ class PlatformIO(Case):
     def test_builds_all_sources(self):
         chosen = set()
         for sign, pattern in (re.match(r"([+-])<(.+)>$", one).groups() for one in self.library["build"]["srcFilter"]):
-            # A srcFilter that names a folder includes everything below it, as in PlatformIO's match_src_files.
+            # A srcFilter that names a folder includes everything below it.
             matched = set()
             for path in glob.glob(str(ROOT / pattern), recursive=True):
                 below = Path(path).rglob("*.cpp") if os.path.isdir(path) else [Path(path)]
@@ -81,8 +80,7 @@ class PlatformIO(Case):
 
 
 class Zephyr(Case):
-    # Checks that module.yml has exactly these keys, which the schema in Zephyr's own scripts/zephyr_module.py allows,
-    # and that its paths exist.
+    # The schema in Zephyr's scripts/zephyr_module.py allows these keys.
     def test_module_file(self):
         module = yaml.safe_load((ROOT / "zephyr/module.yml").read_text())
         self.assertEqual(module.keys(), {"name", "build"})
@@ -137,8 +135,7 @@ endforeach()
 
 
 class EspIdf(Case):
-    # Keys of the manifest, from
-    # https://docs.espressif.com/projects/idf-component-manager/en/latest/reference/manifest_file.html
+    # From https://docs.espressif.com/projects/idf-component-manager/en/latest/reference/manifest_file.html
     KEYS = {"version", "description", "license", "tags", "dependencies", "files"}
 
     def test_manifest_has_documented_keys(self):
@@ -153,7 +150,7 @@ class EspIdf(Case):
         self.assertGreaterEqual(packed, sources() | {"CMakeLists.txt", "cmake/sources.cmake", "packages/esp-idf.cmake"})
         self.assertFalse([path for path in packed if path.startswith(("absenc/os", "absenc/sim", "tools", "tests"))])
 
-    # The idf_component_register of this project is a fake that creates a library, as the real one does.
+    # This idf_component_register is a fake that creates a library, as the real one does.
     PROJECT = f"""
 cmake_minimum_required(VERSION 3.16)
 project(esp LANGUAGES CXX)
@@ -174,7 +171,7 @@ add_subdirectory({ROOT} absenc)
         self.assertEqual(re.search("^-- headers=(.*)$", output, re.MULTILINE)[1], str(ROOT))
 
     def test_early_script_stops_at_registration(self):
-        """In ESP-IDF's early expansion, idf_component_register ends the script, and no files can be searched."""
+        """In ESP-IDF's early expansion, idf_component_register ends the script."""
         (self.folder / "early.cmake").write_text(f"""
 set(ESP_PLATFORM 1)
 set(CMAKE_BUILD_EARLY_EXPANSION 1)
@@ -188,7 +185,7 @@ include({ROOT}/CMakeLists.txt)
 
 
 class Arduino(Case):
-    # Keys of library.properties, from https://arduino.github.io/arduino-cli/latest/library-specification/
+    # From https://arduino.github.io/arduino-cli/latest/library-specification/
     REQUIRED = {"name", "version", "author", "maintainer", "sentence", "paragraph", "category", "url", "architectures"}
     OPTIONAL = {"includes", "dot_a_linkage"}
 
@@ -212,8 +209,7 @@ class Arduino(Case):
     def test_sketch_reads_positions(self):
         sketch = self.library / "examples/ReadTFormat/ReadTFormat.ino"
         program = self.folder / "sketch.cpp"
-        # A program made of the sketch as Arduino does it: Arduino.h before the sketch, and a `main` that calls `setup`
-        # and `loop`.
+        # Makes a program of the sketch as Arduino does.
         program.write_text(f'#include <Arduino.h>\n#include "{sketch}"\n'
                            "int main() { setup(); for (int i = 0; i < 20000; ++i) loop(); }\n")
         exported = self.library / "src"
@@ -221,7 +217,7 @@ class Arduino(Case):
             self.folder / "sketch", program, exported / "absenc/protocol/host_rules.cpp",
             *sorted((exported / "absenc/protocol/author").rglob("*.cpp")))
         output = run(self.folder / "sketch").splitlines()
-        # Every third reply is damaged. The next reply then only confirms the one after it, so it prints no position.
+        # Every third reply is damaged, and the one after it prints no position.
         self.assertEqual(output[:6], ["4660 74565", "bad_checksum"] * 3)
 
 
@@ -259,8 +255,7 @@ class FetchContent(Case):
         self.assertIn("absenc::tformat::", symbols)
         for unit in self.OTHERS:
             self.assertNotIn(f"absenc::{unit}::", symbols)
-        # A program linked only with the sources that it needs must have the same size as the one with all sources
-        # available.
+        # A program that is linked only with the needed sources must have the same size.
         alone = self.folder / "alone"
         flags = "-mcpu=cortex-m0plus -mthumb -std=c++20 -Os -DNDEBUG -ffreestanding -ffunction-sections -fdata-sections"
         run("arm-none-eabi-g++", *flags.split(), "-fno-exceptions", "-fno-rtti", "-fno-threadsafe-statics",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Opens the page of `absenc serve` in Chromium with named encoders, for tests and for ./dev pictures."""
+"""Opens the page of `absenc serve` in Chromium, for tests and for ./dev pictures."""
 import os
 import sys
 import urllib.parse
@@ -32,8 +32,7 @@ KINDS = {
 
 
 def config(kinds, ports=None):
-    """Returns the text of an absenc.toml with these encoders, on the ports that `ports` has by name, all others on
-    sim."""
+    """Returns the text of an absenc.toml with these encoders. `ports`: those not on sim, by name."""
     text = ""
     for name, (protocol, options) in kinds.items():
         text += f'[encoder.{name}]\nprotocol = "{protocol}"\nport = "{(ports or {}).get(name, "sim")}"\nrate_hz = 100\n'

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests the RAA38S6 on CAN with the command: behind an slcan adapter on a pseudo-terminal, and in the simulator."""
+"""Tests the RAA38S6 on CAN with the absenc command."""
 import json
 import os
 import re
@@ -49,8 +49,7 @@ class CanBus(Case):
         self.assert_no_rule_broken()
 
     def burst(self, count):
-        """Sends `count` requests in one write. Returns how many of them the adapter accepted, how many it refused, and
-        how many the node answered."""
+        """Sends requests in one write. Returns how many were accepted, refused and answered."""
         descriptor = os.open(self.node.path, os.O_RDWR | os.O_NOCTTY)
         self.addCleanup(os.close, descriptor)
         tty.setraw(descriptor)
@@ -218,7 +217,7 @@ class CanBus(Case):
         self.assertRegex(self.node.end()[2], r"faults injected: .*drop.*silence.*repeat")
 
     def test_survives_interrupted_adapter(self):
-        """Garbage and an incomplete command of another program arrive at the adapter before absenc uses it."""
+        """The adapter gets garbage and an incomplete command before absenc uses it."""
         address = self.bus("--singleturn", "9799")
         with open(self.node.path, "wb", buffering=0) as other:
             other.write(b"garbage\rt22")  # another program sends garbage and an incomplete adapter command

@@ -10,8 +10,7 @@ from command_support import Case, Emulator, FakeEncoder, absenc, json_lines
 
 
 def framed(text):
-    """Returns the bytes of the hexadecimal text followed by their CRC, low byte first, computed in the steps of the
-    manual (3.1.7)."""
+    """Returns the bytes of a hexadecimal text and their CRC, as in the manual (3.1.7)."""
     data = bytes.fromhex(text)
     crc = 0xFFFF
     for byte in data:
@@ -42,8 +41,7 @@ FRAMES = [
     ("bits=14", REQUEST_1, framed("01830b"), "request_rejected", "behind the gateway", "gateway"),
     ("bits=14", REQUEST_1, framed("018377"), "request_rejected", "the standard does not have", "manual"),
 ]
-# Further bad exchanges, whose requests no reading sends. Each row: request, reply, expected error, evidence in the
-# message.
+# Exchanges that no reading has: request, reply, expected error, evidence in the message.
 OTHER_FRAMES = [
     (framed("ffa0"), framed("ffa000"), "out_of_range", "from 1 to 247"),
     (framed("ffa0"), framed("ffa001")[:-1], "wrong_length", "several encoders"),
@@ -206,7 +204,7 @@ class Settings(ModbusCase):
         emulator = self.emulator("--also", "address=2")
         result = absenc("config", "set", self.uri(emulator), "address", "2", "--yes")
         self.assert_failed(result, "invalid_argument", "answers at that address already", "nothing was sent")
-        # With two encoders on the line, the request A0 does not identify one of them, so it gets no clear reply.
+        # Two encoders on the line give no clear reply to the request A0.
         self.set(self.uri(emulator), "address", "3")
         self.assert_good(absenc("read", self.uri(emulator, "&address=2")))
         self.assertEqual(self.violations(emulator), [])

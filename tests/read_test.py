@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc read`, `run` and `bench`, mostly over a pseudo-terminal, and their error messages."""
+"""Tests `absenc read`, `run` and `bench`."""
 import json
 import os
 import pty
@@ -102,8 +102,7 @@ class Readings(EncoderCase):
         readings = json_lines(absenc("read", address, "--json", "--count", "20", "--rate", "200").stdout)
         for before, after in zip(readings, readings[1:]):
             turned = (after["angle_deg"] - before["angle_deg"]) % 360
-            # The shaft makes one revolution per second. The tolerance is large, because the timestamp is the end of the
-            # request, and the virtual encoder samples the position later.
+            # The tolerance is large, because the encoder samples later than the timestamp.
             self.assertAlmostEqual(turned, 360 * (after["time_s"] - before["time_s"]), delta=360 * 0.3)
             self.assertGreater(turned, 0)
 
@@ -147,15 +146,13 @@ class Simulator(EncoderCase):
         self.assertEqual(readings[0]["singleturn_bits"], 23)
 
     def test_damaged_words_are_not_confirmed(self):
-        """SSI has no check, so a word is only confirmed by another word that differs by no more than the possible
-        motion."""
+        """SSI has no check: only another word can confirm a word."""
         result = absenc("read", "sim:ssi?fault=corrupt=1&max_rpm=1", "--json", "--count", "6", "--rate", "50")
         readings = [json.loads(line) for line in result.stdout.splitlines()]
         self.assertEqual(len(readings), 6)
         for one in readings:
             away = min(one["singleturn"], 4096 - one["singleturn"])
-            # A confirmed SSI position may differ from the true one by up to 4 counts, because damaged words may match
-            # by chance.
+            # Damaged words may confirm each other by chance.
             self.assertTrue(not one["confirmed"] or away <= 4, one)
         doubtful = [one for one in readings if not one["confirmed"]]
         self.assertTrue(doubtful)
@@ -164,8 +161,7 @@ class Simulator(EncoderCase):
             self.assertFalse(one["singleturn_valid"])
 
     def test_speed_limit_confirms_words(self):
-        """Three of ten words are damaged. Of the confirmed words, fewer than 40 may be wrong, because damaged words may
-        match by chance."""
+        """Three of ten words are damaged. Damaged words may confirm each other by chance."""
         for encoder in ("sim:ssi?fault=corrupt=0.3&max_rpm=1", "sim:amt21?fault=corrupt=0.3&max_rpm=1"):
             result = absenc("read", encoder, "--json", "--count", "400", "--rate", "0")
             readings = [json.loads(line) for line in result.stdout.splitlines()]
@@ -180,7 +176,7 @@ class Simulator(EncoderCase):
 
 
 class ErrorMessages(EncoderCase):
-    """Tests that error messages state what happened and, where they apply, the transmitted bytes and what to try."""
+    """Tests that error messages state what happened."""
 
     def test_silence(self):
         result = absenc("read", f"tformat:{self.emulator('--fault', 'silence=1').path}")
@@ -312,7 +308,7 @@ class ErrorMessages(EncoderCase):
 
 
 class OrdinaryUser(EncoderCase):
-    """Tests of file access. Root may open any file, so as root these tests run a copy of absenc as the user nobody."""
+    """Tests of file access. As root they run a copy of absenc as the user nobody."""
 
     def setUp(self):
         super().setUp()
@@ -422,7 +418,7 @@ class Termination(EncoderCase):
         result = subprocess.run(["sh", "-c", '"$0" read "tformat:$1?latency=300" >&-', ABSENC, emulator.path],
                                 capture_output=True, text=True, timeout=PATIENCE, check=False)
         self.assert_failed(result, "standard output cannot be written")
-        # Only the two position requests reached the emulator as requests, and not the text of a reading.
+        # Only the two position requests reached the emulator, not the text of a reading.
         self.assertIn("absenc: 2 requests answered", emulator.end()[2])
 
 
@@ -517,8 +513,7 @@ class Run(EncoderCase):
         self.assertIn("0 requests answered", emulator.end()[2])
 
     def ask(self, address, answer):
-        """Runs `zero` on a terminal and answers its question with `answer`. Returns the exit status and the terminal's
-        text."""
+        """Runs `zero` on a terminal and gives `answer`. Returns the exit status and the text."""
         terminal, ours = pty.openpty()
         process = subprocess.Popen([ABSENC, "run", address, "zero"], stdin=ours, stdout=subprocess.DEVNULL, stderr=ours)
         os.close(ours)

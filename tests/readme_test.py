@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests that the README and other pages show real output: the examples of each page are run, from top to bottom."""
+"""Tests that the README and other pages show real output, by running their examples."""
 import os
 import re
 import select
@@ -18,8 +18,7 @@ SOURCE = Path(os.environ["ABSENC_SOURCE_DIR"])
 PAGES = ["README.md", *(f"docs/{name}.md" for name in ("read", "set-up", "record", "serve", "decode", "test-a-drive", "doctor", "cpp",
                                                         "python", "add-an-encoder", "write-a-unit"))]
 PORT = "/dev/ttyUSB0"
-# Languages of code blocks that this test does not run: commands that change the computer, texts, settings of other
-# programs, and programs that other tests run.
+# Languages of code blocks that this test does not run.
 OTHERS = {"sh", "text", "cmake", "cpp", "yaml", "nginx", "caddy"}
 
 
@@ -40,15 +39,13 @@ def commands(block):
 
 
 def masked(text):
-    """Returns the lines of the text with each number replaced by N and spaces reduced, because numbers vary between
-    runs. Removes a count of failed readings, which a busy machine may cause."""
+    """Returns the lines of the text with each number replaced by N, because numbers vary."""
     text = re.sub(r" \(\d+ failed(; this computer itself was up to [^)]*)?\)", "", text)
     return [re.sub(r"\s+", " ", re.sub(r"\d+(\.\d+)?", "N", line)).strip() for line in text.splitlines() if line.strip()]
 
 
 class Page:
-    """Runs the examples of a page in a temporary folder, with the virtual encoder that a comment in the page names
-    in place of the port in the examples."""
+    """Runs the examples of a page in a temporary folder."""
 
     def __init__(self, name, folder):
         self.text = (SOURCE / name).read_text(encoding="utf-8")
@@ -67,8 +64,7 @@ class Page:
         return text.replace("/tmp/", f"{self.folder}/").replace(PORT, f"{self.folder}/ttyUSB0").replace("127.0.0.1:8420", f"127.0.0.1:{self.port}")
 
     def start(self, command):
-        """Starts the command in the background until `close`, and waits for its first line, which shows that it is
-        ready."""
+        """Starts the command in the background, and waits for its first line."""
         process = subprocess.Popen(["bash", "-c", "exec " + self.here(command)], cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL,
                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         self.running.append(process)

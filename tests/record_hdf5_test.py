@@ -31,7 +31,7 @@ class Hdf5(RecordCase):
         return super().output(name)
 
     def read(self, path=None):
-        """Returns the attributes and columns of a recording, after checking that all columns are complete."""
+        """Returns the attributes and columns of a recording, which must be complete."""
         with h5py.File(path or self.output(), "r") as file:
             attributes = {name: value.decode() if isinstance(value, bytes) else value for name, value in file.attrs.items()}
             count = len(file["time_s"])
@@ -43,8 +43,7 @@ class Hdf5(RecordCase):
         return attributes, columns
 
     def assert_is_what_the_shaft_did(self, columns):
-        """Checks that the positions fit their times: the shaft turns at 60 rpm from 0, one count every 7.6 us, whether
-        or not readings are lost."""
+        """Checks that the positions fit their times: the shaft turns at 60 rpm from 0."""
         good = columns["event"] == b""
         turns = columns["position"][good] / 2**17
         self.assertLess(numpy.ptp(turns - columns["time_s"][good]), 1e-4)
@@ -95,8 +94,7 @@ class Hdf5(RecordCase):
             self.assertTrue(set(columns["event"]) - {b"", b"gap"}, part)
 
     def test_killed_recording_is_valid(self):
-        """Sends SIGKILL up to 3 s after the first rows, eight times. It must be possible to open the file, and at most
-        the rows of LOST seconds may be missing."""
+        """A killed recording may lack at most the rows of LOST seconds."""
         random.seed(3)
         for number in range(8):
             path = self.output(f"{number}.h5")
@@ -126,8 +124,7 @@ class Hdf5(RecordCase):
         self.assertNotIn("is whole", messages)
 
     def test_full_disk(self):
-        """A limit on the file size has the effect of a full disk. The file must have as many readings as the
-        message reports."""
+        """A limit on the file size has the effect of a full disk."""
         limit = ("import resource, signal, os, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN); "
                  "resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000)); os.execv(sys.argv[1], sys.argv[1:])")
         result = subprocess.run([sys.executable, "-c", limit, ABSENC, "record", "sim:tformat?motion=rpm=60", "--rate", "0",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests the files that `absenc record` writes, also when the encoder, the disk or the command fails."""
+"""Tests the files that `absenc record` writes, also after failures."""
 import csv
 import datetime
 import glob
@@ -28,7 +28,7 @@ def wait_until(condition, what):
 
 
 def read_csv(path):
-    """Returns the header and the rows of a CSV recording, after checking that every line is complete."""
+    """Returns the header and the rows of a CSV recording, whose lines must be complete."""
     with open(path, encoding="utf-8", newline="") as file:
         text = file.read()
     if text and not text.endswith("\n"):
@@ -175,12 +175,10 @@ class Files(RecordCase):
 
 
 class Gaps(RecordCase):
-    """Tests of gaps: readings that were due but not taken, because the process was stopped or the
-    line is too slow."""
+    """Tests of gaps: readings that were due but not taken."""
 
     def record_and_stop(self, name, stopped, *arguments):
-        """Starts a recording of 3 s, stops the process for `stopped` seconds after the first readings, and returns
-        the final message of `record`."""
+        """Stops a recording for `stopped` seconds. Returns the final message of `record`."""
         path = self.output(name)
         process = self.start("record", "sim:tformat", "--output", path, "--rate", "200", "--for", "3", *arguments)
         wait_until(lambda: os.path.exists(path) and os.path.getsize(path) > 3000, "readings")
@@ -241,7 +239,7 @@ class Gaps(RecordCase):
 
 class Failures(RecordCase):
     def lose(self, change, *words):
-        """Records, calls `change(path)` to change the file, and expects that `record` ends with an error."""
+        """Records, calls `change(path)`, and expects that `record` ends with an error."""
         path = self.output(f"{len(os.listdir(self.directory))}.csv")
         process = self.start("record", "sim:tformat", "--output", path, "--every", "1000", "--rate", "100")
         wait_until(lambda: len(rows_so_far(path)) > 0, "readings")
@@ -367,8 +365,7 @@ class Failures(RecordCase):
         self.assertGreater(os.path.getsize(copy), 2**20 - 3 * 4096)
 
     def test_killed_recording_is_complete(self):
-        """Sends SIGKILL up to 50 ms after the file appears, a hundred times. Every line must be complete, and at most
-        the last second may be missing."""
+        """Every line must be complete, and at most the last second may be missing."""
         random.seed(1)
         for number in range(100):
             path = self.output(f"{number}.csv")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests that `record` and `monitor` end on a line that is never silent: after their time, and when interrupted."""
+"""Tests that `record` and `monitor` end on a line that is never silent."""
 import signal
 import time
 import unittest

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc serve` with clients that send too much, too slowly or nothing at all: other clients must still be
-served."""
+"""Tests `absenc serve` with clients that send too much, too slowly or nothing."""
 import contextlib
 import os
 import resource
@@ -29,8 +28,7 @@ class Abuse(ServeCase):
         return connection
 
     def status(self, path="/healthz", address="127.0.0.1"):
-        """Returns the HTTP status of a request on a new connection, or None if the server resets the connection
-        without a reply."""
+        """Returns the HTTP status of a request on a new connection, or None if it is reset."""
         with socket.create_connection(("127.0.0.1", self.served.port), PATIENCE, (address, 0)) as connection:
             with contextlib.suppress(ConnectionError):
                 connection.sendall(f"GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n".encode())
@@ -57,7 +55,7 @@ class Abuse(ServeCase):
         for half in halves:
             half.sendall(b"GET /api/encoders HTTP/1.1\r\nHost: local")
         self.assert_well()
-        # The server closes each incomplete request after a time limit, even if another byte arrives now and then.
+        # The server closes incomplete requests after a time, even if bytes still arrive.
         talker = halves[0]
         talker.settimeout(0.2)
         deadline = time.monotonic() + PATIENCE
@@ -73,8 +71,7 @@ class Abuse(ServeCase):
         self.fail("it is still waited for")
 
     def raw(self, request):
-        """Sends the request. Returns the bytes received until the header of a reply is complete or the server closes
-        the connection, and the connection."""
+        """Sends the request. Returns the bytes received with the header of a reply, and the connection."""
         connection = self.connect()
         connection.sendall(request)
         answer = b""
@@ -145,8 +142,7 @@ class Abuse(ServeCase):
             begin = time.monotonic()
             self.assertEqual(self.status("/api/encoders", "127.0.0.2"), 200)
             return time.monotonic() - begin
-        # On an idle machine a reply takes 4 ms at most. On a busy machine the measurement repeats until no reply takes
-        # 100 ms.
+        # Repeated, because a busy machine replies later.
         wait_until(lambda: max(longest() for _ in range(20)) < 0.1, "another address is served within 100 ms")
 
     def test_idle_connections_of_many_addresses_do_not_block_others(self):

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc serve` with a broker that violates MQTT or refuses messages, and with an MQTT client process that
-ends or hangs: encoders must still be read, and no message may be lost."""
+"""Tests `absenc serve` with brokers and MQTT processes that fail."""
 import json
 import os
 import shutil
@@ -109,7 +108,7 @@ class BadPackets(BrokerCase):
 
 
 class RefusedMessages(BrokerCase):
-    """Tests of a broker that refuses the readings or the states of one of two encoders. Readings it accepts later."""
+    """Tests of a broker that refuses messages of one of two encoders."""
     BAD, GOOD = "/bad/readings", "/good/readings"
 
     def serve(self, answer):
@@ -159,7 +158,7 @@ class RefusedMessages(BrokerCase):
         self.check(broker, server, 1, "Not authorized")
 
     def test_refused_by_closing_connection(self):
-        """The broker refuses a message by closing the connection, as those of MQTT 3.1.1 and some of MQTT 5 do."""
+        """The broker refuses a message by closing the connection, as those of MQTT 3.1.1 do."""
         def answer(broker, _connection, kind, flags, body, usual):
             if self.refuses(broker, kind, flags, body) is not None:
                 raise Closed

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests the page of `absenc serve` in Debian's Chromium: texts, keyboard operation and notifications."""
+"""Tests the page of `absenc serve` in Chromium."""
 import os
 import signal
 import subprocess
@@ -38,8 +38,7 @@ class Page(ServeCase):
         self.browser.get(self.served.url + hash_text)
 
     def text(self, selector="body"):
-        """Returns the visible text of the elements that match the selector. It is read in one step, because the page
-        may replace its nodes between two."""
+        """Returns the visible text of the elements that match, read in one step."""
         return self.browser.execute_script("""
             return [...document.querySelectorAll(arguments[0])].filter((one) => one.getClientRects().length > 0)
                    .map((one) => one.innerText).join("\\n");""", selector)
@@ -92,8 +91,7 @@ class Page(ServeCase):
         self.assertEqual(len(places), 1, (places, values))
 
     def test_distinguishes_good_from_not_reported(self):
-        """The page must distinguish three encoders: one with a word without an error bit, one with an error bit, and
-        one whose turns are invalid because of an alarm."""
+        """The page must distinguish alarms that are not reported from a good state."""
         served = self.without_history("sim:ssi", "sim:ssi?error_bit=active_high", "sim:tformat?alarm=battery_error")
         self.browser.get(served.url)
         wait_until(lambda: self.pills() == ["▲ 1 alarm", "○ 1 live, alarms not reported", "● 1 good"], "the bar tells them apart")
@@ -243,8 +241,7 @@ class Page(ServeCase):
         self.assert_no_errors()
 
     def canvas_has(self, selector, color):
-        """Returns whether a plot has pixels of the colour [red, green, blue]. A thin line between two rows of pixels is
-        half transparent."""
+        """Returns whether a plot has pixels of the colour [red, green, blue]."""
         return self.browser.execute_script("""
             const [selector, [red, green, blue]] = arguments;
             return [...document.querySelectorAll(selector + " canvas")].some((canvas) => {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests openapi.json with a client generated from it, by openapi-typescript, the TypeScript compiler and Node."""
+"""Tests openapi.json with a TypeScript client that is generated from it."""
 import json
 import os
 import re

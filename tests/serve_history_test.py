@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests the history of `absenc serve` when its file is moved, removed, replaced or damaged, and when it cannot be
-written."""
+"""Tests the history of `absenc serve` when its file is changed or cannot be written."""
 import contextlib
 import glob
 import json
@@ -21,15 +20,14 @@ NOTICED_S = 5
 
 
 def seconds_in(path):
-    """Returns the times, in seconds, that a history file has recorded, after checking the file's integrity."""
+    """Checks the integrity of a history file. Returns the times that it has, in seconds."""
     with contextlib.closing(sqlite3.connect(path)) as database:
         assert database.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
         return {at for at, in database.execute("SELECT at FROM second")}
 
 
 class DisturbedFile(ServeCase):
-    """Tests of damage to the history file. The server must report it within 5 s and record again. Rows that are
-    still in the file must not be lost."""
+    """Tests of a disturbed history file, of which no remaining row may be lost."""
 
     def setUp(self):
         super().setUp()
@@ -42,8 +40,7 @@ class DisturbedFile(ServeCase):
         return self.served.json(of(NAME, "history"), rows=5000)["rows"]
 
     def records_again_after(self, disturb, words):
-        """Calls `disturb` to damage the file, and waits until the server reports `words` and records again. Returns the
-        seconds recorded before."""
+        """Disturbs the file and waits for `words` and new rows. Returns the seconds before."""
         before = {row[0] for row in self.rows()}
         begin = self.disturbed_at = time.time()
         disturb()
@@ -138,8 +135,7 @@ class DisturbedFile(ServeCase):
             self.assertEqual(file.read(), half)
 
     def test_overwritten_by_copy(self):
-        """`cp` overwrites the file but keeps its inode. The copied content is not valid together with the existing
-        write-ahead log."""
+        """The copied content is not valid together with the existing write-ahead log."""
         self.write_to_the_file()
         copy = self.path + ".copy"
         with contextlib.closing(sqlite3.connect(self.path)) as database:
@@ -175,8 +171,7 @@ class DisturbedFile(ServeCase):
 
 
 class UnusableFile(ServeCase):
-    """Tests of a history that cannot be written: encoders must still be read and shown, and the health check must
-    report the failure."""
+    """Tests of a history that cannot be written: encoders must still be read."""
 
     def assert_failing(self, path, words, **settings):
         server = self.server(NAME, "--history", path, "--token-file", self.tokens(), **settings)
@@ -242,8 +237,7 @@ DAY = 86_400
 
 
 class WrongSystemClock(ServeCase):
-    """Tests in which the system clock jumps while the server reads (by libfaketime). The clock of the readings
-    continues without a jump."""
+    """Tests in which the system clock jumps, but not the clock of the readings."""
 
     def setUp(self):
         super().setUp()

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks the page of `absenc serve` as Chromium renders it: no text may be broken, cut off or covered, at up to six
-widths in both themes, and axe-core must find no fault. ABSENC_SCREENSHOTS=FOLDER writes the pictures and contact
-sheets of each scene."""
+"""Checks the page of `absenc serve` as Chromium renders it. ABSENC_SCREENSHOTS=FOLDER writes pictures."""
 import os
 import unittest
 
@@ -199,8 +197,7 @@ class Look(ServeCase):
         self.look("hundred")
 
     def test_redraw_writes_only_changes(self):
-        """The page must write only values that changed: any write makes the browser recompute styles and layout, which
-        was most of its work with a hundred encoders."""
+        """The page must write only values that changed, because writes are slow."""
         server = self.served(hundred())
         self.open(server, "document.querySelectorAll('.card .digits').length === 100")
         same, often = self.browser.driver.execute_async_script("""

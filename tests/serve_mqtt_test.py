@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc serve` with MQTT: the messages that Debian's mosquitto receives, and recovery when mosquitto or the
-server is killed."""
+"""Tests `absenc serve` with Debian's mosquitto, also when either is killed."""
 import json
 import os
 import pathlib
@@ -169,7 +168,7 @@ class Spool(MqttCase):
         wait_until(lambda: self.numbers(receiver)[-1] >= goal, "they come")
         found = self.numbers(receiver)
         self.assertEqual(found, sorted(found))
-        # The killed broker may have accepted messages without forwarding them, because it stores them in memory only.
+        # The killed broker may have accepted messages without forwarding them.
         missing = set(range(1, goal + 1)) - set(found)
         self.assertFalse([one for one in missing if not seen < one <= before], missing)
         self.assertEqual(self.mqtt(server)["dropped"], 0)
@@ -373,7 +372,7 @@ class Access(MqttCase):
 
 class OldBroker(MqttCase):
     def test_broker_with_only_3_1_1(self):
-        """The broker supports only MQTT 3.1.1, and answers the CONNECT of MQTT 5 with a reply of version 3.1.1."""
+        """The broker answers the CONNECT of MQTT 5 with a reply of version 3.1.1."""
         with socket.create_server(("127.0.0.1", 0)) as listener:
             listener.settimeout(PATIENCE)
             server = self.sender(f"mqtt://127.0.0.1:{listener.getsockname()[1]}", ONE)

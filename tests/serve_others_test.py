@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests what `absenc serve` sends to other programs: Home Assistant, PlotJuggler, Prometheus, and a dashboard for
-Grafana. Of these only Prometheus runs."""
+"""Tests what `absenc serve` sends to other programs, such as Prometheus."""
 import json
 import os
 import pathlib

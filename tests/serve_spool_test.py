@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests the MQTT spool of `absenc serve` when its disk is full and when the spool is removed or damaged: reading must
-continue, and every loss must be reported."""
+"""Tests the MQTT spool of `absenc serve` on a full disk, and when removed or damaged."""
 import os
 import pathlib
 import resource
@@ -29,8 +28,7 @@ class SpoolCase(MqttCase):
         return (self.numbers(receiver) or [0])[-1]
 
     def remove_spool(self):
-        """Removes the spool folder in one step by renaming it: a server that misses its newest file creates another one
-        in the folder, which would then not be empty."""
+        """Renames the spool folder first, because the server may create files in it."""
         os.rename(self.spool(), self.spool() + ".gone")
         shutil.rmtree(self.spool() + ".gone")
 
@@ -61,8 +59,6 @@ class FullDisk(SpoolCase):
         with open(f"{seen}/others", "wb", buffering=0) as others, self.assertRaises(OSError):
             while True:
                 others.write(bytes(65536))  # the disk is filled by another program
-        # With a full disk the server stores up to 4 MB of messages in memory, at 45 kB/s. This test only checks the
-        # messages on disk.
         wait_until(lambda: "No space left" in self.mqtt(server)["trouble"], "it says that the disk is full")
         self.assertEqual(server.json("/healthz")["mqtt"], "failing")
         self.assertFalse(server.json("/healthz")["ok"])

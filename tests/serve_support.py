@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shared by the tests of `absenc serve`: the server process, its event streams, and waiting for a condition."""
+"""Shared by the tests of `absenc serve`: the server process, event streams, waiting."""
 import contextlib
 import http.client
 import json

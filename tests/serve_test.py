@@ -168,8 +168,7 @@ class EncoderValues(ServeCase):
         self.assertAlmostEqual(rows[2][1] - rows[1][1], 360, delta=60)
 
     def test_last_minute_averages_across_wrap(self):
-        """The mean angle must be circular: the shaft stays within 40 degrees of zero, and the plain mean of 1 and 359
-        degrees would be far away."""
+        """The mean angle must be circular: the plain mean of 1 and 359 degrees is far away."""
         server = self.without_history("sim:raa38-can?motion=sine=40,1")
 
         def places():
@@ -249,7 +248,7 @@ class ApiDescription(ServeCase):
               "/api/encoders/{encoder}/acknowledge": {"alarm": "over_heat"}}
 
     def schema(self, schema, components):
-        """Returns an OpenAPI 3.0 schema in the form for jsonschema, which expresses "nullable" differently."""
+        """Returns an OpenAPI 3.0 schema in the form for jsonschema."""
         if isinstance(schema, list):
             return [self.schema(one, components) for one in schema]
         if not isinstance(schema, dict):
@@ -382,7 +381,7 @@ class PortInUse(ServeCase):
             self.assertEqual(json.loads(printed)["encoders"][0]["encoder"], f"tformat:{emulator.path}")
             folder = os.path.join(self.directory, "absenc")
             (notice,) = os.listdir(folder)
-            # If the notice of the server names another process, it does not identify the process that holds the port.
+            # A notice that names another process does not identify the holder of the port.
             with open(os.path.join(folder, notice), "w", encoding="utf-8") as file:
                 file.write("1 http://127.0.0.1:1/\n")
             refused = absenc("read", f"tformat:{emulator.path}").stderr
@@ -561,8 +560,7 @@ class AccessRights(ServeCase):
         self.assertEqual([self.command(server, wrong)[0] for _ in range(13)], [401] * 10 + [429] * 3)
         self.assertEqual(self.command(server, {"Authorization": f"Bearer {TOKEN}"})[0], 200)
         self.assertIn("absenc_wrong_tokens_total{} 13\n", server.ask("/metrics")[1])
-        # The limit counts the wrong tokens of an address at all paths together, so /api/token refuses this one with
-        # 429.
+        # The limit counts the wrong tokens of an address at all paths together.
         self.assertEqual(server.ask("/api/token", headers=wrong)[0], 429)
         self.assertIn("absenc_wrong_tokens_total{} 14\n", server.ask("/metrics")[1])
 
@@ -615,7 +613,7 @@ class AccessRights(ServeCase):
 
 
 class EncoderAccess(ServeCase):
-    """Tests of settings, memory and doctor, which access an encoder between two readings or instead of readings."""
+    """Tests of settings, memory and doctor, which access an encoder beside its readings."""
 
     def post(self, server, encoder, headers=None):
         status, body = server.ask(of(encoder, "doctor"), "POST", headers)
@@ -759,15 +757,14 @@ class EncoderAccess(ServeCase):
         self.assertEqual(self.post(server, "sim:tformat")[0], 200)
 
     def silent(self):
-        """Returns the port of a line without an encoder. Doctor takes long on it, because it tries all rates."""
+        """Returns the port of a line without an encoder, on which doctor takes long."""
         line = SilentLine()
         line.__enter__()
         self.addCleanup(line.__exit__, None, None, None)
         return line.path
 
     def begin(self, server, name):
-        """Starts doctor by a request in a thread, as another client would. Returns the thread and the list for its
-        reply."""
+        """Starts doctor in a thread. Returns the thread and the list for its reply."""
         answers = []
 
         def ask():
@@ -912,7 +909,7 @@ class History(ServeCase):
         wait_until(lambda: self.rows(server), "it has a second")
         end(server.process)
         with contextlib.closing(sqlite3.connect(path)) as database:
-            # Old rows are deleted only if newer rows are in 24 different hours, so a row in each of 24 hours is added.
+            # Old rows are deleted only if there are newer rows in 24 different hours.
             hours = [(int(time.time()) - 3600 * i,) for i in range(1, 25)]
             database.executemany("INSERT INTO second SELECT id, ?, 50, 0, 1, 2, 3, NULL, NULL, NULL FROM encoder",
                                  [(1,), *hours])

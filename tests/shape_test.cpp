@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests that the types `Step`, `Event` and `Machine` of link/step.hpp suit every kind of link. Toy machines, as hosts
-// and as devices, hold conversations in virtual time with exact times.
+// Tests that `Step`, `Event` and `Machine` of link/step.hpp suit every kind of link.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -19,7 +18,7 @@ using ByteToy = toy::Toy<Byte>;
 using CanToy = toy::Toy<CanFrame>;
 using Kind = Event<Byte>::Kind;
 
-// (a) Request and reply on half duplex: 2.5 Mbps, a character takes 4 us, the reply begins 3 us after the request.
+// (a) Request and reply on half duplex; the reply begins 3 us after the request.
 struct RequestReply : testing::Test {
   sim::Line<Byte> line{LinkKind::half_duplex, {.rate = 2'500'000}};
   std::vector<Byte> answer{0x1A, 0x00, 0x55};
@@ -72,7 +71,7 @@ TEST_F(RequestReply, WaitsForCharacterThatHasBegun) {
   EXPECT_EQ(host.log, "4000 sent, 9000 timer, 11000 received 1A, 15000 received 00, 19000 received 55");
 }
 
-// (b) An endless stream: the device sends without requests, and the caller ends the conversation.
+// (b) An endless stream: the device sends without requests.
 TEST(Stream, EmitsResultsWithoutRequest) {
   sim::Line<Byte> line(LinkKind::full_duplex, {.rate = 1'000'000});
   Byte count = 0;
@@ -102,9 +101,7 @@ TEST(Stream, EmitsResultsWithoutRequest) {
   EXPECT_NE(host.log.find("130000 received 81, 180000 silence, 210000 received FF"), std::string::npos) << host.log;
 }
 
-// (c) Full-duplex SPI as in EncoLink: every frame carries the position, its check and one byte of a register access.
-// The host's second byte carries the request for the access. The access needs four frames, and each of them is a
-// reading too.
+// (c) Full-duplex SPI as in EncoLink: each frame carries a position and one register byte.
 class SpiDevice final : public Machine<Byte> {
  public:
   void feed(const Event<Byte>& event) override {
@@ -195,8 +192,7 @@ TEST(Spi, ReadsRegisterWithinPositionFrames) {
             "274000 good 250 140\n");
 }
 
-// (d) Clocked bits: SSI at 250 kHz with a word of 13 bits, which the encoder repeats from its MSB. 0x1234 left-aligned
-// is 91 A0.
+// (d) Clocked bits: SSI at 250 kHz with a word of 13 bits. 0x1234 left-aligned is 91 A0.
 struct Clocked : testing::Test {
   sim::Line<Byte> line{LinkKind::clocked, {.rate = 250'000}};
   std::string notes;
@@ -233,8 +229,7 @@ TEST_F(Clocked, ReportsTooFewClocksToDevice) {
   EXPECT_EQ(notes, "too few clocks: 8");
 }
 
-// (e) CAN at 250 kbit/s: a frame without data takes 47 bits of 4 us, each data byte 8 more; stuff bits are added to
-// that.
+// (e) CAN at 250 kbit/s: 47 bits for a standard frame, 8 for each data byte, and stuff bits.
 struct Can : testing::Test {
   sim::Line<CanFrame> line{LinkKind::can, {.rate = 250'000}};
   static CanFrame frame(std::uint32_t id, Byte data) { return {.id = id, .size = 1, .data = {data}}; }
@@ -254,7 +249,7 @@ struct Can : testing::Test {
 
 TEST_F(Can, ArbitratesCyclicFramesByIdentifier) {
   CanToy high(cyclic(0x121, 0xB0));
-  // this node's frame begins at the same nanosecond; it comes later in the list of nodes, and wins the arbitration
+  // this frame begins at the same nanosecond, and wins the arbitration
   CanToy low(cyclic(0x120, 0xA0));
   CanToy host;
   host.send({frame(0x200, 0x01)});
@@ -290,7 +285,7 @@ TEST_F(Can, StandardFrameWinsOverExtendedFrameWithSamePrefix) {
   EXPECT_EQ(standard.log, "242000 sent, 534000 received 04800000:");
 }
 
-// (f) A pulse on a separate wire requests each frame: 10 us wide, the reply begins 30 us after its leading edge.
+// (f) A pulse on a separate wire requests each frame.
 TEST(Trigger, RequestsEachFrameWithLongEnoughPulse) {
   sim::Line<Byte> line(LinkKind::half_duplex, {.rate = 1'000'000});
   ByteToy device([](ByteToy& self, const Event<Byte>& event) {
@@ -313,7 +308,7 @@ TEST(Trigger, RequestsEachFrameWithLongEnoughPulse) {
   EXPECT_EQ(device.log, "0 triggered 10000, 40000 sent, 100000 triggered 9000");
 }
 
-// (g) Another baud rate during the conversation: the device changes it after the last bit of its reply to command 19.
+// (g) Another baud rate during the conversation, after the reply to command 19.
 struct BaudChange : testing::Test {
   static constexpr LineSettings fast{.rate = 2'000'000};
   sim::Line<Byte> line{LinkKind::half_duplex, {.rate = 1'000'000}};
@@ -365,8 +360,7 @@ TEST_F(BaudChange, ReportsLineErrorsIfHostDoesNotFollow) {
   EXPECT_EQ(device.log, "10000 received 19, 25000 sent, 40000 error");
 }
 
-// (h) Collisions: the wire carries the AND of the bits of all senders. A host whose transceiver cannot mute its
-// receiver receives its own bytes, too.
+// (h) Collisions: the wire carries the AND of the bits of all senders.
 struct Collision : testing::Test {
   sim::Line<Byte> line{LinkKind::half_duplex, {.rate = 1'000'000}};
   static ByteToy::React answer(std::vector<Byte> bytes, Time delay) {

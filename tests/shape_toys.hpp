@@ -26,7 +26,7 @@ inline std::string text_of(const CanFrame& frame) {
   return text;
 }
 
-// A machine that reacts to each event by calling a function. It logs all events, and runs the steps that a test queues.
+// A machine that reacts to each event by a function, logs it, and runs queued steps.
 template <class Item>
 class Toy final : public Machine<Item> {
  public:

@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests measured speeds in real time, over pseudo-terminals and beside busy processes: no speed may differ from the
-true one by more than its stated uncertainty."""
+"""Tests that measured speeds are right within their stated uncertainty, in real time."""
 import json
 import os
 import subprocess
@@ -10,8 +9,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 from command_support import ABSENC, Busy, Emulator, EncoderCase, absenc
 
-SPEEDS = (1, 12, 60, 3000)  # speeds of the shaft in rpm
-# Options with which a unit is tested, "" for the defaults. A unit that is missing here is tested with its defaults.
+SPEEDS = (1, 12, 60, 3000)  # rpm
+# Options of the units that are not tested with their defaults alone.
 OPTIONS = {"encolink": ("", "stream_rate=500&resolution=20"), "raa38": ("mode=bus", "mode=timing")}
 
 
@@ -37,8 +36,7 @@ class Speed(EncoderCase):
         return header, rows
 
     def assert_within(self, header, rows, rpm):
-        """Checks that no speed differs from `rpm` by more than its uncertainty. Returns a list of (speed,
-        uncertainty)."""
+        """Checks that no speed is wrong by more than its uncertainty. Returns both as pairs."""
         unit = "mm_s" if "speed_mm_s" in header["units"] else "rpm"
         pairs = []
         for row in rows:

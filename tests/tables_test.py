@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests the tables of the documents that have a row for each protocol: rows that are there must be what the command and
-the folders of the protocols say now. A new protocol may have no rows yet; `./dev tables` writes all rows."""
+"""Tests tables of the documents that have rows for protocols; `./dev tables` writes them."""
 
 import json
 import os
@@ -26,7 +25,7 @@ def units():
 
 
 def families():
-    """Returns the rows of the table of families: a folder of protocols, its title, and the lines of its protocols."""
+    """Returns the rows of the table of families: folder, title, lines of its protocols."""
     listed = [line for line in absenc("list").split("\n\n")[0].splitlines()[1:]]
     lines = {}
     for line in listed:
@@ -45,8 +44,7 @@ def families():
 
 
 def clauses():
-    """Returns the rows of the table of clauses: the numbers of those that `conform` tests, of those of them that
-    only --changes allows, and of those for hosts."""
+    """Returns the rows of the table of clauses."""
     rows = []
     for unit in units():
         reading, both = (
@@ -66,8 +64,7 @@ class Tables(unittest.TestCase):
     maxDiff = None
 
     def check(self, page, name, rows):
-        """Compares the rows between the marks `<!-- name -->` and `<!-- end -->` of a page with what they should be, or
-        writes them if UPDATE is set."""
+        """Compares rows of a page with what they should be, or writes them if UPDATE is set."""
         path = SOURCE / page
         text = path.read_text(encoding="utf-8")
         table = re.compile(rf"(<!-- {name} -->\n(?:```\n|\|.*\n\|[-|]+\n))(.*?)((?:```\n)?<!-- end -->)", re.DOTALL)

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shared by the tests of `absenc tap`: a relay that copies a line between a host and an emulator, and the `tap`
-process."""
+"""Shared by the tests of `absenc tap`: a relay that copies a line, and the `tap` process."""
 import os
 import select
 import signal
@@ -13,9 +12,7 @@ from command_support import ABSENC, PATIENCE, Case, Emulator, end, json_lines, r
 
 
 class Relay:
-    """Forwards bytes between the host's pseudo-terminal `host_path` and the encoder's, and first copies each byte to
-    `tap_path`, a third pseudo-terminal, or to the serial port `copy_to`. No byte is lost, because the relay waits while
-    a line is full. `change(data, from_host)` may alter the bytes; `copied` has the altered bytes."""
+    """Forwards bytes between host and encoder, and copies them to a tap. `change` may alter them."""
 
     def __init__(self, encoder_path, change=lambda data, from_host: data, copy_to=None):
         self.change = change
@@ -48,7 +45,7 @@ class Relay:
                 return
             if self.tap in ready:
                 self.from_tap += os.read(self.tap, 4096)
-            # The encoder is served first: bytes that the host sent meanwhile come after the reply that it waited for.
+            # The encoder is served first: the host may have sent bytes after its reply.
             for here, there in ((self.encoder, self.host), (self.host, self.encoder)):
                 if here in ready:
                     data = self.change(os.read(here, 4096), here == self.host)
@@ -87,8 +84,7 @@ class TapCase(Case):
         return relay
 
     def tap(self, *arguments, stdin=subprocess.DEVNULL):
-        """Starts `tap` with its output in a file, so that no reader is needed. Returns the process when tap is
-        ready."""
+        """Starts `tap` with its output in a file. Returns the process when tap is ready."""
         out, messages = open(self.file("out"), "w+b"), subprocess.PIPE
         self.addCleanup(out.close)
         process = subprocess.Popen([ABSENC, "tap", *arguments], stdin=stdin, stdout=out, stderr=messages, bufsize=0)

@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `tap` on a line between a host and an emulator; a relay copies both directions to a third pseudo-terminal.
-`--all` reads up to ten thousand positions per unit."""
+"""Tests `tap` on a line between a host and an emulator. `--all` reads more positions."""
 import collections
 import os
 import re
@@ -18,8 +17,7 @@ ALL = "--all" in sys.argv
 COUNT = 10_000 if ALL else 150
 
 
-# For each serial unit: options of the emulator, options of the host, and number of readings. Units whose replies end
-# only by silence have fewer readings, because each reading takes as long as the latency.
+# For each tested unit: options of the emulator, options of the host, number of readings.
 UNITS = {
     "tformat": ([], "latency=1000", COUNT), "esl": ([], "latency=1000", COUNT), "e201": ([], "latency=1000", COUNT),
     "raa38": (["--option", "mode=bus"], "latency=1000&mode=bus", COUNT),
@@ -48,10 +46,10 @@ class EveryExchange(TapCase):
         self.wait_for_all(tap, relay)
         status, text, messages = self.finish(tap)
         lines, summary = self.lines(text)
-        # On a busy machine a reply may arrive after the host's timeout. The host then repeats its request.
+        # On a busy machine a reply may arrive after the host's timeout.
         repeated = [line for line in lines if line["kind"] == "request" and line.get("error") == "timeout"]
         exchanges = [line for line in lines if line["kind"] == "exchange"]
-        # Half a second after a request, tap reports a timeout. It shows a later reply without a request (docs/tap.md).
+        # tap shows a reply without its request if it comes after half a second (docs/tap.md).
         late = [line for before, line in zip(lines, lines[1:])
                 if line["kind"] == "reply" and before in repeated and line["time_s"] - before["time_s"] >= 0.5]
         self.assertEqual([line for line in lines
@@ -65,8 +63,7 @@ class EveryExchange(TapCase):
         self.assertEqual(summary["exchanges"], len(exchanges))
         self.assertEqual(summary["bytes"], len(relay.copied))
         self.assertEqual(sum(kind["count"] for kind in summary["per_request"]), len(lines) - len(late))
-        # Each position that the host read must be in an exchange of tap's output, in the same order. Some encoders are
-        # polled twice for a reading.
+        # Each position that the host read must be in tap's output, in the same order.
         key = "singleturn" if "singleturn" in readings[0] else "position"
         said = [line["fields"][key] for line in lines if key in line.get("fields", {})]
         wanted = [reading.get(key, reading.get("fields", {}).get(key)) for reading in readings]
@@ -97,7 +94,7 @@ class EveryExchange(TapCase):
 
 class Damage(TapCase):
     def test_damaged_bytes(self):
-        """If bytes are damaged, tap must show intact exchanges as good and damaged ones as bad, and invent none."""
+        """tap must show intact exchanges as good and damaged ones as bad."""
         emulator = self.emulator("tformat", "--motion", "rpm=60")
         replies = collections.Counter()
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests logs of terminal programs, piped through `grep` into `absenc decode -`, and damaged or missing captures."""
+"""Tests `absenc decode` with logs of terminal programs, and with damaged captures."""
 import os
 import subprocess
 import unittest
@@ -15,8 +15,7 @@ def text_of(data):
     return "".join(chr(byte) if 0x20 <= byte < 0x7F else "." for byte in data)
 
 
-# Functions that format one line of a log from its number, the port, whether the bytes were received or sent, and the
-# bytes.
+# Functions that format a line of a log from number, port, direction and bytes.
 STYLES = {
     "port": lambda n, port, rx, data: f"{port}: {plain(data)}",
     "brackets": lambda n, port, rx, data: f"[17:55:{n:02}.125] [{port}] {'RX' if rx else 'TX'}: {plain(data)}",
@@ -61,8 +60,7 @@ class Logs(Case):
                     result = self.decode(protocol, self.log(style, exchanges))
                     found = json_lines(result.stdout)
                     self.assertEqual([one for one in found if one["ok"] is False and one["error"] != "sequence_mismatch"], [],
-                                     # The vectors are no real conversation, so their sequence counters do not advance;
-                                     # this error is expected.
+                                     # The vectors are no real conversation: their sequence counters do not advance.
                                      result.stderr)
                     self.assertEqual([(one["request"], one["reply"]) for one in found],
                                      [(request.hex(), reply.hex()) for request, reply in exchanges])

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests that outputs show the three states of an alarm: reported and clear, reported and raised, not reported. The same
-holds for each part of a position. A value that no reply reports must not be shown as clear, valid or INVALID."""
+"""Tests that outputs show the three states of an alarm: clear, raised, not reported."""
 import csv
 import io
 import json
@@ -8,8 +7,7 @@ import unittest
 
 from command_support import Case, absenc, json_lines
 
-# Requests of T-format with their replies; the digit is the data ID. A reply to ID 0 has only the status field SF, one
-# to ID 3 also the alarm field ALMC.
+# Requests of T-format with their replies; the digit is the data ID.
 CLEAR_3 = "1A 1A 00 45 23 01 11 34 12 00 00 4A"
 CLEAR_0 = "02 02 00 CD AB 01 65"
 ALARM_0 = "02 02 20 CD AB 01 45"

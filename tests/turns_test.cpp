@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests that a reading which claims to continue the previous one has the true motion of the shaft. Reads every unit and
-// model across pauses, with slow and fast shafts, in virtual time.
+// Tests that a reading which claims to continue the previous one has the shaft's motion.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -56,8 +55,7 @@ std::vector<Case> cases() {
     all.push_back(
         {.unit = find_unit(unit), .encoder_options = encoder_options, .host_options = host_options, .take = take});
   };
-  // In these cases the encoder's identity says that it counts no turns. Without that identity a host would expect 16
-  // bits of turns.
+  // Here the encoder's identity says that it counts no turns.
   for (const std::string_view unit : {"encolink", "encolink-spi"})
     add(unit, {{"multiturn_bits", "0"}}, {}, Take::newest);
   for (const Take take : {Take::newest, Take::every}) {
@@ -70,8 +68,7 @@ std::vector<Case> cases() {
   return all;
 }
 
-/// A shaft that turns at a constant speed. It stands still for the first millisecond, because some encoders must be
-/// switched on at rest.
+/// A shaft that turns steadily after 1 ms, because some encoders must be switched on at rest.
 struct SpinningShaft final : Shaft {
   explicit SpinningShaft(double speed) : rpm(speed) {}
   [[nodiscard]] ShaftState at(Time time) const override {
@@ -103,8 +100,7 @@ class TurningEncoder {
 
   void pause(Time time) { port_->line().run_until(port_->line().now() + time); }
 
-  /// Reads the position once and returns how the unwrapper joined it to the previous one. If it continued, the distance
-  /// must be that of the motion of the shaft to 0.45 turn, so that no whole turn is lost or added.
+  /// Reads the position once, and returns how the unwrapper joined it to the previous one.
   Joined read() {
     const Conversation<Item>* conversation = session_->read(*find_command(*case_.unit, Verb::read), case_.take);
     EXPECT_EQ(text_of(conversation->error()).name, "none") << conversation->detail();
@@ -137,8 +133,7 @@ class TurningEncoder {
   std::int64_t last_shaft_position_ = 0;
 };
 
-// Returns the speed in rpm for a case. For a linear encoder the measuring range replaces the revolution, so that the
-// speed in metres per second is `rpm` / 1000.
+// Returns the speed of the shaft in rpm. A linear encoder moves at `rpm` mm/s.
 double speed_of(const Case& one, double rpm) {
   const Resolution resolution = one.unit->resolution(options_of(*one.unit, one.model, one.host_options));
   if (resolution.unit_um == 0) return rpm;
@@ -157,9 +152,7 @@ class Turns : public ::testing::TestWithParam<Case> {
         for (int i = 0; i < 3; ++i) bench.read();
         bench.pause(pause);
         const Joined joined = bench.read();
-        // The position of an encoder that counts turns continues across the pause. Without a count of turns the
-        // position is ambiguous after the pause, unless the host takes every reading that arrived meanwhile or the
-        // shaft is slow.
+        // A count of turns keeps the position known across the pause.
         const bool counts = GetParam().turn_bits > 0;
         if (counts) {
           EXPECT_EQ(joined, Joined::continued);

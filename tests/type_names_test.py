@@ -1,12 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""A name of a type has one meaning: a type that two files define under one name is renamed, or stands in SHARED, or
-for now in AMBIGUOUS.
-
-Counts types at the scope of a namespace or of a class, in absenc/ and tools/ without tests. Types inside of
-functions do not count. The same alias in several files is one meaning, and so is one qualified name in several
-files of a folder.
-"""
+"""Tests that the name of a type has one meaning, except those in SHARED and AMBIGUOUS."""
 
 import os
 import re
@@ -19,7 +13,7 @@ from cpp_source import Source
 
 SOURCE = Path(os.environ.get("ABSENC_SOURCE_DIR", Path(__file__).resolve().parent.parent))
 
-# Type names that several types share on purpose, each with the meaning common to all of these types.
+# Type names that several types share on purpose, each with the common meaning.
 SHARED = {
     "Bits": "the bits of a BiSS word with its check",
     "Candidate": "a guess that is to be tested further",
@@ -80,7 +74,7 @@ SHARED = {
     "value_type": "a name that C++ prescribes",
 }
 
-# Type names that still have several meanings. After renaming such a type, remove its name from this list; add no name.
+# Type names that still have several meanings; add no name.
 AMBIGUOUS = set("""
     Access Answer Ask BadRequest Burst Bus Carries Channel Check Condition Content Damage Descriptor Encoder Errors
     Finding Frames Known Layout Meaning Mode Open Order Part Place Rate Refusal Report Reported Run
@@ -88,7 +82,7 @@ AMBIGUOUS = set("""
 """.split())
 
 KEYS = ("struct", "class", "union", "enum")
-# Tokens that show that `struct NAME` before them is only a use of the name or a forward declaration, without a body.
+# Tokens after `struct NAME` that show that it has no body.
 NO_BODY = set(";(),>=&*")
 
 
@@ -97,8 +91,7 @@ def is_test(path):
 
 
 def type_name(source, index):
-    """Returns (type name, index of its body) of the definition whose keyword, such as `struct`, is at `index`; None if
-    the keyword begins no definition."""
+    """Returns (type name, index of its body) of the definition at `index`, or None."""
     i = index + 1
     while source[i] in ("class", "struct"):  # second keyword of `enum class`
         i += 1
@@ -119,8 +112,7 @@ def type_name(source, index):
 
 
 def namespace_body(source, index):
-    """Returns the index of the opening brace of the namespace that begins at `index`; None if no namespace with a body
-    begins there."""
+    """Returns the index of the opening brace of the namespace at `index`, or None."""
     if source[index] == "namespace":
         i = index + 1
         while source[i] not in ("{", ";", "="):
@@ -130,8 +122,7 @@ def namespace_body(source, index):
 
 
 def types_of(text):
-    """Yields (name, alias) of each type of a source. The name includes the enclosing classes; `alias` is the definition
-    of an alias, or "" for other types."""
+    """Yields (name with enclosing classes, definition of an alias or "") of each type."""
     source = Source(text)
     yield from types_between(source, 0, len(source.tokens), "")
 
@@ -166,8 +157,7 @@ def types_between(source, first, last, scope):
 
 
 def definitions(root):
-    """Returns a dictionary: unqualified type name -> meaning -> list of "qualified name in file". The meaning is the
-    definition of an alias, or the folder and qualified name of any other type."""
+    """Returns a dictionary: unqualified type name -> meaning -> places."""
     found = defaultdict(lambda: defaultdict(list))
     for top in ("absenc", "tools"):
         for path in sorted((root / top).rglob("*.[ch]pp")):
@@ -181,8 +171,7 @@ def definitions(root):
 
 
 def shared_names(root):
-    """Returns a line such as "Kind: Sample::Kind in encoder.hpp, Order::Kind in order.hpp" for each type name with
-    several meanings that is not listed in SHARED or AMBIGUOUS."""
+    """Returns a line for each type name with several meanings that is not listed."""
     lines = []
     for name, meanings in sorted(definitions(root).items()):
         places = sorted({place for files in meanings.values() for place in files[:1]})

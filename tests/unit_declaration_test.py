@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Tests that a misspelt member in a unit's declaration does not compile, and that a test sets every member. Uses the
-unit in docs/protocol-template."""
+"""Tests that a misspelt member in a unit's declaration does not compile."""
 
 import os
 import re

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fuzz target that feeds arbitrary bytes to a unit: as request and reply to its decoder, as captures to its probe, as a
-// frame whose end is sought, as received bytes to a conversation, and as requests to its virtual encoder unless the
-// host clocks the line. The first three bytes of an input select the unit, its options and the command.
+// Fuzz target that feeds arbitrary bytes to a unit, which the first bytes select.
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -29,8 +27,6 @@ struct Nowhere final : EvidenceSink {
   void put(const OptionEvidence&) override {}
 };
 
-/// Returns the configurations of every unit. They are computed once, because computing them takes longer than one
-/// input.
 const std::vector<std::vector<Configuration>>& all_configurations() {
   static const std::vector<std::vector<Configuration>> all = [] {
     std::vector<std::vector<Configuration>> made;
@@ -52,8 +48,7 @@ OwnedFrame as_frame(const Unit& unit, Bytes bytes) {
   return frame;
 }
 
-// Decodes the input, split into request and reply at up to 17 places. With an error no field may be reported; a good
-// frame must report at least one field.
+// With an error no field may be reported; a good frame must report at least one.
 void decode(const Unit& unit, const Options& options, Bytes input) {
   for (std::size_t split = 0; split <= input.size() && split <= 16; ++split) {
     const OwnedFrame request = as_frame(unit, input.first(split));
@@ -96,8 +91,7 @@ std::vector<Item> items_of(const Unit& unit, Bytes bytes) {
   }
 }
 
-// Runs a conversation in which each reply is the input, in pieces of `piece` items. At step 300 the conversation is
-// asked to end early. It must end within 30000 steps, and report nothing together with an error.
+// Runs a conversation in which each reply is the input, in pieces of `piece` items.
 template <class Item>
 void converse(const Unit& unit, const Options& options, const Command& command, Bytes input, std::size_t piece) {
   using Kind = typename Event<Item>::Kind;
@@ -143,9 +137,7 @@ void converse(const Unit& unit, const Options& options, const Command& command, 
   require(false);
 }
 
-// Feeds the input to the virtual encoder, with a pause before each byte from F0 on, and before each CAN frame whose
-// index is that of such a byte. After each item the encoder must wait again, or send an unsolicited frame, within 100
-// steps, and it must not send an empty frame.
+// Feeds the input to the virtual encoder, which must not send an empty frame.
 template <class Item>
 void ask_device(const Unit& unit, const Options& options, Bytes input) {
   using Kind = typename Event<Item>::Kind;

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests that arguments which absenc does not understand end the command with status 2 before the command has any
-effect."""
+"""Tests that arguments which absenc does not understand have no effect but status 2."""
 import json
 import unittest
 

@@ -14,7 +14,7 @@ from command_support import ABSENC, PATIENCE, Case, absenc, end
 UNITS = [json.loads(line) for line in absenc("list", "--json").stdout.splitlines()]
 WIRES = {"half_duplex": {"line"}, "full_duplex": {"host", "device"}, "exchange": {"cs", "sck", "mosi", "miso"},
          "clocked": {"clock", "data"}, "can": {"can"}}
-# Message of `decode` for a frame of EncoLink's channels 2 or 3, whose bytes are spread over several exchanges.
+# Message of `decode` for a frame of EncoLink that is spread over several exchanges.
 IN_PARTS = "each of the last exchanges carried a part of it"
 
 
@@ -109,8 +109,7 @@ class Wave(Case):
             self.assertEqual(a.read(), b.read())
 
     def test_decode_finds_every_exchange(self):
-        """Even on a slow line, the waveform's idle time before the first request and after the last reply must be long
-        enough for `decode`."""
+        """The waveform's idle times must be long enough for `decode`, even on a slow line."""
         for unit, kind in (("tformat", "exchange"), ("esl", "exchange"), ("encolink", "exchange"),
                            ("encolink-spi", "exchange"), ("biss", "reply"), ("ssi", "reply"), ("e201", "exchange"),
                            ("raa38", "reply"), ("raa38?mode=bus", "exchange"), ("raa38-modbus", "exchange"),
@@ -132,8 +131,7 @@ class Wave(Case):
                         self.assertGreaterEqual(sum(row["kind"] == kind for row in rows), count)
 
     def test_spread_frames_are_no_replies(self):
-        """`decode` shows cycles of EncoLink's channel 2 as rows, but its statistics must not count them as unsolicited
-        replies."""
+        """The statistics must not count cycles of EncoLink's channel 2 as unsolicited replies."""
         for unit in ("encolink", "encolink-spi"):
             with self.subTest(unit):
                 path = self.file(unit + ".vcd")

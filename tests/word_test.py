@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests encoders that no unit supports: the user describes the encoder's word, and the tested verbs work with it."""
+"""Tests encoders that no unit supports: the user describes the encoder's word."""
 import csv
 import json
 import os

@@ -1,9 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Begins a protocol unit: copies docs/protocol-template to absenc/protocol/<name> and lists it in all.cpp.
-
-In the template, in contents and in file names, `protocol_name` stands for the name.
-"""
+"""Begins a protocol unit: copies docs/protocol-template, and lists the new unit in all.cpp."""
 
 import argparse
 import re

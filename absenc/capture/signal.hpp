@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Data types of a capture, from the content of the file (samples or level changes) to the decoded line: characters,
-// bursts of clocked bits and CAN frames. Times are ticks of the capture's own clock.
+// Data types of a capture: its levels, characters, bursts of clocked bits and CAN frames.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +11,7 @@
 
 namespace absenc::capture {
 
-/// A time in ticks from the beginning of the capture: a tick is a sample, or the unit of the file's time scale.
+/// A time in ticks of the capture's own clock.
 using Tick = std::uint64_t;
 
 /// Kind of data in a capture file.
@@ -28,12 +27,11 @@ struct Layout {
   std::vector<std::string> channels;   // names of the channels; for bytes and frames: of the directions or lines
   std::uint64_t ticks_per_second = 0;  // rate of the ticks; 0: the file has no times
   std::uint64_t ticks = 0;  // length of the capture in ticks; 0: not known before the capture was read to its end
-  // By-arrival gap: not 0 if the times of bytes are those of their arrival at a program, see Annotator::Settings::gap.
-  // 0: times on the line.
+  // not 0: bytes have arrival times at a program, see Annotator::Settings::gap
   Tick arrival_gap = 0;
 };
 
-/// Level changes of one channel. The level alternates, so the times suffice; they are strictly increasing.
+/// Level changes of one channel; the level alternates, and the times increase strictly.
 struct Changes {
   bool before = false;  // level before the first change
   std::vector<Tick> at;
@@ -52,24 +50,21 @@ struct Character {
   bool is_break = false;
 };
 
-/// A sequence of clocks: an SPI transfer between two edges of chip select, or a clocked word between two pauses. An
-/// incomplete burst is marked as `cut`, because a word without its first bits looks like a valid wrong position.
+/// A sequence of clocks, between two edges of chip select or between two pauses.
 struct Burst {
   Tick begin = 0;
   Tick end = 0;
   std::size_t bits = 0;           // number of clocks in the burst
   std::vector<std::uint8_t> in;   // bits sent by the encoder, packed MSB first, the last byte left-aligned
   std::vector<std::uint8_t> out;  // SPI: bits sent by the host, packed like `in`
-  // The burst's beginning or end is not in the capture, or it is a piece of a burst of more than
-  // ClockedDecoder::most_bits bits: bits may be missing at its beginning or end.
+  // bits may be missing at the beginning or the end
   bool cut = false;
   // The following members apply to clocked words without chip select.
   bool low_before = false;   // the clock rested at its low level before the burst
   bool low_after = false;    // the clock rests at its low level after the burst
   bool fell_before = false;  // the clock, high behind the previous word, fell during the rest between the two words
   bool has_last = false;     // `last` is known: the level of the encoder's data line behind the last clock change
-  // Level of the encoder's data line behind the last clock change: a host that gives n clocks for n bits takes its last
-  // bit there.
+  // level behind the last clock change, where a host with one clock per bit takes its last bit
   bool last = false;
 };
 
@@ -88,11 +83,10 @@ struct Damage {
   bool note = false;         // true: no data is missing, but the user should know of the problem
 };
 
-/// A part of a capture that is decoded on its own. It owns its storage, which is used again for the next part.
+/// A part of a capture that is decoded on its own; its storage is used again.
 struct Block {
   std::uint64_t index = 0;  // number of the block: 0, 1, 2 ... in the order of time
-  // Tick of the first sample, or time from which the changes are valid; after damage it may be later than the end of
-  // the previous block, because the data between them is missing.
+  // first tick of the block; after damage it may be later than the end of the previous block
   Tick first = 0;
   Tick end = 0;                       // tick behind the last tick of the block
   std::vector<std::uint8_t> samples;  // samples, `bytes_per_sample` bytes each, little endian, channel 0 in bit 0
@@ -108,13 +102,11 @@ struct Block {
 struct Reader {
   virtual ~Reader() = default;
   [[nodiscard]] virtual const Layout& layout() const = 0;
-  /// Claims the next part of the file, in the order of the file; only one thread may call it at a time. Returns false
-  /// at the end of the file or if the rest of the file cannot be read.
+  /// Claims the next part of the file, by one thread at a time; returns false if there is none.
   [[nodiscard]] virtual bool claim(Block& block) = 0;
-  /// Reads or decompresses the part that `claim` put into `block`. Several threads may call it at once, each with its
-  /// own block. A damaged block is cut short.
+  /// Reads the part that `claim` put into `block`; threads may fill different blocks at once.
   virtual void fill(Block& block) = 0;
-  /// Returns the problems found in the file, in the order of the file; complete after the last block was filled.
+  /// Returns the problems of the file in its order; complete after the last block was filled.
   [[nodiscard]] virtual const std::vector<Damage>& damages() const = 0;
 };
 

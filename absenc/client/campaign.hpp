@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures how well a protocol detects errors on a bad line: host and virtual encoder exchange frames under random
-// faults, in virtual time.
+// Measures how well a protocol detects errors on a bad line, simulated in virtual time.
 #pragma once
 
 #include <cstdint>
@@ -14,34 +13,32 @@
 
 namespace absenc::client {
 
-/// A kind of fault that a campaign injects: into the line, into the encoder's replies or into the host's requests.
+/// A kind of fault that a campaign injects.
 struct LineFault {
   std::string_view name;     ///< Name of the fault, as `--fault` takes it.
   std::string_view meaning;  ///< What the fault does to the line, as a phrase.
   double usual;              ///< Default rate of the fault, 0 to 1.
 };
 
-/// Returns all faults that a campaign can inject: those of `emulate --fault`, under the same names, and faults of the
-/// line itself: bit, burst, double, talker, late.
+/// Returns all faults that a campaign can inject.
 [[nodiscard]] std::span<const LineFault> line_faults();
 
-/// Settings of a campaign: the virtual encoder, the motion of its shaft, the number of exchanges, and the faults.
+/// Settings of a campaign.
 struct CampaignChoices {
   std::string model{};                 ///< Name of a model; empty: the first that fits `options`.
   std::vector<std::string> options{};  ///< Options of the unit, as "address=3".
-  /// Faults with their rates from 0 to 1, as "bit=0.001"; others have rate 0. Empty: the default rates of all faults.
+  /// Faults with their rates from 0 to 1, as "bit=0.001"; empty: the default rates of all faults.
   std::vector<std::string> faults{};
   std::uint64_t exchanges = 100'000;  ///< Number of exchanges, at least 1; the last reading may exceed it.
   std::uint64_t seed = 1;             ///< Seed of faults and shaft positions; the same seed gives the same counts.
-  /// Speed of the shaft in revolutions per minute (mm/s for linear encoders), with positions confirmed as `absenc read`
-  /// does. Without a value the shaft moves to another place before every reading and positions are not confirmed.
+  /// Speed of the shaft in revolutions per minute, or mm/s for linear encoders; positions are then confirmed. Without a
+  /// value the shaft moves to another place before every reading.
   std::optional<double> rpm{};
-  /// Speed limit that the host assumes with `rpm`, in rev/min or mm/s; 0: that of the model, or the default.
+  /// Speed limit that the host assumes with `rpm`, in rev/min or mm/s; 0: a default.
   std::uint32_t maximum_rpm = 0;
 };
 
-/// Computed strength of the frame check, for replies whose bits are damaged independently at the rate of the fault
-/// `bit`. The rates are shares of all replies.
+/// Computed strength of the frame check against independent bit errors. The rates are shares of all replies.
 struct CheckWorth {
   unsigned check_bits = 0;     ///< Width of the check in bits; 0: none.
   std::size_t frame_bits = 0;  ///< Length of a reply, in bits.
@@ -55,15 +52,14 @@ struct CheckWorth {
 /// Shares of confirmed and of wrong positions, in a campaign with a turning shaft.
 struct Guarded {
   Share confirmed{};  ///< Share of readings whose position a second reading confirmed.
-  /// Share of confirmed readings whose position the shaft had at no measurement within 2 ms of their latch time;
-  /// excludes readings after which the encoder proves to be changed.
+  /// Share of confirmed readings with a position that the shaft did not have near that time; excludes changed encoders.
   Share wrong{};
   Share alone{};  ///< Share of wrong positions, confirmed or not, among the readings that passed every frame check.
   double let_through = 0;  ///< Computed number of wrong positions that pass both frame checks and confirmation.
 };
 
 /// Result of a campaign: numbers of exchanges and shares of errors. With `rpm`, `recovered`, `wrong` and `older` are
-/// not counted: `guarded` has the wrong positions.
+/// not counted.
 struct CampaignResult {
   std::string protocol{};       ///< Identifier of the unit.
   std::string model{};          ///< Name of the encoder's model; "" if the unit has none.
@@ -74,21 +70,17 @@ struct CampaignResult {
   Share given_up{};             ///< Share of readings that ended with an error after all attempts.
   Share recovered{};            ///< Share of readings that succeeded after a failed attempt.
   Share wrong{};                ///< Share of exchanges with a wrong position; includes `older`, excludes `changed`.
-  /// Share of exchanges (with `rpm`: of readings) with an error or a wrong position after which the encoder proves to
-  /// be changed by a damaged request; the campaign then continues with a fresh encoder.
+  /// Share of exchanges (with `rpm`: of readings) after which the encoder proved to be changed.
   Share changed{};
-  /// Share of exchanges that returned an earlier position of the shaft, taken from a frame that was sent before the
-  /// request.
+  /// Share of exchanges with an earlier position, from a frame that was sent before the request.
   Share older{};
   std::optional<Guarded> guarded{};  ///< Shares of confirmed and wrong positions; without a value unless `rpm` was set.
-  /// Computed strength of the frame check. Without a value on CAN, if no sample reply has a position, if the check has
-  /// more than 16 bits, is not linear or covers at most half of the reply, or if replies differ in length.
+  /// Computed strength of the frame check; without a value if it cannot be computed, as on CAN.
   std::optional<CheckWorth> worth{};
   double seconds = 0;  ///< Processor time of the process during the exchanges, in seconds; excludes computing `worth`.
 };
 
-/// Runs a campaign on one core. Throws UsageError for unknown names, for wrong option values, for rates outside 0 to 1,
-/// and for options with which the unit has no virtual encoder.
+/// Runs a campaign on one core. Throws UsageError.
 [[nodiscard]] CampaignResult campaign(std::string_view protocol, const CampaignChoices& choices = {});
 
 }  // namespace absenc::client

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reports whether a command changed its encoder: not sent, confirmed, refused or unknown. Programs compare the state's
-// word, people read its sentence. Exceptions of the port, the encoder or a cancellation carry the state if the command
-// changes the encoder.
+// Reports whether a command changed its encoder.
 #pragma once
 
 #include <cstdint>
@@ -29,7 +27,7 @@ enum class ChangeState : std::uint8_t {
 /// State of a change of the encoder, with advice for the user.
 struct Change {
   ChangeState state = ChangeState::none;  ///< Whether the encoder was changed, as far as it is known.
-  /// For `unknown`, what the user can do; for `confirmed`, the encoder's new address; "": no advice.
+  /// Advice for the user; "": none.
   std::string advice{};
   std::string note{};  ///< Reason why the journal has no entry of this change; "": the journal has it, or needs none.
 
@@ -37,8 +35,7 @@ struct Change {
   [[nodiscard]] std::string text() const;
 };
 
-/// Returns `what`, the text of a failure, followed by the sentence of the change on a line of its own; only `what` for
-/// the state `none`.
+/// Returns `what` and, except for the state `none`, a line with the sentence of the change.
 [[nodiscard]] std::string with_change(std::string_view what, const Change& change);
 
 /// Base class of exceptions that carry the state of a change.
@@ -49,8 +46,7 @@ struct Changing {
   Change change;  ///< The change and its state when the exception was thrown.
 };
 
-/// An exception of a command that changes the encoder: an exception of type `Base` with the state of the change.
-/// Handlers of `Base` catch it.
+/// An exception of type `Base` that also carries the state of a change.
 template <class Base>
 class OfChange final : public Base, public Changing {
  public:
@@ -67,15 +63,13 @@ class OfChange final : public Base, public Changing {
   std::string text_;
 };
 
-/// Returns the change that the exception carries; null if it carries none, or one with the state `none`.
+/// Returns the change that the exception carries; null if there is none or its state is `none`.
 [[nodiscard]] const Change* change_of(const std::exception& failure);
 
-/// Rethrows the exception that is being handled, with `change` added unless the state of `change` is `none`, the
-/// exception already carries a change, or its type can carry none. Call this only in a catch block.
+/// Rethrows the exception that is being handled, with `change` added where possible. Call this only in a catch block.
 [[noreturn]] void rethrow_with(const Change& change);
 
-/// Runs `work`, which sends nothing that changes the encoder, and returns its result. Adds the state `not_sent` to
-/// exceptions of `work`, as `rethrow_with` does.
+/// Returns the result of `work`, which changes no encoder; adds `not_sent` to its exceptions.
 template <class Work>
 auto before_change(const Work& work) {
   try {

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs the changing commands that each unit confirms on a good line, with every fault that its link can have, and with
-// a port that is lost after various numbers of steps. Compares the reported change with the memory of the virtual
-// encoder, in virtual time.
+// Compares reported changes with the virtual encoder's memory, with faults and lost ports.
 #include "absenc/client/change.hpp"
 
 #include <gtest/gtest.h>
@@ -79,8 +77,7 @@ Stored stored(VirtualDevice& device) {
   return one.bytes != nullptr ? of(one.bytes->memory()) : of(one.frames->memory());
 }
 
-/// Runs a command on a virtual encoder and returns how it ended. The port fails after `steps` steps; without `steps`
-/// the port does not fail.
+/// Runs a command on a virtual encoder; the port fails after `steps` steps, without them never.
 Ended run(const std::string& address, const Command& command, const Values& values,
           std::optional<std::size_t> steps = {}) {
   VirtualDevice* device = nullptr;
@@ -110,8 +107,7 @@ Ended run(const std::string& address, const Command& command, const Values& valu
   return ended;
 }
 
-/// Returns arguments with which the command's change is confirmed on a good line; nothing if no candidate is, as when
-/// the command needs options that depend on the encoder's installation.
+/// Returns arguments with which the change is confirmed on a good line; nothing: none found.
 std::optional<Values> working_values(const Unit& unit, const Command& command) {
   std::vector<Values> candidates;
   for (const std::int64_t wanted : {INT64_MAX, std::int64_t{2}, std::int64_t{3}, std::int64_t{90}, INT64_MIN}) {
@@ -172,7 +168,7 @@ void require_truth(const Ended& ended, const Ended& good, const std::string& wha
   }
 }
 
-// Returns the smallest number of steps at the port, but at least 33, with which the command ends without an exception.
+// Returns the smallest number of steps at the port, at least 33, with which nothing is thrown.
 std::size_t steps_of(const std::string& address, const Command& command, const Values& values) {
   std::size_t most = 64;
   while (run(address, command, values, most).thrown) most *= 2;
@@ -238,7 +234,7 @@ TEST_P(EveryUnit, ReportedChangeMatchesMemoryAfterPortLoss) {
     const Ended good = run(address, command, values);
     Counts of_command{};
     const std::size_t all = steps_of(address, command, values);
-    // Lets the port fail after each of the last steps, in which the change occurs, and after some of the earlier ones.
+    // The change occurs in the last steps, so each of these is tried, and some of the others.
     const std::size_t each = test_cases(60);
     const std::size_t last = all > each ? all - each : 0;
     for (std::size_t steps = 0; steps < all; steps = steps < last ? std::min(steps + 1 + all / 12, last) : steps + 1) {

@@ -33,32 +33,27 @@ struct ClauseResult {
 struct Conformance {
   std::string protocol{};               ///< Identifier of the unit.
   std::vector<ClauseResult> clauses{};  ///< Results in the order of the unit's clauses.
-  /// Commands with which the user restores values that the test changed and could not restore. If there are any, the
-  /// encoder is left changed.
+  /// Commands with which the user restores values that the test left changed; empty: none.
   std::vector<std::string> left{};
 
   /// Returns the number of clauses with this verdict.
   [[nodiscard]] std::size_t count(Verdict verdict) const;
-  /// Returns `broken` if any clause is broken or the encoder is left changed; otherwise `kept` if any clause is kept;
-  /// otherwise `untested`.
+  /// Returns `broken` if a clause is broken or `left` is not empty, else `kept` if one is kept, else `untested`.
   [[nodiscard]] Verdict verdict() const;
-  /// Returns the results in the Test Anything Protocol, version 13, with "Bail out!" if the verdict is `untested` or
-  /// the encoder is left changed.
+  /// Returns the results in the Test Anything Protocol, version 13.
   [[nodiscard]] std::string tap() const;
-  /// Returns the results as JUnit XML, with an error if the verdict is `untested` or the encoder is left changed.
+  /// Returns the results as JUnit XML.
   [[nodiscard]] std::string junit() const;
-  /// Returns the results as text for people: three lines for each clause, the commands that restore an encoder that is
-  /// left changed, the numbers of verdicts and, if the verdict is `untested`, a line that says so.
+  /// Returns the results as text for people.
   [[nodiscard]] std::string report() const;
 };
 
 /// Limits of a conformance test of an encoder: its length, and the changes it may make.
 struct ConformChoices {
   std::size_t readings = 100;  ///< Number of readings, at least 1.
-  /// Whether clauses that change the encoder are tested too; the test then tries to restore the values.
+  /// Whether clauses that change the encoder are tested too; values are restored where possible.
   bool changes = false;
-  /// With `changes`, whether the test may erase a zero, turns or alarms, which nothing can restore. If not, a clause is
-  /// tested only if the encoder has nothing that its test would erase.
+  /// With `changes`, whether the test may erase a zero, turns or alarms, which nothing restores.
   bool resets = false;
   /// Polled during the test; once it returns true, the test ends with Cancelled. Empty: never.
   std::function<bool()> over{};
@@ -67,10 +62,9 @@ struct ConformChoices {
 /// Returns the verdict as a word: "kept", "broken" or "untested".
 [[nodiscard]] std::string_view name_of(Verdict verdict);
 
-/// Tests the encoder of an address and returns the results. Changes the encoder only with `changes`. `text` and
-/// `settings` are those of `open`. Restores changed values before it throws: UsageError, Cancelled, os::Interrupted, or
-/// an exception of the port. If it cannot restore them, it throws a Failure instead, whose text contains the commands
-/// that do.
+/// Tests the encoder of an address and returns the results. `text` and `settings` are those of `open`. Throws
+/// UsageError, Cancelled, os::Interrupted, Failure and exceptions of the port. If changed values cannot be restored,
+/// the text of a Failure contains the commands that restore them.
 [[nodiscard]] Conformance conform(std::string_view text, std::span<const std::string> settings = {},
                                   const ConformChoices& choices = {});
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests whether a host complies with the document of a protocol: a virtual encoder serves the host and judges its
-// requests.
+// Tests whether a host complies with the document of a protocol.
 #pragma once
 
 #include <cstddef>
@@ -18,14 +17,12 @@ struct ConformHostChoices {
   std::size_t answers = 100;  ///< Number of replies, half before the first and half after the last fault; at least 2.
   Time patience = std::chrono::seconds(10);       ///< Longest silence of the host after it first sent something.
   std::function<void(const Emulation&)> ready{};  ///< Called with the running emulation when the host can connect.
-  /// Polled during the test; once it returns true, the test ends and the host is judged. Empty: never.
+  /// Polled during the test; true ends it. Empty: never.
   std::function<bool()> over{};
 };
 
-/// Tests a host and returns the results. Suppresses a few replies, then damages a few, then, if the unit has a clause
-/// about it, damages a few requests; the host must continue with its requests. Ends when the number of answered
-/// requests or the silence of the host, after it first sent something, reaches its limit, or when `over` returns true.
-/// `text` and `place` are those of `emulate`. Throws UsageError, os::Interrupted and exceptions of the port.
+/// Tests a host with a virtual encoder that also makes faults, and returns the verdicts. `text` and `place` are those
+/// of `emulate`. Throws UsageError, os::Interrupted and exceptions of the port.
 [[nodiscard]] Conformance conform_host(std::string_view text, const EmulateChoices& place = {},
                                        const ConformHostChoices& choices = {});
 

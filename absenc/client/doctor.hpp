@@ -107,7 +107,7 @@ struct Finding {
   [[nodiscard]] std::string sentence() const;
 };
 
-/// How many readings report alarms and validity. A property that no reading reports cannot be called good.
+/// How many readings report alarms and validity.
 struct Reported {
   std::size_t alarms = 0;  ///< Number of readings that report every alarm of the protocol.
   std::size_t valid = 0;   ///< Number of readings that report a valid position.
@@ -122,10 +122,9 @@ struct Measured {
   Time slowest{};        ///< Longest time from the end of a request to the end of its good reply; 0: not known.
   Time computer_late{};  ///< Greatest delay of this computer itself; 0: not measured.
   double rate = 0;       ///< Number of good readings per second; 0: none, or not known.
-  /// Echo of the adapter: "echo seen", "no echo" or "echo not known", or the user's setting, as "echo=off"; "": not a
-  /// line of characters, or no good reading.
+  /// Echo of the adapter in words, as "no echo", or the user's setting, as "echo=off"; may be "".
   std::string echo{};
-  /// Latency of the connection, from the adapter's latency timer or the setting `latency`; without a value: not known.
+  /// Latency of the connection; without a value: not known.
   std::optional<Time> latency{};
   bool turned = false;  ///< Whether positions were also read while the user turned the shaft by hand.
 };
@@ -153,7 +152,7 @@ struct DoctorChoices {
   Time limit = std::chrono::seconds(3);  ///< Time limit of such a series while the shaft is as it is.
   Time turning{};                        ///< Time of further readings while the user turns the shaft by hand; 0: none.
   std::function<void(const std::string& what)> progress{};  ///< Called with the step that begins, as a phrase.
-  /// Polled during each wait of the diagnosis; once it returns true, the diagnosis ends with Cancelled. Empty: never.
+  /// Polled during the diagnosis; true ends it. Empty: never.
   std::function<bool()> over{};
 };
 
@@ -162,9 +161,8 @@ struct DoctorChoices {
 /// Returns the identifier of a kind of finding, as "only_echo".
 [[nodiscard]] std::string_view id_of(FindingKind finding_kind);
 
-/// Diagnoses an encoder from the port upwards, by readings, and returns the result. Sends no command that changes the
-/// encoder. `text` and `settings` are those of `open`. A port that cannot be opened is a finding, not an exception.
-/// Throws UsageError, Cancelled.
+/// Diagnoses an encoder from the port upwards and returns the result. `text` and `settings` are those of `open`. A port
+/// that cannot be opened is a finding. Throws UsageError, Cancelled.
 [[nodiscard]] Examination examine(std::string_view text, std::span<const std::string> settings = {},
                                   const DoctorChoices& choices = {});
 

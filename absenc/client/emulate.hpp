@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a virtual encoder on a port that programs open like a real one, for tests of programs that read encoders.
+// Runs a virtual encoder on a port that programs open like a real one.
 #pragma once
 
 #include <cstddef>
@@ -17,35 +17,32 @@ namespace absenc::client {
 /// Port on which programs reach the virtual encoder.
 struct EmulateChoices {
   std::string link{};  ///< Path of a symbolic link to the pseudo-terminal; "": no link.
-  /// TCP port of 127.0.0.1 on which the encoder also listens; 0: the system chooses a free port; without a value: none.
+  /// TCP port of 127.0.0.1 on which the encoder also listens; 0: a free one; no value: none.
   std::optional<std::uint16_t> tcp{};
-  /// Network interface of a CAN encoder, as "can0"; "": the encoder is on an emulated slcan adapter.
+  /// Network interface of a CAN encoder, as "can0"; "": an emulated slcan adapter.
   std::string can{};
 };
 
-/// How often the virtual encoder checked a rule of the document, and how often its host broke it.
+/// How often the virtual encoder checked a rule of the document, and how often it was broken.
 struct RuleCount {
   std::string_view rule{};   ///< The rule, in words.
   std::uint64_t looked = 0;  ///< Number of times that the rule was checked.
   std::uint64_t broken = 0;  ///< Number of times that the host broke the rule.
 };
 
-/// Counts of what the virtual encoder received from hosts. CAN frames that decoding reports as unexpected_reply are not
-/// counted: they belong to other devices on the bus.
+/// Counts of what the virtual encoder received from hosts.
 struct RequestCounts {
-  /// Number of valid requests that `bad` does not count, including those for other encoders on the line.
+  /// Number of good requests, including those for other encoders on the line.
   std::uint64_t good = 0;
-  /// Number of byte runs or CAN frames that are no request, of requests sent before the reply to the last one, and of
-  /// damaged characters. Counts from the start until the first good request, and from 0 again after it.
+  /// Number of byte runs, CAN frames and characters that are no good request; starts again at the first good one.
   std::uint64_t bad = 0;
-  /// Number of byte runs or CAN frames that are no request, and of damaged characters, received before the first good
-  /// request; 0 until there is one.
+  /// Value of `bad` at the first good request; 0 until there is one.
   std::uint64_t before = 0;
   std::string first_bad = {};  ///< Text of the first item counted in `bad`; "" for a damaged character or none.
 };
 
-/// A running virtual encoder, served by its own thread. Any thread may call the functions; a change is effective when
-/// the call returns. If serving has failed, functions that change or ask the encoder throw the exception that ended it.
+/// A running virtual encoder, served by its own thread; several threads may call its functions. Functions that change
+/// or ask the encoder throw the exception that ended the service, if any.
 class Emulation {
  public:
   /// Starts the virtual encoder, as `emulate` does.
@@ -56,13 +53,11 @@ class Emulation {
   Emulation& operator=(Emulation&&) noexcept;
   ~Emulation();
 
-  /// Returns the path of the link to the pseudo-terminal, or of the pseudo-terminal if there is no link; for an encoder
-  /// on a CAN interface, the name of the interface.
+  /// Returns the path of the pseudo-terminal or of the link to it, or the name of the CAN interface.
   [[nodiscard]] const std::string& path() const;
   /// Returns the TCP port on which the encoder listens; 0 if there is none.
   [[nodiscard]] std::uint16_t tcp_port() const;
-  /// Returns the address with which `open` reaches the encoder, without options: "tformat:/dev/pts/3",
-  /// "raa38-can:slcan:/dev/pts/3".
+  /// Returns the encoder's address for `open`, without options, as "tformat:/dev/pts/3".
   [[nodiscard]] std::string address() const;
   /// Returns the unit that is emulated.
   [[nodiscard]] const Unit& unit() const;
@@ -71,32 +66,28 @@ class Emulation {
 
   /// Switches the virtual encoder off: it sends no replies until `power_on`.
   void power_off();
-  /// Switches the virtual encoder on. With `real` it starts up as slowly as a real one, otherwise at once.
+  /// Switches the virtual encoder on; with `real` it starts up as slowly as a real one.
   void power_on(bool real = false);
-  /// Raises an alarm by its name in the unit. Throws UsageError for an unknown name, and for an alarm that the encoder
-  /// cannot report with its options.
+  /// Raises an alarm by its name in the unit. Throws UsageError.
   void raise_alarm(std::string_view name);
-  /// Ends the cause of an alarm; an alarm that the encoder latches stays. Throws UsageError for an unknown name.
+  /// Ends the cause of an alarm; an alarm that the encoder latches stays. Throws UsageError.
   void lower_alarm(std::string_view name);
-  /// Sets a condition such as "temperature" or "battery" to a value in the unit of the condition; `absenc list` prints
-  /// names and units. Throws UsageError.
+  /// Sets a condition, as "temperature", to a value in the condition's unit. Throws UsageError.
   void set_condition(std::string_view name, std::int64_t value);
-  /// Sets the rate, 0 to 1, of a fault such as "corrupt" or "drop", named as in `emulate --fault`. Other faults keep
-  /// their rates. Throws UsageError.
+  /// Sets the rate, 0 to 1, of a fault such as "corrupt". Throws UsageError.
   void set_fault(std::string_view kind, double rate);
   /// Sets the rate of every fault to 0.
   void clear_faults();
 
-  /// Returns how often this fault was injected, into replies or, for "request_corrupt", into requests. Throws
-  /// UsageError for an unknown fault.
+  /// Returns how often this fault was injected. Throws UsageError.
   [[nodiscard]] std::uint64_t fault_count(std::string_view kind) const;
-  /// Returns how many answers the encoder has given. Unsolicited frames, and requests that get no reply, may count too.
+  /// Returns how many answers the encoder has given; unsolicited frames may count, too.
   [[nodiscard]] std::uint64_t answer_count() const;
   /// Returns how often the host broke a rule of the document.
   [[nodiscard]] std::uint32_t violations() const;
   /// Returns the first rule that the host broke, in words; empty: none.
   [[nodiscard]] std::string first_violation() const;
-  /// Returns, for each rule that the host's behaviour put to the test, how often it was checked and broken.
+  /// Returns, for each rule that was checked, how often it was checked and broken.
   [[nodiscard]] std::vector<RuleCount> rule_counts() const;
   /// Returns how many good and bad requests the virtual encoder received.
   [[nodiscard]] RequestCounts request_counts() const;
@@ -106,9 +97,8 @@ class Emulation {
   std::unique_ptr<Service> service_;
 };
 
-/// Starts a virtual encoder and returns it. `text` is an address without `sim:`, as
-/// "tformat?model=23-bit&motion=rpm=60&fault=corrupt=0.01". The link of the unit must carry characters or CAN frames.
-/// Throws UsageError, os::Failure.
+/// Starts a virtual encoder and returns it. `text` is an address without `sim:`, as "tformat?model=23-bit". The link of
+/// the unit must carry characters or CAN frames. Throws UsageError, os::Failure.
 [[nodiscard]] inline Emulation emulate(std::string_view text, const EmulateChoices& choices = {}) {
   return {text, choices};
 }

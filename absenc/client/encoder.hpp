@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An encoder, opened by its address or its name: readings, series of samples, commands, memory and settings.
+// An encoder, opened by its address or its name.
 #pragma once
 
 #include <cstdint>
@@ -37,8 +37,7 @@ enum class PositionState : std::uint8_t {
 /// Returns a sentence for people that describes `state`.
 [[nodiscard]] std::string_view text_of(PositionState state);
 
-/// Result of one attempt to read or to open the port: a reading, a failure, or an event of the port. Instants are those
-/// of os::now.
+/// Result of one attempt to read or to open the port. Instants are those of os::now.
 struct Sample {
   /// The kind of a sample.
   enum class Kind : std::uint8_t {
@@ -54,36 +53,33 @@ struct Sample {
   Reading reading{};         ///< The reading; default-constructed if `kind` is not `reading`.
   /// Whether the position agrees with the one that was read before it (host::FirstReading).
   bool confirmed = false;
-  /// Whether the encoder was ready and its position valid, but not `confirmed`. The validity in `reading` is then
-  /// unknown.
+  /// Whether the encoder was ready and its position valid, but not `confirmed`.
   bool doubtful = false;
   bool position_valid = false;  ///< Whether `position` is valid.
   /// Position in counts, continued past the end of the encoder's counter; see `position_valid`.
   std::int64_t position = 0;
-  /// Whether `position` starts again at this sample, because the position jumped or the pause since the last valid
-  /// position was too long to know the distance.
+  /// Whether `position` starts again at this sample, after a jump or after too long a pause.
   bool restarted = false;
   /// Whether `speed` is valid: the times of the two positions must determine it closely enough.
   bool speed_valid = false;
   /// Mean speed between two positions, in rpm (mm/s for linear encoders); 0 unless `speed_valid`.
   double speed = 0;
-  /// Greatest difference between `speed` and the true mean speed between the instants at which the two positions were
-  /// latched, in the same unit. Errors and noise of the encoder are not included.
+  /// Greatest difference between `speed` and the true mean speed, in the same unit; errors of the encoder are not
+  /// included.
   double speed_uncertainty = 0;
   Time speed_delay{};     ///< Time by which the speed lags behind the position.
   JointAngles angles{};   ///< Angles of joint and motor; empty unless the address has settings of the drive.
   Trouble trouble{};      ///< Description of the failure; empty unless `kind` is `failed`.
   std::string message{};  ///< Text of the event: port lost, absent or back, or position restarted; "": no event.
 
-  /// Returns whether `reading.singleturn` can be used, or why not. For turns see `reading.multiturn_validity()`; for
-  /// `position` see `position_valid`.
+  /// Returns whether `reading.singleturn` can be used, or why not.
   [[nodiscard]] PositionState position_state() const;
 
-  /// Returns the speed with its uncertainty, in rpm (mm/s for linear encoders); nothing if the speed is invalid.
+  /// Returns `speed` with its uncertainty; nothing if the speed is invalid.
   [[nodiscard]] std::optional<Estimate> measured_speed() const;
-  /// Returns the speed of a rotary encoder in rpm; nothing for a linear encoder or if the speed is invalid.
+  /// Returns the speed in rpm; nothing for a linear encoder or if the speed is invalid.
   [[nodiscard]] std::optional<Estimate> speed_rpm() const;
-  /// Returns the speed of a linear encoder in mm/s; nothing for a rotary encoder or if the speed is invalid.
+  /// Returns the speed in mm/s; nothing for a rotary encoder or if the speed is invalid.
   [[nodiscard]] std::optional<Estimate> speed_mm_s() const;
 
   /// Returns the text of the failure, or of the event; "" if the sample has neither.
@@ -99,7 +95,7 @@ struct SampleChoices {
 
 class Samples;
 
-/// An encoder, connected or not. One thread at a time may use it; `cancel` may be called from any thread.
+/// An encoder, connected or not. One thread at a time may use it; any thread may call `cancel`.
 class Encoder {
  public:
   /// Connection and state of an encoder; for the library itself only.
@@ -111,60 +107,53 @@ class Encoder {
   Encoder& operator=(Encoder&&) noexcept;
   ~Encoder();
 
-  /// Opens the port, or uses the open port of another encoder on the same line. Throws os::Failure, UsageError.
+  /// Opens the port, or shares that of another encoder on the line. Throws os::Failure, UsageError.
   void connect();
-  /// Releases the port; counters and statistics remain. Later calls of `read`, `next` and `run` connect again.
+  /// Releases the port; counters and statistics remain.
   void disconnect();
-  /// Returns whether the encoder has a port: from `connect` until `disconnect`, or until a sample reports the loss of
-  /// the port.
+  /// Returns whether the encoder has a port.
   [[nodiscard]] bool connected() const;
 
-  /// Returns a reading of the position. If the position is valid, but no second reading confirmed it, its validity is
-  /// marked as unknown. Connects first if `connected` is false. Throws EncoderFailure, Failure, UsageError,
-  /// os::Failure, os::Interrupted, Cancelled. Throws DeadlinePassed if a wait for the encoder reaches `deadline`, a
-  /// time of os::now.
+  /// Returns a reading of the position; a valid position that no second one confirmed is marked as unknown. Connects
+  /// first if needed. Throws EncoderFailure, Failure, UsageError, os::Failure, os::Interrupted, Cancelled, and
+  /// DeadlinePassed if a wait for the encoder reaches `deadline`, a time of os::now.
   [[nodiscard]] Reading read(Time deadline = never);
-  /// Returns a reading with the alarms: by the unit's command for alarms if it has one and the options allow it,
-  /// otherwise from a reading of the position, which need not be confirmed.
+  /// Returns a reading with the alarms; its position need not be confirmed.
   [[nodiscard]] Reading read_alarms();
-  /// Returns a range of samples. A lost port does not end it; `count`, the deadline, `cancel` and the function of
-  /// `end_when` do.
+  /// Returns a range of samples. A lost port does not end it.
   [[nodiscard]] Samples samples(const SampleChoices& choices = {});
-  /// Takes one sample and returns it: reads or, if `connected` is false, waits up to a quarter of a second and tries to
-  /// open the port. Throws os::Interrupted, UsageError, Failure, Cancelled.
+  /// Takes one sample and returns it; if the encoder is not connected, tries to open the port. Throws os::Failure,
+  /// os::Interrupted, UsageError, Failure, Cancelled.
   Sample next();
 
   /// Runs a command of the unit by name and returns the fields of its result. Optional arguments may be left out at the
-  /// end. Does not ask the user for confirmation, even if the command changes the encoder. Throws EncoderFailure,
-  /// Failure, os::Failure, os::Interrupted, UsageError, Cancelled.
+  /// end. Does not ask for confirmation. Throws EncoderFailure, Failure, os::Failure, os::Interrupted, UsageError,
+  /// Cancelled.
   Answer run(std::string_view command, std::span<const std::int64_t> arguments = {});
   /// Runs a command of the unit by name, with arguments in the order of the command.
   Answer run(std::string_view command, std::initializer_list<std::int64_t> arguments) {
     return run(command, std::span(arguments.begin(), arguments.size()));
   }
 
-  /// Returns access to the encoder's memory. It needs a connected encoder, and this Encoder must not be moved while it
-  /// is used.
+  /// Returns access to the memory. The encoder must be connected and must not be moved meanwhile.
   [[nodiscard]] Memory memory() { return Memory(*this); }
 
-  /// Returns access to the encoder's settings. It needs a connected encoder, and this Encoder must not be moved while
-  /// it is used.
+  /// Returns access to the settings. The encoder must be connected and must not be moved meanwhile.
   [[nodiscard]] Settings settings() { return Settings(*this); }
 
-  /// Cancels from any thread: until `resume`, each wait for a reply or for the next sample throws Cancelled. A loop
-  /// over samples ends without an exception.
+  /// Cancels from any thread: until `resume`, waits throw Cancelled, and a loop over samples ends.
   void cancel();
   /// Withdraws `cancel`, so that the encoder can be used again.
   void resume();
 
-  /// Sets a function that is polled during each wait for a reply or for the next sample; empty: none. Once it returns
-  /// true, the wait throws Cancelled; a loop over samples ends without an exception. Returns the previous function.
+  /// Sets a function that is polled during waits; true ends them as `cancel` does. Empty: none. Returns the previous
+  /// function.
   std::function<bool()> end_when(std::function<bool()> over);
 
-  /// Returns the change, with its state, of the last command that changes the encoder and was run; see change.hpp.
+  /// Returns the state of the last command that changes the encoder; see change.hpp.
   [[nodiscard]] const Change& change() const;
 
-  /// Makes the continued position start again at the next valid position; call it after a command that moves the zero.
+  /// Makes the continued position start again; call it after a command that moves the zero.
   void forget_position();
 
   /// Returns protocol and port of the address, without settings: "tformat:/dev/ttyUSB0".
@@ -179,7 +168,7 @@ class Encoder {
   [[nodiscard]] const std::vector<std::string>& notes() const;
   /// Returns the counts of all conversations: good ones, errors by kind, repeated attempts.
   [[nodiscard]] const host::Counters& counters() const;
-  /// Returns the latencies of the good conversations: the time from the request to the end of the reply.
+  /// Returns the latencies of the good conversations, from the request to the end of the reply.
   [[nodiscard]] const host::Latencies& latencies() const;
   /// Returns the stored bad exchanges, the newest first, with times of os::now.
   [[nodiscard]] std::vector<BadExchangeText> bad_exchanges() const;
@@ -187,13 +176,11 @@ class Encoder {
   [[nodiscard]] std::uint64_t readings() const;
   /// Returns how often the port was lost since the encoder was opened.
   [[nodiscard]] std::uint64_t losses() const;
-  /// Returns how often the continued position started again, after a jump of the position or after a pause too long to
-  /// know the distance.
+  /// Returns in how many samples the continued position started again (`Sample::restarted`).
   [[nodiscard]] std::uint64_t restarts() const;
-  /// Returns the number of readings per second, averaged over about the last second; 0 before the second reading.
+  /// Returns the number of readings per second, averaged over about the last second.
   [[nodiscard]] double rate() const;
-  /// Returns a warning if the shaft, at its speed limit, turns too fast to follow its turns at the intended rate; "" if
-  /// not, and for a linear encoder.
+  /// Returns a warning if the rate is too low to follow the turns of a fast shaft; "" if not.
   [[nodiscard]] std::string rate_note() const;
 
  private:
@@ -202,13 +189,11 @@ class Encoder {
   std::unique_ptr<Parts> parts_;
 };
 
-/// Opens and connects an encoder and returns it. `text` is an address, "tformat:/dev/ttyUSB0?model=23-bit" or
-/// "sim:esl", or a name of absenc.toml; `settings` ("name=value") are added to its settings. Throws os::Failure,
-/// UsageError.
+/// Opens and connects an encoder and returns it. `text` is an address, as "tformat:/dev/ttyUSB0?model=23-bit" or
+/// "sim:esl", or a name of absenc.toml; `settings` ("name=value") are added to it. Throws os::Failure, UsageError.
 [[nodiscard]] Encoder open(std::string_view text, std::span<const std::string> settings = {});
 
-/// An input range of samples. With a rate they are due at equal distances in time, without drift; if several are
-/// overdue, all but the last are left out. Without a rate they follow as fast as possible.
+/// An input range of samples. With a rate they are due at equal distances in time, without drift.
 class Samples {
  public:
   /// Type of the values in the range.
@@ -228,7 +213,7 @@ class Samples {
   [[nodiscard]] Iterator begin();
   /// Returns the end of the range, for comparison with an iterator.
   [[nodiscard]] static Iterator::End end() { return {}; }
-  /// Returns the sample that was taken last, or null at the end of the range. The sample is valid until `advance`.
+  /// Returns the last sample, or null at the end of the range; valid until `advance`.
   [[nodiscard]] const Sample* current() const;
   /// Waits for the next sample and takes it, or ends the range.
   void advance();
@@ -239,8 +224,7 @@ class Samples {
   std::unique_ptr<Parts> parts_;
 };
 
-/// Returns a word for the sample: "lost" or "back" for these events of the port, "restarted" for a reading at which the
-/// position starts again, the name of the error for a failed attempt, otherwise "".
+/// Returns a word for the sample: "lost", "back" or "restarted", the name of an error, or "".
 [[nodiscard]] std::string_view event_name(const Sample& sample);
 
 /// Returns the unit of the speed: "rpm", or "mm/s" for a linear encoder.

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Exceptions of the client library. Ports also throw os::Failure and os::Interrupted. All are derived from
-// std::exception.
+// Exceptions of the client library. Ports also throw os::Failure and os::Interrupted.
 #pragma once
 
 #include <stdexcept>
@@ -9,13 +8,12 @@
 
 namespace absenc::client {
 
-/// Exception: the caller requested something impossible. The text is a sentence that says what is wrong.
+/// Exception: the caller requested something impossible. The text says what is wrong.
 struct UsageError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Exception: an operation cannot be completed, as when a file or a well-formed reply has unexpected content. The text
-/// is a sentence that states the problem.
+/// Exception: an operation cannot be completed. The text states the problem.
 struct Failure : std::runtime_error {
   using std::runtime_error::runtime_error;
 };

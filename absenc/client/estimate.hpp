@@ -13,9 +13,7 @@ struct Estimate {
   double uncertainty = 0;  ///< Greatest distance of the true value from `value`.
 };
 
-/// Returns value and uncertainty as text, "12.0 ± 0.3", with as many digits as the uncertainty justifies, at most four
-/// decimals. The uncertainty is rounded up and covers the rounding of the value. `sign` is the text between the two
-/// numbers.
+/// Returns value and uncertainty as text, "12.0 ± 0.3"; `sign` is the text between the numbers.
 [[nodiscard]] std::string to_text(const Estimate& estimate, std::string_view sign = "±");
 /// Returns the value alone as text, "12.0", with as many digits as the uncertainty justifies.
 [[nodiscard]] std::string value_text(const Estimate& estimate);

@@ -14,23 +14,22 @@
 
 namespace absenc::client {
 
-/// A complete frame with its check: bytes, or bits of a clocked link, packed with the most significant bit first.
+/// A complete frame with its check: bytes, or bits with the most significant bit first.
 struct CheckedFrame {
   std::vector<std::uint8_t> bytes;  ///< Bytes of the frame, including the checksum.
   std::size_t bits = 0;             ///< Number of bits of a frame on a clocked link; 0: the frame has whole bytes.
 };
 
-/// A check that explains the searched frames. Positions in a frame count from 0, in bytes, or in bits for frames of
-/// bits.
+/// A check that explains the frames. Positions count from 0, in bytes or, for frames of bits, in bits.
 struct FoundCheck {
   std::string_view name;  ///< Kind of check: "crc", "sum", "negative_sum" or "xor".
-  /// Parameters of a CRC; for the other kinds the width is 8 and `init` is the constant of the sum or xor.
+  /// Parameters of a CRC; for the other kinds `init` is the constant of the sum or xor.
   CrcParameters parameters{};
   bool low_first = false;  ///< Whether the low byte of a check of more than 8 bits comes first.
   bool padded = false;     ///< Whether the check also covers a byte 00 appended to the data.
-  /// True if all frames have the same length and no usual init and xorout fit: each init then fits with some xorout.
+  /// Whether the frames leave open which init belongs to which xorout.
   bool init_open = false;
-  /// Possible positions of the first byte or bit that the check covers; the covered part ends at the check.
+  /// Possible positions of the first byte or bit that the check covers.
   std::vector<std::size_t> first{};
   std::size_t check_size = 0;  ///< Size of the check, in positions.
   std::size_t trailing = 0;    ///< Number of positions after the check, up to the end of the frame.
@@ -46,26 +45,24 @@ struct CheckFindings {
   std::size_t longest = 0;           ///< Length of the longest frame, in positions.
   /// Whether the frames contain too little information to list all checks that explain them.
   bool is_open = false;
-  /// Number, from 1, of a frame without which a check explains all others beyond doubt; 0: there is none, or a check
-  /// explains every frame, or `is_open`, or there are fewer than 5 frames.
+  /// Number, from 1, of a frame without which a check explains all others beyond doubt; 0: none was found.
   std::size_t odd = 0;
-  /// A sentence about open questions, or about the reason why no check was found; "": there is nothing to say.
+  /// A sentence about open questions or about the failure of the search; may be "".
   std::string advice{};
 };
 
-/// Returns checks of 3 to 16 bits that explain every frame. Throws UsageError for fewer than two frames, for bytes and
-/// bits together, and for frames that are too short or longer than 64 bytes or 128 bits.
+/// Returns checks of 3 to 16 bits that explain every frame. Throws UsageError.
 [[nodiscard]] CheckFindings find_crc(std::span<const CheckedFrame> frames);
 
 /// A unit with options that configure it for a found check.
 struct CheckOptions {
   const Unit* unit;  ///< Unit whose frames can have the check.
-  /// Options that select the check, as "crc_width=16"; empty if the defaults of the unit select it.
+  /// Options that select the check, as "crc_width=16"; empty if the unit's defaults do.
   std::vector<std::string> options;
 };
 
 /// Returns the units whose frames can end with this check, with the options that select it. `frame_size` is the length
-/// of the shortest frame and `link` the link of the frames.
+/// of the shortest frame.
 [[nodiscard]] std::vector<CheckOptions> options_for(const FoundCheck& check, std::size_t frame_size, LinkKind link);
 
 }  // namespace absenc::client

@@ -21,7 +21,7 @@ struct FoundEncoder {
   std::vector<std::string> settings{};  ///< Short list of settings that yields `options`, as "model=23-bit".
   /// Address for `open`, as "tformat:/dev/ttyUSB0?model=23-bit"; "" for a capture.
   std::string address{};
-  /// Setting with the address of this encoder, as "address=3"; "": its address was not found or it has none.
+  /// Setting with the address of this encoder, as "address=3"; may be "".
   std::string encoder{};
   std::string line{};         ///< Line of the encoder, as "RS-485 half duplex, 2.5 Mbit/s".
   std::size_t tried = 0;      ///< Number of exchanges that were checked.
@@ -45,14 +45,12 @@ struct IdentifyChoices {
   std::function<void(const std::string& what)> progress{};
 };
 
-/// Polls the line with the protocols that fit, by requests that change nothing, and returns the encoders that reply or
-/// send unsolicited frames. `place` is a port with its settings: "/dev/ttyUSB0", "tcp:HOST:PORT?latency=50",
-/// "spi:/dev/spidev0.0", "can0". Throws os::Failure, UsageError, os::Interrupted.
+/// Polls the line with the protocols that fit and returns the encoders that it finds. `place` is a port with its
+/// settings, as "/dev/ttyUSB0" or "tcp:HOST:PORT?latency=50". Throws os::Failure, UsageError, os::Interrupted.
 [[nodiscard]] Identified identify(std::string_view place, const IdentifyChoices& choices = {});
 
-/// Returns the encoders that explain the frames of the capture in the file `path`. `choices` must contain neither a
-/// model nor options, because these are searched for. Throws UsageError if it does, and os::Interrupted; `notes` says
-/// if the file cannot be read.
+/// Returns the encoders that explain the frames of the capture `path`. `choices` must contain neither a model nor
+/// options. Throws UsageError, os::Interrupted.
 [[nodiscard]] Identified identify_capture(const std::string& path, const DecodeChoices& choices = {});
 
 }  // namespace absenc::client

@@ -6,8 +6,7 @@
 
 namespace absenc::client {
 
-/// Input iterator of `Range`. The range has a type `value_type`, a function `current()`, which returns a pointer to the
-/// value or null at the end, and a function `advance()`.
+/// Input iterator of `Range`, which has `value_type`, `current()` and `advance()`.
 template <class Range>
 class InputIterator {
  public:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Mechanics between an encoder and its drive: angles of joint and motor that follow from the encoder's position.
+// Angles of joint and motor that follow from the encoder's position.
 #pragma once
 
 #include <optional>
@@ -9,14 +9,13 @@
 
 namespace absenc::client {
 
-/// How an encoder is mounted in its drive: settings of an address, after `?`, or of absenc.toml. They add values to a
-/// sample and leave the values of the encoder as they are.
+/// How an encoder is mounted in its drive: settings of an address or of absenc.toml.
 ///
 ///   joint_deg      = direction * (position_deg - offset_deg) / gear
 ///   electrical_deg = direction * (angle_deg - offset_deg) * pole_pairs  modulo 360, from 0 to below 360
 ///
 /// `position_deg` is the angle of the encoder's shaft, continued past the end of a turn; `angle_deg` is the angle
-/// within the turn. For linear encoders position_mm and offset_mm are millimetres.
+/// within the turn. For linear encoders:
 ///
 ///   joint_mm       = direction * (position_mm - offset_mm)
 ///   electrical_deg = direction * (position_mm - offset_mm) / pole_pair_mm * 360  modulo 360
@@ -32,10 +31,9 @@ struct Joint {
   [[nodiscard]] bool has_motor() const { return pole_pairs != 0 || pole_pair_mm > 0; }
 };
 
-/// Angles of joint and motor from one reading. A member is empty if it was not configured, is invalid or is unknown.
+/// Angles of joint and motor from one reading; a member without a value is not known.
 struct JointAngles {
-  /// Angle of a rotary joint, in degrees. Also empty if the number of turns is unknown and `gear` is not 1; with `gear`
-  /// 1 and unknown turns, the angle is right up to whole turns.
+  /// Angle of a rotary joint, in degrees; right only up to whole turns if the encoder counts none.
   std::optional<double> joint_deg{};
   std::optional<double> joint_mm{};  ///< Position of a linear joint, in millimetres.
   /// Speed of a rotary joint in revolutions per minute; without a value if it is not known.
@@ -44,13 +42,11 @@ struct JointAngles {
   std::optional<double> electrical_deg{};      ///< Electrical angle of the motor, in degrees, from 0 to below 360.
 };
 
-/// Returns the angle of a rotary joint, in degrees. `position_deg` is the encoder's angle, continued past the end of a
-/// turn.
+/// Returns the angle of a rotary joint from the encoder's continued angle, both in degrees.
 [[nodiscard]] double joint_degrees(const Joint& joint, double position_deg);
-/// Returns the position of a linear joint, in millimetres. `position_mm` is the position of the encoder.
+/// Returns the position of a linear joint from that of the encoder, both in millimetres.
 [[nodiscard]] double joint_millimetres(const Joint& joint, double position_mm);
-/// Returns the electrical angle of the motor, in degrees, from 0 to below 360. `position` is the encoder's angle within
-/// the turn in degrees, or the position of a linear encoder in mm.
+/// Returns the electrical angle, 0 to below 360 degrees, from the encoder's degrees or millimetres.
 [[nodiscard]] double electrical_degrees(const Joint& joint, double position);
 /// Returns the speed of the joint, in the unit of `speed`, which is the speed of the encoder.
 [[nodiscard]] Estimate joint_speed(const Joint& joint, const Estimate& speed);

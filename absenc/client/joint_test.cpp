@@ -47,8 +47,6 @@ TEST(Joint, ElectricalAngleIsFrom0ToBelow360) {
   EXPECT_DOUBLE_EQ(electrical_degrees(linear, 5 + 24 * 1000), 0);
 }
 
-/// Compares the joint and motor angles of samples, and the joint speed if it is known, with values that are computed
-/// from the encoder's continued position and speed. The shaft must turn more than three times.
 void expect_angles(const std::string& address, double direction, double offset, double gear, double pole_pairs) {
   Encoder encoder = open(address);
   double first = 0;

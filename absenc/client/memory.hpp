@@ -40,14 +40,14 @@ struct MemoryRun {
 
 /// Returns the number of bytes at each address of the unit's memory: 1, 2 or 4.
 [[nodiscard]] unsigned word_bytes(const Unit& unit);
-/// Returns what an address of the unit's memory holds: "byte", or "word"; in the plural if `count` is not 1.
+/// Returns "byte" or "word" for the unit's memory, in the plural unless `count` is 1.
 [[nodiscard]] std::string_view word_noun(const Unit& unit, std::size_t count);
 /// Returns bytes or words of the unit's memory in hexadecimal, for people: "00 5A", "005A 1234".
 [[nodiscard]] std::string words_in_hex(const Unit& unit, std::span<const std::uint32_t> words);
 /// Returns bytes or words of the unit's memory in hexadecimal, for programs: "005a", "005a1234".
 [[nodiscard]] std::string words_in_json(const Unit& unit, std::span<const std::uint32_t> words);
 
-/// Returns the bytes or words of `image` as runs in the order of their addresses, each of at most `longest` of them.
+/// Returns `image` as runs in the order of their addresses, each of at most `longest` words.
 [[nodiscard]] std::vector<MemoryRun> runs(const MemoryImage& image, std::size_t longest = SIZE_MAX);
 
 /// Returns all addresses that a dump of the unit's memory contains, each with the value 0.
@@ -56,7 +56,7 @@ struct MemoryRun {
 /// Returns the bytes or words of `wanted` that are missing or different in `found`.
 [[nodiscard]] MemoryImage differing(const MemoryImage& wanted, const MemoryImage& found);
 
-/// Returns the address in words: "page 2 address 0x05", or "address 0x05" for a memory without pages.
+/// Returns the address in words, as "page 2 address 0x05".
 [[nodiscard]] std::string to_text(const Unit& unit, MemoryAddress at);
 
 /// Returns all addresses of `image` in words: "page 0 to 5: 0x00 to 0x7E; page 7: 0x04, 0x06".
@@ -92,12 +92,10 @@ class Memory {
   /// Returns the unit of the encoder.
   [[nodiscard]] const Unit& unit() const;
 
-  /// Reads the position and throws if that fails, as it often does with a wrong model; commands for the memory do not
-  /// detect a wrong model. Does nothing if the unit cannot read positions.
+  /// Reads the position, if the unit can, and throws if that fails, as it may with a wrong model.
   void check_model();
 
-  /// Reads the bytes or words at the addresses of `image`, whose values are ignored, and returns them. Throws
-  /// UsageError if one of them cannot be read.
+  /// Returns the bytes or words at the addresses of `image`, whose values are ignored.
   [[nodiscard]] MemoryImage read(const MemoryImage& image, const MemoryProgress& progress = {});
 
   /// Writes a byte and reads it back. `before` is the byte that is stored now, if it is known.
@@ -109,22 +107,19 @@ class Memory {
   Encoder* encoder_;
 };
 
-/// A change of the memory to a wanted image in three steps: look, write, verify. They throw the exceptions of Memory;
-/// the images then state how far the change came.
+/// A change of the memory in three steps: look, write, verify. They throw the exceptions of Memory.
 class MemoryChange {
  public:
-  /// Prepares the change without sending anything. Throws UsageError if a byte of `wanted` cannot be written with this
-  /// access.
+  /// Prepares the change without sending anything. Throws UsageError.
   MemoryChange(Memory memory, MemoryImage wanted, MemoryAccess access);
 
   /// Checks the model and reads the bytes that are stored at the wanted addresses.
   void look(const MemoryProgress& progress = {});
   /// Writes the bytes that differ, one by one, and reads each back.
   void write(const MemoryProgress& progress = {});
-  /// Reads all written bytes again, because a later write may have changed an earlier byte. Throws Failure if it
-  /// finds a changed byte.
+  /// Reads all written bytes again, because later writes may have changed earlier bytes.
   void verify(const MemoryProgress& progress = {});
-  /// Reads the byte that `unknown` returns, if there is one, to find out whether it was written. Ignores a failed read.
+  /// Reads the byte of `unknown` again, to find out whether it was written. Ignores a failure.
   void settle();
 
   /// Returns the wanted bytes with their addresses.
@@ -135,11 +130,9 @@ class MemoryChange {
   [[nodiscard]] const MemoryImage& differing() const { return differing_; }
   /// Returns the bytes that were written and read back, without those that `verify` found changed.
   [[nodiscard]] const MemoryImage& written() const { return written_; }
-  /// Returns the wanted bytes that differed and were not written, or that `verify` found changed, without the byte that
-  /// `unknown` returns.
+  /// Returns the bytes that still have to be written, without the byte of `unknown`.
   [[nodiscard]] MemoryImage not_written() const;
-  /// Returns the state of the last byte that was to be written, or unknown if `verify` found changed bytes; not_sent
-  /// before the first write.
+  /// Returns the state of the change; not_sent before the first write.
   [[nodiscard]] ChangeState state() const { return state_; }
   /// Returns the byte of which it is unknown whether it was written; empty if there is none.
   [[nodiscard]] MemoryImage unknown() const;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The flags of a reading, by channel. Each flag has one of three states: clear, raised, or not reported.
+// The flags of a reading, by channel.
 #pragma once
 
 #include <cstdint>
@@ -27,18 +27,16 @@ struct Flags {
 
 /// Returns the alarms of a reading, one entry for each channel; empty if the unit has no alarms.
 [[nodiscard]] std::vector<Flags> alarms_of(const Unit& unit, const Reading& reading);
-/// Returns the status flags of a reading, one entry for each field; empty if the unit has no status.
+/// Returns the status flags of a reading, one entry for each field.
 [[nodiscard]] std::vector<Flags> status_of(const Unit& unit, const Reading& reading);
 
-/// Returns the flags of a reading: status and alarms of the first channel, then those of the second.
+/// Returns the status flags and alarms of a reading.
 [[nodiscard]] std::vector<Flags> flags_of(const Unit& unit, const Reading& reading);
 
-/// Returns the alarms of all channels joined: raised if one channel raises them, reported if every channel reports
-/// them. Returns nothing if the unit has no alarms.
+/// Returns the alarms of all channels joined; nothing if the unit has no alarms.
 [[nodiscard]] std::optional<Flags> joined_alarms(const Unit& unit, const Reading& reading);
 
-/// Returns the reading. If the encoder is ready and its position is valid but not `confirmed`, the validity of the
-/// position and of valid turns is marked as unknown.
+/// Returns the reading; may mark its position as unknown if it is not `confirmed`.
 [[nodiscard]] Reading checked(Reading reading, bool confirmed);
 
 }  // namespace absenc::client

@@ -9,8 +9,7 @@
 
 namespace absenc::client {
 
-/// The columns of position, turns and flags in a row. A unit with two channels has columns of flags for each channel,
-/// and the column `alarms` with the alarms of both channels.
+/// The columns of position, turns and flags in a row.
 class ReadingColumns {
  public:
   /// Makes the columns for the unit with these options. `unit` must outlive this object.
@@ -18,9 +17,7 @@ class ReadingColumns {
 
   /// Returns the columns, in the order in which `fill` writes their values.
   [[nodiscard]] std::span<const Column> columns() const { return columns_; }
-  /// Writes the reading into `values`, one value for each column. A value that the reading does not have becomes empty.
-  /// A position in degrees, millimetres or micrometres becomes `Invalid` unless it is known to be valid; flags and
-  /// validity become values as `value_of` returns them.
+  /// Writes the reading into `values`, one value for each column.
   void fill(const Reading& reading, std::span<Value> values) const;
 
  private:

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes long recordings: files with a header and rows for readings, failures, events of the port and gaps. Lines of
-// text are written at once, so that a killed process loses none; HDF5 rows are written within a second.
+// Writes long recordings: files with a header and rows for readings, failures and events.
 #pragma once
 
 #include <cstdint>
@@ -17,13 +16,11 @@ namespace absenc::client {
 
 /// File, rate, and length of a recording, and the limits of its parts.
 struct RecordingSettings {
-  /// Path of the file, which ends in .csv, .jsonl or .ndjson (JSON lines), or .h5 or .hdf5 (HDF5). The file must not
-  /// exist yet.
+  /// Path of a new file, which ends in .csv, .jsonl, .ndjson, .h5 or .hdf5.
   std::string path;
   std::string encoder;   ///< Name of the encoder, as the header of the file shows it.
   double rate_hz = 100;  ///< Intended number of readings per second; 0: as many as possible.
-  /// Writes only every Nth reading, and also each reading whose alarms, or which of them are reported, differ from
-  /// those of the reading before. 1: writes all.
+  /// Writes every Nth reading, and each one with other alarms than the one before; 1: all.
   std::uint64_t every = 1;
   std::uint64_t count = 0;         ///< Number of written readings after which the recording ends; 0: no limit.
   std::optional<Time> duration{};  ///< Time after which the recording ends; without a value: no limit.
@@ -32,20 +29,17 @@ struct RecordingSettings {
   std::optional<Time> part_time{};  ///< Time after which the next part begins; without a value: no limit.
 };
 
-/// A recording in progress. With a limit of the parts, the files of log.csv are log-0001.csv, log-0002.csv and so on;
-/// each has the header and can be read alone.
+/// A recording in progress. Parts of log.csv are log-0001.csv, log-0002.csv and so on.
 class Recording {
  public:
-  /// Creates the first file, for readings of `encoder`, which must outlive this object. Throws UsageError, and
-  /// os::Failure, also if the file exists.
+  /// Creates the first file, for readings of `encoder`, which must outlive this object. Throws UsageError, Failure,
+  /// os::Failure.
   Recording(const RecordingSettings& settings, Encoder& encoder);
   ~Recording();
 
-  /// Reads and writes until the settings, Encoder::cancel, end_when or an interrupt end the recording; then flushes to
-  /// the disk. Calls `on_written` with each sample: after its row was appended, or at once if it gets no row. If the
-  /// port is lost, waits until it is open again. Also writes rows for loss and return of the port and, while it is
-  /// open, for readings that were due but not taken. Returns whether the last sample was a reading. Throws UsageError,
-  /// Failure, and os::Failure from the disk, with kind `lost` if the file was removed, moved, replaced or cut.
+  /// Reads and writes until the settings, Encoder::cancel, end_when or an interrupt end the recording. Calls
+  /// `on_written` with each sample. Returns whether the last sample was a reading. Throws UsageError, Failure,
+  /// os::Failure.
   bool run(const std::function<void(const Sample&)>& on_written = {});
 
   /// Returns the counts of the rows in all files.

@@ -21,7 +21,7 @@ enum class ColumnType : std::uint8_t { int64, uint64, real, boolean, flags, text
 struct Column {
   /// How people see the value in text and tables.
   struct Presentation {
-    /// Format of a real number, as for std::format, "{:.6f}"; "": the shortest text that yields the same number.
+    /// Format of a real number, as for std::format; "": the shortest text of the same number.
     std::string_view format{};
     bool is_detail = false;  ///< Whether tables with one line for each row leave the value out.
     /// Whether the number is shown in hexadecimal; tables of values show it in decimal nevertheless.
@@ -40,52 +40,46 @@ struct Column {
 /// Type of a value that is a sequence of bytes.
 using ByteVector = std::vector<std::uint8_t>;
 
-/// Alternative of `Value` for a value that the encoder reported as invalid, or that is computed from values not known
-/// to be valid. The value itself is not stored.
+/// Alternative of `Value` for a value that is invalid; the value itself is not stored.
 struct Invalid {
   /// Returns true, because all invalid values are equal.
   friend bool operator==(const Invalid&, const Invalid&) = default;
 };
 
-/// Alternative of `Value` for a value that is not known: no reply has reported the value, or whether it is valid.
+/// Alternative of `Value` for a value that is not known.
 struct Unknown {
   /// Returns true, because all unknown values are equal.
   friend bool operator==(const Unknown&, const Unknown&) = default;
 };
 
-/// Type of a value in a row. The alternatives are: std::monostate, if the row has no value; the types of `ColumnType`
-/// in their order; `Invalid`; `Unknown`.
+/// Type of a value in a row: std::monostate without a value; the types of `ColumnType` in their order; `Invalid`;
+/// `Unknown`.
 using Value = std::variant<std::monostate, std::int64_t, std::uint64_t, double, bool, Flags, std::string, ByteVector,
                            Invalid, Unknown>;
 
-/// Returns whether the value has one of the types of `ColumnType`, and is not missing, invalid or unknown.
+/// Returns whether the value is not missing, invalid or unknown.
 [[nodiscard]] inline bool has_value(const Value& value) {
   return value.index() != 0 && !std::holds_alternative<Invalid>(value) && !std::holds_alternative<Unknown>(value);
 }
 
-/// Returns flags as a value; `Unknown` if no flag is raised and `Flags::is_complete` is false, so that some flag may be
-/// raised without being reported.
+/// Returns flags as a value, or `Unknown` if too few of them are reported.
 [[nodiscard]] Value value_of(const Flags& flags);
-/// Returns the validity as a boolean value, true if it is `valid`; no value if the validity is absent, `Unknown` if it
-/// is unknown.
+/// Returns whether the validity is `valid`; no value if it is absent, `Unknown` if it is unknown.
 [[nodiscard]] Value value_of(Validity validity);
 
-/// Returns the value as text, "12.5", "yes", "over_heat battery_alarm" or "1A 00"; "" if the value is missing, invalid
-/// or unknown, or if no flag is raised.
+/// Returns the value as text, as "12.5", "yes" or "1A 00"; "" if there is none.
 [[nodiscard]] std::string to_text(const Value& value);
 /// Returns the value of a column as text with its unit: "80 degC".
 [[nodiscard]] std::string to_text(const Column& column, const Value& value);
 
-/// A row: values with their columns, which the owner of the row owns. They are valid while the owner is unchanged.
+/// A row: values with their columns, which the owner of the row owns.
 struct Row {
   std::span<const Column> columns;  ///< Descriptions of the values; the owner of the row owns them.
   std::vector<Value> values;        ///< Values of the row, one for each column.
 
-  /// Returns the value of the column `name`. If there is no such column, throws UsageError, which suggests a similar
-  /// name or lists all.
+  /// Returns the value of the column `name`. Throws UsageError.
   [[nodiscard]] const Value& operator[](std::string_view name) const;
-  /// Returns the value of the column `name` as type `T`. Throws UsageError if there is no such column, and
-  /// std::bad_variant_access if the value has another type or is missing.
+  /// Returns the value of the column `name` as type `T`. Throws UsageError, std::bad_variant_access.
   template <class T>
   [[nodiscard]] const T& get(std::string_view name) const {
     return std::get<T>((*this)[name]);
@@ -101,8 +95,7 @@ struct Row {
 struct Answer {
   std::vector<Column> columns;  ///< Descriptions of the values, one for each value.
   std::vector<Value> values;    ///< Values in the order of the columns.
-  /// Owners of the column names. Without them, a name from the user's description of a position word would live only as
-  /// long as the encoder.
+  /// Owners of the column names, some of which would otherwise live only as long as the encoder.
   std::vector<std::shared_ptr<const std::string>> names;
 
   /// Returns columns and values as a row, which is valid while this object is unchanged.
@@ -111,9 +104,7 @@ struct Answer {
   [[nodiscard]] const Value& operator[](std::string_view name) const;
 };
 
-/// A sink that collects the fields of a reply into an answer. `put_reading` then replaces the fields of an invalid
-/// position by `Invalid`, and those of a position whose validity is unknown by `Unknown`. If a field repeats, as in a
-/// list, the last value is stored.
+/// A sink that collects the fields of a reply into an answer.
 class AnswerSink final : public FieldSink {
  public:
   /// Adds the field as a column with its value, or replaces the value if the column exists.

@@ -12,25 +12,20 @@
 
 namespace absenc::client {
 
-/// Rows of samples, and of gaps in which readings were due but not taken; `columns` describes their values. `message`,
-/// `sent` and `received` describe the failure or event of a row without a reading. The event of a reading is empty or
-/// "restarted".
+/// Rows of samples, and of gaps in which readings were due but not taken.
 class SampleRows {
  public:
   /// Whether rows also have the columns of the motion, which is computed from several readings.
   enum class With : std::uint8_t { reading, motion };
 
-  /// Makes the columns. `time_s` is the time since `start`, a time of os::now. With settings in `joint` the rows also
-  /// have its angles: `joint_deg` or `joint_mm`, with motion `joint_speed_...` and its uncertainty, and
-  /// `electrical_deg`.
+  /// Makes the columns. `time_s` is the time since `start`, a time of os::now.
   SampleRows(const Unit& unit, const Options& options, Time start, With with, const Joint& joint = {});
 
   /// Returns the columns of each row, in their order.
   [[nodiscard]] std::span<const Column> columns() const { return columns_; }
   /// Returns the row of a sample. The row is valid until the next call.
   [[nodiscard]] const Row& of(const Sample& sample);
-  /// Returns the row of a gap at the time `at`, in which `missed` readings were due but not taken. Only for rows with
-  /// motion. The row is valid until the next call.
+  /// Returns the row of a gap, valid until the next call. Only for rows with motion.
   [[nodiscard]] const Row& of_gap(Time at, std::uint64_t missed);
 
  private:

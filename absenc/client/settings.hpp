@@ -19,22 +19,20 @@ struct Setting {
   const Command* setter;  ///< Command that writes the setting; null: the setting can only be read.
   const Command* getter;  ///< Command that reads the setting; null: the setting can only be written.
 
-  /// Returns the name of the setting: that of the command that reads it, or of the one that writes it if there is none.
+  /// Returns the name of the command that reads the setting, or else of the one that writes it.
   [[nodiscard]] std::string_view name() const { return getter != nullptr ? getter->name : setter->name; }
 };
 
-/// Returns the unit's commands that read identity, temperature and settings and need no arguments, in the order for a
-/// report.
+/// Returns commands that read identity, temperature and settings and need no arguments.
 [[nodiscard]] std::vector<const Command*> questions(const Unit& unit);
 /// Returns those commands of `questions(unit)` that exist with these options.
 [[nodiscard]] std::vector<const Command*> questions(const Unit& unit, const Options& options);
 
-/// Returns the commands that read the unit's settings, at least one. Throws UsageError if there are none.
+/// Returns the commands that read the unit's settings. Throws UsageError if there are none.
 [[nodiscard]] std::vector<const Command*> readable_settings(const Unit& unit);
-/// Returns the command that reads the setting `name`. Throws UsageError if there is no such setting that can be read.
+/// Returns the command that reads the setting `name`. Throws UsageError.
 [[nodiscard]] const Command& require_readable_setting(const Unit& unit, std::string_view name);
-/// Returns the setting `name`, which can be written. Throws UsageError if the setting can only be read, or if there is
-/// no setting of this name.
+/// Returns the setting `name`, which can be written. Throws UsageError.
 [[nodiscard]] Setting require_setting(const Unit& unit, std::string_view name);
 
 /// Result of writing a setting.
@@ -42,15 +40,14 @@ struct SettingChange {
   Answer now;           ///< Value of the setting that was read back; if the setting cannot be read, the written value.
   bool was_so = false;  ///< Whether no write was sent, because the encoder already had this value.
   ChangeState state = ChangeState::none;  ///< State of the change; not_sent if the encoder already had this value.
-  /// A sentence about a new address of the encoder, "from now on it is reached with address=3"; "": the address is
-  /// unchanged.
+  /// A sentence about a new address of the encoder; "": the address is unchanged.
   std::string note{};
 };
 
 class Encoder;
 
-/// Access to the settings of an open encoder, from Encoder::settings. Functions throw UsageError, EncoderFailure if a
-/// command fails, and exceptions of the port.
+/// Access to the settings of an open encoder. Functions throw UsageError, EncoderFailure, Failure and exceptions of the
+/// port.
 class Settings {
  public:
   /// Reads and writes the settings of `encoder`, which must outlive this object.
@@ -58,10 +55,7 @@ class Settings {
 
   /// Reads the setting `name` and returns its value.
   [[nodiscard]] Answer get(std::string_view name);
-  /// Writes the setting `name` without asking the user for confirmation, reads it back if it can be read, and returns
-  /// the result. If the setting changes how the encoder is reached, the connection uses the new value from then on.
-  /// Throws Failure if the setting reads back differently. If the port is lost in the command after its write, throws a
-  /// Failure that lists the values with which the encoder may be left, or the os::Failure if the command reports none.
+  /// Writes the setting `name`, reads it back if it can be read, and returns the result. Does not ask for confirmation.
   SettingChange set(std::string_view name, std::span<const std::int64_t> arguments);
 
  private:

@@ -8,8 +8,7 @@ namespace absenc::client {
 
 namespace {
 
-// Returns one end of Wilson's score interval, which also holds for shares of 0 and 1. `side`: -1 for the lower end, 1
-// for the upper.
+// `side`: -1 for the lower end of the interval, 1 for the upper.
 double wilson(const Share& share, double side) {
   if (share.of == 0) return side > 0 ? 1 : 0;
   if (share.count == 0 && side < 0) return 0;  // exactly 0, without rounding errors

@@ -6,7 +6,7 @@
 
 namespace absenc::client {
 
-/// A number of hits among a number of tries. The true rate is within Wilson's score interval with 95 % confidence.
+/// A number of hits among a number of tries.
 struct Share {
   std::uint64_t count = 0;  ///< Number of hits.
   std::uint64_t of = 0;     ///< Number of tries.

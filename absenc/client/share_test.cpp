@@ -6,7 +6,7 @@
 namespace absenc::client {
 namespace {
 
-// The expected ends of the interval were computed by hand from Wilson's formula, for 0 of 100 and 10 of 100.
+// Computed by hand from Wilson's formula, for 0 of 100 and 10 of 100.
 TEST(ShareTest, MatchesWilsonInterval) {
   EXPECT_NEAR((Share{0, 100}).low(), 0, 1e-12);
   EXPECT_NEAR((Share{0, 100}).high(), 0.037, 1e-3);

@@ -25,11 +25,8 @@ struct TapChoices {
   bool replaces = false;  ///< Whether an existing file `record` may be replaced.
 };
 
-/// An input range of rows with the columns of `Decoded`, one for each exchange on the line, or for other bytes. Rows
-/// are ordered by the end of their frames and available as soon as their last frame is complete; an unanswered request
-/// may follow later rows. Up to 64 MiB of bytes that arrive while the caller is busy are stored. `time_s` is the time
-/// of arrival at this computer since the first byte. It is too coarse for the latency of an encoder, so `turnaround_us`
-/// is empty.
+/// An input range of rows with the columns of `Decoded`. `time_s` is the time of arrival at this computer since the
+/// first byte; it is too coarse for latencies, so `turnaround_us` is empty.
 class Tap {
  public:
   /// Type of the values in the range.
@@ -37,10 +34,9 @@ class Tap {
   /// Iterator over the range.
   using Iterator = InputIterator<Tap>;
 
-  /// Opens `place` and waits until protocol and options are known. `place` is a port with its settings
-  /// ("/dev/ttyUSB0?baud=115200", "tcp:HOST:PORT"), or "-" for raw bytes from standard input. Writes nothing to a
-  /// serial port. Throws os::Failure, os::Interrupted, UsageError, and Failure if the port is lost, if nothing is
-  /// received, or if no protocol explains the received bytes.
+  /// Opens `place` and waits until protocol and options are known. `place` is a port with its settings, as
+  /// "/dev/ttyUSB0?baud=115200" or "tcp:HOST:PORT", or "-" for standard input. Throws os::Failure, os::Interrupted,
+  /// UsageError, Failure.
   explicit Tap(const std::string& place, const TapChoices& choices = {});
   /// Moves the tap; afterwards the other object may only be destroyed or assigned to.
   Tap(Tap&&) noexcept;
@@ -48,8 +44,8 @@ class Tap {
   Tap& operator=(Tap&&) noexcept;
   ~Tap();
 
-  /// Waits for the first row and returns an iterator to it, at the end if there is no row; call it once. Throws
-  /// os::Failure, Failure, os::Interrupted or, after `cancel`, Cancelled, as every later step does.
+  /// Waits for the first row and returns an iterator to it; call it once. Throws os::Failure, Failure, os::Interrupted
+  /// or Cancelled, as every later step does.
   [[nodiscard]] Iterator begin();
   /// Returns the end of the range, for comparison with an iterator.
   [[nodiscard]] static Iterator::End end() { return {}; }
@@ -57,12 +53,12 @@ class Tap {
   [[nodiscard]] const Row* current() const { return row_; }
   /// Waits until the next row is complete or the range ends, and moves there.
   void advance();
-  /// Cancels from any thread: a caller that waits for a row, now or later, gets the exception Cancelled.
+  /// Cancels from any thread: the caller soon gets the exception Cancelled.
   void cancel();
 
   /// Returns the identifier of the unit with which the tap decodes.
   [[nodiscard]] std::string_view protocol() const;
-  /// Returns the options with which the tap decodes, as a short list of settings, each "name=value".
+  /// Returns the options with which the tap decodes, as settings "name=value".
   [[nodiscard]] std::vector<std::string> options() const;
   /// Returns the columns of each row, in their order.
   [[nodiscard]] std::span<const Column> columns() const;

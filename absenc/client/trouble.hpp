@@ -24,8 +24,7 @@ struct Trouble {
   /// Finding of client/doctor.hpp that the failed reading suggests, "only_echo: ..."; "": none.
   std::string finding{};
 
-  /// Returns error, message, exchange, advice and change as text of several lines, without the finding and without a
-  /// last line end.
+  /// Returns error, message, exchange, advice and change as text of several lines.
   [[nodiscard]] std::string text() const;
 };
 

@@ -35,7 +35,7 @@ struct Reading {
   /// false: no reply so far reports whether `singleturn` is valid, so it must not be used.
   bool singleturn_known = true;
   bool multiturn_known = true;  ///< false: no reply so far reports whether `multiturn` is valid
-  /// true: the encoder counts turns below zero, and `multiturn` is a two's complement number of `multiturn_bits` bits.
+  /// true: the encoder counts turns below zero, and `multiturn` is in two's complement
   bool multiturn_signed = false;
   double unit_um = 0;                 ///< linear encoders: micrometres per count of `singleturn`; 0: rotary encoder
   bool ready = true;                  ///< false while the encoder reports that it is starting
@@ -43,7 +43,7 @@ struct Reading {
   std::uint32_t alarms = 0;           ///< bits named by the unit's alarms field, then those of its second alarms field
   std::uint32_t status_reported = 0;  ///< bits of `status` that the encoder reported; the others are unknown, not clear
   std::uint32_t alarms_reported = 0;  ///< bits of `alarms` that the encoder reported; the others are unknown, not clear
-  /// Time for which the position is taken to hold: the known or assumed time of sampling, or else that of arrival.
+  /// Time for which the position is taken to hold.
   Time latched{};
   Time received{};  ///< time at which the last byte of the reply arrived
 
@@ -51,14 +51,13 @@ struct Reading {
   [[nodiscard]] constexpr bool singleturn_valid() const {
     return singleturn_bits != 0 && singleturn_valid_bits == singleturn_bits;
   }
-  /// Returns `valid` if all bits of the single-turn position can be trusted; else the reason why not. A position of
-  /// which only some bits are valid is `invalid`.
+  /// Returns `valid` if all bits of the single-turn position can be trusted; else why not.
   [[nodiscard]] constexpr Validity singleturn_validity() const {
     if (singleturn_bits == 0) return Validity::absent;
     if (!singleturn_known) return Validity::unknown;
     return singleturn_valid() ? Validity::valid : Validity::invalid;
   }
-  /// Returns the number of revolutions; it is below zero only if the encoder counts them with a sign.
+  /// Returns the number of revolutions, with a sign if the encoder counts them so.
   [[nodiscard]] constexpr std::int64_t turns() const {
     if (multiturn_signed && multiturn_bits != 0) return with_sign(multiturn, multiturn_bits);
     return static_cast<std::int64_t>(multiturn);
@@ -71,14 +70,13 @@ struct Reading {
   }
 };
 
-/// Returns the angle in degrees, 0 to below 360, of a position of 1 to 64 bits. A revolution has 2^bits counts, not
-/// 2^bits - 1.
+/// Returns the angle in degrees, 0 to below 360; a revolution has 2^bits counts, 1 to 64 bits.
 [[nodiscard]] constexpr double degrees(std::uint64_t counts, unsigned bits) {
   if (bits > 48) return degrees(counts >> (bits - 48), 48);  // the result for many bits could be rounded up to 360
   return 180.0 * static_cast<double>(counts) / static_cast<double>(std::uint64_t{1} << (bits - 1));
 }
 
-/// Converts counts of a linear encoder to micrometres, or counts per second to micrometres per second.
+/// Converts counts, or counts per second, of a linear encoder to micrometres (per second).
 [[nodiscard]] constexpr double micrometres(double counts, double unit_um) { return counts * unit_um; }
 /// Returns the position of a linear encoder in micrometres.
 [[nodiscard]] constexpr double micrometres(std::uint64_t counts, double unit_um) {
@@ -89,8 +87,8 @@ struct Reading {
   return micrometres(static_cast<double>(counts), unit_um);
 }
 
-/// Returns the shortest signed distance from `from` to `to` on a circle of 2^bits counts, 1 to 63 bits. The result
-/// is from -2^(bits-1) to 2^(bits-1) - 1.
+/// Returns the shortest signed distance from `from` to `to` on a circle of 2^bits counts, 1 to 63 bits: from
+/// -2^(bits-1) to 2^(bits-1) - 1.
 [[nodiscard]] constexpr std::int64_t wrapped_difference(std::uint64_t to, std::uint64_t from, unsigned bits) {
   return with_sign(to - from, bits);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cyclic redundancy check of a fixed number of bits, up to 64, whose parameters may be chosen at run time.
+// Cyclic redundancy check of up to 64 bits in one number, with parameters known at run time.
 #pragma once
 
 #include <array>
@@ -11,14 +11,12 @@
 
 namespace absenc {
 
-/// The CRC of up to `4 * rows` bits in one number. It is linear: a table has the remainder of each four bits at each
-/// place, so that no look-up waits for the result of another. `Entry`: std::uint16_t; std::uint8_t is enough for widths
-/// up to 8.
+/// The CRC of up to `4 * rows` bits in one number. `Entry` may be std::uint8_t for widths up to 8.
 template <class Entry = std::uint16_t, std::size_t rows = 16>
 class BitCrc {
  public:
   constexpr BitCrc() = default;
-  /// Makes the table of a CRC of 0 to 16 bits over `count` bits, at most `4 * rows`. refin and refout must be false.
+  /// Makes the table of a CRC over `count` bits, at most `4 * rows`. refin and refout must be false.
   constexpr BitCrc(const CrcParameters& parameters, unsigned count) : used_((count + 3) / 4) {
     const auto mask = static_cast<std::uint32_t>(low_mask(parameters.width));
     const auto step = [&](std::uint32_t remainder, bool bit) {

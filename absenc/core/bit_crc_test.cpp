@@ -34,8 +34,7 @@ TEST(BitCrc, EqualsDefinitionForEveryWidthAndLength) {
   }
 }
 
-// Checks that with init 0 the CRC of `count` bits equals that of 64 bits, the first of which are 0. A count that is no
-// multiple of 4 uses a part of its last row of the table.
+// A count that is no multiple of 4 uses a part of its last row of the table.
 TEST(BitCrc, LeadingZerosChangeOnlyInitialValue) {
   sim::Random random(4);
   const CrcParameters parameters{16, 0x90D9, 0, false, false, 0xFFFF};

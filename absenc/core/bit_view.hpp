@@ -26,8 +26,7 @@ struct BitView {
     return ((bytes[index / 8] >> (7 - index % 8)) & 1) != 0;
   }
 
-  /// Returns `count` bits (0 to 64) that begin at index `first`, the first one as the most significant. All `count`
-  /// bits must lie within the view.
+  /// Returns `count` (0 to 64) bits from index `first` on, the first as the highest. All must lie within the view.
   [[nodiscard]] constexpr std::uint64_t load(std::size_t first, unsigned count) const {
     if (count == 0) return 0;
     std::uint64_t value = 0;
@@ -37,8 +36,7 @@ struct BitView {
     return value << count | window(first) >> (register_bits - count);
   }
 
-  /// Returns the same as `load` for 1 to 64 bits, without a loop where a machine word has 64 bits and the view 8 bytes
-  /// or more. The code is repeated where it is called.
+  /// Returns the same as `load`, for 1 to 64 bits.
   [[nodiscard, gnu::always_inline]] constexpr std::uint64_t load_quickly(std::size_t first, unsigned count) const {
     if constexpr (register_bits < 64) return load(first, count);
     const std::uint64_t begin = window(first);
@@ -46,7 +44,7 @@ struct BitView {
     return begin >> 32 << (count - 32) | std::uint64_t{window(first + 32)} >> (96 - count);
   }
 
-  /// Returns the index behind the run of equal bits that begins at `first`; `size` if the run reaches the end.
+  /// Returns the index behind the run of equal bits from index `first` on, at most `size`.
   [[nodiscard]] constexpr std::size_t end_of_run(std::size_t first) const {
     const std::size_t ones = first < size && (*this)[first] ? 0 : ~std::size_t{0};
     for (std::size_t at = first; at < size; at += window_bits) {
@@ -59,8 +57,8 @@ struct BitView {
   static constexpr unsigned register_bits = sizeof(std::size_t) * 8;  ///< Number of bits of a machine word.
   static constexpr unsigned window_bits = register_bits - 7;          ///< Number of bits that `window` always has.
 
-  /// Returns one machine word whose top bit is the view's bit `first`, which is less than 8 * bytes.size(). At least
-  /// its top `window_bits` bits are the view's bits from `first` on; bits behind the last byte are 0.
+  /// Returns a word whose top `window_bits` bits are the view's from `first` on; 0 behind the last byte. `first` must
+  /// lie within `bytes`.
   [[nodiscard, gnu::always_inline]] constexpr std::size_t window(std::size_t first) const {
     if (bytes.size() < sizeof(std::size_t)) return short_window(bytes.data(), bytes.size(), first);
     const std::size_t at = std::min(first / 8, bytes.size() - sizeof(std::size_t));
@@ -73,14 +71,13 @@ struct BitView {
   }
 
  private:
-  // Loads a machine word without a loop, so that the compiler emits a single load where the processor has one.
+  // Has no loop, so that the compiler can emit a single load.
   template <std::size_t... i>
   [[nodiscard]] constexpr std::size_t register_at(std::size_t at, std::index_sequence<i...>) const {
     const std::uint8_t* from = bytes.data() + at;
     return ((std::size_t{from[i]} << (register_bits - 8 - 8 * i)) | ...);
   }
-  // Returns the same machine word as `window`, for views with fewer bytes than a machine word.
-  // The arguments fit into registers: a call with the address of a view would make every view live in memory.
+  // Takes no view: a call with the address of a view would make the view live in memory.
   [[nodiscard, gnu::noinline]] static constexpr std::size_t short_window(const std::uint8_t* bytes, std::size_t count,
                                                                          std::size_t first) {
     std::size_t value = 0;
@@ -90,7 +87,7 @@ struct BitView {
   }
 };
 
-/// A bit sequence of up to 64 bits in one number, the first bit as the most significant. Has `load` like BitView.
+/// A bit sequence of 1 to 64 bits in one number, the first bit as the highest.
 struct BitNumber {
   std::uint64_t number;  ///< The bits as a number, the first bit highest.
   unsigned size;         ///< number of bits in `number`, 1 to 64
@@ -105,8 +102,8 @@ struct BitNumber {
 template <std::size_t Capacity>
 class BitBuffer {
  public:
-  /// Appends the low `count` (0 to 64) bits of `value`, most significant first. Returns false, and stores nothing, if
-  /// the buffer has room for fewer than `count` bits.
+  /// Appends the low `count` (0 to 64) bits of `value`, highest first. Returns false, and stores nothing, if they do
+  /// not fit.
   constexpr bool append(std::uint64_t value, unsigned count) {
     if (count > Capacity - size_) return false;
     for (unsigned i = count; i-- > 0;) {
@@ -133,8 +130,7 @@ class BitBuffer {
   std::size_t size_ = 0;
 };
 
-/// Returns the CRC of the `count` bits of `bits` that begin at index `first`. If `count` is no multiple of 8, zeros are
-/// put before the bits; they do not change the CRC, because its register begins at 0.
+/// Returns the CRC of `count` bits of `bits` from index `first` on.
 template <CrcParameters parameters, CrcTable table = CrcTable::byte, class Bits>
 [[nodiscard]] constexpr auto crc_of(const Bits& bits, std::size_t first, std::size_t count) {
   static_assert(parameters.init == 0 && !parameters.refin);

@@ -10,8 +10,7 @@ namespace {
 
 constexpr std::array<std::uint8_t, 10> bytes{0x80, 0xFF, 0x12, 0x34, 0x56, 0x78, 0x9A, 0xBC, 0xDE, 0xF0};
 
-// Checks every load from buffers of 1 to 10 bytes: some are shorter than a machine word, and loads reach the end of
-// each buffer.
+// Some buffers are shorter than a machine word, and loads reach the end of each buffer.
 TEST(BitView, LoadsAnyRunAtAnyPlace) {
   for (std::size_t size = 8; size <= 80; size += 8) {
     const std::vector<std::uint8_t> end(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size / 8));

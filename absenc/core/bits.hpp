@@ -18,8 +18,7 @@ namespace absenc {
 /// Returns whether an odd number of bits of `value` is set.
 [[nodiscard]] constexpr bool odd_parity(std::uint64_t value) { return (std::popcount(value) & 1) != 0; }
 
-/// Returns the low `bits` bits of `value` in reverse order. 1 to 32 bits: a small processor shifts 32 bits in one
-/// instruction.
+/// Returns the low `bits` (1 to 32) bits of `value` in reverse order.
 [[nodiscard]] constexpr std::uint32_t reflect(std::uint32_t value, unsigned bits) {
   std::uint32_t reversed = 0;
   for (unsigned i = 0; i < bits; ++i) reversed |= ((value >> i) & 1) << (bits - 1 - i);

@@ -14,8 +14,7 @@ using Bytes = std::span<const std::uint8_t>;
 /// A view of bytes that belong to another object and may be written.
 using MutableBytes = std::span<std::uint8_t>;
 
-/// A buffer for up to Capacity items, which are stored inside the object. Items for which there is no room are refused
-/// together, never truncated.
+/// A buffer for up to Capacity items, which are stored inside the object.
 template <class Item, std::size_t Capacity>
 class Buffer {
  public:
@@ -28,11 +27,10 @@ class Buffer {
     return true;
   }
 
-  /// Appends `items`. Returns false, and stores nothing, if the buffer has no room for all of `items`.
+  /// Appends `items`. Returns false, and stores nothing, if they do not all fit.
   constexpr bool append(std::span<const Item> items) {
     if (items.size() > Capacity - size_) return false;
-    // Counts in a local copy: the compiler must assume that a stored byte may alias `size_`, and would load `size_`
-    // again for each item.
+    // Counts in a local copy, because a stored byte may alias `size_`.
     std::size_t size = size_;
     for (const Item& item : items) items_[size++] = item;
     size_ = size;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cyclic redundancy checks of 3 to 16 bits, in the parameters of the Rocksoft model (width, poly, init, refin, refout,
-// xorout). `crc_bitwise` is the definition; `Crc` computes the same with a table made at compile time.
+// Cyclic redundancy checks of 3 to 16 bits, with the parameters of the Rocksoft model.
 #pragma once
 
 #include <array>
@@ -13,7 +12,7 @@
 
 namespace absenc {
 
-/// Parameters of a CRC. `poly` is in normal notation (the highest power left out): x8+x5+x3+x2+x+1 is 0x2F.
+/// Parameters of a CRC. `poly` is in normal notation: x8+x5+x3+x2+x+1 is 0x2F.
 struct CrcParameters {
   unsigned width;        ///< width of the checksum in bits, 3 to 16; for BitCrc 0 to 16
   std::uint16_t poly;    ///< Polynomial of the CRC without its highest term.
@@ -26,8 +25,7 @@ struct CrcParameters {
   friend constexpr bool operator==(const CrcParameters&, const CrcParameters&) = default;
 };
 
-/// Returns the CRC of `bytes`, computed bit by bit, straight from the definition. The tests compare the table-driven
-/// `Crc` with it.
+/// Returns the CRC of `bytes`, computed bit by bit.
 [[nodiscard]] constexpr std::uint16_t crc_bitwise(const CrcParameters& parameters, Bytes bytes) {
   const std::uint32_t top = std::uint32_t{1} << (parameters.width - 1);
   const auto mask = static_cast<std::uint32_t>(low_mask(parameters.width));
@@ -51,8 +49,7 @@ enum class CrcTable {
   nibble,  ///< table of 16 entries, two look-ups per byte: 16 or 32 bytes, for firmware
 };
 
-/// The running calculation of a CRC with a table. The remainder is stored reflected when `refin` is set, otherwise
-/// left-aligned in `Word`, so that widths that are no multiple of 8 (3 to 7, 9 to 15) need no special case.
+/// The running calculation of a CRC with a table.
 template <CrcParameters parameters, CrcTable table_kind = CrcTable::byte>
 class Crc {
   static_assert(parameters.width >= 3 && parameters.width <= 16, "widths from 3 to 16 bits");
@@ -62,7 +59,7 @@ class Crc {
   using Word = std::conditional_t<(parameters.width <= 8), std::uint8_t, std::uint16_t>;
 
   constexpr Crc() = default;
-  /// Starts with the register value `init` instead of `parameters.init`; the table does not depend on either.
+  /// Starts with the register value `init` instead of `parameters.init`.
   constexpr explicit Crc(std::uint16_t init) : remainder_(initial(init)) {}
 
   /// Adds a byte to the checksum.
@@ -110,7 +107,7 @@ class Crc {
   static constexpr std::uint32_t poly =
       parameters.refin ? reflect(parameters.poly, parameters.width) : std::uint32_t{parameters.poly} << spare_bits;
 
-  // Returns the remainder after `bits` bits of input when it was 0 before: one entry of the look-up table.
+  // Returns the remainder of `bits` bits of input: one entry of the table.
   static constexpr Word advance(std::uint32_t input, unsigned bits) {
     std::uint32_t remainder = 0;
     if constexpr (parameters.refin) {
@@ -136,7 +133,6 @@ class Crc {
 
   template <unsigned bits>
   constexpr void step(std::uint32_t input) {
-    // If the remainder has no more bits than the input, the shift removes all of them. 32 bits make the shift defined.
     const std::uint32_t remainder = remainder_;
     if constexpr (parameters.refin) {
       const std::uint32_t index = (remainder ^ input) & low_mask(bits);

@@ -22,8 +22,7 @@ constexpr bool checks(std::uint16_t expected) {
 constexpr CrcParameters modbus{16, 0x8005, 0xFFFF, true, true, 0x0000};
 constexpr CrcParameters biss{6, 0x03, 0x00, false, false, 0x3F};
 
-// CRCs of supported encoders give the published check values. The lines with (msb) check ESL's polynomials without
-// reflection, that is, before the bit order on the line is applied.
+// CRCs of supported encoders; (msb): ESL's polynomials without reflection.
 static_assert(checks<CrcParameters{8, 0x01, 0x00, true, true, 0x00}>(0x31), "T-format");
 static_assert(checks<CrcParameters{8, 0x97, 0x00, false, false, 0xFF}>(0x6B), "RLS EncoLink");
 static_assert(checks<biss>(0x2E), "BiSS-C");
@@ -35,8 +34,7 @@ static_assert(checks<CrcParameters{16, 0x5935, 0x0000, false, false, 0x00}>(0x5D
 static_assert(checks<CrcParameters{16, 0x5935, 0xFFFF, false, false, 0x00}>(0x772B), "ESL channel 2 (msb)");
 static_assert(checks<modbus>(0x4B37), "Modbus RTU");
 
-// CRCs from the public catalogue of parametrised CRC algorithms. Among them are widths that are no multiple of 8, an
-// xorout that is not 0, and a refin that differs from refout.
+// CRCs from the public catalogue of parametrised CRC algorithms.
 static_assert(checks<CrcParameters{3, 0x3, 0x0, false, false, 0x7}>(0x4), "CRC-3/GSM");
 static_assert(checks<CrcParameters{3, 0x3, 0x7, true, true, 0x0}>(0x6), "CRC-3/ROHC");
 static_assert(checks<CrcParameters{5, 0x05, 0x1F, true, true, 0x1F}>(0x19), "CRC-5/USB");
@@ -61,8 +59,7 @@ constexpr auto noise = [] {
   return bytes;
 }();
 
-// Sample 0 has the polynomial x^width + 1. Other samples have a pseudo-random polynomial; init and xorout are
-// pseudo-random in every sample.
+// Sample 0 has the polynomial x^width + 1, the others a pseudo-random one.
 constexpr CrcParameters sampled(unsigned width, std::uint64_t sample, bool refin, bool refout) {
   const std::uint64_t bits = mixed(width * 64 + sample);
   const std::uint64_t mask = low_mask(width);
@@ -84,7 +81,7 @@ template <CrcParameters parameters>
 constexpr Engines engines{parameters, [](Bytes bytes) -> std::uint16_t { return Crc<parameters>::of(bytes); },
                           [](Bytes bytes) -> std::uint16_t { return Crc<parameters, CrcTable::nibble>::of(bytes); }};
 
-// A refout different from refin changes only the final step, so one sample of each such pair suffices.
+// A refout different from refin changes only the final step: one sample of each pair is enough.
 template <unsigned width>
 constexpr std::array engines_of_width{
     engines<sampled(width, 0, false, false)>, engines<sampled(width, 1, false, false)>,

@@ -9,8 +9,7 @@ namespace absenc {
 /// Returns the Gray code of `binary`.
 [[nodiscard]] constexpr std::uint64_t gray_encode(std::uint64_t binary) { return binary ^ (binary >> 1); }
 
-/// Returns the number whose Gray code is `gray`, of any width up to 64 bits: the prefix XOR needs six shifts (four
-/// would stop at 16 bits).
+/// Returns the number, of up to 64 bits, whose Gray code is `gray`.
 [[nodiscard]] constexpr std::uint64_t gray_decode(std::uint64_t gray) {
   for (unsigned shift = 1; shift < 64; shift *= 2) gray ^= gray >> shift;
   return gray;

@@ -21,8 +21,8 @@ namespace absenc {
   return -1;
 }
 
-/// Parses pairs of hexadecimal digits into `bytes`; spaces are allowed around bytes. Returns the number of parsed
-/// bytes. Errors: invalid_argument (a character that is no digit, or half a byte), buffer_too_small.
+/// Parses pairs of hexadecimal digits, with spaces between pairs allowed, into `bytes`. Returns the number of bytes.
+/// Errors: invalid_argument, buffer_too_small.
 [[nodiscard]] constexpr Result<std::size_t> parse_hex(std::string_view text, MutableBytes bytes) {
   std::size_t count = 0;
   for (std::size_t i = 0; i < text.size();) {
@@ -63,7 +63,7 @@ consteval auto hex_bytes() {
 }
 }  // namespace detail
 
-/// Static bytes, at most 256, that a literal contains as hexadecimal text: `hex<"1A 00">` is two bytes.
+/// Bytes, at most 256, of a literal of hexadecimal text: `hex<"1A 00">` has two bytes.
 template <HexLiteral literal>
 inline constexpr auto hex = detail::hex_bytes<literal>();
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Errors between a host and an encoder, and a value-or-error type with the member names of std::expected.
+// Errors between a host and an encoder, and a value-or-error type.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace absenc {
 
-/// Errors, grouped by their source. Alarms and warnings that an encoder reports in a good frame are data, not errors.
+/// Errors, grouped by their source.
 enum class Error : std::uint8_t {
   none,
   // errors caused by the caller
@@ -68,7 +68,7 @@ inline constexpr std::array<ErrorText, 17> error_texts{{
     {"not_still", "the shaft is turning, and this needs it standing still", "stop the shaft, then try again"},
 }};
 
-/// Returns whether `error` means that the received bytes are damaged: they are no whole frame with a right checksum.
+/// Returns whether `error` means that the received bytes are damaged.
 [[nodiscard]] constexpr bool is_damage(Error error) {
   return (error >= Error::line_stuck && error <= Error::wrong_length) || error == Error::bad_checksum;
 }
@@ -76,7 +76,7 @@ inline constexpr std::array<ErrorText, 17> error_texts{{
 /// Returns name, description and advice for `error`.
 [[nodiscard]] constexpr const ErrorText& text_of(Error error) { return error_texts[static_cast<std::size_t>(error)]; }
 
-/// A value (initially T{}) or an Error other than `none`. The value of a failed result must not be read.
+/// A value (initially T{}) or an Error. The value of a failed result must not be read.
 template <class T>
 class [[nodiscard]] Result {
  public:
@@ -87,7 +87,7 @@ class [[nodiscard]] Result {
   constexpr Result(T&& value) : value_(std::move(value)) {}
   /// Makes a failed result that holds `error`, which is not `Error::none`.
   constexpr Result(Error error) : error_(error) {}
-  /// Makes a result that holds the value that `make` returns, which is constructed in place instead of moved.
+  /// Makes a result that holds the value that `make` returns, which is not moved.
   template <class Make>
   requires std::is_same_v<std::invoke_result_t<Make>, T>
   [[gnu::always_inline]] constexpr explicit Result(Make make) : value_(make()) {}

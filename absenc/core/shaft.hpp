@@ -10,7 +10,7 @@ namespace absenc {
 
 /// Position and motion of a shaft at one time.
 struct ShaftState {
-  /// Position in units of 2^-32 revolution; the upper 32 bits count revolutions, negative below zero.
+  /// Position in units of 2^-32 revolution.
   std::int64_t position = 0;
   std::int32_t speed_millirpm = 0;  ///< speed in 1/1000 revolutions per minute, counter-clockwise positive
   std::int32_t acceleration = 0;    ///< angular acceleration in rad/s^2

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Text functions for firmware, which has neither memchr nor the exceptions that std::string_view functions need.
+// Text functions for firmware, without memchr and exceptions.
 #pragma once
 
 #include <cstddef>

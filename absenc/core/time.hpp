@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The type of protocol time: nanoseconds since a start that the caller chooses. Core, link, protocol, host and sim read
-// no clock.
+// The type of protocol time: nanoseconds since a start that the caller chooses.
 #pragma once
 
-// libstdc++'s <bits/chrono.h> has the durations and clocks of <chrono>, but not its calendars and time zones, which
-// would cost half a second of compile time in every file.
+// libstdc++'s <bits/chrono.h> lacks the calendars and time zones, which are slow to compile.
 #if __has_include(<bits/chrono.h>)
 #include <bits/chrono.h>
 #else
@@ -18,8 +16,7 @@ using Time = std::chrono::nanoseconds;
 
 inline constexpr Time never = Time::max();  ///< A time that is never reached.
 
-/// Returns whether `one` is before `other`. Compares the counts as numbers: the operators of chrono use <=>, which
-/// costs a call on a small core instead of three instructions.
+/// Returns whether `one` is before `other`.
 [[nodiscard]] constexpr bool operator<(Time one, Time other) { return one.count() < other.count(); }
 /// Returns whether `one` is after `other`.
 [[nodiscard]] constexpr bool operator>(Time one, Time other) { return one.count() > other.count(); }

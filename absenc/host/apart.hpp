@@ -8,12 +8,10 @@
 
 namespace absenc::host {
 
-/// Meaning of `Reading::latched`: the time at which the encoder latched the position, or the time at which the reading
-/// arrived. Readings that waited in a buffer arrive together.
+/// The meaning of `Reading::latched`: the time of the latching, or that of the arrival.
 enum class Times : std::uint8_t { latched, arrived };
 
-/// Returns whether this encoder may transmit unsolicited, so that only the arrival times of its readings are certain:
-/// always on a CAN bus, otherwise if Unit::streams says so.
+/// Returns whether this encoder may transmit unsolicited.
 [[nodiscard]] constexpr bool sends_unsolicited(const Unit& unit, const Options& options) {
   return unit.link == LinkKind::can || (unit.streams != nullptr && unit.streams(options));
 }
@@ -24,9 +22,7 @@ class Apart {
   /// `times` is the meaning of the times that are added.
   explicit constexpr Apart(Times times) : times_(times) {}
 
-  /// Returns the longest time that can lie between the last added reading and a reading with the time `latched`. With
-  /// Times::arrived: readings that arrive together may have been latched anywhere in the wait before them, so the
-  /// result is at least that wait until as much time again has passed.
+  /// Returns the longest time that can lie between the last added reading and one at `latched`.
   [[nodiscard]] constexpr Time since_last(Time latched) const { return has_waited(latched) ? latched - last_ : wait_; }
 
   /// Adds a reading with the time `latched`.

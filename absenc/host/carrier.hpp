@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a machine from interrupts, where a program cannot wait as host::drive does. The carrier owns no port and no
-// clock; docs/firmware.md connects it to a UART, a DMA channel and a timer.
+// Runs a machine from interrupts, where a program cannot wait as host::drive does; see docs/firmware.md.
 #pragma once
 
 #include <algorithm>
@@ -13,21 +12,17 @@
 
 namespace absenc::host {
 
-/// Runs one conversation after the other on a line. Call all members in one context: from interrupts of one priority,
-/// or with these disabled.
+/// A driver of conversations on a line. Call all members in one context, for example from interrupts of one priority.
 ///
-/// Line has `void begin(const Step<Item>&)`, which starts a transfer, a pulse or a change of the rate and does not wait
-/// for its end, and `void result(bool over)`. The carrier calls `result(false)` for every `emit`, and `result(true)` at
-/// `done`, when `is_busy()` is false again.
+/// Line has `void begin(const Step<Item>&)`, which does not wait for the end of the step, and `void result(bool over)`:
+/// `over` is false at `emit` and true at `done`.
 template <class Item, class Line>
 class Carrier {
  public:
-  /// `latency`: delay of the path to the encoder, which is added to each limit of silence; for a UART on the chip at
-  /// most one character.
+  /// `latency`: delay of the path to the encoder, which is added to each limit of silence.
   explicit Carrier(Line& line, Time latency = {}) : line_(&line), latency_(latency) {}
 
-  /// Starts the conversation `machine`, which must live until it has ended. A conversation that still runs is
-  /// abandoned.
+  /// Starts the conversation `machine`, which must live until it has ended. Abandons one that still runs.
   void start(Machine<Item>& machine, Time now) {
     machine_ = &machine;
     expected_ = gathered_ = 0;
@@ -46,9 +41,7 @@ class Carrier {
     silent_since_ = now;
     deliver({.kind = Event<Item>::Kind::sent, .at = now});
   }
-  /// Reports received items; they are dropped while no conversation runs. If the machine sets a gap limit and expects
-  /// at least two characters, single characters are gathered. They are delivered when as many as the machine expects,
-  /// at most 16, have arrived, a silence, timer or line error is reported, or several items arrive in one call.
+  /// Reports received items; they are dropped while no conversation runs.
   void received(std::span<const Item> items, Time now) {
     if (items.size() == 1 && gathered_ + 1u < expected_) return gather(items.front(), now);
     take_input(items, now);
@@ -59,9 +52,7 @@ class Carrier {
     deliver_input({.kind = Event<Item>::Kind::line_error, .at = now});
   }
 
-  /// Begins the pending transfer, frame or pulse, or reports a silence or timer, if its time is reached. Call it at
-  /// `due()`; more calls do no harm. Calls that are late make the reports late, but do not report a silence that there
-  /// was not.
+  /// Does what is due at `now`. Call it at `due()`; more calls do no harm.
   void tick(Time now) {
     if (now < due()) return;
     deliver_gathered();
@@ -79,8 +70,7 @@ class Carrier {
     at_ = never;
     deliver({.kind = Event<Item>::Kind::timer, .at = now});
   }
-  /// Returns the time at which `tick` must be called; `never`: not before a conversation starts or another event is
-  /// reported.
+  /// Returns the time at which `tick` must be called, or `never`.
   [[nodiscard]] Time due() const {
     if (!is_busy()) return never;
     return waiting_ ? step_.at : std::min(at_, silence_end());
@@ -142,8 +132,7 @@ class Carrier {
     return silence_reported_ || limit == Time{} ? never : silent_since_ + limit + latency_;
   }
 
-  // Takes the machine's steps until it waits or is done. A transfer or pulse that begins later or has frames is stored
-  // in `step_`; the limits of the silence after it are in the wait step that follows.
+  // Takes the machine's steps until it waits or is done.
   void take_steps(Time now) {
     for (;;) {
       const Step<Item> step = machine_->next(now);
@@ -182,10 +171,10 @@ class Carrier {
     }
   }
 
-  // Room for the characters of most replies; longer replies are delivered in pieces. CAN: room for one frame.
+  // greatest number of items that are gathered
   static constexpr std::size_t room = sizeof(Item) == 1 ? 16 : 1;
 
-  // Members that are used for every received character come first, so that short instructions reach them.
+  // Members used for every received character come first, so that short instructions reach them.
   std::uint8_t expected_ = 0;  // number of characters to deliver in one piece; below 2: each character at once
   std::uint8_t gathered_ = 0;
   bool waiting_ = false;

@@ -1,17 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a machine on a port until the machine is done or the caller stops it: the loop of programs that may wait.
+// Runs a machine on a port: the loop of programs that may wait.
 #pragma once
 
 #include "absenc/link/port.hpp"
 
 namespace absenc::host {
 
-/// Runs `machine` on `port`. `on_emit()` is called for every `emit` step and returns whether to continue. Returns true
-/// when the machine is done, false when `on_emit` stopped it. Exceptions of the port and of `on_emit` pass through.
+/// Runs `machine` on `port`; `on_emit()` returns whether to continue after an `emit`. Returns whether the machine is
+/// done. Exceptions pass through.
 template <class Item, class OnEmit>
 bool drive(Machine<Item>& machine, Port<Item>& port, OnEmit&& on_emit) {
-  // Between two events the machine is given the time of the last event: reading the clock more often costs time and
-  // gains nothing.
+  // Between two events the clock is not read: that would cost time and gain nothing.
   for (Time now = port.now();;) {
     const Step<Item> step = machine.next(now);
     switch (step.kind) {
@@ -35,8 +34,7 @@ bool drive(Machine<Item>& machine, Port<Item>& port, OnEmit&& on_emit) {
   }
 }
 
-/// Feeds all items that have arrived at `port` to a machine that streams, and drops its results, so that the next
-/// result is new.
+/// Feeds the items that have arrived at `port` to a machine that streams, and drops its results.
 template <class Item>
 void catch_up(Machine<Item>& machine, Port<Item>& port) {
   for (Time now = port.now();;) {

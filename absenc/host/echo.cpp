@@ -35,8 +35,7 @@ ByteStep EchoFilter::next(Time now) {
   if (step.expect != 0) {
     step.expect += working_mode() == EchoMode::on ? echo_due_ : sent_.size() - std::min(sent_.size(), held_.size());
   }
-  // Until something besides the echo was received, the encoder may still take its answer time: the gap limit must not
-  // be shorter.
+  // The encoder may still take its answer time: the gap limit must not be shorter.
   if (!passed_) step.gap = std::max(step.gap, step.answer);
   return step;
 }
@@ -93,9 +92,7 @@ bool EchoFilter::is_reply(Bytes bytes) const {
   return unit_ != nullptr && unit_->check(*options_, {.bytes = sent_}, {.bytes = bytes}) == Error::none;
 }
 
-// Decides whether the held bytes, which begin like the request, begin with its echo. Their number decides; if they are
-// enough for echo and reply, there is no echo if the bytes are a valid reply from the first byte on, but not from the
-// length of the request on.
+// Decides whether the held bytes, which begin like the request, begin with its echo.
 void EchoFilter::decide(Time at) {
   const std::size_t echo = sent_.size();
   const bool echo_and_reply = held_.size() >= reply_due_ + echo;

@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Removes the local echo of an RS-485 adapter from the received bytes: by count, not by comparison, because a valid
-// reply may equal its request byte for byte. The removed bytes are compared with the request to detect a disturbed
-// line. In automatic mode the filter decides whether the adapter echoes: an echo begins like the request; then the
-// number of bytes decides, and where that is ambiguous, which bytes are a valid reply.
+// Removes the local echo of an RS-485 adapter from the received bytes. A valid reply may equal its request.
 #pragma once
 
 #include <cstdint>
@@ -26,8 +23,7 @@ class EchoFilter final : public Machine<std::uint8_t> {
   /// Makes a filter; `mode` states whether the adapter echoes.
   explicit EchoFilter(EchoMode mode) : mode_(mode) {}
 
-  /// Sets the unit that decides whether a reply is valid; `unit` and `options` must outlive the filter's use. Without a
-  /// unit no reply counts as valid, so that the number of bytes decides.
+  /// Sets the unit that decides whether a reply is valid; `unit` and `options` must outlive the filter's use.
   void use_unit(const Unit& unit, const Options& options) {
     unit_ = &unit;
     options_ = &options;
@@ -38,8 +34,7 @@ class EchoFilter final : public Machine<std::uint8_t> {
     sent_.clear();
     held_.clear();
   }
-  /// Ends the exchange; `good`: without an error. In automatic mode only a good conversation makes the detected mode
-  /// final: a reply with extra bytes can look like an echo that a reply follows.
+  /// Ends the exchange; `good`: without an error. Only a good one makes the detected mode final.
   void conclude(bool good);
 
   /// Processes an event that the port reports.

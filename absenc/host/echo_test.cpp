@@ -99,8 +99,6 @@ TEST(EchoFilter, DetectsDisturbedEcho) {
   }
 }
 
-// The silence between the echo and the reply is the encoder's answer time: the gap limit must not end the exchange in
-// it.
 TEST(EchoFilter, AnswerLimitAppliesAfterEcho) {
   Bench port_like(EchoMode::on);  // on a real port the echo is received after the `sent` event
   std::vector<std::byte> storage(port_like.unit.host_storage);

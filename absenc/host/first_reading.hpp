@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decides whether a position can be trusted. Encoders send well-formed wrong positions while they start, and no
-// checksum detects all damage: a position is trusted when it is near enough to the one before.
+// Decides whether a position can be trusted: encoders can send well-formed wrong positions.
 #pragma once
 
 #include <cstdint>
@@ -11,14 +10,10 @@
 
 namespace absenc::host {
 
-/// A check that compares each position with the position before: at its highest speed the shaft must be able to move
-/// from one to the other in the time between them. If it can move farther than 15/32 of the counted range in that time,
-/// every position up to 15/32 away is accepted. A movement that is too fast by a factor of `most_excess` at most is
-/// accepted if the movement before it was too fast as well, and nearly the same.
+/// A check that compares each position with the one before, by the highest speed of the shaft.
 class FirstReading {
  public:
-  /// Makes a check for a shaft of at most `maximum_rpm` revolutions per minute; 0: unknown, so the default of
-  /// `SpeedLimit` applies.
+  /// Makes a check for a shaft of at most `maximum_rpm` revolutions per minute; 0: the default of `SpeedLimit`.
   explicit constexpr FirstReading(std::uint32_t maximum_rpm)
       : FirstReading(Reach::of_shaft(maximum_rpm != 0 ? maximum_rpm : SpeedLimit{}.rpm)) {}
   /// Makes a check for a shaft or carriage that moves at most as far as `reach` states.
@@ -30,8 +25,7 @@ class FirstReading {
     has_step_ = false;
   }
 
-  /// Returns whether `reading` is ready and valid, and near enough to the stored position; false if no position is
-  /// stored. Then calls `keep` with `reading`.
+  /// Returns `is_near(reading)`, then calls `keep(reading)`.
   constexpr bool confirms(const Reading& reading) {
     const bool agrees = is_near(reading);
     keep(reading);
@@ -45,8 +39,8 @@ class FirstReading {
   /// Returns whether a position is stored, with which the next one is compared.
   [[nodiscard]] constexpr bool has_last() const { return last_.bits != 0; }
 
-  /// Returns whether the position of `reading` is accepted after the stored one and the time `between`, by the rules of
-  /// the class. False if no position is stored, if `reading` has none, or if their numbers of bits differ.
+  /// Returns whether `reading` is near enough to the position stored the time `between` before; false if none is
+  /// stored.
   [[nodiscard]] constexpr bool is_near(const Reading& reading, Time between) const {
     const Place place = place_of(reading);
     if (!is_like_last(place)) return false;
@@ -58,19 +52,18 @@ class FirstReading {
     if (!has_step_ || moved / most_excess > reached || distance(step_, place.bits) <= allowed) return false;
     return distance(step - step_, place.bits) <= least(allowed, most_judged(place.bits) / 8);
   }
-  /// Returns `is_near(reading, between)` for the time between the latch times of the stored position and of `reading`.
+  /// Returns `is_near` for the time between the latch times of the stored position and of `reading`.
   [[nodiscard]] constexpr bool is_near(const Reading& reading) const {
     return is_near(reading, reading.latched - latched_);
   }
 
-  /// Returns whether even at its highest speed the shaft moves by less than 15/32 of the counted range in the time
-  /// `between`; false if `reading` has no position.
+  /// Returns whether `between` is short enough to judge the position of `reading`.
   [[nodiscard]] constexpr bool can_judge(const Reading& reading, Time between) const {
     const Place place = place_of(reading);
     return place.bits != 0 && reach(place, between) < most_judged(place.bits);
   }
 
-  /// Stores the position of `reading` for the next comparison. A reading without a position clears the stored position.
+  /// Stores the position of `reading`, or that it has none, for the next comparison.
   constexpr void keep(const Reading& reading) {
     const Place place = place_of(reading);
     has_step_ = is_like_last(place);
@@ -105,7 +98,7 @@ class FirstReading {
   [[nodiscard]] static constexpr std::uint64_t least(std::uint64_t one, std::uint64_t other) {
     return one < other ? one : other;
   }
-  // Returns the length of the movement `step` in a counted range of 2^bits counts, in the shorter of both directions.
+  // Returns the length of the movement `step` modulo 2^bits in the shorter direction.
   [[nodiscard]] static constexpr std::uint64_t distance(std::uint64_t step, unsigned bits) {
     return least(step & low_mask(bits), (0 - step) & low_mask(bits));
   }
@@ -115,7 +108,7 @@ class FirstReading {
     const std::uint64_t counts = reach_.counts(between, place.singleturn_bits);
     return counts < ~noise ? counts + noise : counts;
   }
-  // Returns the largest distance that can be judged: 15/32 of the counted range, as in longest_gap.
+  // Returns the largest distance that can be judged, as in longest_gap.
   [[nodiscard]] static constexpr std::uint64_t most_judged(unsigned bits) {
     constexpr std::uint64_t share = 15;
     return bits >= 5 ? share << (bits - 5) : (share << bits) >> 5;

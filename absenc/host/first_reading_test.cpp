@@ -68,7 +68,7 @@ TEST(FirstReading, ConfirmsFasterShaftAtThirdPosition) {
 }
 
 TEST(FirstReading, RefusesMuchFasterShaft) {
-  // Steps in counts of 13 bits: the limit allows 819 in 1 ms, and four times as many at the third position.
+  // Counts of 13 bits: 819 are allowed in 1 ms, and four times as many at the third position.
   for (const std::uint64_t step : {1638u, 3276u, 3500u}) {
     FirstReading first(6000);
     EXPECT_FALSE(first.confirms(of_bits(15, 0, 0ms)));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs conversations on a simulated line behind the ReplyGuard, as a session does: for the test campaigns of the units.
+// Runs conversations on a simulated line behind the ReplyGuard, as a session does.
 #pragma once
 
 #include <cstdint>
@@ -19,9 +19,7 @@ class GuardedHost {
     valid_ = resolve_options(unit, {}, options, options_).kind == OptionError::Kind::none;
   }
 
-  /// Runs `conversation`. Returns whether the conversation ended within the time `limit`; one that sends a request for
-  /// each result without end counts as ended at its first result. False also if the options of the constructor are
-  /// invalid. `may_repeat`: whether its requests may be repeated because they only read.
+  /// Runs `conversation`; returns whether it ended, or gave a result if it `asks`, within `limit`.
   [[nodiscard]] bool run(Conversation<Item>& conversation, Time limit, bool may_repeat = true) {
     streams_ = conversation.asks();
     emitted_ = false;
@@ -51,8 +49,7 @@ class GuardedHost {
   bool emitted_ = false;
 };
 
-/// Returns how many of the injected faults were of kinds that change bytes, so that a wrong frame can be valid. All
-/// other faults leave frames intact, so no wrong reading may follow from these other faults.
+/// Returns the number of injected faults of the kinds that change bytes.
 [[nodiscard]] inline std::uint64_t changed_bytes(const sim::FaultyDevice& faulty) {
   using sim::FaultKind;
   std::uint64_t sum = 0;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests Reach and longest_gap with random speeds, and unwrapping and velocity with random motions, below and above the
-// speed at which they are valid.
+// Tests reach, unwrapping and velocity with random speeds and motions.
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -44,8 +43,7 @@ RC_GTEST_PROP(UnwrapProperty, FollowsEveryMotionBelowHalfTheRangeAStep, (std::in
   unwrapper.add(shown(position, singleturn_bits, multiturn_bits, Time{}));
   const std::int64_t offset = unwrapper.position() - position;
   for (int i = 1; i <= 200; ++i) {
-    // The random steps are up to one count below half the range in one direction, and up to half the range in the
-    // other.
+    // Steps go from minus half the range up to one count below half the range.
     position += *rc::gen::weightedOneOf<std::int64_t>(
         {{8, rc::gen::inRange<std::int64_t>(-half, half)}, {1, rc::gen::just(-half)}, {1, rc::gen::just(half - 1)}});
     RC_ASSERT(unwrapper.add(shown(position, singleturn_bits, multiturn_bits, Time(i))) == Unwrapper::Joined::continued);
@@ -75,7 +73,7 @@ RC_GTEST_PROP(UnwrapProperty, TheLongestGapKeepsWithinThatLimit, ()) {
   RC_ASSERT(counts * static_cast<double>(gap.count() + 2) >= half * 0.9);
 }
 
-// The integer arithmetic of Reach gives the floating-point result to one count, rounded up by at most 0.02 %.
+// The integer arithmetic of Reach rounds up by at most 0.02 %.
 RC_GTEST_PROP(ReachProperty, EqualsDistanceAtHighestSpeed, ()) {
   const auto bits = *rc::gen::inRange(1u, 65u);
   const auto speed = *rc::gen::inRange<std::uint32_t>(1, 1'000'001);
@@ -91,8 +89,7 @@ RC_GTEST_PROP(ReachProperty, EqualsDistanceAtHighestSpeed, ()) {
 }
 
 RC_GTEST_PROP(VelocityProperty, EqualsSpeedInMiddleOfWindow, ()) {
-  // The motion has a random speed in counts/s, acceleration in counts/s^2; readings every 0.1 to 20 ms, with a jitter
-  // of up to half of that.
+  // Speed in counts/s, acceleration in counts/s^2; each reading is late by up to half a period.
   const double speed = *rc::gen::inRange(-100'000'000, 100'000'000);
   const double acceleration = *rc::gen::inRange(-100'000'000, 100'000'000);
   const auto period = *rc::gen::inRange<std::int64_t>(100'000, 20'000'000);

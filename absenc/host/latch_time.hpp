@@ -7,7 +7,7 @@
 
 namespace absenc::host {
 
-/// The interval in which a position was latched, between request and reply. The exact time in it is unknown.
+/// The interval in which a position was latched, as far as it is known.
 struct LatchTime {
   Time earliest{};  ///< Earliest time at which the position can have been latched.
   Time latest{};    ///< Latest time at which the position can have been latched.
@@ -18,7 +18,7 @@ struct LatchTime {
   [[nodiscard]] constexpr Time width() const { return latest - earliest; }
 };
 
-/// Returns the latch interval by the times of `reading` alone: from `latched` until the reply was received.
+/// Returns the latch interval by the times of `reading` alone.
 [[nodiscard]] constexpr LatchTime latch_time(const Reading& reading) {
   return {reading.latched, reading.received > reading.latched ? reading.received : reading.latched};
 }

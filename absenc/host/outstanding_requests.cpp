@@ -84,8 +84,7 @@ void OutstandingRequests<Item>::mark_lost(Items request, Time longest) {
   entry->sent_at.clear();
 }
 
-// Removes the oldest request of an entry, first those that count as lost: a late reply may belong to one of them, and
-// then the replies to later requests may still arrive.
+// Removes lost requests first: a late reply may belong to one of them.
 template <class Item>
 void OutstandingRequests<Item>::remove_oldest(Entry& entry) {
   if (entry.lost != 0) {

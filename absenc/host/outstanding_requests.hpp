@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The outstanding requests of one line: each was sent and not answered, and its reply may still arrive. Used by
-// ReplyGuard.
+// The requests of one line whose replies may still arrive. Used by ReplyGuard.
 #pragma once
 
 #include <algorithm>
@@ -19,7 +18,7 @@ template <class Item>
 class OutstandingRequests {
  public:
   static constexpr bool is_can = std::is_same_v<Item, CanFrame>;  ///< Whether items are CAN frames, not bytes.
-  /// Items of a request: at most 16 bytes or one CAN frame. ReplyGuard does not guard longer requests.
+  /// Items of a request: at most 16 bytes or one CAN frame.
   using Request = Buffer<Item, is_can ? 1 : 16>;
   /// Items as they were sent or received.
   using Items = std::span<const Item>;
@@ -29,15 +28,14 @@ class OutstandingRequests {
     Request request;            ///< Items of the request.
     std::size_t expect = 0;     ///< Number of items of the reply to this request; 0: unknown before it ends.
     Buffer<Time, 4> sent_at{};  ///< Times at which the requests that are not lost were sent, the oldest first.
-    /// Time at which the oldest lost request counts as sent (see `mark_lost`). Lost: the line was silent after it, so
-    /// most likely no reply follows, or four newer ones are stored.
+    /// Time at which the oldest lost request counts as sent.
     Time lost_first{};
     Time lost_last{};   ///< Time at which the newest lost request was sent.
     unsigned lost = 0;  ///< Number of lost requests.
 
     /// Returns the time at which the newest request of this entry was sent.
     [[nodiscard]] Time newest() const { return sent_at.empty() ? lost_last : sent_at[sent_at.size() - 1]; }
-    /// Returns the time at which the oldest request of this entry was sent, or counts as sent if it is lost.
+    /// Returns the time at which the oldest request was sent, or counts as sent if it is lost.
     [[nodiscard]] Time oldest() const { return lost != 0 ? lost_first : sent_at[0]; }
     /// Returns how often the request of this entry is outstanding, lost ones included.
     [[nodiscard]] std::size_t count() const { return lost + sent_at.size(); }
@@ -57,8 +55,7 @@ class OutstandingRequests {
   [[nodiscard]] Time character() const;
   /// Returns whether `reply` is a valid reply to `request`.
   [[nodiscard]] bool is_reply(Items request, Items reply) const;
-  /// Returns whether `reply`, valid or not, may belong to `request`. Always true for bytes; on a CAN bus other nodes
-  /// send frames, too.
+  /// Returns whether `reply`, valid or not, may belong to `request`; always true for bytes.
   [[nodiscard]] bool may_answer(Items request, Items reply) const;
 
   /// Returns whether no reply is outstanding.
@@ -74,18 +71,16 @@ class OutstandingRequests {
   /// Returns the first entry whose request `reply` could answer, or null if no entry matches.
   [[nodiscard]] Entry* find_by_reply(Items reply);
 
-  /// Adds `request`, which was sent at `sent_at` and whose reply has `expect` items. If the list is full, only a
-  /// request that has an entry already is added.
+  /// Adds `request`, sent at `sent_at`; its reply has `expect` items. A full list takes only requests that it has
+  /// already.
   void add(Items request, std::size_t expect, Time sent_at);
-  /// Marks all outstanding requests equal to `request` as lost, because the line was silent after them. The oldest of
-  /// them is treated as sent at most `longest` before the newest.
+  /// Marks all requests equal to `request` as lost. The oldest counts as sent at most `longest` before the newest.
   void mark_lost(Items request, Time longest);
   /// Removes the oldest request of `entry`, because its reply was received.
   void remove_oldest(Entry& entry);
   /// Removes all entries.
   void clear() { entries_.clear(); }
-  /// Returns the longest time between two consecutively added requests since the list was empty, whatever their bytes,
-  /// or the time from the last one until `now` if that is longer.
+  /// Returns the longest time between consecutive requests since the list was empty, or from the last until `now`.
   [[nodiscard]] Time longest_interval(Time now) const { return std::max(longest_interval_, now - newest_); }
   /// Removes the entries whose newest request was sent before `before`.
   void remove_older(Time before);

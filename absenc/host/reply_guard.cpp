@@ -17,7 +17,7 @@ constexpr Time longest_silence = 2500ms;
 // Least silence after which the replies that a stalled line delayed count as lost.
 constexpr Time stall_silence = 500ms;
 constexpr Time longest_lateness = 10s;  // a reply later than this counts as lost
-// Items that arrive for this time or longer, and until `received_` could be full, are noise; not on CAN.
+// Items that arrive for less than this time are not taken for noise.
 constexpr Time least_noise = 100ms;
 constexpr Time tick{1};
 
@@ -81,15 +81,13 @@ void ReplyGuard<Item>::enter_delaying(const Step<Item>& request, Time now) {
   received_.clear();
   outstanding_.remove_older(now - longest_lateness);
   pending_ = {.step = request, .deadline = std::max(now, request.at) + 4 * longest_wait()};
-  // The guard waits for late replies during a pause of more than 1 ms before the request. A shorter pause is left to
-  // the port, which keeps it more exactly than a timer.
+  // A pause of up to 1 ms is left to the port, which keeps it more exactly than a timer.
   delaying_ = {.until = request.at > now + 1ms ? request.at : now + tick, .received_at = now - request.gap};
-  // If the list is full, the guard first waits for late replies; `send` then clears a list that is still full.
+  // `send` clears a list that is still full.
   if (outstanding_.full()) {
     delaying_.until = std::max(delaying_.until, last_.sent_at + required_silence());
   } else if (const Entry* entry = outstanding_.find(request.out)) {
-    // An encoder that left the same request unanswered twice is taken to be absent, if no reply was ever late on this
-    // line.
+    // An encoder that left the same request unanswered twice is most likely absent.
     const bool absent = expected_lateness_ == Time{} && entry->count() > 1;
     const Time silence = expected_lateness_ == Time{} ? required_silence() / 2 : required_silence();
     if (!absent) delaying_.until = std::max(delaying_.until, entry->newest() + silence);
@@ -126,9 +124,7 @@ void ReplyGuard<Item>::enter_listening(const Entry& entry) {
   listening_ = {.until = until, .suspected = suspected};
 }
 
-// Returns how long to listen, from the end of the request: 5/4 of the lateness `suspected`, within limits. If the
-// expected lateness is at most half of `suspected`, the line may only have stalled: then, except on CAN, a shorter time
-// may be enough, because a line that delays every reply keeps the intervals of the requests.
+// Returns how long to listen, from the end of the request.
 template <class Item>
 Time ReplyGuard<Item>::listening_time(Time suspected) const {
   const Time always_late = std::clamp(suspected * 5 / 4, required_silence(), longest_wait());
@@ -147,8 +143,7 @@ Step<Item> ReplyGuard<Item>::next(Time now) {
         return forward(now);
       case Phase::delaying:
         if (now < delaying_.until) return {.at = delaying_.until, .gap = pending_.step.gap};
-        // Bytes of the request must not collide with bytes that still arrive; after `noise_limit` it is sent
-        // nevertheless.
+        // The request must not collide with bytes that still arrive, unless they are noise.
         if (!is_can && delaying_.received_at + pending_.step.gap > now) {
           if (delaying_.noise_end == never) delaying_.noise_end = now + noise_limit();
           if (now < delaying_.noise_end) {
@@ -175,9 +170,7 @@ Step<Item> ReplyGuard<Item>::next(Time now) {
   }
 }
 
-// Returns the conversation's next step; if that is a request, enters delaying and returns the step of that phase. A
-// request or `done` ends the exchange. The step is constructed in place, because steps are large and this runs for each
-// event.
+// Returns the conversation's next step or, if that is a request, the step of delaying.
 template <class Item>
 Step<Item> ReplyGuard<Item>::forward(Time now) {
   Step<Item> step = next_of_conversation(now);
@@ -190,8 +183,6 @@ Step<Item> ReplyGuard<Item>::forward(Time now) {
   return step;
 }
 
-// Feeds the events of `Report` to the conversation one by one. Returns the first step that is not `wait`, or the step
-// after the last event.
 template <class Item>
 Step<Item> ReplyGuard<Item>::next_of_conversation(Time now) {
   while (report_event()) {
@@ -255,7 +246,7 @@ void ReplyGuard<Item>::feed_forwarding(const Event<Item>& event) {
     exchange.received = exchange.received || outstanding_.may_answer(last_.items, event.items);
   }
   if constexpr (is_can) {
-    // While no reply is awaited, a frame that answers an outstanding request is taken for its late reply.
+    // A frame that answers an outstanding request is taken for its late reply.
     if (event.kind == Kind::received && !exchange.answerable && !outstanding_.empty()) {
       if (Entry* const entry = outstanding_.find_by_reply(event.items)) return count_late(entry, event.at);
     }
@@ -309,7 +300,7 @@ void ReplyGuard<Item>::store(Items items, Time at) {
   if (received_.empty()) return;
   matching_.received_at = at;
   if (!is_can && at - matching_.first_at >= noise_limit()) return conclude_noise();
-  // A reply of unknown length ends with silence, because its first items may look like a complete reply.
+  // The first items of a reply of unknown length may look like a complete reply.
   const std::size_t expected = is_can ? 1 : pending_.step.expect;
   if (expected == 0 || received_.size() < expected) return;
   const bool complete =
@@ -327,8 +318,6 @@ void ReplyGuard<Item>::keep_foreign(const Item& item) {
   }
 }
 
-// Removes from the beginning of the stored items each reply of known length that answers an outstanding request and not
-// the present one, and counts it as late; the items behind it may be the reply to the present request.
 template <class Item>
 void ReplyGuard<Item>::strip_late(Time at) {
   for (std::size_t i = 0; i < outstanding_.size();) {
@@ -366,8 +355,7 @@ void ReplyGuard<Item>::conclude_matching(bool timed_out) {
                                .received_at = matching_.received_at}});
 }
 
-// Ends matching because of noise: no reply can be matched on a line that is never silent. The conversation gets a line
-// error and none of the stored items.
+// Ends matching: no reply can be matched on a line that is never silent.
 template <class Item>
 void ReplyGuard<Item>::conclude_noise() {
   received_.clear();
@@ -379,8 +367,7 @@ void ReplyGuard<Item>::conclude_noise() {
 
 // ---- Delaying and listening
 
-// Keeps the last items, which the conversation does not get, to detect and count late replies to outstanding requests
-// and, except on CAN, second replies to the last request.
+// Keeps the last items, which the conversation does not get, to detect late replies.
 template <class Item>
 void ReplyGuard<Item>::drop_items(Items items, Time at) {
   if (phase_ == Phase::delaying) delaying_.received_at = at;
@@ -392,14 +379,13 @@ void ReplyGuard<Item>::drop_items(Items items, Time at) {
     if (i < outstanding_.size()) {
       drop_late_reply(&outstanding_[i], at);
     } else if (!is_can && last_.exists && ends_with_reply(last_.items, last_.expect)) {
-      // The items are a second reply to the last request: the first one may have belonged to an earlier request.
+      // A second reply to the last request: the first one may have belonged to an earlier request.
       drop_late_reply(nullptr, at);
     }
   }
 }
 
-// Handles silence: drops the received items, which may be a late reply of unknown length, because such a reply ends
-// with silence.
+// A late reply of unknown length ends with silence.
 template <class Item>
 void ReplyGuard<Item>::drop_at_silence(Time at) {
   if (received_.empty()) return;
@@ -411,16 +397,14 @@ void ReplyGuard<Item>::drop_at_silence(Time at) {
   received_.clear();
 }
 
-// Returns whether the received items end with a reply to `request`. Only the last items are checked, because noise may
-// precede the reply; a reply of unknown length is found at silence.
+// Checks only the last items, because noise may precede the reply.
 template <class Item>
 bool ReplyGuard<Item>::ends_with_reply(Items request, std::size_t expect) const {
   const std::size_t size = is_can ? 1 : expect;
   return size != 0 && received_.size() >= size && outstanding_.is_reply(request, received_.view().last(size));
 }
 
-// Drops a late reply, and adapts the end of delaying or listening. `entry`: the outstanding request that the reply
-// answers; null: it is a second reply to the last request.
+// `entry`: the request that the reply answers; null: it is a second reply to the last request.
 template <class Item>
 void ReplyGuard<Item>::drop_late_reply(Entry* entry, Time at) {
   received_.clear();
@@ -440,12 +424,11 @@ void ReplyGuard<Item>::count_late(Entry* entry, Time at) {
   Time sent_at = last_.sent_at;
   if (entry != nullptr) {
     sent_at = entry->sent_at.empty() ? entry->lost_last : entry->sent_at[0];
-    // The first late reply may answer any of several equal requests, so its lateness is measured from the newest one.
-    // Not on CAN, where the reply may also have been unsolicited.
+    // The reply may answer any of several equal requests: the newest gives the least lateness.
     if (!is_can && expected_lateness_ == Time{}) sent_at = entry->newest();
   }
   expected_lateness_ = std::max(expected_lateness_, std::min(at - sent_at, longest_lateness));
-  // If no reply was late before, a second reply to the last request is more likely a duplicate, and not counted.
+  // If no reply was late before, a second reply is most likely a duplicate.
   if (entry == nullptr && late_replies_ == 0) return;
   ++late_replies_;
   // Another reply was received while listening, so the stored reply was late.

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Keeps late replies from answering the wrong request. No supported protocol numbers its requests: a reply that arrives
-// after its timeout would answer the next request, whose own reply would answer the one after, without end.
+// Keeps late replies from being taken for the reply to a later request.
 #pragma once
 
 #include <cstddef>
@@ -14,19 +13,16 @@
 
 namespace absenc::host {
 
-/// A filter between a conversation and its line. A request without a reply is outstanding until its reply arrives, or a
-/// reply that can only answer a later request (a line keeps the order of replies), until listening ends, or for ten
-/// seconds. If eight different requests are outstanding, all are given up after a silence.
+/// A filter between a conversation and its line. A request is outstanding while its reply may still arrive.
 ///
 ///   phase       entered when                     received items       left when                             next phase
 ///   ----------  -------------------------------  -------------------  ------------------------------------  ----------
-///   forwarding  a conversation is attached; a    go to the            the conversation wants to send a      delaying
-///               request is sent and none is      conversation         request
+///   forwarding  a conversation begins or ends;   go to the            the conversation wants to send a      delaying
+///               a request is sent and none is    conversation         request
 ///               outstanding; or matching or
 ///               listening has ended
-///   delaying    a request is to be sent          are dropped, late    the line was silent long enough, or noisy
-///                                                replies counted      for 100 ms and the duration of 64
-///                                                                     characters: the request is sent;
+///   delaying    a request is to be sent          are dropped, late    the line was silent long enough, or
+///                                                replies counted      too noisy: the request is sent;
 ///                                                                       no request is outstanding           forwarding
 ///                                                                       others are outstanding              matching
 ///   matching    a request was sent while others  are stored           a reply answers this request only;
@@ -37,26 +33,13 @@ namespace absenc::host {
 ///                                                replies counted      repeated where it may be, else a
 ///                                                                     timeout is reported                   forwarding
 ///
-/// Delaying ends at once for a request that is not outstanding, unless it demands a pause of more than 1 ms, items
-/// still arrive (not on CAN), or the list of outstanding requests is full. An outstanding request is sent again after
-/// four times the longest timeout, but not before 3/2 of the expected lateness, with an upper limit of 2.5 to 10 s;
-/// late replies prolong this, except on CAN. Where no reply was late yet, half of that time is enough, and the guard
-/// does not wait for an encoder that did not answer twice.
-///
-/// Listening lasts for 5/4 of the lateness that the stored reply would have, but at least four times the longest
-/// timeout and 3/2 of the expected lateness, with the upper limit above: if the stored reply was late, the reply of the
-/// present request follows within that time. Except on CAN, a shorter time is enough where the expected lateness is at
-/// most half of the stored reply's: 5/4 of the longest interval between the requests after the stored reply, and at
-/// least half a second, because a line that delays every reply keeps their intervals.
-///
 /// The guard knows no protocol: Unit::check decides whether a reply can answer a request. On CAN an unsolicited reply
-/// cannot be told from a late one. Tests compare each reading with the true shaft (tests/late_reply_test.cpp) and
-/// accept no wrong reading.
+/// cannot be told from a late one.
 template <class Item>
 class ReplyGuard final : public Machine<Item> {
  public:
-  /// Serves the conversation `inner` from now on; `inner`, `unit` and `options` must live until another one is
-  /// attached. `may_repeat`: whether each request of the conversation may be sent once more.
+  /// Serves `inner` from now on; `inner`, `unit` and `options` must live until another one is attached. `may_repeat`:
+  /// whether each request of the conversation may be sent once more.
   void attach(Machine<Item>& inner, const Unit& unit, const Options& options, bool may_repeat);
   /// Returns whether this guard serves the conversation `inner`.
   [[nodiscard]] bool serves(const Machine<Item>& inner) const { return inner_ == &inner; }
@@ -70,8 +53,7 @@ class ReplyGuard final : public Machine<Item> {
 
   /// Returns the number of replies that arrived after their timeout and were dropped.
   [[nodiscard]] std::uint64_t late() const { return late_replies_; }
-  /// Returns the longest time, as estimated, between a request and its dropped late reply, at most 10 s; 0 if `late()`
-  /// is 0.
+  /// Returns the longest estimated time between a request and its late reply; 0 if `late()` is 0.
   [[nodiscard]] Time lateness() const { return greatest_lateness_; }
 
  private:
@@ -107,7 +89,7 @@ class ReplyGuard final : public Machine<Item> {
     Time first_at{};       // when the first of the stored items was received
     Time received_at{};    // when the last of the stored items was received; if none was stored, end of the request
     bool damaged = false;  // a line error was received, or, except on CAN, the time limit passed
-    // CAN: a frame that would be the reply if its identifier had 11 bits instead of 29; it explains a timeout.
+    // CAN: a frame that would be the reply if its identifier had 11 bits instead of 29.
     Buffer<Item, 1> foreign_frame{};
   };
   struct Listening {
@@ -166,9 +148,7 @@ class ReplyGuard final : public Machine<Item> {
   Delaying delaying_{};
   Matching matching_{};
   Listening listening_{};
-  // One buffer for all phases, because a microcontroller has little RAM. Forwarding: the reply to report. Matching: the
-  // received items that may be the reply. Delaying and listening: the last received items, which may end with a late
-  // reply.
+  // One buffer for all phases, because a microcontroller has little RAM.
   Buffer<Item, is_can ? 1 : 64> received_{};
 
   Pending pending_{};

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a unit's commands on a port: repeats commands that may be repeated, removes echo, confirms positions by further
-// readings, counts errors.
+// Runs a unit's commands on a port, with repetition, echo removal, confirmed positions and counters.
 #pragma once
 
 #include <array>
@@ -38,8 +37,7 @@ struct Counters {
   }
 };
 
-/// A filter between the conversation (or its reply guard) and the echo filter: it sees each transfer and all received
-/// items but echo, late replies included, and may change them.
+/// A filter between the conversation, or its reply guard, and the echo filter.
 template <class Item>
 struct Filter : Machine<Item> {
   /// Sets the machine to which the filter passes events from now on.
@@ -49,8 +47,7 @@ struct Filter : Machine<Item> {
   ~Filter() = default;
 };
 
-/// Selects which reading of an encoder that transmits unsolicited is returned. A caller that reads at its own rate
-/// needs `newest`: `every` may return a reading that has waited in the port.
+/// Selects which reading of an encoder that transmits unsolicited is returned.
 enum class Take : std::uint8_t {
   newest,  ///< the first reading that is received after the call
   every,   ///< the reading that follows the last returned one, however long ago it was received
@@ -60,8 +57,8 @@ enum class Take : std::uint8_t {
 template <class Item>
 class Session {
  public:
-  /// `unit`, `port` and `storage` must outlive the session. `storage` holds one conversation at a time:
-  /// unit.host_storage bytes, aligned for any type. `attempts`: how often a repeatable command is tried at most.
+  /// `unit`, `port` and `storage` must outlive the session. `storage`: unit.host_storage bytes, aligned for any type.
+  /// `attempts`: how often a repeatable command is tried at most.
   Session(const Unit& unit, const Options& options, Port<Item>& port, std::span<std::byte> storage,
           EchoMode echo = EchoMode::off, unsigned attempts = 3)
       : unit_(&unit),
@@ -74,10 +71,8 @@ class Session {
         first_(reach()),
         apart_(times()) {}
 
-  /// Runs one command to its end; repeats a repeatable command after most errors, in at most `attempts` attempts.
-  /// `on_emit(conversation)` is called for each result before the end and returns whether to continue; it is not called
-  /// for a conversation that streams, which stops at its first result. The returned conversation is valid until the
-  /// next command; null: the unit cannot run the command, or `storage` is too small.
+  /// Runs one command; `on_emit(conversation)` returns whether to continue after a result. The returned conversation is
+  /// valid until the next command; null: it cannot be run.
   template <class OnEmit>
   const Conversation<Item>* run(const Command& command, Arguments arguments, OnEmit&& on_emit) {
     streaming_ = false;
@@ -85,26 +80,18 @@ class Session {
     streaming_ = false;  // `run` always begins anew; only `next` and `read` continue a stream
     return conversation;
   }
-  /// Runs `command` as above and ignores the results before the end. Returns the conversation, or null if the unit
-  /// cannot run the command or `storage` is too small.
+  /// Runs `command` as above and ignores the results before the end.
   const Conversation<Item>* run(const Command& command, Arguments arguments = {}) {
     return run(command, arguments, [](const Conversation<Item>&) { return true; });
   }
 
-  /// Runs `command` as `run` does, but continues a conversation of the same `command` that streams and was stopped at a
-  /// result by `next` or `read`; `arguments` are then ignored. After `run`, `doubt` or another command it begins anew.
+  /// Runs `command` as `run` does, but may continue its stream: `arguments` are then ignored.
   const Conversation<Item>* next(const Command& command, Arguments arguments = {}) {
     if (command_ != &command) streaming_ = false;
     return attempt(command, arguments, [](const Conversation<Item>&) { return true; });
   }
 
-  /// Reads the position, and reads it again until it is confirmed: near the one read before it (FirstReading::is_near).
-  /// Gives up after an error or ten further readings; `confirmed` is then false. If the first reading is too far from
-  /// the position before the call, but the confirmed one is near it, the first one counts as an error,
-  /// cross_check_failed, because no checksum detects all damage. A position that the encoder reports as invalid is not
-  /// read again if a position was confirmed since the last timeout or `doubt`. A conversation that streams continues
-  /// where it stopped, because finding its frames again costs two of them; `take` decides whether frames that were
-  /// received meanwhile are used. `on_reading` is called with each reading.
+  /// Reads the position, and again up to ten times to confirm it. `on_reading` is called with each reading.
   template <class OnReading>
   const Conversation<Item>* read(const Command& command, Take take, OnReading&& on_reading) {
     if (streaming_ && take == Take::newest && !current_->asks()) catch_up(machine(), *port_);
@@ -125,36 +112,30 @@ class Session {
         known_ = true;
         return conversation;
       }
-      // A position that the encoder itself reports as invalid is read again only until one was confirmed: the encoder
-      // may be starting.
+      // An encoder with an invalid position may be starting, unless a position was confirmed.
       if (number == most || (known_ && !FirstReading::has_position(*reading))) return conversation;
     }
   }
-  /// Reads the position with `command`. Returns the conversation, or null if the unit cannot run the command or
-  /// `storage` is too small.
+  /// Reads the position with `command` as above.
   const Conversation<Item>* read(const Command& command, Take take = Take::newest) {
     return read(command, take, [](const Reading&) {});
   }
 
-  /// Asks the running conversation to end early. Returns true if it restores the encoder and then ends by itself;
-  /// false: it may be abandoned.
+  /// Asks the running conversation to end early. Returns false if it may be abandoned instead.
   bool abort() { return current_ != nullptr && current_->abort(); }
-  /// Puts into `sink` the settings that the last conversation left changed in the encoder when its port threw; see
-  /// Conversation::report_left.
+  /// Puts into `sink` the settings that the last conversation left changed; see Conversation::report_left.
   void report_left(FieldSink& sink) const {
     if (current_ != nullptr) current_->report_left(sink);
   }
 
-  /// Returns whether the last conversation sent a request that changes the encoder, also when its port threw.
+  /// Returns whether the last conversation sent a request that changes the encoder.
   [[nodiscard]] ChangeSent change_sent() const {
     return current_ != nullptr ? current_->change_sent() : ChangeSent::no;
   }
 
-  /// Uses `guard` in place of a guard of its own. The sessions of all encoders on a line share one, because late
-  /// replies belong to the line. The guard must outlive the sessions.
+  /// Uses `guard`, which must outlive the session. The sessions of all encoders on a line share one.
   void share(ReplyGuard<Item>& guard) { guard_ = &guard; }
-  /// Sets the filter of later commands; null: none. Not while a stream may continue. The filter must outlive the
-  /// session.
+  /// Sets the filter of later commands; null: none. Not while a stream may continue. It must outlive the session.
   void set_filter(Filter<Item>* filter) { filter_ = filter; }
   /// Returns ReplyGuard::lateness as of the end of the last command.
   [[nodiscard]] Time lateness() const { return lateness_; }
@@ -164,15 +145,13 @@ class Session {
     options_ = options;
     follow_options();
   }
-  /// Sets the encoder's speed limit from the next reading on, and forgets the positions before. The default is the
-  /// model's limit, else that of SpeedLimit.
+  /// Sets the encoder's speed limit from the next reading on, and forgets the positions before.
   void set_speed_limit(const SpeedLimit& limit) {
     limit_ = limit;
     follow_options();
   }
 
-  /// Sets the statistics to which the results of later attempts are added; null: none. They need 5 kB, which firmware
-  /// may not have.
+  /// Sets the statistics to which the results of later attempts are added; null: none.
   void observe(Statistics<Item>* statistics) { statistics_ = statistics; }
 
   /// Requires the next position to be confirmed, because the encoder may be another one now.
@@ -183,12 +162,12 @@ class Session {
     shortest_interval_ = never;
     first_.start_again();
   }
-  /// Counts the last command as failed although it ended well: its caller knows that the reading is wrong.
+  /// Counts the last command, which ended well, as failed with `error`.
   void refuse_last(Error error) {
     --counters_.good;
     ++counters_.errors[static_cast<std::size_t>(error)];
   }
-  /// Returns whether the last `read` returned a position that agrees with the one before it; false after `doubt`.
+  /// Returns whether the last `read` confirmed its position; false after `doubt`.
   [[nodiscard]] bool confirmed() const { return confirmed_; }
   /// Returns the counters of this session.
   [[nodiscard]] const Counters& counters() const { return counters_; }
@@ -196,7 +175,7 @@ class Session {
   [[nodiscard]] const EchoFilter& echo() const { return echo_; }
 
  private:
-  // Forgets all positions: with other options or another speed limit they cannot be compared with the next one.
+  // Positions of other options or of another speed limit cannot be compared with the next one.
   void follow_options() {
     first_ = FirstReading(reach());
     apart_ = Apart(times());
@@ -204,16 +183,13 @@ class Session {
   [[nodiscard]] Reach reach() const { return Reach::of(limit_, unit_->resolution(options_)); }
   [[nodiscard]] Times times() const { return sends_unsolicited(*unit_, options_) ? Times::arrived : Times::latched; }
 
-  // Returns whether the position of `reading` is not near the last one (FirstReading::is_near); false if one of the two
-  // is missing, or the time between is too long to judge.
+  // Returns whether the position of `reading` is known to be too far from the last one.
   [[nodiscard]] bool contradicts(const Reading& reading) const {
     const Time between = apart_.since_last(reading.latched);
     return first_.has_last() && first_.can_judge(reading, between) && !first_.is_near(reading, between);
   }
 
-  // Returns whether the position of `reading` is near the last one, and stores it as the last one. `follows`: it was
-  // read directly after the last one. If it was not, and the time between is too long to judge, returns false, unless
-  // even the shortest time between readings is too long to judge.
+  // Stores a position; returns whether it is confirmed. `follows`: read directly after the last.
   bool confirms(const Reading& reading, bool follows) {
     const Time between = apart_.since_last(reading.latched);
     bool near = first_.is_near(reading, between);
@@ -231,7 +207,6 @@ class Session {
     if (statistics_ != nullptr) statistics_->add(damaged);
   }
 
-  // Runs the command, or continues its stream, in up to `attempts_` attempts if the command is repeatable.
   template <class OnEmit>
   const Conversation<Item>* attempt(const Command& command, Arguments arguments, OnEmit&& on_emit) {
     const unsigned attempts = command.repeatable ? attempts_ : 1;
@@ -262,7 +237,6 @@ class Session {
 
   [[nodiscard]] std::uint64_t late() const { return guard_->late(); }
 
-  // Counts the damaged frames that the stream has discarded since the last call, also those that `catch_up` dropped.
   void count_discarded(const Conversation<Item>& conversation) {
     const StreamCounts* stream = conversation.stream();
     if (stream == nullptr) return;
@@ -275,16 +249,13 @@ class Session {
     return current_ = unit_->host(options_, command, arguments, storage_).template of<Item>();
   }
 
-  // Returns whether the reply guard is used for `command`. On a link whose clock the host drives no reply is late. On a
-  // CAN bus only commands with the verbs read and read_part are guarded: other nodes send too, and a listener receives
-  // all frames.
+  // No reply is late where the host drives the clock; on CAN a listener needs all frames.
   [[nodiscard]] bool guarded(const Command& command) const {
     if (unit_->link == LinkKind::can) return command.verb == Verb::read || command.verb == Verb::read_part;
     return unit_->link != LinkKind::spi && unit_->link != LinkKind::clocked;
   }
 
-  // Returns the machine that runs on the port: the conversation, inside its reply guard, the filter and the echo
-  // filter, as far as each is used.
+  // Returns the outermost machine in use: echo filter, filter, reply guard or conversation.
   Machine<Item>& machine() {
     if constexpr (std::is_same_v<Item, std::uint8_t>) {
       if (echo_.mode() != EchoMode::off) return echo_;
@@ -300,13 +271,11 @@ class Session {
     return *current_;
   }
 
-  // Runs the conversation and returns whether it came to its end. A conversation that streams stops at its next result
-  // instead, any other where `on_emit` returns false.
+  // Returns whether the conversation came to its end. One that streams stops at its next result.
   template <class OnEmit>
   bool drive_one(const Command& command, Conversation<Item>& conversation, OnEmit&& on_emit, bool again) {
     if (!again) guarded_ = guarded(command);
-    // A stream that continues attaches the guard again only if the guard has served another encoder on the line
-    // meanwhile.
+    // The guard may have served another encoder on the line meanwhile.
     if (guarded_ && !(again && guard_->serves(conversation))) {
       guard_->attach(conversation, *unit_, options_, !command.changes_encoder);
     }

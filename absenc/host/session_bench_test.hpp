@@ -23,7 +23,7 @@ struct Still final : Shaft {
   }
   std::int64_t position = 0;
   const Device<std::uint8_t>* device = nullptr;
-  // Number of the answer that contains `wrong_position`, counted from 0; UINT64_MAX: no answer does.
+  // Number of the answer that contains `wrong_position`, from 0; UINT64_MAX: none.
   std::uint64_t wrong_answer = UINT64_MAX;
   std::int64_t wrong_position = 0;
 };
@@ -49,7 +49,7 @@ struct Bench {
     EXPECT_EQ(read().error(), Error::none);
     return device->answer_count() - before;
   }
-  /// Makes the next answer of the encoder wrong: its position differs by `turned`, in 2^-32 of a turn.
+  /// Makes the position of the encoder's next answer wrong by `turned`, in 2^-32 of a turn.
   void answer_wrong(std::int64_t turned) {
     shaft.wrong_answer = device->answer_count();
     shaft.wrong_position = shaft.position + turned;

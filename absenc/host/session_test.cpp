@@ -64,8 +64,6 @@ struct OneRequest final : Machine<std::uint8_t> {
   Wire heard;
 };
 
-// For ten seconds a reply may belong to the earlier, unanswered request, and is dropped. After that the earlier request
-// counts as lost.
 TEST(ReplyGuard, RequestsAreOutstandingForTenSeconds) {
   using Kind = Step<std::uint8_t>::Kind;
   const Bench bench(EchoMode::off);
@@ -111,8 +109,7 @@ TEST(ReplyGuard, SendsAfterATenthOfASecondOfNoise) {
   EXPECT_LT(now, begin + 110ms);
 }
 
-// At 2400 baud a reply may take longer than a tenth of a second: only items that arrive for the duration of 64
-// characters are noise.
+// At 2400 baud a reply may take longer than a tenth of a second.
 TEST(ReplyGuard, LongReplyOnSlowLineIsNoNoise) {
   using Kind = Step<std::uint8_t>::Kind;
   const Unit& unit = *find_unit("raa38-modbus");
@@ -213,11 +210,10 @@ TEST(Session, ShowsTheSecondOfTwoReadingsThatAgree) {
   bench.faulty->set_rates({});
   const auto before = bench.device->answer_count();
   EXPECT_EQ(bench.read().error(), Error::none);
-  // The first answer could be the late reply to an earlier request, so the request is repeated: three answers, not two.
+  // The first answer could be the late reply to an earlier request: the request is repeated.
   EXPECT_EQ(bench.device->answer_count(), before + 3);
 }
 
-// The last attempt reports the frame that explains its timeout, although the reply to an earlier attempt may arrive.
 TEST(Session, ReplyWithWrongKindOfIdentifierExplainsTimeout) {
   struct Extended final : Machine<CanFrame> {
     void feed(const Event<CanFrame>& event) override {
@@ -321,7 +317,7 @@ TEST(SessionGuard, TurnsConfirmAfterALongPause) {
   EXPECT_EQ(bench.answers_of_a_reading(), 3u);
 }
 
-// A reading takes 51 us, in which the shaft turns nearly once, so a second reading tells no more than the first.
+// A reading takes 51 us, in which the shaft turns nearly once: a second one tells no more.
 TEST(SessionGuard, RefusesHalfATurnIfSecondReadingTakesTooLong) {
   Bench bench(EchoMode::off, {}, 3, {no_turns});
   bench.session->set_speed_limit({.rpm = 1'000'000});
@@ -359,8 +355,6 @@ TEST(SessionGuard, ConfirmsNothingWithoutAgreement) {
   EXPECT_EQ(device->answer_count(), 3u * 11);
 }
 
-// An encoder whose position was confirmed needs no second reading for a position that it reports as invalid. That
-// position is not confirmed.
 TEST(SessionGuard, ReturnsInvalidPositionOfKnownEncoderAtOnce) {
   Bench bench(EchoMode::off);
   bench.read();

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Speed limit of a shaft or a carriage: how far apart two positions can be after a time, and how long the time between
-// readings may be.
+// Speed limit of a shaft or carriage, and how far apart in place and time two readings may be.
 #pragma once
 
 #include <cstdint>
@@ -9,11 +8,9 @@
 
 namespace absenc::host {
 
-/// Highest speed that a shaft or carriage is assumed to have. Without a limit, turns during a pause between readings
-/// would be lost unnoticed.
+/// Highest speed that a shaft or carriage is assumed to have.
 struct SpeedLimit {
-  /// Speed limit of rotary encoders in revolutions per minute. Default: the specified speed of the fastest supported
-  /// encoders.
+  /// Speed limit of rotary encoders in revolutions per minute.
   std::uint32_t rpm = 10'000;
   /// Speed limit of linear encoders in mm/s. Default: no linear axis is assumed to be faster.
   std::uint32_t mm_s = 20'000;
@@ -36,9 +33,7 @@ inline constexpr unsigned most_excess = 4;
   return limit.rpm / 60.0 * (bits >= 63 ? 9.2e18 : static_cast<double>(std::uint64_t{1} << bits));
 }
 
-/// Returns the upper limit for the time between two readings: at the speed limit the position then changes by 15/32 of
-/// the counted range. That is half of it, less a margin for noise and for latch times that are not known to the
-/// microsecond. `never` for a speed limit of 0, or if Time cannot hold the result.
+/// Returns the time in which the position changes by 15/32 of the counted range at the speed limit, at most `never`.
 [[nodiscard]] constexpr Time longest_gap(const Resolution& resolution, const SpeedLimit& limit) {
   const bool linear = resolution.unit_um > 0;
   const unsigned bits = linear ? resolution.singleturn_bits : resolution.multiturn_bits;
@@ -51,32 +46,28 @@ inline constexpr unsigned most_excess = 4;
   return nanoseconds < 9.2e18 ? Time(static_cast<std::int64_t>(nanoseconds)) : never;
 }
 
-/// The distance that a shaft or carriage can move in a given time at its speed limit. Computes distances with integers,
-/// because a small processor has no floating point; only of_carriage() uses floating point.
+/// The distance that a shaft or carriage can move in a given time at its speed limit.
 class Reach {
  public:
-  /// Returns the reach of a shaft of at most `rpm` revolutions per minute; `rpm` is limited to about 1 830 000.
+  /// Returns the reach of a shaft of at most `rpm` revolutions per minute, limited to about 1 830 000.
   [[nodiscard]] static constexpr Reach of_shaft(std::uint32_t rpm) {
     constexpr std::uint32_t turns_a_ns_of_1_rpm = 2346;  // 1 rpm in turns per ns, times 2^47, rounded up by 0.016 %
     constexpr std::uint32_t fastest = 0xFFFF'FFFF / turns_a_ns_of_1_rpm;
     return {turns_a_ns_of_1_rpm * (rpm < fastest ? rpm : fastest), 47, true};
   }
-  /// Returns the reach of a carriage of at most `mm_s` mm/s whose encoder has counts of `unit_um` micrometres. Uses
-  /// floating point.
+  /// Returns the reach of a carriage of at most `mm_s` mm/s with counts of `unit_um` micrometres.
   [[nodiscard]] static constexpr Reach of_carriage(std::uint32_t mm_s, double unit_um) {
     double factor = mm_s / unit_um / 1e6;  // speed limit in counts per nanosecond
     std::int8_t shift = 0;
     for (; factor < 0x8000'0000 && shift < 100; factor *= 2) ++shift;
     return {factor < 0xFFFF'FFFF ? static_cast<std::uint32_t>(factor) + 1 : 0xFFFF'FFFF, shift, false};
   }
-  /// Returns the reach of a shaft or carriage that moves within `limit`; `resolution` tells which of them it is, and
-  /// the size of a count of a linear encoder.
+  /// Returns the reach of the shaft or carriage that `resolution` describes, within `limit`.
   [[nodiscard]] static constexpr Reach of(const SpeedLimit& limit, const Resolution& resolution) {
     return resolution.unit_um > 0 ? of_carriage(limit.mm_s, resolution.unit_um) : of_shaft(limit.rpm);
   }
 
-  /// Returns by how many counts the position can change in the time `between`, at most 2^64 - 1. `singleturn_bits`: 1
-  /// to 64.
+  /// Returns by how many counts the position can change in the time `between`. `singleturn_bits`: 1 to 64.
   [[nodiscard]] constexpr std::uint64_t counts(Time between, unsigned singleturn_bits) const {
     auto time = static_cast<std::uint64_t>(between > Time{} ? between.count() : 0);
     int shift = turns_ ? shift_ - static_cast<int>(singleturn_bits) : shift_;

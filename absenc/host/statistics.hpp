@@ -15,8 +15,7 @@
 
 namespace absenc::host {
 
-/// A distribution of reply latencies in a fixed 4 kB; latencies above 68.7 s count as 68.7 s in it. A percentile
-/// below that is at most 1/32 too long, never too short.
+/// A distribution of reply latencies in about 4 kB. Its percentiles are at most 1/32 too long.
 class Latencies {
  public:
   /// Adds the latency of a reply.
@@ -35,8 +34,7 @@ class Latencies {
   /// Returns the sum of all latencies, each limited to 0 to 68.7 s.
   [[nodiscard]] constexpr Time sum() const { return sum_; }
 
-  /// Returns, for each of the ascending limits (all below 68 s), how many latencies surely do not exceed it. Latencies
-  /// in the last 1/32 below a limit may be counted with the next limit only.
+  /// Returns how many latencies surely do not exceed each of the ascending limits, all below 68 s.
   template <std::size_t Size>
   [[nodiscard]] constexpr std::array<std::uint64_t, Size> within(const std::array<Time, Size>& limits) const {
     std::array<std::uint64_t, Size> counts{};
@@ -47,7 +45,7 @@ class Latencies {
     return counts;
   }
 
-  /// Returns the latency that `share` (0 to 1) of all latencies do not exceed; 0 without latencies.
+  /// Returns the percentile `share` (0 to 1) of the latencies; 0 without latencies.
   [[nodiscard]] constexpr Time percentile(double share) const {
     const auto rank = static_cast<std::uint64_t>(share * static_cast<double>(count_));
     std::uint64_t below = 0;
@@ -63,7 +61,7 @@ class Latencies {
   static constexpr unsigned most_bits = 36;
   static constexpr std::int64_t most = (std::int64_t{1} << most_bits) - 1;
 
-  // Returns the number of the bucket for a latency of `value` ns. Each value below 2^fine_bits has a bucket of its own.
+  // Returns the number of the bucket for a latency of `value` ns.
   [[nodiscard]] static constexpr std::size_t bucket(std::uint64_t value) {
     const auto width = static_cast<unsigned>(std::bit_width(value));
     if (width <= fine_bits) return static_cast<std::size_t>(value);
@@ -136,15 +134,14 @@ struct BadExchange {
   Buffer<Item, 64 / sizeof(Item)> received{};
 };
 
-/// Statistics of one encoder's conversations. A session adds every conversation, repeated ones included.
+/// Statistics of one encoder's conversations.
 template <class Item>
 class Statistics {
  public:
   /// Greatest number of stored failed exchanges; only the last ones are stored.
   static constexpr std::size_t most_stored = 8;
 
-  /// Adds the result of a conversation: its latency, or after an error its exchange. A conversation that only listened
-  /// has no latency: its exchange has the same time twice.
+  /// Adds the result of a conversation: its latency, if it has one, or after an error its exchange.
   void add(const Conversation<Item>& conversation) {
     const Exchange<Item> exchange = conversation.exchange();
     if (conversation.error() == Error::none) {
@@ -156,12 +153,11 @@ class Statistics {
   /// Adds a failed exchange, which replaces the oldest one if `most_stored` are stored.
   void add(const BadExchange<Item>& bad) { bad_[bad_count_++ % most_stored] = bad; }
 
-  /// Returns the distribution of the times from the end of the request to the end of the reply, in the last exchange of
-  /// each good conversation.
+  /// Returns the distribution of the times from the end of a request to the end of its reply.
   [[nodiscard]] const Latencies& latencies() const { return latencies_; }
   /// Returns how many failed exchanges are stored, at most `most_stored`.
   [[nodiscard]] std::size_t kept() const { return std::min<std::size_t>(bad_count_, most_stored); }
-  /// Returns a stored failed exchange; `number` 0 is the last one, 1 the one before it, up to `kept()` - 1.
+  /// Returns a stored failed exchange; `number` 0 is the last one, `kept()` - 1 the oldest.
   [[nodiscard]] const BadExchange<Item>& bad(std::size_t number) const {
     return bad_[(bad_count_ - 1 - number) % most_stored];
   }

@@ -49,7 +49,7 @@ TEST(Latencies, AreCountedWithinLimits) {
   for (const Time latency : {Time(9us), Time(10'400ns), Time(15us), Time(999'900ns), Time(1001us), Time(2s)}) {
     latencies.add(latency);
   }
-  // The latency 999.9 us is in the last 1/32 below its limit, so it is counted with the next limit.
+  // 999.9 us is in the last 1/32 below its limit: it is counted with the next limit.
   EXPECT_EQ(latencies.within(limits), (std::array<std::uint64_t, 4>{1, 3, 3, 5}));
   EXPECT_EQ(latencies.sum(), 2s + 2'035'300ns);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Continuous position: a counter of 64 bits from consecutive readings, where the encoder's own counter wraps.
+// Continuous position: a counter of 64 bits from consecutive readings.
 #pragma once
 
 #include <cstdint>
@@ -11,9 +11,7 @@
 
 namespace absenc::host {
 
-/// A continuous position: adds the shorter of the two distances from each reading to the next. If the time between two
-/// readings is so long that the encoder may have moved nearly half of its range at the speed limit (`longest_gap`), it
-/// starts again with the encoder's own turns and counts.
+/// A continuous position, from readings in which the encoder's own counter wraps.
 class Unwrapper {
  public:
   /// How a reading joins the positions before it.
@@ -24,13 +22,13 @@ class Unwrapper {
     restarted,  ///< the pause was too long to know the distance: the position starts again with the encoder's own
   };
 
-  /// Makes a continuous position of a shaft that moves within `limit`. `times` is the meaning of Reading::latched.
+  /// Makes a continuous position within `limit`. `times` is the meaning of Reading::latched.
   explicit constexpr Unwrapper(const SpeedLimit& limit = {}, Times times = Times::latched)
       : limit_(limit), times_(times), apart_(times) {}
 
   /// Adds `reading` with the latch interval that its own times allow. Returns how it was joined.
   constexpr Joined add(const Reading& reading) { return add(reading, latch_time(reading)); }
-  /// Adds `reading`, which was latched at an unknown time in the interval `at`, and returns how it was joined.
+  /// Adds `reading`, which was latched in the interval `at`. Returns how it was joined.
   constexpr Joined add(const Reading& reading, const LatchTime& at) {
     if (!has_position(reading)) return Joined::ignored;
     const bool first = !started_;
@@ -44,9 +42,7 @@ class Unwrapper {
     return first ? Joined::started : joins ? Joined::continued : Joined::restarted;
   }
 
-  /// Returns whether the position of `reading` is farther from the last added one than `most_excess` times the speed
-  /// limit allows in the time between plus 1 ms, plus 4 counts. False if nothing can be compared or the time between is
-  /// too long to judge.
+  /// Returns whether `reading` is a jump from the last added one; false if that is not known.
   [[nodiscard]] constexpr bool jumps(const Reading& reading) const {
     if (!started_ || !has_position(reading) || !is_near(reading)) return false;
     constexpr Time vague{1'000'000};  // uncertainty of the latch time: 1 ms
@@ -57,12 +53,10 @@ class Unwrapper {
            most_excess * counts_per_second(resolution_of(reading), limit_) * seconds + noise;
   }
 
-  /// Returns the continuous position in counts of the single-turn resolution. It starts with the encoder's own counts,
-  /// and turns if they are valid.
+  /// Returns the continuous position in counts of the single-turn resolution.
   [[nodiscard]] constexpr std::int64_t position() const { return static_cast<std::int64_t>(position_); }
 
-  /// Returns whether the continuous position started with turns that the encoder counts. If not, it started within an
-  /// unknown turn.
+  /// Returns whether the continuous position started with turns that the encoder counts.
   [[nodiscard]] constexpr bool counts_turns() const { return counts_turns_; }
 
  private:
@@ -84,8 +78,7 @@ class Unwrapper {
     return turn_bits(reading) != 0 && turn_bits(last_) != 0;
   }
 
-  // Returns the resolution of `reading`, without its turns unless both it and the last reading have turns
-  // (`turn_bits`).
+  // Returns the resolution of `reading`, with its turns only if the last reading has turns, too.
   [[nodiscard]] constexpr Resolution resolution_of(const Reading& reading) const {
     return {reading.singleturn_bits, have_turns(reading) ? reading.multiturn_bits : 0, reading.unit_um};
   }
@@ -93,9 +86,7 @@ class Unwrapper {
     return apart(reading) < longest_gap(resolution_of(reading), limit_);
   }
 
-  // Returns whether the time between the last reading and `reading` is short enough to know the distance, even if their
-  // latch times lie at the outer ends of their intervals. The margin of `longest_gap` for unknown latch times is added
-  // again, because the intervals state them. Always true for arrival times, and if `longest_gap` is `never`.
+  // Adds the margin of `longest_gap` again: the intervals state the unknown latch times.
   [[nodiscard]] constexpr bool are_surely_near(const Reading& reading, const LatchTime& at) const {
     const Time gap = longest_gap(resolution_of(reading), limit_);
     return times_ == Times::arrived || gap == never || at.latest - last_at_.earliest < gap / 15 * 16;

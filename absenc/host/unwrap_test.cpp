@@ -130,7 +130,7 @@ TEST(Unwrapper, UsesSpeedOfLinearEncoder) {
 }
 
 TEST(Unwrapper, ReadingsThatArriveTogetherMayBeFarApart) {
-  // At 600 rpm half a turn takes 50 ms. A host that was delayed for 100 ms receives the waiting frames within 1 ms.
+  // At 600 rpm half a turn takes 50 ms. The host was delayed for 100 ms.
   Unwrapper unwrapper(SpeedLimit{.rpm = 600}, Times::arrived);
   unwrapper.add(singleturn(0, 0ms));
   EXPECT_EQ(unwrapper.add(singleturn(10, 25ms)), Joined::continued);
@@ -143,8 +143,7 @@ TEST(Unwrapper, ReadingsThatArriveTogetherMayBeFarApart) {
 }
 
 TEST(Unwrapper, DetectsJumpOfShaft) {
-  // The speed limit is a tenth of a turn per ms. A jump is more than four times that in the elapsed time plus 1 ms
-  // (uncertain latch times), plus 4 counts.
+  // The speed limit is a tenth of a turn per ms.
   Unwrapper unwrapper(SpeedLimit{.rpm = 6000});
   EXPECT_FALSE(unwrapper.jumps(multiturn(9, 0, 0ms))) << "nothing is known yet";
   unwrapper.add(multiturn(5, 0, 0ms));
@@ -187,8 +186,7 @@ TEST(LongestGap, IsNearlyHalfOfTheRangeAtFullSpeed) {
 }
 
 TEST(Unwrapper, DoesNotJoinPositionsThatMayHaveBeenLatchedTooFarApart) {
-  // At 10 000 rpm half a turn takes 3 ms. The requests were 1 ms apart, but the third reply was late, so the encoder
-  // may have latched late, too.
+  // At 10 000 rpm half a turn takes 3 ms. The third reply was late.
   Unwrapper unwrapper;
   unwrapper.add(singleturn(0, 0ms), {0ms, 1ms});
   EXPECT_EQ(unwrapper.add(singleturn(300, 1ms), {1ms, 2ms}), Joined::continued);

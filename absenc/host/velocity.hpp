@@ -11,28 +11,17 @@
 
 namespace absenc::host {
 
-/// Mean speed between two positions: the newest one and an older one. At constant acceleration this is the speed in the
-/// middle of that time, so the delay is half of it.
-///
-/// The true mean speed between the two latch times differs from `counts_per_second` by at most `uncertainty`, which
-/// covers unknown latch times and one count of each position, but not the noise and errors of the encoder.
-///
-/// The time between the two positions is about `window` if that is enough. Otherwise it is longer, up to about
-/// `longest_windows` windows, so that the latch times leave at most 1/20 of the speed uncertain and the distance is 0,
-/// or at least 20 counts. With the longest time any number of counts is accepted, and 1/4 of the speed may be
-/// uncertain. If that is not enough either, no speed is valid.
+/// Mean speed between the newest position and an older one: at constant acceleration the speed in the middle of that
+/// time. `uncertainty` covers the latch times and one count of each position, but no noise of the encoder.
 class Velocity {
  public:
   static constexpr std::size_t most_positions = 48;  ///< Greatest number of positions that are stored.
   static constexpr int longest_windows = 20;         ///< Longest window, as a multiple of the shortest one.
 
-  /// `window`: roughly the shortest time over which the speed is measured. If readings are farther apart, the shortest
-  /// time is that between two readings. Until readings span `window`, a shorter time is used if the shaft has moved far
-  /// enough.
+  /// `window`: desired time over which the speed is measured.
   explicit constexpr Velocity(Time window = std::chrono::milliseconds(50)) : window_(window) {}
 
-  /// Adds a position of `Unwrapper`. A position that was not latched after the one before is ignored, and no speed is
-  /// valid then.
+  /// Adds a position of `Unwrapper`. One that was not latched after the last one is ignored.
   constexpr void add(std::int64_t position, const LatchTime& at) {
     start_ = none;
     if (size_ != 0 && at.middle() <= newest().at.middle()) return;
@@ -58,13 +47,11 @@ class Velocity {
     const double middle = (fastest() + slowest()) / 2;
     return moved() < 0 ? -middle : middle;
   }
-  /// Returns the greatest difference between the true mean speed and `counts_per_second`, in counts/s. 0 while
-  /// `valid()` is false.
+  /// Returns the uncertainty of `counts_per_second` in counts/s; 0 while `valid()` is false.
   [[nodiscard]] constexpr double uncertainty() const { return valid() ? (fastest() - slowest()) / 2 : 0; }
-  /// Returns the latch interval of the older position, which begins the window. Call it only while `valid()` is true.
+  /// Returns the latch interval of the position that begins the window. Requires `valid()`.
   [[nodiscard]] constexpr const LatchTime& since() const { return positions_[start_].at; }
-  /// Returns how long before the newest position (the middle of its latch interval) the shaft had this speed. 0 while
-  /// `valid()` is false.
+  /// Returns half the time between the two positions; 0 while `valid()` is false.
   [[nodiscard]] constexpr Time delay() const { return valid() ? span(start_) / 2 : Time{}; }
 
  private:
@@ -73,7 +60,7 @@ class Velocity {
     LatchTime at;
   };
   static constexpr std::size_t none = ~std::size_t{0};
-  // Before the longest window: least distance in counts, if not 0, and least ratio of the window to its uncertainty.
+  // So many counts, and a window of so many times its uncertainty, are enough.
   static constexpr int enough = 20;
   static constexpr int least = 4;  // least ratio of the longest window to its uncertainty
 
@@ -91,7 +78,7 @@ class Velocity {
   [[nodiscard]] static constexpr double per_second(double counts, Time time) {
     return counts * 1e9 / static_cast<double>(time.count());
   }
-  // Bounds of the absolute speed: a position is known to one count, so a distance may be one count longer or shorter.
+  // A distance may be one count longer or shorter than measured.
   [[nodiscard]] constexpr double fastest() const {
     return per_second(static_cast<double>(moved_from(start_)) + 1, newest().at.earliest - positions_[start_].at.latest);
   }
@@ -108,7 +95,7 @@ class Velocity {
     if (old != 0) remove(0, old);
   }
 
-  // Removes one position. At high rates old positions are stored at longer intervals than new ones.
+  // Removes one position, so that old ones are stored at longer intervals than new ones.
   constexpr void thin_out() {
     std::size_t closest = 1;
     for (std::size_t i = 2; i + 1 < size_; ++i) {
@@ -117,7 +104,7 @@ class Velocity {
     const bool drops_first = positions_[closest].at.width() > positions_[closest + 1].at.width();
     remove(drops_first || closest + 2 == size_ ? closest : closest + 1, 1);
   }
-  // Returns the time between positions `i` and `i + 1` in units of about 1 us, so that a product fits into 64 bits.
+  // Uses units of about 1 us, so that a product of two fits into 64 bits.
   [[nodiscard]] constexpr std::int64_t gap(std::size_t i) const {
     return (positions_[i + 1].at.middle() - positions_[i].at.middle()).count() >> 10;
   }

@@ -130,8 +130,7 @@ TEST(Velocity, IsInvalidIfLongestWindowIsTooUncertain) {
 // Position of a shaft in counts as a function of seconds.
 using Motion = std::function<double(double)>;
 
-// Compares each speed with the true mean speed over its window, which begins at the true latch time that belongs to
-// Velocity::since. Checks that at least `least_valid` of 3000 speeds are valid.
+// Compares each speed with the true mean speed over its window.
 void expect_bounds(const Motion& motion, Time period, Time longest_jitter, unsigned seed, std::size_t least_valid) {
   std::mt19937_64 random(seed);
   const auto within = [&](Time most) {

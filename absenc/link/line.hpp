@@ -8,13 +8,12 @@
 
 namespace absenc {
 
-/// How items (bytes, bits or frames) travel. The kind decides what `Step::Kind::transfer` means (link/step.hpp).
+/// How items (bytes, bits or frames) travel.
 enum class LinkKind : std::uint8_t {
   half_duplex,  ///< one pair for both directions (RS-485): never send while the other side sends
   full_duplex,  ///< a pair for each direction (RS-422, RS-232, USB serial)
   spi,          ///< the host's clock moves one byte in each direction at once
-  /// The host clocks bits out of the encoder (SSI, BiSS). Bits are packed MSB first, the last byte left-aligned. The
-  /// clock idles high; at its rising edge the encoder outputs the next bit.
+  /// The host clocks bits out of the encoder (SSI, BiSS), packed MSB first, the last byte left-aligned.
   clocked,
   can,
 };
@@ -25,23 +24,20 @@ enum class Parity : std::uint8_t { none, odd, even };
 /// Wires beside the data wires; the host drives them.
 enum class ExtraWire : std::uint8_t { trigger, clear };
 
-/// Bit rate, in bits per second, that is assumed where a protocol defines none, for example by virtual encoders.
+/// Bit rate, in bits per second, that is assumed where a protocol defines none.
 inline constexpr std::uint32_t assumed_rate = 115'200;
 
-/// Settings of a line. For SPI and clocked links they describe how to configure a controller; sim draws waveforms from
-/// them.
+/// Settings of a line.
 struct LineSettings {
   std::uint32_t rate = 0;        ///< bits per second: baud rate, SPI or shift clock, CAN bit rate
   Parity parity = Parity::none;  ///< Parity of each character.
   std::uint8_t stop_bits = 1;    ///< Number of stop bits, 1 or 2.
-  /// Data bits of each character, 5 to 16, the lowest first. A character of more than 8 bits carries two bytes, the low
-  /// one first; the high one has zeros above the data. Serial ports refuse more than 8 bits; pseudo-terminals do not.
+  /// Data bits of each character, 5 to 16, the lowest first. More than 8 bits carry two bytes, the low one first.
   std::uint8_t data_bits = 8;
   std::uint8_t spi_mode = 0;     ///< spi, clocked: 2 * CPOL + CPHA
   std::uint8_t idle_clocks = 0;  ///< clocked: number of clocks before the first bit, during which the line stays idle
   Time select_lead{};            ///< spi: minimum time from chip select to the first clock
-  /// Highest rate in bits per second that the encoder's document allows, if a controller could be faster; 0: not
-  /// stated.
+  /// Highest rate in bits per second that the encoder's document allows; 0: not stated.
   std::uint32_t highest_rate = 0;
 
   /// Returns these settings, with `assumed_rate` if `rate` is 0.
@@ -54,7 +50,7 @@ struct LineSettings {
   /// Returns whether all members of two settings are equal.
   friend constexpr bool operator==(const LineSettings&, const LineSettings&) = default;
 
-  /// Returns the duration of `count` bits on the line, rounded to the nearest nanosecond. `rate` must not be 0.
+  /// Returns the duration of `count` bits, rounded to the nearest nanosecond. `rate` must not be 0.
   [[nodiscard]] constexpr Time bits(std::uint64_t count) const {
     return Time((count * 1'000'000'000 + rate / 2) / rate);
   }
@@ -66,7 +62,7 @@ struct LineSettings {
   [[nodiscard]] constexpr unsigned character_bytes() const { return data_bits > 8 ? 2 : 1; }
   /// Returns the duration of one asynchronous character.
   [[nodiscard]] constexpr Time character() const { return bits(character_bits()); }
-  /// Returns the share of a character's duration that one byte has: half of it if two bytes share the character.
+  /// Returns the duration of a character divided by its number of bytes.
   [[nodiscard]] constexpr Time byte_time() const { return character() / character_bytes(); }
 };
 

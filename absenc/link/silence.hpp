@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The rule for the `silence` event, which the ports of the operating system and the simulated lines follow.
+// The rule for the `silence` event of ports and simulated lines.
 #pragma once
 
 #include "absenc/link/step.hpp"
 
 namespace absenc {
 
-/// A silence timer at one end of a line. `silence` is reported at most once after each transfer or pulse and once
-/// after each received item, when the line was quiet for the limit in the machine's last step.
+/// A timer for the `silence` event at one end of a line.
 class Silence {
  public:
   Silence() = default;
@@ -22,8 +21,7 @@ class Silence {
     received_ = true;
     reported_ = false;
   }
-  /// Records activity on the line that did not reach this end as an item: the line is silent since `at`. A `silence`
-  /// that was reported already is not reported again.
+  /// Records activity that did not reach this end as an item: the line is silent since `at`.
   void busy(Time at) { since_ = at; }
   /// Records that `silence` was reported.
   void reported() { reported_ = true; }
@@ -33,8 +31,7 @@ class Silence {
   /// Returns whether an item was received since the last transfer or pulse.
   [[nodiscard]] bool has_received() const { return received_; }
 
-  /// Returns when `silence` is due for a step with these limits (Step::answer and gap); `latency` is the port's delay,
-  /// which is added. Returns `never` if `silence` was already reported or no limit applies.
+  /// Returns when `silence` is due by the limits `answer` and `gap` plus `latency`, or `never`.
   [[nodiscard]] Time due(Time answer, Time gap, Time latency = {}) const {
     const Time limit = received_ ? gap : answer;
     return reported_ || limit <= Time{} ? never : since_ + limit + latency;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The ASCII protocol of serial-line CAN adapters (Lawicel CAN232, slcand of can-utils): each frame is one line of text.
+// The ASCII protocol of serial-line CAN adapters (Lawicel CAN232): each frame is a line of text.
 #pragma once
 
 #include <array>
@@ -22,14 +22,12 @@ inline constexpr std::size_t line_capacity = 31;
 /// Text of one line, with or without its CR.
 using LineText = ByteBuffer<line_capacity>;
 
-/// Returns whether `byte` begins a frame: t and T for data frames, r and R for remote frames; capitals mean 29-bit
-/// identifiers.
+/// Returns whether `byte` begins a frame: t or T (data), r or R (remote).
 [[nodiscard]] constexpr bool begins_frame(std::uint8_t byte) {
   return byte == 't' || byte == 'T' || byte == 'r' || byte == 'R';
 }
 
-/// Returns the digit that follows S in the command that sets the bit rate `rate`; nothing if the protocol has no code
-/// for this rate.
+/// Returns the digit that sets the bit rate `rate` in the command S; nothing if there is none.
 [[nodiscard]] constexpr std::optional<std::uint8_t> rate_code(std::uint32_t rate) {
   constexpr std::array<std::uint32_t, 9> rates{10'000,  20'000,  50'000,  100'000,  125'000,
                                                250'000, 500'000, 800'000, 1'000'000};
@@ -39,7 +37,7 @@ using LineText = ByteBuffer<line_capacity>;
   return std::nullopt;
 }
 
-/// Returns the bit rate that S followed by the digit `code` sets, the inverse of `rate_code`; 0 if `code` is invalid.
+/// Returns the bit rate of the digit `code`, the inverse of `rate_code`; 0 if `code` is invalid.
 [[nodiscard]] constexpr std::uint32_t rate_of(std::uint8_t code) {
   for (const std::uint32_t rate :
        {10'000u, 20'000u, 50'000u, 100'000u, 125'000u, 250'000u, 500'000u, 800'000u, 1'000'000u}) {
@@ -66,8 +64,7 @@ constexpr std::int64_t digits_of(Bytes text) {
 }
 }  // namespace detail
 
-/// Returns `frame` encoded as a line with CR. A `time`, in milliseconds (0 to 59999), is appended as timestamp; give
-/// it only if the other side requested timestamps with Z1.
+/// Returns `frame` as a line with CR, and with `time`, in milliseconds (0 to 59999), as timestamp.
 [[nodiscard]] constexpr LineText encode(const CanFrame& frame, std::optional<std::uint16_t> time = {}) {
   LineText text;
   text.push_back(frame.remote ? (frame.extended ? 'R' : 'r') : (frame.extended ? 'T' : 't'));
@@ -81,8 +78,7 @@ constexpr std::int64_t digits_of(Bytes text) {
   return text;
 }
 
-/// Returns the frame that a line without its CR contains; a timestamp at the end is skipped. Errors: bad_framing (not a
-/// frame, or a character that is no digit), out_of_range (identifier, more than 8 bytes), wrong_length.
+/// Returns the frame of a line without its CR; skips a timestamp. Errors: bad_framing, out_of_range, wrong_length.
 [[nodiscard]] constexpr Result<CanFrame> decode(Bytes line) {
   if (line.empty() || !begins_frame(line[0])) return Error::bad_framing;
   CanFrame frame;
@@ -108,8 +104,7 @@ constexpr std::int64_t digits_of(Bytes text) {
   return frame;
 }
 
-/// A reader that splits received bytes into lines. After garbage or a lost CR it resumes behind the next CR or BEL, or
-/// at the next letter that begins a frame (t, T, r, R): none of these letters occurs within a frame or a command.
+/// A reader that splits received bytes into lines, and resumes after garbage.
 class LineReader {
  public:
   /// Event that a received byte completes.
@@ -137,7 +132,7 @@ class LineReader {
     return LineEvent::nothing;
   }
 
-  /// Returns the complete line, without the CR; valid only directly after `feed` has returned `line`.
+  /// Returns the complete line without its CR; valid directly after `feed` has returned `line`.
   [[nodiscard]] constexpr Bytes line() const { return line_; }
 
  private:

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Feeds arbitrary bytes as an adapter's output: each line that decodes to a frame must equal the line encoded from that
-// frame, apart from the case of digits and the timestamp. A valid frame behind the bytes must be found.
+// Feeds arbitrary bytes as an adapter's output. A valid frame behind them must be found.
 #include "absenc/link/slcan.hpp"
 
 #include <cstddef>
@@ -15,8 +14,7 @@ void require(bool condition) {
   if (!condition) std::abort();
 }
 
-// Converts digits a to f to upper case, as `encode` writes them. The letters that begin frames are not among these
-// digits.
+// Converts digits a to f to upper case, as `encode` writes them.
 std::uint8_t upper(std::uint8_t byte) {
   return byte >= 'a' && byte <= 'f' ? static_cast<std::uint8_t>(byte - 'a' + 'A') : byte;
 }
@@ -26,7 +24,7 @@ void check(Bytes line) {
   if (!frame) return;
   require(frame->size <= 8 && frame->id <= (frame->extended ? 0x1FFFFFFFu : 0x7FFu));
   const slcan::LineText again = slcan::encode(*frame);
-  // Without its CR, the encoded line is as long as `line`, or 4 digits shorter if `line` ends with a timestamp.
+  // `line` has no CR, and may end with a timestamp of 4 digits.
   require(again.size() - 1 == line.size() || again.size() + 3 == line.size());
   for (std::size_t i = 0; i + 1 < again.size(); ++i) require(again[i] == upper(line[i]));
 }

@@ -74,7 +74,7 @@ TEST(Slcan, MapsBitRatesToCodes) {
   EXPECT_EQ(rate_of('9'), 0u);
 }
 
-// Returns the lines that a LineReader finds in `stream`, and "refused" or "garbage" for the events of these names.
+// Returns the lines that are found in `stream`, and "refused" or "garbage" for these events.
 std::vector<std::string> found(std::string_view stream) {
   LineReader reader;
   std::vector<std::string> all;

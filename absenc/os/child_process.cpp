@@ -46,8 +46,7 @@ struct SpawnSteps {
     }
     ::posix_spawn_file_actions_adddup2(&files, channel, channel_of_child);
     ::posix_spawn_file_actions_addclosefrom_np(&files, channel_of_child + 1);
-    // The child blocks signals: Ctrl-C and systemd signal all processes at once, but the child must go on until the
-    // parent has used it to end its connections in order.
+    // Signals such as Ctrl-C reach all processes at once, but the parent still needs the child.
     sigset_t blocked;
     ::sigemptyset(&blocked);
     for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE}) ::sigaddset(&blocked, signal);
@@ -77,7 +76,7 @@ void limit(__rlimit_resource what, rlim_t most) {
   ::setrlimit(what, &both);
 }
 
-// Returns the size of data and stack in bytes (sixth number of statm, proc(5)); RLIMIT_DATA does not count the stack.
+// Returns the size of data and stack in bytes (sixth number of statm, proc(5)).
 std::size_t data_bytes() {
   std::ifstream file("/proc/self/statm");
   std::size_t pages = 0;
@@ -114,7 +113,7 @@ ChildProcess::ChildProcess(std::vector<std::string> arguments) : channel_(Descri
   std::vector<char*> words;
   for (std::string& one : arguments) words.push_back(one.data());
   words.push_back(nullptr);
-  // /proc/self/exe is the running program, even if a newer version was installed at its path since.
+  // /proc/self/exe is the running program, even if a newer version was installed since.
   const int error = ::posix_spawn(&number_, "/proc/self/exe", &steps.files, &steps.attributes, words.data(), ::environ);
   if (error != 0) throw system_failure("starting this program again", error);
   channel_ = Channel(std::move(ends.ours));
@@ -142,7 +141,7 @@ std::string ChildProcess::end(Time longest) {
 }
 
 Channel become_child(const char* name, std::size_t bytes) {
-  // If the parent has ended before this call, its end of the channel is closed already, so the child notices it.
+  // If the parent ended before this call, its end of the channel is closed: the child notices.
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   ::prctl(PR_SET_NAME, name);
   ::fcntl(channel_of_child, F_SETFD, FD_CLOEXEC);

@@ -17,9 +17,9 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr Time wakeup_interval = 1ms;
-// Time between two bytes through one terminal: the kernel's worker threads must have slept before each of them.
+// Time between two bytes: the kernel's worker threads must have slept before each of them.
 constexpr Time byte_interval = 5ms;
-// More terminals see a delay sooner, because the worker threads are late independently of each other.
+// More terminals see a delay sooner: the worker threads are late independently.
 constexpr std::size_t loop_count = 4;
 
 }  // namespace

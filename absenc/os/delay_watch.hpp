@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures how late this computer is: a reply delayed by no more than the measured time may be punctual.
+// Measures how late this computer is: a reply that is no later may be punctual.
 #pragma once
 
 #include <atomic>
@@ -11,13 +11,10 @@
 
 namespace absenc::os {
 
-/// A measurement of this computer's own delays in a thread of its own, as long as the object exists: how late the
-/// thread is woken, and, with `terminals`, how long bytes take through pseudo-terminals that only this object uses. The
-/// kernel passes received bytes of every terminal, also of a serial port, to programs by its own worker threads; on a
-/// busy computer these get the processor much later than a waiting program does.
+/// A thread that measures this computer's own delays as long as the object exists.
 class DelayWatch {
  public:
-  /// `terminals`: whether pseudo-terminals are measured, too. One that cannot be opened is left out.
+  /// `terminals`: whether to measure pseudo-terminals, too, as far as they can be opened.
   explicit DelayWatch(bool terminals);
 
   /// Returns the longest delay that was measured so far.

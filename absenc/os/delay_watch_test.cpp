@@ -21,8 +21,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Stops a process with a DelayWatch for at least 60 ms. Returns 0 if that process then measured 50 ms or more within
-// 10 s, else 1.
+// Stops a process with a DelayWatch for 60 ms or more; returns 0 if it measured at least 50 ms.
 int measured_while_stopped(bool terminals) {
   const pid_t child = ::fork();
   if (child == 0) {
@@ -56,7 +55,7 @@ std::set<std::string> open_slaves() {
   return paths;
 }
 
-/// Takes a byte away from one of the terminals: it is on its way for ever, although the thread is woken in time.
+/// Takes a byte away from one of the terminals: it is on its way for ever.
 TEST(DelayWatch, ByteThatDoesNotArriveIsLate) {
   const std::set<std::string> before = open_slaves();
   const DelayWatch watch(true);

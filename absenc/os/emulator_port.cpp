@@ -37,10 +37,7 @@ void check(bool good, const std::string& what) {
   if (!good) throw system_failure(what, errno);
 }
 
-// Returns a socket that is bound to a kernel name derived from `link`, to mark the link as in use; an empty descriptor
-// with errno on an error, EADDRINUSE if another socket has the name. The name lives as long as the socket, at most as
-// long as the process that bound it, so a link left by a killed emulator can be told from one in use, even if another
-// program has got the number of its terminal. Opening the terminal instead would be noticed by its user.
+// Returns a socket whose kernel name marks `link` as in use; empty, with errno, on an error.
 Descriptor bind_name_of(const fs::path& link) {
   struct stat folder {};
   Descriptor socket(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
@@ -64,8 +61,7 @@ Descriptor bind_name_of(const fs::path& link) {
 EmulatorPort::EmulatorPort(std::string link, std::optional<std::uint16_t> tcp_port) {
   set_latency(2ms);
   set_idle_latency(200us);
-  // `sent` gets the time before the write, because the write wakes the host, which often answers before this program
-  // continues.
+  // The write wakes the host, which often answers before this program continues.
   set_read_at_once(true);
   open_terminal();
   if (tcp_port) listen_on(*tcp_port);
@@ -84,8 +80,7 @@ EmulatorPort::~EmulatorPort() {
 
 void EmulatorPort::open_terminal() {
   terminal_ = open_terminal_pair();
-  // The watch is added after this port has opened the slave itself, so it reports only other programs. If inotify is
-  // missing, bytes and settings that a program leaves behind are not cleared for the next program.
+  // This port has opened the slave already, so the watch reports only other programs.
   watch_ = Descriptor(::inotify_init1(IN_NONBLOCK | IN_CLOEXEC));
   if (watch_) ::inotify_add_watch(watch_.get(), terminal_.path.c_str(), IN_OPEN | IN_CLOSE);
 }
@@ -132,8 +127,7 @@ void EmulatorPort::make_link() {
 }
 
 std::size_t EmulatorPort::read_some(MutableBytes into, std::span<const int> ready) {
-  // A program's open or close of the slave is handled first, so that the reply to a request that is read below is not
-  // discarded as a leftover.
+  // Handled first, so that the reply to a request that is read below is not discarded.
   if (std::find(ready.begin(), ready.end(), watch_.get()) != ready.end()) users_changed();
   std::size_t filled = 0;
   for (const int descriptor : ready) {
@@ -153,11 +147,7 @@ std::size_t EmulatorPort::read_some(MutableBytes into, std::span<const int> read
   return filled;
 }
 
-// Returns how long received bytes may have waited before this thread read them, because this thread could not run. On a
-// busy machine a ready thread may wait for milliseconds. A host that times out and repeats its request meanwhile has
-// broken no rule, although both requests arrive at once. Kernel threads that carry the bytes of pseudo-terminals wait
-// as well, at other times, so a delay is used for one second, or until a longer one is read. The delay is read at most
-// every 0.5 ms, because shorter delays do not matter.
+// Returns how long received bytes may have waited because this thread could not run.
 Time EmulatorPort::lateness() {
   const Time now = os::now();
   if (now < delay_read_at_ + 500us) return lateness_;
@@ -190,10 +180,7 @@ void EmulatorPort::accept_client() {
   clients_.push_back(std::move(client));
 }
 
-// Handles an open or close of the slave by a program. Because this port keeps the slave open, the next program does not
-// get the clean state of a real port: an exclusive mode (TIOCEXCL) left by the last program would lock it out, and it
-// would read replies to the last program. Within 200 ms after a reply no bytes are discarded: another program may still
-// read the reply.
+// An exclusive mode (TIOCEXCL) that the last program left would lock out the next one.
 void EmulatorPort::users_changed() {
   std::array<std::byte, 4096> events;
   while (::read(watch_.get(), events.data(), events.size()) > 0) {

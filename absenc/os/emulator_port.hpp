@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The line of a virtual encoder: a pseudo-terminal and optionally a TCP port, to which any program can connect.
+// The line of a virtual encoder: a pseudo-terminal, and optionally a TCP port.
 #pragma once
 
 #include <cstddef>
@@ -14,28 +14,19 @@
 
 namespace absenc::os {
 
-/// A pseudo-terminal and TCP clients as one line: the device receives bytes from every end, and each end receives the
-/// bytes of the device. As on a wire, bytes that no program reads are lost. A pause ends a frame when it exceeds the
-/// gap limit of the step by the latency: 2 ms by default, 0.2 ms where the device expects no more bytes.
-///
-/// After a `configure` step the device receives bytes from the terminal only if the terminal has the same rate (within
-/// 1 %) or the default rate (the kernel's 38400 baud), which means no rate. TCP clients have no rate either: the device
-/// receives their bytes at every rate. So a wrong change of the rate shows without hardware. Devices that share the
-/// line (sim::Bus) are not affected by rates.
+/// A pseudo-terminal and TCP clients as one line of a device.
 class EmulatorPort final : public StreamPort {
  public:
-  /// `link` is the path of a symbolic link to the pseudo-terminal, removed by the destructor if it still leads there;
-  /// empty for none. It replaces only a link to a pseudo-terminal that no other EmulatorPort uses. `tcp_port` is the
-  /// port to listen on at 127.0.0.1; 0 for any free one, empty for none. Throws Failure: `in_use` (the link or the TCP
-  /// port), `system`.
+  /// `link`: path of a symbolic link to the pseudo-terminal; empty: none. `tcp_port`: port to listen on at 127.0.0.1, 0
+  /// for any free one; empty: none. Throws Failure.
   explicit EmulatorPort(std::string link = {}, std::optional<std::uint16_t> tcp_port = {});
   ~EmulatorPort() override;
 
-  /// Returns the path for other programs to open: the link if there is one, otherwise the pseudo-terminal.
+  /// Returns the path for other programs to open: the link if there is one, else the terminal.
   [[nodiscard]] const std::string& path() const { return link_.empty() ? terminal_.path : link_; }
   /// Returns the TCP port, or 0 when the port does not listen.
   [[nodiscard]] std::uint16_t tcp_port() const { return tcp_port_; }
-  /// Returns the number of bytes that were lost because a terminal or TCP client did not read them.
+  /// Returns the number of bytes that a terminal or a TCP client did not take.
   [[nodiscard]] std::uint64_t dropped() const { return dropped_; }
 
  private:

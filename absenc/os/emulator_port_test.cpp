@@ -124,7 +124,7 @@ TEST(EmulatorPort, RefusesClientsAboveItsLimit) {
   EXPECT_EQ(failure_of([&] { static_cast<void>(hosts.back()->wait({.at = never})); }).kind(), Failure::Kind::lost);
 }
 
-// Simulates a busy machine: two threads compete for one processor, and the one under test has to wait.
+// Simulates a busy machine: another thread competes for the one processor.
 TEST(EmulatorPort, ReportsSchedulingDelayAsLate) {
   cpu_set_t before;
   cpu_set_t one;
@@ -202,7 +202,6 @@ TEST(EmulatorPort, IsNotLockedByAUserWhoLeft) {
   EXPECT_EQ(exclusive, 0);
 }
 
-// After a byte the port waits long for the rest of a request, but only briefly where the device expects no more bytes.
 TEST(EmulatorPort, PauseIsShorterWhereNoMoreBytesAreExpected) {
   EmulatorPort device;
   device.set_latency(std::chrono::hours(1));

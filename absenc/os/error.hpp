@@ -10,8 +10,7 @@
 
 namespace absenc::os {
 
-/// A failure of a port, a file or another object of the operating system. `what()` reports to the user what happened
-/// and mostly what to try.
+/// A failure of a port, a file or another object of the operating system. `what()` is a text for the user.
 class Failure : public std::runtime_error {
  public:
   /// Kind of a failure.
@@ -25,8 +24,7 @@ class Failure : public std::runtime_error {
     system,         ///< any other error of the operating system
   };
 
-  /// State of the CAN bus that caused a failure: `off` (the controller has left the bus after too many errors),
-  /// `not_acknowledged` (no other node acknowledges frames); `unknown` for every other failure.
+  /// State of the CAN bus that caused a failure: `off` (after too many errors), `not_acknowledged`, or `unknown`.
   enum class Bus : std::uint8_t { unknown, off, not_acknowledged };
 
   /// Kind of program that holds a port in use.
@@ -42,8 +40,7 @@ class Failure : public std::runtime_error {
   [[nodiscard]] Kind kind() const { return kind_; }
   /// Returns the state of the CAN bus that caused the failure; `unknown` if no such state did.
   [[nodiscard]] Bus bus() const { return bus_; }
-  /// Returns the kind of program that holds the port; `unknown` if the failure is not `in_use` or the program is not
-  /// known.
+  /// Returns the kind of program that holds the port; `unknown` if that is not known.
   [[nodiscard]] Holder holder() const { return holder_; }
 
  private:
@@ -57,18 +54,15 @@ class Failure : public std::runtime_error {
   return {Failure::Kind::system, what + " failed: " + std::generic_category().message(error)};
 }
 
-// Interrupted and Ended below are std::exceptions, so that a program whose `main` catches std::exception ends in order.
-// Code that catches std::exception and continues must catch these two first.
+// Code that catches std::exception and continues must catch the two classes below first.
 
-/// Thrown after SIGINT or SIGTERM, once `catch_interrupts` (os/signals.hpp) was called, by `wait_for`, `Poller::wait`,
-/// and all ports and functions that wait with them.
+/// Thrown after SIGINT or SIGTERM, once `catch_interrupts` (os/signals.hpp) was called.
 struct Interrupted : std::exception {
   /// Returns the text "interrupted".
   [[nodiscard]] const char* what() const noexcept override { return "interrupted"; }
 };
 
-/// Thrown by a port when the time set by its `set_end` is reached, and by waits of this folder when a CancelCheck
-/// returns true.
+/// Thrown by a port at the time of its `set_end`, and by waits when a CancelCheck returns true.
 struct Ended : std::exception {
   /// Returns the text "cancelled".
   [[nodiscard]] const char* what() const noexcept override { return "cancelled"; }

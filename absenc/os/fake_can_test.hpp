@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Test replacement for the kernel behind a CAN port: one interface, whose other end the test holds.
+// Test replacement for the kernel behind a CAN port, with one interface.
 #pragma once
 
 #include <linux/can.h>

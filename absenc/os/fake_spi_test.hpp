@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Test replacement for the kernel behind an SPI port. It logs the written settings and the messages.
+// Test replacement for the kernel behind an SPI port, with a log of settings and messages.
 #pragma once
 
 #include <fcntl.h>
@@ -80,8 +80,7 @@ class FakeSpi final : public SpiKernel {
 
   static void* at(const UserMemory& memory) { return reinterpret_cast<void*>(memory.address); }
 
-  // Serves a request like the kernel serves CUSE: it copies the memory that the reply asks for, until the reply is
-  // final.
+  // Serves a request as CUSE does: copies the memory that the reply asks for.
   int carry(unsigned long request, void* argument) {
     Data in;
     std::vector<UserMemory> out;

@@ -69,8 +69,7 @@ Event<CanFrame> FramePort::wait(const Step<CanFrame>& step) {
     collect(std::min(waiting_.due(), end_));
     const Time time = os::now();
     if (time >= end_) throw Ended{};
-    // Received frames are reported before a silence or timer: if this program looks late, the other side is not at
-    // fault.
+    // Received frames are reported before a silence or timer: this program may look late.
     if (!pending_events_.empty()) continue;
     if (const std::optional<Event<CanFrame>> event = waiting_.take_due(time)) return *event;
   }

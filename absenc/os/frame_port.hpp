@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Steps and events (link/step.hpp) on any port that carries CAN frames: the common timing of such ports.
+// Steps and events (link/step.hpp) on any port that carries CAN frames.
 #pragma once
 
 #include <deque>
@@ -9,14 +9,8 @@
 
 namespace absenc::os {
 
-/// Base class of the CAN ports in this folder. `now`, `begin` and `wait` throw Failure, Interrupted (os/signals.hpp) or
-/// Ended.
-///
-/// A transfer begins at `at`, earlier only by the send slack; `begin` blocks until then. A frame received before a
-/// transfer began, or before `now` was called, is reported with a time not later than that transfer or call, however
-/// long the frame waited in a queue. Because replies on CAN carry no number, the machine recognises such an old frame
-/// only by its time. `sent` carries the time before the frame was handed to the kernel, because the kernel does not
-/// report when the controller has sent it; so a reply is never older than `sent`. `timer` is reported as by StreamPort.
+/// Base class of the CAN ports in this folder. `now`, `begin` and `wait` throw Failure, Interrupted or Ended. `sent`
+/// has the time before the last frame was handed over.
 class FramePort : public Port<CanFrame> {
  public:
   FramePort() = default;
@@ -28,7 +22,7 @@ class FramePort : public Port<CanFrame> {
   void begin(const Step<CanFrame>& step) final;
   [[nodiscard]] Event<CanFrame> wait(const Step<CanFrame>& step) final;
 
-  /// Returns the delay between the bus and this program, which is added to the answer and gap limits of a step.
+  /// Returns the delay between bus and program, which is added to the answer and gap limits.
   [[nodiscard]] Time latency() const { return latency_; }
   void set_latency(Time latency) { latency_ = latency; }
 
@@ -39,14 +33,13 @@ class FramePort : public Port<CanFrame> {
   void set_end(Time end) { end_ = end; }
 
  protected:
-  /// Passes received frames to `push`. Waits for the first one, at most until `deadline`; does not wait if `deadline`
-  /// is in the past.
+  /// Passes received frames to `push`. Waits for the first one, at most until `deadline`.
   virtual void collect(Time deadline) = 0;
   virtual void send(const CanFrame& frame) = 0;
   virtual void apply(const LineSettings& settings) = 0;
 
   void push(const CanFrame& frame, Time at);
-  /// Queues the event `line_error` for `wait`: a frame was destroyed on the bus or could not be sent.
+  /// Queues a `line_error`: a frame was destroyed on the bus or could not be sent.
   void push_error(Time at);
   [[nodiscard]] Time end() const { return end_; }
 

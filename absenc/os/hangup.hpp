@@ -6,8 +6,7 @@
 
 namespace absenc::os {
 
-/// Returns a descriptor that is readable after SIGHUP. Call it before other threads are started, or the signal would
-/// end the process through one of them. Throws Failure.
+/// Returns a descriptor that is readable after SIGHUP. Call it before other threads are started. Throws Failure.
 [[nodiscard]] Descriptor catch_hangups();
 
 /// Takes pending SIGHUPs out of the descriptor. Returns false if none was pending.

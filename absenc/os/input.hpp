@@ -10,8 +10,8 @@
 
 namespace absenc::os {
 
-/// Reads standard input into `into` as soon as bytes are available and returns their number; 0 at the end of the input;
-/// nothing if `deadline` (`never`: no deadline) is reached first. Throws Failure, Interrupted, Ended.
+/// Reads standard input as soon as bytes are available. Returns their number; 0 at the end, nothing at `deadline`.
+/// Throws Failure, Interrupted, Ended.
 [[nodiscard]] std::optional<std::size_t> read_standard_input(MutableBytes into, Time deadline);
 
 }  // namespace absenc::os

@@ -15,7 +15,7 @@ namespace {
 constexpr std::size_t longest_line = 4096;
 }
 
-// The kernel stops a background program that reads its terminal. With SIGTTIN ignored, the read fails with EIO instead.
+// With SIGTTIN ignored, a read in the background fails with EIO: it does not stop the program.
 InputLines::InputLines(int descriptor) : descriptor_(descriptor) {
   if (::isatty(descriptor) == 1) static_cast<void>(::signal(SIGTTIN, SIG_IGN));
 }

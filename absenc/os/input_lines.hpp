@@ -9,13 +9,10 @@ namespace absenc::os {
 
 class InputLines {
  public:
-  /// Reads lines from `descriptor`, which is not closed here. If the descriptor is a terminal and this program runs in
-  /// the background, nothing is read and the program is not stopped.
+  /// Reads lines from `descriptor`, which is not closed here.
   explicit InputLines(int descriptor = 0);
 
-  /// Returns the complete lines of one read, without their line ends. Never blocks. A line of 4096 bytes or more is
-  /// returned in parts of 4096 bytes; the last part may be empty. At the end of the input an incomplete last line is
-  /// returned.
+  /// Returns the lines of one read without their ends; never blocks. Lines of 4096 bytes or more come in parts.
   [[nodiscard]] std::vector<std::string> take();
   /// Returns whether the input has ended, or reading it failed.
   [[nodiscard]] bool ended() const { return ended_; }

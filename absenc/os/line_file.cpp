@@ -40,7 +40,7 @@ Failure::Kind kind_of(int error) {
   throw Failure(kind_of(error), "the file " + path + " cannot be made: " + std::generic_category().message(error));
 }
 
-// Renames `from` to `to` if no file `to` exists. Returns 0 or a value of errno; EEXIST if `to` exists.
+// Renames `from` to `to` and returns 0, or a value of errno: EEXIST if `to` exists.
 int rename_to_new(const std::string& from, const std::string& to) {
   if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
   if (errno != EINVAL && errno != ENOSYS) return errno;

@@ -64,7 +64,7 @@ TEST(LineFile, RemovesPartOfLinesThatDoNotFit) {
   const Directory directory;
   LineFile file(directory.path / "log");
   file.append("whole line\n");
-  // A file size limit of the process simulates the full disk: the first part of the write succeeds.
+  // A file size limit simulates the full disk: the first part of the write succeeds.
   rlimit before{};
   ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
   auto* const handler = std::signal(SIGXFSZ, SIG_IGN);

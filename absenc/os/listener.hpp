@@ -17,16 +17,14 @@ struct Listener {
   bool on_loopback = false;  // whether only programs on this computer can reach the port
 };
 
-/// Opens a TCP port at `host`: a name, an IPv4 address, or an IPv6 address with or without brackets. `port` 0 means any
-/// free port. Throws Failure: `not_found` (unknown host, or no address of this computer), `in_use`, `no_permission`,
-/// `system`.
+/// Opens a TCP port at `host`: a name or an address, an IPv6 address also in brackets. `port` 0: any free one. Throws
+/// Failure.
 [[nodiscard]] Listener listen_at(const std::string& host, std::uint16_t port);
 
-/// Returns the IP address in `address` as text, for example "127.0.0.1"; "" if it is no internet address.
+/// Returns the IP address in `address` as text, "127.0.0.1"; "" if it is no internet address.
 [[nodiscard]] std::string host_text(const sockaddr& address);
 
-/// Shuts down the connection of `socket`: its readers get the end of the stream, its writers an error. The descriptor
-/// stays open until its owner closes it.
+/// Shuts down the connection of `socket`, which stays open until its owner closes it.
 void end_connection(int socket);
 
 }  // namespace absenc::os

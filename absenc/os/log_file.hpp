@@ -14,11 +14,10 @@ namespace absenc::os {
 /// A folder that this process owns: it is locked (flock) for the lifetime of the object.
 class OwnedFolder {
  public:
-  /// Creates the folder at `path` if it is missing, but not its parent, and locks it. Throws Failure: `in_use` if it is
-  /// locked already, `not_found` if its parent is missing, `system`.
+  /// Creates the folder at `path` if it is missing, but not its parent, and locks it. Throws Failure.
   explicit OwnedFolder(const std::string& path);
 
-  /// Returns whether the path still leads to this folder: the folder may have been removed, moved or replaced.
+  /// Returns whether the path still leads to this folder.
   [[nodiscard]] bool is_there() const;
 
  private:
@@ -30,15 +29,15 @@ class OwnedFolder {
 class LogFile {
  public:
   enum class Open : std::uint8_t { fresh, existing };
-  /// Creates the file at `path` (`fresh`; it must not exist) or opens it (`existing`). Throws Failure.
+  /// Creates the file at `path` (`fresh`) or opens it (`existing`). Throws Failure.
   LogFile(const std::string& path, Open how);
 
   /// Appends all of `bytes` or, on error, none of them. Returns 0 or a value of errno.
   [[nodiscard]] int append(std::string_view bytes);
-  /// Replaces the existing byte at `offset`, which needs no room on the disk. Returns 0 or a value of errno.
+  /// Replaces the existing byte at `offset`. Returns 0 or a value of errno.
   [[nodiscard]] int replace(std::size_t offset, char byte) const;
-  /// Replaces the whole content by `bytes`, which must not be longer, so that no room on the disk is needed. Returns
-  /// false if `bytes` is longer, or on an error; the content may then be a mixture of both.
+  /// Replaces the content by `bytes`, which must not be longer. Returns false on an error; the content may then be a
+  /// mixture.
   [[nodiscard]] bool shrink_to(std::string_view bytes);
   /// Returns up to `size` bytes of the file from `offset`; fewer at its end. Throws Failure.
   [[nodiscard]] std::string read(std::size_t offset, std::size_t size) const;

@@ -18,16 +18,14 @@ class Datagrams {
   /// Resolves `host`, a name or an address, once. Throws Failure: `not_found`, `system`.
   Datagrams(const std::string& host, std::uint16_t port);
 
-  /// Sends `text` as one datagram. Returns false if the system did not take it, for example because the send buffer is
-  /// full.
+  /// Sends `text` as one datagram. Returns false if the system did not take it.
   [[nodiscard]] bool send(std::string_view text);
 
  private:
   Descriptor socket_;
 };
 
-/// Resolves the name `host`. Returns its addresses as text, in the order in which they are to be tried. Throws Failure
-/// `not_found`.
+/// Returns the addresses of the name `host` as text. Throws Failure `not_found`.
 [[nodiscard]] std::vector<std::string> addresses_of(const std::string& host);
 
 /// Directions in which a socket is ready: to be read or written without blocking.
@@ -35,8 +33,7 @@ struct Ready {
   bool to_read = false;
   bool to_write = false;
 };
-/// Waits until `socket` can be read, or with `for_writing` until it can be read or written, at most `longest` or until
-/// a signal arrives. Returns the directions in which it is ready. Works with any descriptor number, unlike select().
+/// Waits until `socket` can be read, or with `for_writing` read or written, at most `longest`.
 [[nodiscard]] Ready wait_for_socket(int socket, bool for_writing, Time longest);
 
 /// Returns the name of this computer; "" if it has none.

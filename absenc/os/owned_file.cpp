@@ -33,7 +33,7 @@ FileIdentity identity_of(const std::string& path) {
 OwnedFile::OwnedFile(const std::string& path) : path_(path) {
   constexpr int most_tries = 100;
   for (int tries = 0; tries < most_tries; ++tries) {
-    // The type of the file is checked before opening, because opening a device may already have an effect.
+    // Checked before opening, because opening a device may already have an effect.
     struct stat named {};
     const bool there = ::stat(path.c_str(), &named) == 0;
     if (there) require_regular(is_regular(named), path);
@@ -53,7 +53,7 @@ OwnedFile::OwnedFile(const std::string& path) : path_(path) {
     // The file may have been replaced before it was locked.
     if (identity_of(path) == identity_of(opened)) return;
   }
-  // After all tries: the path is a link to itself or to nothing, or another process replaces the file again and again.
+  // A link to itself or to nothing, or another process replaces the file again and again.
   struct stat named {};
   throw system_failure("opening " + path, ::stat(path.c_str(), &named) < 0 ? errno : ELOOP);
 }

@@ -40,9 +40,7 @@ void Poller::arm(Time deadline) {
 
 std::span<const int> Poller::wait(Time deadline) {
   if (interrupts_ < 0 && interrupt_descriptor() >= 0) add(interrupts_ = interrupt_descriptor());
-  // Deadlines mostly move later with every exchange. An armed timer is left at its old, earlier deadline: that costs
-  // one useless wake-up, but saves setting the timer at every wait. A deadline in the past needs no timer: the wait
-  // only checks which descriptors are ready.
+  // A useless wake-up at an earlier deadline costs less than setting the timer at every wait.
   const bool over = deadline < armed_ && now() >= deadline;
   if (!over && deadline < armed_) arm(deadline);
   const Time patience = CancelCheck::interval();

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Waits for bytes on a few descriptors, for a deadline and for SIGINT or SIGTERM, mostly with one system call, whatever
-// the number of descriptors. Ports use it instead of `wait_for` for this reason.
+// Waits for bytes on a few descriptors, for a deadline, and for SIGINT or SIGTERM.
 #pragma once
 
 #include <array>
@@ -14,7 +13,7 @@ namespace absenc::os {
 
 class Poller {
  public:
-  // Greatest number of descriptors that one call of `wait` returns; the next call returns further ones.
+  // Greatest number of descriptors that one call of `wait` returns.
   static constexpr std::size_t most_ready = 16;
 
   /// Creates the epoll and timer descriptors. Throws Failure.
@@ -25,8 +24,7 @@ class Poller {
   /// Stops watching `descriptor`; call it before the descriptor is closed.
   void remove(int descriptor);
 
-  /// Blocks until an added descriptor is readable and returns the readable ones; empty if `deadline` (`never`: no
-  /// deadline) is reached first. Descriptors that are ready at once are reported even after the deadline. Throws
+  /// Blocks until an added descriptor is readable and returns the readable ones; empty at `deadline`. Throws
   /// Interrupted, Ended and Failure.
   [[nodiscard]] std::span<const int> wait(Time deadline);
 

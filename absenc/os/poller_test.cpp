@@ -14,7 +14,7 @@ using namespace std::chrono_literals;
 
 TEST(Poller, ReturnsAtTheDeadlineAndNeverBefore) {
   Poller poller;
-  // The waits have a far deadline, then nearer and farther ones: a timer left from one wait must not end another.
+  // A timer left from one wait must not end another.
   for (const Time ahead : {5ms, 1ms, 10ms, 2ms}) {
     const Time deadline = now() + ahead;
     EXPECT_TRUE(poller.wait(deadline).empty());

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Properties of a serial port that Linux reports: its driver, how long it holds bytes back, and how many damaged
-// characters its UART has counted.
+// Properties of a serial port that Linux reports.
 #pragma once
 
 #include <cstdint>
@@ -31,14 +30,12 @@ struct PortFacts {
   bool pseudo_terminal = false;  // whether the port is a pseudo-terminal, which has no line and so no rate
 };
 
-/// Returns the properties of the port at `path`. Direction and counts stay unknown for a pseudo-terminal, and if the
-/// port cannot be opened, for example because a program has locked it. `sys` is a parameter for tests.
+/// Returns the properties of the port at `path`, as far as they are known.
 [[nodiscard]] PortFacts port_facts(const std::string& path, const std::filesystem::path& sys = "/sys/class/tty");
 
 /// Returns whether `driver` is known as a driver of mobile modems, whose ports lead to no serial line.
 [[nodiscard]] bool is_modem_driver(const std::string& driver);
-/// Returns whether `driver` is known as a driver of built-in UARTs, which have no transceiver that switches direction
-/// by itself.
+/// Returns whether `driver` is known as a driver of built-in UARTs.
 [[nodiscard]] bool is_bare_uart(const std::string& driver);
 
 }  // namespace absenc::os

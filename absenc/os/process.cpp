@@ -37,8 +37,7 @@ int write_standard_output(std::string_view bytes) {
       const int error = errno;
       struct stat file {};
       const bool is_file = ::fstat(STDOUT_FILENO, &file) == 0 && S_ISREG(file.st_mode);
-      // The part of `bytes` that was written is removed from a regular file, unless another program has written behind
-      // it.
+      // Removes the written part from a regular file, unless another program has written behind it.
       if (done > 0 && is_file && file.st_size == ::lseek(STDOUT_FILENO, 0, SEEK_CUR)) {
         [[maybe_unused]] const int ignored = ::ftruncate(STDOUT_FILENO, file.st_size - done);
         ::lseek(STDOUT_FILENO, -done, SEEK_CUR);
@@ -65,8 +64,7 @@ Time processor_time() {
 RunDelay::RunDelay() : file_(::open("/proc/thread-self/schedstat", O_RDONLY | O_CLOEXEC)) { (void)take(); }
 
 Time RunDelay::take() {
-  // The fields of /proc/thread-self/schedstat: nanoseconds on a processor, nanoseconds ready to run but waiting, number
-  // of time slices.
+  // Fields of schedstat: ns on a processor, ns ready to run but waiting, number of time slices.
   std::array<char, 64> text{};
   if (!file_ || ::pread(file_.get(), text.data(), text.size() - 1, 0) <= 0) return {};
   char* end = text.data();
@@ -88,8 +86,7 @@ std::string folder_of(const std::string& path) {
   return folder.empty() ? "." : folder;
 }
 
-// Opens a file without a name, which leaves nothing behind however the process ends. Not every file system supports
-// this.
+// A file without a name leaves nothing behind, however the process ends.
 Descriptor open_nameless(const std::string& folder, mode_t mode) {
   return Descriptor(::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, mode));
 }

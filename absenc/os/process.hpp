@@ -11,14 +11,11 @@
 
 namespace absenc::os {
 
-/// Protects this process from its standard streams: from this call on, a closed pipe and a file at its size limit
-/// (`ulimit -f`) cause write errors instead of ending the process. Standard streams that were closed are opened on
-/// /dev/null, so that no port gets their numbers: with standard output closed, the readings would be sent to the
-/// encoder. Writing to a standard output that was closed fails. Throws Failure.
+/// Protects this process from its standard streams: a closed pipe and a file at its size limit cause write errors
+/// instead of ending it, and closed streams lead to /dev/null. Throws Failure.
 void protect_standard_streams();
 
-/// Writes `bytes` to standard output. If that is a file and the disk has no room for all of them, none remains, unless
-/// another program has written behind them. Returns 0 or a value of errno.
+/// Writes `bytes` to standard output. Returns 0 or a value of errno.
 [[nodiscard]] int write_standard_output(std::string_view bytes);
 
 [[nodiscard]] bool is_terminal(int descriptor);
@@ -26,13 +23,11 @@ void protect_standard_streams();
 /// Returns the processor time (user and system) that this process has used so far.
 [[nodiscard]] Time processor_time();
 
-/// A measurement of how long the thread that creates it was ready to run but had to wait for a processor. Events during
-/// such a time could not be noticed earlier.
+/// A measurement of how long the thread that creates it waited for a processor.
 class RunDelay {
  public:
   RunDelay();
-  /// Returns how long the thread waited for a processor since the last call or the constructor; 0 if the kernel does
-  /// not report it (proc(5), schedstat).
+  /// Returns that time since the last call or the constructor; 0 if the kernel does not report it.
   [[nodiscard]] Time take();
 
  private:
@@ -40,13 +35,12 @@ class RunDelay {
   Time last_total_{};
 };
 
-/// Checks whether `replace_file` may replace an existing file: a write-protected file must not be replaced, although
-/// its directory would allow it. Returns 0 or a value of errno.
+/// Checks whether `replace_file` may replace an existing file. Returns 0 or a value of errno.
 [[nodiscard]] int replaceable(const std::string& path);
 
 enum class Durable : std::uint8_t { no, yes };
 
-/// A new file that `take_place` puts at `path`; until then `path` leads to the old file or to none. Throws Failure.
+/// A new file that `take_place` puts at `path`. Throws Failure.
 class NewFile {
  public:
   explicit NewFile(const std::string& path);
@@ -58,8 +52,7 @@ class NewFile {
   /// Returns a path by which the new file can be opened before `take_place`.
   [[nodiscard]] const std::string& path() const { return temporary_path_; }
   void write(std::string_view content);
-  /// Gives the file its final name and returns its open descriptor. With `Durable::yes` first waits until the content
-  /// is on the disk.
+  /// Gives the file its name and returns its descriptor; with `Durable::yes` first waits for the disk.
   Descriptor take_place(Durable durable);
 
  private:
@@ -69,12 +62,10 @@ class NewFile {
   Descriptor file_;
 };
 
-/// Creates a file without a name in `folder` ("": the working directory) and returns its open descriptor. The file
-/// disappears when it is closed. Throws Failure.
+/// Creates a file without a name in `folder` ("": the working directory). Throws Failure.
 [[nodiscard]] Descriptor nameless_file(const std::string& folder);
 
-/// Replaces the file at `path` by a new one with `content`, so that `path` never leads to an incomplete file. Throws
-/// Failure.
+/// Replaces the file at `path` by a new one with `content`. Throws Failure.
 void replace_file(const std::string& path, std::string_view content, Durable durable);
 
 }  // namespace absenc::os

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Wires beside the data wires on which a host sends pulses: RTS or DTR of the serial port, or a GPIO line of the board.
+// Wires beside the data wires on which a host sends pulses: RTS, DTR or a GPIO line.
 #pragma once
 
 #include <optional>
@@ -11,8 +11,7 @@ struct gpiod_line;
 
 namespace absenc::os {
 
-/// The user's choice of a wire for pulses; without one no wire is pulsed. Levels of RTS and DTR are those of the UART's
-/// own pins, where a set line is low; an RS-232 driver inverts them.
+/// The user's choice of a wire for pulses. Levels of RTS and DTR are those of the UART's pins, where a set line is low.
 struct PulseWire {
   enum class Kind { none, rts, dtr, gpio } kind = Kind::none;
   std::string name{};           // gpio: name of the line as `gpioinfo` lists it
@@ -26,8 +25,7 @@ struct PulseWires {
   PulseWire clear{};
 };
 
-/// The system calls of a PulseOutput. Few test machines have wires for pulses, and the kernel offers no virtual ones,
-/// so tests override these calls and see every request. A call that fails sets errno.
+/// The system calls of a PulseOutput, which tests override. A call that fails sets errno.
 struct WireKernel {
   virtual ~WireKernel() = default;
   /// Calls ioctl(2) with TIOCMBIS or TIOCMBIC.
@@ -43,8 +41,7 @@ struct WireKernel {
 /// An opened wire for pulses. It is at rest (inactive) until `drive(true)` is called.
 class PulseOutput {
  public:
-  /// `descriptor` belongs to the serial port `path`. Throws Failure: `not_found`, `no_permission` and `in_use` for a
-  /// GPIO line, `unsupported` if the port has no such wire, `system`.
+  /// `descriptor` belongs to the serial port `path`. Throws Failure.
   PulseOutput(PulseWire wire, int descriptor, std::string path, WireKernel& kernel);
   PulseOutput(const PulseOutput&) = delete;
   PulseOutput& operator=(const PulseOutput&) = delete;

@@ -20,7 +20,7 @@ using namespace testing;
 using Wire = PulseWire::Kind;
 using Log = std::vector<std::string>;
 
-/// A kernel with one GPIO line, "CLK", and modem lines; it logs the requests and can refuse them.
+/// A kernel with one GPIO line, "CLK", and modem lines; it logs requests and can refuse them.
 class FakeWires final : public WireKernel {
  public:
   int set_modem_lines(int, unsigned long request, int lines) override {

@@ -25,12 +25,12 @@ Descriptor open_terminal(const std::string& path, SerialUse use) {
   const int access = use == SerialUse::receive ? O_RDONLY : O_RDWR;
   Descriptor descriptor(::open(path.c_str(), access | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
   if (!descriptor) throw open_failure(path, errno);
-  // The type of the file is checked before any wait: epoll refuses regular files with a less clear error.
+  // Checked before any wait: epoll refuses regular files with a less clear error.
   if (!terminal_state(descriptor.get())) throw open_failure(path, errno);
   return descriptor;
 }
 
-// Slaves of Unix98 pseudo-terminals have major numbers 136 to 143 (Documentation/admin-guide/devices.txt).
+// Slaves of Unix98 pseudo-terminals have the major numbers 136 to 143 (devices.txt).
 bool is_pseudo(const struct stat& status) { return major(status.st_rdev) >= 136 && major(status.st_rdev) <= 143; }
 
 bool is_pseudo_terminal(int descriptor) {
@@ -103,12 +103,10 @@ SerialPort::~SerialPort() {
   if (!pseudo_) ::ioctl(descriptor(), TIOCNXCL);
 }
 
-// Locks the port twice, a pseudo-terminal only with flock: flock keeps out every program that uses flock, also those of
-// root; TIOCEXCL keeps out all programs except those of root.
+// flock keeps out programs that use flock, also those of root; TIOCEXCL all but those of root.
 void SerialPort::lock() const {
   if (::flock(descriptor(), LOCK_EX | LOCK_NB) < 0) throw open_failure(path_, errno);
-  // TIOCEXCL lasts until the last descriptor is closed. A virtual encoder keeps the slave open itself, so the flag
-  // would outlive this port and lock out the next user.
+  // A virtual encoder keeps the slave open, so that TIOCEXCL would outlive this port.
   if (!pseudo_) ::ioctl(descriptor(), TIOCEXCL);
 }
 
@@ -176,9 +174,7 @@ void SerialPort::set_direction(Rs485 rs485) {
 }
 
 void SerialPort::shorten_latency() {
-  // The latency of the port covers USB frames, the receive FIFO's own timeout (4 characters) and scheduling. On a
-  // pseudo-terminal it covers only the scheduling of two processes, which a busy machine may delay by a time slice or
-  // two: 2 ms gave false timeouts. The limit only matters when a reply is missing.
+  // On a pseudo-terminal two processes must be scheduled: 2 ms gave false timeouts.
   set_latency(pseudo_ ? 20ms : 10ms);
   if (pseudo_) return;
   serial_struct serial{};

@@ -17,8 +17,7 @@ namespace absenc::os {
 
 /// Selects the component that switches an RS-485 transceiver to sending.
 enum class Rs485 : std::uint8_t {
-  // Automatic (half-duplex lines): the kernel switches with RTS if the port supports it and RTS carries no pulses,
-  // otherwise the adapter must switch by itself.
+  // The kernel switches with RTS if it can and RTS carries no pulses, else the adapter must.
   automatic,
   on,   // the kernel switches; throws `unsupported` if the port cannot do it
   off,  // the kernel never switches; for full-duplex lines
@@ -27,23 +26,21 @@ enum class Rs485 : std::uint8_t {
 /// Directions in which a port is used.
 enum class SerialUse : std::uint8_t {
   both,
-  receive,  // opened without writing, so that nothing can be sent; RTS, which makes some adapters send, is released
+  receive,  // opened for reading only, with RTS released
 };
 
-/// Returns whether `path` is a pseudo-terminal, where characters take no time and every rate works.
+/// Returns whether `path` is a pseudo-terminal, where characters take no time.
 [[nodiscard]] bool is_pseudo_terminal(const std::string& path);
 
-/// A serial port in raw mode, locked against other programs. Closing restores the previous settings of the terminal.
+/// A serial port in raw mode, locked against other programs.
 class SerialPort final : public DescriptorPort {
  public:
-  /// Discards bytes received before. Throws Failure; `bad_rate` if the rate is 0 or the port's nearest rate differs
-  /// from it by more than 1 %. A pulse step whose wire is not named in `wires` throws `unsupported`. `kernel` must
-  /// outlive the port.
+  /// Opens `path` and discards bytes received before. Throws Failure. `kernel` must outlive the port.
   SerialPort(const std::string& path, const LineSettings& settings, Rs485 rs485 = Rs485::automatic,
              const PulseWires& wires = {}, WireKernel& kernel = system_wires(), SerialUse use = SerialUse::both);
   ~SerialPort() override;
 
-  /// Returns hints about settings of this port that could be better, one sentence each, with the remedy.
+  /// Returns hints about settings of this port that could be better, with the remedy.
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
   /// Returns whether this port has made the kernel switch the transceiver's direction.
   [[nodiscard]] bool kernel_direction() const { return kernel_direction_; }

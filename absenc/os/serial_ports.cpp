@@ -35,7 +35,7 @@ std::string link_to(const fs::path& file, const fs::path& folder) {
   return {};
 }
 
-// Returns a text like "sleep (process 4711)"; for absenc with its verb, "absenc serve (process 4711)".
+// Returns a text like "absenc serve (process 4711)", with a verb only for absenc.
 std::string program(const std::string& process) {
   std::string name = first_line(fs::path("/proc") / process / "comm");
   if (name == "absenc") {
@@ -47,8 +47,7 @@ std::string program(const std::string& process) {
   return (name.empty() ? "a program" : name) + " (process " + process + ")";
 }
 
-// Returns the text (`program`) of the process that holds a flock on the file, or "". A line of /proc/locks is like "1:
-// FLOCK  ADVISORY  WRITE 4711 00:1a:7 0 EOF".
+// A line of /proc/locks is like "1: FLOCK  ADVISORY  WRITE 4711 00:1a:7 0 EOF".
 std::string lock_holder(const struct stat& file) {
   std::ifstream locks("/proc/locks");
   std::string number, kind, mode, access, process, inode, rest;
@@ -64,8 +63,7 @@ std::string lock_holder(const struct stat& file) {
   return {};
 }
 
-// Returns the text (`program`) of another process that has the file open; "" if none is found. Only root can inspect
-// processes of other users.
+// Only root can inspect the processes of other users.
 std::string opener(const fs::path& file) {
   std::error_code ignored;
   for (const auto& process : fs::directory_iterator("/proc", ignored)) {
@@ -90,7 +88,7 @@ Failure in_use(const std::string& path) {
                                                              : Holder::program;
     return {what + holder + ": end it, or use another port", who};
   }
-  // The advice does not ask to end the server: the server may read this encoder for several clients.
+  // No advice to end the server: it may read this encoder for several clients.
   const std::string process = holder.substr(server.size(), holder.size() - server.size() - 1);
   const std::string page = page_of_server(path, process);
   const std::string where =
@@ -144,7 +142,7 @@ std::optional<unsigned> latency_timer(const std::string& terminal, const fs::pat
 
 std::string driver_of(const std::string& terminal, const fs::path& sys) {
   std::error_code error;
-  // Since Linux 6.5 two kernel devices lie between a terminal and its UART (drivers/tty/serial/serial_base_bus.c).
+  // Since Linux 6.5 two devices lie between a terminal and its UART (serial_base_bus.c).
   for (fs::path device = fs::canonical(sys / terminal / "device", error); !error; device = device.parent_path()) {
     const std::string driver = fs::canonical(device / "driver", error).filename();
     if (error || (driver != "port" && driver != "ctrl")) return driver;
@@ -158,7 +156,7 @@ std::string holder_of(const std::string& path) {
   struct stat status {};
   std::string holder;
   if (::stat(path.c_str(), &status) == 0) holder = lock_holder(status);
-  // The program that made a pseudo-terminal always has it open; that program does not block the port.
+  // The program that made a pseudo-terminal always has it open, but does not block the port.
   if (holder.empty() && !file.native().starts_with("/dev/pts/")) holder = opener(file);
   return holder;
 }
@@ -184,8 +182,7 @@ Failure open_failure(const std::string& path, int error) {
     case ENXIO:
     case ENODEV:
       return no_port(path);
-    // EIO comes from the ioctl of the terminal: a 16550 that is listed but does not exist, or a line that was hung up
-    // after opening.
+    // A 16550 that is listed but does not exist, or a line that was hung up after opening.
     case EIO:
       return {Failure::Kind::not_found, "the port " + path +
                                             " is there, but no hardware is behind it, or not any more: check the name, "

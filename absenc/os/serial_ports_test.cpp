@@ -22,8 +22,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// Test folders with the layout of /sys: the terminal's device is below an interface of the USB device, and only the
-/// USB device has its identification numbers.
+/// Test folders with the layout of /sys: only the USB device has identification numbers.
 class ListedPorts : public ::testing::Test {
  protected:
   void write(const fs::path& file, std::string_view text) const {

@@ -48,7 +48,7 @@ static_assert(nearest_rate(2'500'000, 9600, 5'000'000) == 9600, "the driver has 
 
 TEST(SerialPort, SetsAnyRateAndRestoresSettings) {
   const PseudoTerminal terminal;
-  // For the master `terminal_state` returns the settings of the slave, because a master has no settings of its own.
+  // A master has no settings of its own: `terminal_state` returns those of the slave.
   const auto before = terminal_state(terminal.master.get());
   ASSERT_TRUE(before);
   {
@@ -163,7 +163,7 @@ TEST(SerialPort, ReportsPseudoTerminalWithoutWires) {
   EXPECT_EQ(failure_of([&] { const SerialPort other(second.path, fast, Rs485::on); }).kind(), Kind::unsupported);
 }
 
-// Opens `path` as an ordinary user in a child process, whose exit status shows whether the message contained `part`.
+// Opens `path` as an ordinary user in a child process; the message must contain `part`.
 void expect_no_permission(const std::string& path, const std::string& part) {
   const pid_t child = ::fork();
   ASSERT_GE(child, 0);

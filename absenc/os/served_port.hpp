@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files that record which server reads a port, so that a program which finds the port in use can name the server.
+// Files that record which server reads a port.
 #pragma once
 
 #include <string>
@@ -7,9 +7,7 @@
 
 namespace absenc::os {
 
-/// The files of one server: one file per port in $RUNTIME_DIRECTORY, which systemd gives to a service, or else in
-/// $XDG_RUNTIME_DIR/absenc. `set` writes them, the destructor removes them. Without these variables, or if the files
-/// cannot be written, there are none: a program that opens the port then finds only the process that holds it.
+/// The files of one server, at most one per port, in $RUNTIME_DIRECTORY or $XDG_RUNTIME_DIR/absenc.
 class ServedPorts {
  public:
   /// `url` is the address of the server's page, for example "http://127.0.0.1:8420/".
@@ -26,8 +24,7 @@ class ServedPorts {
   std::vector<std::string> files_;
 };
 
-/// Returns the address of the page of the server that reads `port`, from $XDG_RUNTIME_DIR/absenc or /run/absenc; "" if
-/// process `holder`, which holds the port, has written none.
+/// Returns the address of the page of the server with process number `holder` that reads `port`; "" if unknown.
 [[nodiscard]] std::string page_of_server(const std::string& port, const std::string& holder);
 
 }  // namespace absenc::os

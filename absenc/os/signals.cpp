@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The signal handler makes an eventfd readable, which `wait_for` and Poller watch. Unlike blocking the signals outside
-// ppoll, this also ends prompts, and waits on a line that is never quiet.
+// The signal handler makes an eventfd readable, which `wait_for` and Poller watch.
 #include "absenc/os/signals.hpp"
 
 #include <sys/eventfd.h>
@@ -124,8 +123,7 @@ void sleep_until(Time time) {
 }
 
 void reach(Time time) {
-  // Limit for the time by which the kernel wakes a thread late (timer slack and scheduling): the clock is polled for
-  // this long.
+  // The kernel may wake a thread late by about this time: the clock is polled meanwhile.
   constexpr Time wake_up = std::chrono::microseconds(100);
   if (time - now() > wake_up) sleep_until(time - wake_up);
   while (now() < time) {

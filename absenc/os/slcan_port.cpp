@@ -32,12 +32,11 @@ void SlcanLine::write(Bytes text) { bytes_->begin({.kind = ByteStep::Kind::trans
 void SlcanLine::collect(Time deadline) {
   received_any_ = false;
   deadline = reach(bytes_->now()) ? Time{} : std::min(deadline, due());
-  // If the deadline is past, reads all available bytes; otherwise reads until a line, a refusal or garbage is complete
-  // or the deadline is reached. Reads at most `most_reads` times.
+  // A past deadline means: read only what is there.
   const bool everything = deadline <= bytes_->now();
   for (unsigned reads = 0; reads < most_reads && (everything || !received_any_); ++reads) {
     const Time now = bytes_->now();
-    // A byte port reports a timer only if it is in the future; available bytes are reported before it.
+    // A byte port reports a timer only if it is in the future.
     const ByteEvent event = bytes_->wait({.at = deadline <= now ? now + 1ns : deadline});
     if (event.kind == ByteEvent::Kind::timer) {
       if (!everything) reach(event.at);
@@ -102,8 +101,7 @@ void SlcanPort::apply(const LineSettings& settings) {
   }
 }
 
-// Waits until the adapter is silent, but not endlessly. Replies carry no number, so replies to earlier commands must
-// not arrive after the next command.
+// Replies carry no number: those to earlier commands must not arrive after the next command.
 void SlcanPort::settle() {
   constexpr unsigned most_replies = 64;
   bool any = true;
@@ -182,8 +180,7 @@ void SlcanAdapter::queue_frame(Bytes line, Time at) {
   waiting_.push_back(*frame);
 }
 
-// Reports at most one frame whose transmission has ended, and begins the next one. It reports only one frame per call,
-// even if it is called late: between two frames a node must be able to send its own.
+// Reports at most one frame per call: between two frames a node must be able to send its own.
 bool SlcanAdapter::reach(Time now) {
   if (waiting_.empty() || bus_free_ > now) return false;
   push(waiting_.front(), bus_free_);
@@ -198,7 +195,7 @@ Time SlcanAdapter::duration(const CanFrame& frame) const {
   return Time(std::chrono::seconds(1)) * bits / std::max<std::int64_t>(1, rate_);
 }
 
-// Executes a command of the host. Returns false if the command is unknown, has a wrong argument, or is not allowed now.
+// Executes a command of the host. Returns false if it is to be refused.
 bool SlcanAdapter::execute(Bytes line) {
   const auto letter = static_cast<char>(line[0]);
   switch (letter) {

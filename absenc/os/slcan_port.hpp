@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// CAN through an adapter on a serial port with the ASCII protocol of Lawicel (link/slcan.hpp), and the other end of
-// this protocol: a simulated adapter with virtual nodes behind it.
+// CAN over an adapter with the ASCII protocol of Lawicel (link/slcan.hpp), real or simulated.
 #pragma once
 
 #include <deque>
@@ -22,9 +21,9 @@ class SlcanLine : public FramePort {
   void collect(Time deadline) final;
   /// Calls `collect` and returns whether it received a line, a refusal or garbage.
   bool receives_until(Time deadline);
-  /// Returns the time of the next event that does not depend on received bytes; `never` if none is due.
+  /// Returns the time of the next event without received bytes; `never` if none is due.
   [[nodiscard]] virtual Time due() const { return never; }
-  /// Handles the event that is due at `due()` if its time is reached. Returns whether an event was pushed.
+  /// Handles the event of `due()` if its time is reached. Returns whether one was pushed.
   virtual bool reach(Time) { return false; }
   /// Handles a received line without its CR, a refusal by the adapter, or garbage.
   virtual void handle_line(slcan::LineReader::LineEvent line_event, Bytes line, Time at) = 0;
@@ -38,8 +37,7 @@ class SlcanLine : public FramePort {
 /// A port on a CAN adapter, which is opened at the bit rate of `settings` and closed at the end.
 class SlcanPort final : public SlcanLine {
  public:
-  /// `name` is for example "/dev/ttyACM0" and is used in messages. Throws Failure: `bad_rate` if the adapter does not
-  /// support the bit rate or refuses it, `system` if it refuses to open. Passes on the exceptions of `bytes`.
+  /// `name`, for example "/dev/ttyACM0", is used in messages. Throws Failure, and as `bytes` does.
   SlcanPort(std::shared_ptr<Port<std::uint8_t>> bytes, std::string name, const LineSettings& settings);
   ~SlcanPort() override;
 
@@ -63,15 +61,13 @@ class SlcanPort final : public SlcanLine {
   unsigned garbage_ = 0;
 };
 
-/// A simulated CAN adapter: passes frames between the host and the device that is driven on this port, while the host
-/// has opened the adapter at the device's bit rate. A frame of the host reaches the device after its time on the bus.
-/// Frames that the host sends at once are queued, as many as an adapter can store; further frames are refused (BEL).
+/// A simulated CAN adapter between a host and the device that is driven on this port.
 class SlcanAdapter final : public SlcanLine {
  public:
   SlcanAdapter(std::shared_ptr<Port<std::uint8_t>> bytes, const LineSettings& settings)
       : SlcanLine(std::move(bytes)), device_rate_(settings.rate) {}
 
-  /// Returns the number of frames lost because the host had closed the adapter or set another bit rate.
+  /// Returns the number of frames lost because the adapter was closed or had another bit rate.
   [[nodiscard]] std::uint64_t lost() const { return lost_; }
   /// Returns the number of frames refused because the queue was full.
   [[nodiscard]] std::uint64_t overflowed() const { return overflowed_; }

@@ -26,7 +26,7 @@ const CanFrame request{.id = 0x220, .size = 8, .data = {0x80, 0x20}};
 
 FrameStep sending(const CanFrame& frame) { return {.kind = FrameStep::Kind::transfer, .out = {&frame, 1}}; }
 
-/// A byte port in memory that answers commands like an adapter, unless a test changes the replies.
+/// A byte port in memory that answers commands like an adapter.
 class FakeAdapter final : public Port<std::uint8_t> {
  public:
   Time now() override { return os::now(); }

@@ -40,8 +40,7 @@ constexpr std::string_view check_bus =
 
 Time time_of(const timespec& time) { return std::chrono::seconds(time.tv_sec) + Time(time.tv_nsec); }
 
-// Converts a kernel time stamp, which is calendar time, to a time of os::now. Both clocks are read together; again, up
-// to eight times in all, if that took 20 us or longer.
+// Converts a kernel time stamp, which is calendar time, to a time of os::now.
 Time since_boot(const timespec& stamp) {
   constexpr Time together = std::chrono::microseconds(20);
   timespec day{};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A CAN interface of Linux (SocketCAN): can0 of an adapter or a controller, or a virtual one, vcan0.
+// A CAN interface of Linux (SocketCAN), real (can0) or virtual (vcan0).
 #pragma once
 
 #include <filesystem>
@@ -14,8 +14,7 @@ struct can_frame;
 
 namespace absenc::os {
 
-/// The system calls of SocketCan; tests override them, because the kernel may have no CAN. Each returns a negative
-/// number and sets errno on failure.
+/// The system calls of SocketCan, which tests override. On failure each returns a negative number and sets errno.
 struct CanKernel {
   virtual ~CanKernel() = default;
   /// Calls socket(PF_CAN, SOCK_RAW, CAN_RAW), non-blocking.
@@ -26,18 +25,15 @@ struct CanKernel {
   /// Binds the socket to the interface with this index.
   virtual int bind(int descriptor, int index);
   virtual ssize_t write(int descriptor, const can_frame& frame);
-  /// Reads a frame. `at` is the time at which the kernel received it, on the clock of os::now; without a kernel time
-  /// stamp the time of the read.
+  /// Reads a frame. `at`: time of os::now at which the kernel received it, or of the read.
   virtual ssize_t read(int descriptor, can_frame& frame, Time& at);
 };
 [[nodiscard]] CanKernel& system_can_kernel();
 
-/// A port on a CAN interface. The bit rate is set by `ip link`, never here; virtual interfaces have none. Frames sent
-/// here are not received; those of other programs on the same interface are.
+/// A port on a CAN interface. It does not set the bit rate.
 class SocketCan final : public FramePort {
  public:
-  /// Opens the CAN interface `interface`. Throws Failure, whose text names a command to type where one helps. `kernel`
-  /// must outlive the port.
+  /// Opens the CAN interface `interface`. Throws Failure. `kernel` must outlive the port.
   explicit SocketCan(const std::string& interface, const LineSettings& settings,
                      CanKernel& kernel = system_can_kernel());
 
@@ -50,7 +46,7 @@ class SocketCan final : public FramePort {
   void set_options();
   void take(const can_frame& frame, Time at);
   void take_error(const can_frame& frame, Time at);
-  // Returns whether the name is that of a virtual interface: then it has no bit rate and every rate is accepted.
+  // A virtual interface has no bit rate: every rate is accepted.
   [[nodiscard]] bool is_virtual() const { return interface_.starts_with("vcan") || interface_.starts_with("vxcan"); }
   [[nodiscard]] std::string up_command(std::uint32_t rate) const;
   [[noreturn]] void fail(const std::string& what, int error) const;
@@ -62,7 +58,7 @@ class SocketCan final : public FramePort {
   Poller poller_;
 };
 
-/// Returns the names of all CAN interfaces, "can0", "vcan0" and so on, sorted. `sys` is a parameter for tests.
+/// Returns the names of all CAN interfaces, "can0", "vcan0" and so on, sorted.
 [[nodiscard]] std::vector<std::string> can_interfaces(const std::filesystem::path& sys = "/sys/class/net");
 
 }  // namespace absenc::os

@@ -188,7 +188,7 @@ TEST(SocketCan, DoesNotSetBitRate) {
   EXPECT_EQ(failure_of([&] { port.begin({.kind = FrameStep::Kind::pulse}); }).kind(), Failure::Kind::unsupported);
 }
 
-// Tests the system call that reads a frame and its time on a UDP socket, which every kernel has.
+// Tests the system call on a UDP socket, which every kernel has.
 TEST(SocketCan, KernelStampIsTimeOfReception) {
   const Descriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
   sockaddr_in address{};
@@ -201,7 +201,7 @@ TEST(SocketCan, KernelStampIsTimeOfReception) {
   const int on = 1;
   ASSERT_EQ(system_can_kernel().set(socket.get(), SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on), 0);
   const can_frame frame = raw(0x120, {1, 2});
-  // The kernel enables time stamps some time after the request; until then a stamp is the time of the read.
+  // The kernel enables time stamps some time later; until then a stamp is the time of the read.
   Time before{}, after{}, at{};
   for (int attempt = 0; attempt < 100 && (attempt == 0 || at > after + 1ms); ++attempt) {
     before = now();

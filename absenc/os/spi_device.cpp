@@ -95,8 +95,7 @@ Time SpiDevice::clock(const SpiTransfer& transfer, Time at) {
   period_ = period_ == Time{} ? period : std::min(period_, period);
   received_.resize(std::min(received_.size() + transfer.size, most_received));
   std::fill(transfer.in.begin(), transfer.in.end(), std::uint8_t{0});
-  // If the host shifts at the edge at which the device samples, the device gets the bit that was on the line before the
-  // edge.
+  // If the host shifts at the edge at which the device samples, the device gets the old bit.
   const bool samples_late = samples_at_trailing_edge(transfer.mode) && !shifts_at_leading_edge(transfer.mode);
   for (std::size_t bit = 0; bit < 8 * transfer.size; ++bit, ++clocks_) {
     const std::uint8_t mask = mask_of(bit, transfer.lsb_first);
@@ -136,7 +135,7 @@ void SpiDevice::run_device(Time now) {
   }
 }
 
-// Returns whether the SPI mode `mode` works with the device. Modes 2 and 3 give a clocked device the same edges.
+// Modes 2 and 3 give a clocked device the same edges.
 bool SpiDevice::suits(std::uint8_t mode) const {
   return kind_ == LinkKind::clocked ? idles_high(mode) : mode == settings_.spi_mode;
 }
@@ -147,8 +146,7 @@ bool SpiDevice::shifts_at_leading_edge(std::uint8_t mode) const {
   return shifts_at_rising_edge != idles_high(mode);
 }
 
-// Returns the bit that the controller samples at clock `clock`; it follows from the number of shifts of the device
-// until then.
+// Returns the bit that the controller samples at clock `clock`.
 bool SpiDevice::driven(std::size_t clock, std::uint8_t mode) const {
   std::size_t shifts = clock;
   if (samples_at_trailing_edge(mode) && shifts_at_leading_edge(mode)) ++shifts;
@@ -156,7 +154,7 @@ bool SpiDevice::driven(std::size_t clock, std::uint8_t mode) const {
   if (kind_ == LinkKind::spi) {
     before_first_bit = samples_at_trailing_edge(settings_.spi_mode) ? 1 : 0;
   } else if (!idles_high(mode) && shifts > 0) {
-    --shifts;  // the first rising edge is no shift: it precedes the first falling edge, at which the device latches
+    --shifts;  // the first rising edge precedes the edge at which the device latches
   }
   if (shifts < before_first_bit) return true;
   const std::size_t bit = shifts - before_first_bit;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The device side of an SPI controller: converts the clock edges of a message to events of a device machine, and its
-// output to samples.
+// The device side of an SPI controller.
 #pragma once
 
 #include <cstddef>
@@ -24,19 +23,15 @@ struct SpiTransfer {
   bool deselect = false;  // deselects the chip after `delay`; in the last transfer: the chip stays selected
 };
 
-/// One device machine behind a controller, simulated edge by edge in every SPI mode. A side that samples at an edge at
-/// which the other side shifts gets the old bit, and a bit that no side drives is 1. A whole message is processed in
-/// one call, with the future times of its parts; the caller must answer the program when the time of its end is
-/// reached. For this reason SpiDevice is no Port.
+/// One device machine behind a controller, simulated edge by edge in every SPI mode.
 class SpiDevice {
  public:
-  /// `kind` must be spi or clocked, otherwise throws std::invalid_argument. `device` must outlive this object.
+  /// `kind` must be spi or clocked, else throws std::invalid_argument. `device` must outlive this object.
   SpiDevice(LinkKind kind, const LineSettings& settings, Machine<std::uint8_t>& device);
 
-  /// Takes the device's first step, as every port does before the first event: the device may request a timer.
+  /// Takes the device's first step: the device may request a timer.
   void begin(Time now) { run_device(now); }
-  /// Processes an SPI message and returns the time of its end. On a clocked link a pause of the clock between two
-  /// transfers ends a word.
+  /// Processes an SPI message and returns the time of its end.
   Time message(std::span<const SpiTransfer> transfers, Time start);
 
   /// Notes that the clock line rests at the idle level of this mode between two messages.

@@ -22,8 +22,7 @@ constexpr LineSettings chip_settings{.rate = 1'000'000, .spi_mode = 1};
 const Data driven{0x95, 0xC6, 0x12};
 const Data sent{0xA7, 0x01, 0x80};
 
-// Reference model: both ends as shift registers on three wires, edge by edge. A side that samples at an edge gets the
-// level before the edge.
+// Reference model: both ends as shift registers on three wires, edge by edge.
 struct Wires {
   explicit Wires(std::uint8_t host, std::uint8_t chip) : host_mode(host), chip_mode(chip) {}
 

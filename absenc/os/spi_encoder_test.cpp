@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs the hosts of biss, ssi and an SPI protocol on an SPI port with a virtual encoder behind it.
+// Runs hosts of biss, ssi and an SPI protocol on an SPI port with a virtual encoder.
 #include <gtest/gtest.h>
 
 #include "absenc/host/drive.hpp"
@@ -49,7 +49,7 @@ TEST_F(SpiEncoder, SsiOfEveryLength) {
   }
 }
 
-// Clocks 1000 bits, more than the frame needs, on three kinds of port that carry a clocked line.
+// Clocks 1000 bits, more than the frame needs.
 TEST_F(SpiEncoder, SloIsLowBehindTheCrcOnEveryPort) {
   constexpr std::size_t clocks = 1000;
   const auto samples = [&](Port<std::uint8_t>& port) {
@@ -148,7 +148,6 @@ TEST_F(SpiEncoder, BissIsStartedByAByteOfPulses) {
   EXPECT_EQ(encoder.violation_count(), 0u);
 }
 
-// On a controller whose clock can only idle high, positions can be read, but a register access fails, with advice.
 TEST_F(SpiEncoder, AControllerThatOnlyIdlesHighReadsNoRegisters) {
   BissRegisters registers(kernel, shaft);
   SpiPort port(FakeSpi::path, LinkKind::clocked, biss::line_settings, {}, kernel);

@@ -155,8 +155,7 @@ void SpiPort::transfer(const ByteStep& step) {
 void SpiPort::send_message(bool with_output) {
   std::array<spi_ioc_transfer, 2> transfers{};
   const auto lead = std::chrono::ceil<std::chrono::microseconds>(settings_.select_lead).count();
-  // The first transfer, which is sent only if there is a lead, has no bytes: it only waits between chip select and the
-  // first clock.
+  // The first transfer has no bytes: it only waits between chip select and the first clock.
   transfers[0].delay_usecs = static_cast<std::uint16_t>(lead);
   spi_ioc_transfer& bytes = transfers[1];
   if (with_output) bytes.tx_buf = reinterpret_cast<std::uintptr_t>(out_.data());
@@ -178,8 +177,7 @@ void SpiPort::send_message(bool with_output) {
   throw Failure(Kind::system, what + ": try another speed=HZ, and see what the kernel says in dmesg");
 }
 
-// Reduces the sampled bytes to `bits` bits: removes the bits of the idle clocks, whose level goes to `idle_low_`, and
-// the bits of clocks behind the last one.
+// Removes the bits of the idle clocks, and those behind `bits`.
 void SpiPort::extract_bits(std::size_t bits) {
   const BitView clocked{in_, in_.size() * 8};
   idle_low_ = settings_.idle_clocks > 0 && clocked.load(0, settings_.idle_clocks) == 0;
@@ -191,7 +189,7 @@ void SpiPort::extract_bits(std::size_t bits) {
   in_ = std::move(extracted);
 }
 
-// Applies only the settings that have changed: a conversation may configure the line before each reading.
+// Applies only changed settings: a conversation may configure the line before each reading.
 void SpiPort::apply(LineSettings settings) {
   settings.rate = choice_.speed.value_or(settings.rate);
   settings.spi_mode = choice_.mode.value_or(settings.spi_mode);
@@ -223,8 +221,7 @@ void SpiPort::set_mode(std::uint8_t mode) {
                                        reason(error) + ": " + advice);
 }
 
-// Holds the clock line low by changing the idle level of the controller. Most drivers apply the idle level at once,
-// some only with the next message.
+// Some drivers apply the idle level only with the next message.
 void SpiPort::hold_low(Time until) {
   const std::uint8_t mode = settings_.spi_mode;
   try {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An SPI controller of Linux (spidev), for encoders with SPI and, as the clock master, for clocked encoders (SSI,
-// BiSS).
+// An SPI controller of Linux (spidev), for encoders with SPI and for clocked encoders (SSI, BiSS).
 #pragma once
 
 #include <cstdint>
@@ -15,8 +14,7 @@
 
 namespace absenc::os {
 
-/// The system calls of SpiPort. Build machines rarely have an SPI controller or the right to create a virtual one
-/// (os/cuse), so tests override these calls.
+/// The system calls of SpiPort, which tests override.
 struct SpiKernel {
   virtual ~SpiKernel() = default;
   /// Opens `path` like open(2) with O_RDWR: returns a negative number, with errno set, on failure.
@@ -26,22 +24,17 @@ struct SpiKernel {
 };
 [[nodiscard]] SpiKernel& system_kernel();
 
-/// Controller settings chosen by the user; they override those of the protocol, also in every `configure` step.
+/// Controller settings chosen by the user, which override those of the protocol.
 struct SpiChoice {
   std::optional<std::uint32_t> speed;  // clock rate in Hz
   std::optional<std::uint8_t> mode;    // SPI mode, 0 to 3
 };
 
-/// A port on an SPI controller, locked against other programs that use locks. `begin` and `wait` throw Failure,
-/// Interrupted or Ended (os/signals.hpp).
-///
-/// A transfer begins at `at` or later, and `begin` blocks until it is over. On an `spi` link the transfer receives at
-/// least `expect` bytes; on a `clocked` link nothing is sent but clocks. A controller clocks whole bytes: the first
-/// `bits` bits after `idle_clocks` are returned, and up to seven more clocks are given. `timer` is reported as by
-/// StreamPort.
+/// A port on an SPI controller, locked against other programs that use locks. A clocked transfer has up to seven more
+/// clocks, because a controller clocks whole bytes. `begin` and `wait` throw Failure, Interrupted or Ended.
 class SpiPort final : public Port<std::uint8_t> {
  public:
-  /// Opens the controller at `path`, /dev/spidevB.C; `kind` spi or clocked, otherwise throws invalid_argument. `kernel`
+  /// Opens the controller at `path`, /dev/spidevB.C; `kind`: spi or clocked, else throws invalid_argument. `kernel`
   /// must outlive the port. Throws Failure.
   SpiPort(const std::string& path, LinkKind kind, const LineSettings& settings, const SpiChoice& choice = {},
           SpiKernel& kernel = system_kernel());
@@ -86,7 +79,7 @@ class SpiPort final : public Port<std::uint8_t> {
   bool idle_low_ = false;          // whether the data line was low at all idle clocks of the last clocked transfer
 };
 
-/// Returns the chip selects of all SPI controllers, "/dev/spidev0.0" and so on, sorted. `sys` is a parameter for tests.
+/// Returns the chip selects of all SPI controllers, "/dev/spidev0.0" and so on, sorted.
 [[nodiscard]] std::vector<std::string> spi_devices(const std::filesystem::path& sys = "/sys/class/spidev");
 
 }  // namespace absenc::os

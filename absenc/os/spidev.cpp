@@ -11,9 +11,9 @@ namespace absenc::os {
 
 namespace {
 
-// Greatest number of bytes of a message in each direction: the default of the kernel module's parameter bufsiz.
+// Greatest number of bytes of a message in each direction: the kernel's default of bufsiz.
 constexpr std::size_t most_bytes = 4096;
-// Greatest number of buffers of a message: a FUSE request has 256, one of which holds the list of transfers.
+// Greatest number of buffers: a FUSE request has 256, one of which holds the transfers.
 constexpr std::size_t most_buffers = 255;
 constexpr std::uint8_t most_wires = 1;
 constexpr std::uint32_t lsb_first = SPI_LSB_FIRST;
@@ -39,8 +39,7 @@ bool is_message(unsigned long request) {
   return _IOC_TYPE(request) == SPI_IOC_MAGIC && _IOC_NR(request) == 0 && _IOC_DIR(request) == _IOC_WRITE;
 }
 
-// Memory ranges of the program that a message reads and writes (`reply`), and the number of bytes that it sends (`in`)
-// and receives (`out`).
+// Memory ranges of a message, and how many bytes it sends (`in`) and receives (`out`).
 struct Buffers {
   SpidevReply reply{.again = true};
   std::size_t in = 0;
@@ -152,9 +151,7 @@ int Spidev::set_mode(std::uint32_t wanted) {
   return 0;
 }
 
-// Processes a message in several calls: the first requests the list of transfers, the next the list again with its
-// buffers, the last clocks them. If another thread of the program changes the list meanwhile, the list that came with
-// the buffers is used, or requested again if the sizes of the buffers do not match it.
+// Another thread of the program may change the list of transfers between two calls.
 SpidevReply Spidev::message(std::uint64_t address, std::size_t size, Bytes in, std::size_t room, Time now) {
   if (size % sizeof(spi_ioc_transfer) != 0) return error_reply(EINVAL);
   if (size == 0) return {};

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Simulates the kernel's driver spidev with a controller in front of an SpiDevice: answers requests of programs to
-// /dev/spidevB.C.
+// Simulates the kernel's driver spidev with a controller in front of an SpiDevice.
 #pragma once
 
 #include <cstddef>
@@ -21,7 +20,7 @@ struct UserMemory {
 
 struct SpidevReply {
   int result = 0;  // return value of ioctl, read and write; negative: -errno
-  /// True if the program's request must be repeated, with the content of `in` and with room for `out`, concatenated.
+  /// Whether the request must be repeated, with the content of `in` and with room for `out`.
   bool again = false;
   std::vector<UserMemory> in{};
   std::vector<UserMemory> out{};
@@ -37,22 +36,17 @@ struct SpidevSettings {
   std::uint32_t mode_bits;  // mode flags that the controller supports
 };
 
-/// A simulated spidev device: implements Documentation/spi/spidev.rst with the limits of the kernel module and of FUSE.
-/// The controller sends words of 8 bits on one wire at every speed, and refuses all mode flags but CPHA, CPOL and
-/// LSB_FIRST. It begins in mode 0, the default without an entry in the device tree. Spidev never reads memory of the
-/// requesting program but returns the ranges that it needs, as the kernel requires of CUSE.
+/// A simulated spidev device (Documentation/spi/spidev.rst) with words of 8 bits on one wire.
 class Spidev {
  public:
   explicit Spidev(SpiDevice& device);
 
   void open() { ++users_; }
-  /// Closes the device for one program; the close of the last program resets the controller's speed.
+  /// Closes the device for one program; the close of the last one resets the controller's speed.
   void close();
 
-  /// Handles an ioctl. `in` is the content of the memory ranges `in` that the last SpidevReply requested, empty at
-  /// first; `room` is the total size of the ranges `out` of that reply. Errors: ENOTTY (no request of spidev), EINVAL,
-  /// EMSGSIZE (more than 4096 bytes in a direction, more than 255 buffers, or more than 2^31 - 1 bytes with those that
-  /// have no buffer).
+  /// Handles an ioctl. `in`: content of the ranges `in` of the last SpidevReply, empty at first; `room`: total size of
+  /// its ranges `out`.
   [[nodiscard]] SpidevReply control(unsigned long request, std::uint64_t address, Bytes in, std::size_t room, Time now);
   [[nodiscard]] SpidevReply read(std::size_t size, Time now);
   [[nodiscard]] SpidevReply write(Bytes bytes, Time now);

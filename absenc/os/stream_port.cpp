@@ -69,8 +69,7 @@ ByteEvent StreamPort::wait(const ByteStep& step) {
     const Time time = os::now();
     if (time >= end_) throw Ended{};
     if (!ready.empty()) {
-      // Received bytes are reported before a silence or timer: if this program looks late, the other side is not at
-      // fault.
+      // Received bytes are reported before a silence or timer: this program may look late.
       if (const std::size_t size = read_some(buffer_, ready); size > 0) {
         const Time at = std::max(time, sent_at_);  // an echo is received before the computed end of sending
         waiting_.silence.received(at);
@@ -138,7 +137,7 @@ std::size_t DescriptorPort::read_some(MutableBytes into, std::span<const int>) {
 }
 
 void DescriptorPort::write_all(Bytes bytes) {
-  // Longest time without room for any byte, after which the peer counts as one that reads nothing.
+  // After so long without room for any byte the peer counts as one that reads nothing.
   constexpr Time patience = 3s;
   for (;;) {
     const ssize_t size = write_some(bytes);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Steps and events (link/step.hpp) on any port that carries a byte stream: the common timing of such ports, and the
-// port on one file descriptor.
+// Steps and events (link/step.hpp) on any port that carries a byte stream.
 #pragma once
 
 #include <array>
@@ -17,11 +16,7 @@
 
 namespace absenc::os {
 
-/// Base class of all byte stream ports. `begin` and `wait` throw Failure, Interrupted (os/signals.hpp) or Ended.
-///
-/// A transfer begins no earlier than the send slack before its `at`; `begin` blocks until then. `timer` is reported
-/// when the `at` of a wait is reached, if `at` is later than the last reported event or call of `now`, or if the wait
-/// before requested the same `at` and another event ended it.
+/// Base class of all byte stream ports. `begin` and `wait` throw Failure, Interrupted or Ended.
 class StreamPort : public Port<std::uint8_t> {
  public:
   StreamPort(const StreamPort&) = delete;
@@ -32,31 +27,27 @@ class StreamPort : public Port<std::uint8_t> {
   void begin(const Step<std::uint8_t>& step) final;
   [[nodiscard]] Event<std::uint8_t> wait(const Step<std::uint8_t>& step) final;
 
-  /// Returns the delay between the line and this program, which is added to the answer and gap limits of a step.
+  /// Returns the delay between the line and this program.
   [[nodiscard]] Time latency() const { return latency_; }
   void set_latency(Time latency) { latency_ = latency; }
-  /// Sets the delay that is added to the gap limit where no more bytes are expected (`expect` 0), if it is less than
-  /// `latency`. Default `never`.
+  /// Sets the delay, if less than `latency`, for the gap limit where `expect` is 0. Default `never`.
   void set_idle_latency(Time latency) { idle_latency_ = latency; }
 
-  /// Sets the slack: a transfer due within `slack` is sent at once. For a virtual encoder, whose line takes no time.
-  /// Default 0.
+  /// Sets the slack: a transfer due within `slack` is sent at once. Default 0.
   void set_send_slack(Time slack) { send_slack_ = slack; }
 
   /// Sets the time from which the port throws Ended. Default `never`.
   void set_end(Time end) { end_ = end; }
 
-  /// Returns the duration of a character on the line; 0 if unknown or if there is no line, as behind a pseudo-terminal.
+  /// Returns the duration of a character on the line; 0 if it is unknown or there is no line.
   [[nodiscard]] Time character_time() const { return character_time_; }
 
  protected:
   StreamPort();
 
-  /// Sets the duration of a character. `sent` is computed from it, because tcdrain blocks for milliseconds. Default 0:
-  /// a transfer counts as sent when it is written.
+  /// Sets the duration of a character, from which the time of `sent` is computed. Default 0.
   void set_character_time(Time time) { character_time_ = time; }
-  /// With true, the time of a transfer counts from before its write, because the program at the other end may read and
-  /// answer the bytes before the write returns. Default false: it counts from after the write.
+  /// Sets whether the time of a transfer counts from before its write. Default false.
   void set_read_at_once(bool yes) { read_at_once_ = yes; }
   [[nodiscard]] Time end() const { return end_; }
   /// Returns the end of the last transfer or pulse.
@@ -64,10 +55,9 @@ class StreamPort : public Port<std::uint8_t> {
 
   /// Returns the poller; a derived port adds its descriptors.
   [[nodiscard]] Poller& poller() { return poller_; }
-  /// Reads bytes from the `ready` descriptors, as many as fit into `into`, and returns their number; 0 if no bytes were
-  /// received.
+  /// Reads bytes from the `ready` descriptors into `into`, and returns their number.
   virtual std::size_t read_some(MutableBytes into, std::span<const int> ready) = 0;
-  /// Returns how long this program may have been unable to read the bytes that `read_some` returned; 0 if unknown.
+  /// Returns how long this program may have been unable to read these bytes; 0 if unknown.
   virtual Time lateness() { return {}; }
   virtual void write_all(Bytes bytes) = 0;
   /// `drive` and `change_rate` throw Failure `unsupported` unless overridden.
@@ -102,7 +92,7 @@ class StreamPort : public Port<std::uint8_t> {
 /// A stream port on one descriptor that is read and written. Its default latency is 0.
 class DescriptorPort : public StreamPort {
  public:
-  /// `name` is for example "the port /dev/ttyUSB0" and is used in messages. Makes the descriptor non-blocking.
+  /// Makes the descriptor non-blocking. `name`, for example "the port /dev/ttyUSB0", is used in messages.
   DescriptorPort(Descriptor descriptor, std::string name);
 
   [[nodiscard]] const std::string& name() const { return name_; }

@@ -205,7 +205,7 @@ TEST_F(StreamPortTest, WaitsForAnAnswerAfterEachTransfer) {
   port_.begin(transfer(request_));
   EXPECT_EQ(port_.wait({.at = never}).kind, Kind::sent);
   port_.set_end(now() + 5s);
-  // After a transfer the answer limit ends the wait, although a byte was received before. The gap limit is 0: none.
+  // The answer limit ends the wait, although a byte was received before the transfer.
   EXPECT_EQ(port_.wait({.at = never, .answer = 1ms}).kind, Kind::silence);
 }
 

@@ -19,8 +19,7 @@ namespace absenc::os {
   return line;
 }
 
-/// Returns the number at the beginning of the file at `path`; empty if the file does not begin with a number or the
-/// number has more than 32 bits.
+/// Returns the number of up to 32 bits at the beginning of the file at `path`; empty if none.
 [[nodiscard]] inline std::optional<std::uint32_t> first_number(const std::filesystem::path& path, int base = 10) {
   const std::string text = first_line(path);
   std::uint32_t number = 0;

@@ -15,7 +15,7 @@ struct TerminalPair {
   std::string path{};  ///< path of the slave: "/dev/pts/3"
 };
 
-/// Returns a new pseudo-terminal in raw mode: it changes no byte, and its slave sends nothing back. Throws Failure.
+/// Returns a new pseudo-terminal in raw mode. Throws Failure.
 [[nodiscard]] TerminalPair open_terminal_pair();
 
 }  // namespace absenc::os

@@ -27,9 +27,7 @@ constexpr std::uint16_t silicon_labs = 0x10C4;
 constexpr std::uint16_t wch = 0x1A86;
 
 // Rates from the data sheets: FTDI DS_FT232R, DS_FT232BM, DS_FT2232D, DS_FT2232H, DS_FT4232H, DS_FT232H, DS_FT231X;
-// Silicon Labs CP2105; WCH CH340DS1, CH343DS1, CH9102DS1. FTDI's bcdDevice as in the kernel's ftdi_sio.c. CP2102 (1
-// Mbit/s) and CP2102N (3 Mbit/s) have the same USB numbers, and so have the PL2303 variants: none of these chips is
-// listed.
+// Silicon Labs CP2105; WCH CH340DS1, CH343DS1, CH9102DS1. FTDI's bcdDevice: the kernel's ftdi_sio.c.
 constexpr std::array<KnownChip, 11> chips{{
     {ftdi, 0x6001, 0x0600, {"FT232R", 3'000'000}},
     {ftdi, 0x6001, 0x0400, {"FT232B", 3'000'000}},
@@ -50,7 +48,7 @@ std::optional<UsbAdapter> usb_adapter(const std::string& terminal, const fs::pat
   std::error_code error;
   fs::path folder = fs::canonical(sys / terminal / "device", error);
   if (error) return std::nullopt;
-  // The terminal is below an interface of the USB device, and only the USB device has an idVendor.
+  // Only the USB device, above the terminal's interface, has an idVendor.
   for (; folder.has_relative_path(); folder = folder.parent_path()) {
     if (!fs::exists(folder / "idVendor", error)) continue;
     return UsbAdapter{number_of(folder / "idVendor"),  number_of(folder / "idProduct"),

@@ -9,7 +9,7 @@
 
 namespace absenc::os {
 
-/// Identity of a USB adapter, from its USB descriptors; a missing text is empty, a missing number 0.
+/// Identity of a USB adapter from its USB descriptors; missing texts are empty, numbers 0.
 struct UsbAdapter {
   std::uint16_t vendor = 0;     // vendor number, from idVendor
   std::uint16_t product = 0;    // product number, from idProduct
@@ -25,8 +25,7 @@ struct AdapterChip {
   std::uint32_t highest_rate;  // highest rate in bits per second, from the chip's data sheet
 };
 
-/// Reads the identity of the adapter behind a terminal ("ttyUSB0"); empty if the terminal is not on USB. `sys` is a
-/// parameter for tests.
+/// Returns the identity of the adapter behind a terminal ("ttyUSB0"); empty if it is not on USB.
 [[nodiscard]] std::optional<UsbAdapter> usb_adapter(const std::string& terminal,
                                                     const std::filesystem::path& sys = "/sys/class/tty");
 

@@ -11,7 +11,7 @@
 
 namespace absenc::os {
 
-/// Timing state of a port: the time known to its machine, the requested timer, and the silence limit.
+/// Timing of a port: the time known to its machine, the requested timer, the silence limit.
 template <class Item>
 class Waiting {
  public:
@@ -23,15 +23,13 @@ class Waiting {
   /// Returns the time known to the machine: that of the last call of `now` or of the last event.
   [[nodiscard]] Time known_time() const { return known_time_; }
   Time now() { return known_time_ = os::now(); }
-  /// Returns `event` and records its time as known to the machine: a timer later than this time is still to be
-  /// reported, even if the event is reported late.
+  /// Returns `event` and records its time as known to the machine.
   Event<Item> report(const Event<Item>& event) {
     known_time_ = event.at;
     return event;
   }
 
-  /// Starts a wait for the events that `step` requests. A timer whose time has passed stays due if another event ended
-  /// the wait before and the machine requests the same time again.
+  /// Starts a wait for the events that `step` requests.
   void begin(const Step<Item>& step, Time latency = {}) {
     timer_ = step.at > known_time_ || step.at == timer_ ? step.at : never;
     silence_ = silence.due(step.answer, step.gap, latency);

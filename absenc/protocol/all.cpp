@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The only C++ file that names every unit. In the code, a new protocol needs its folder and one line here.
+// The list of all protocol units.
 #include "absenc/protocol/all.hpp"
 
 #include <array>
 
 #include "absenc/protocol/clause.hpp"
 
-// One line for each unit: its folder, and the name of its descriptor there. Other names follow from these, so the list
-// is a macro. A build with only some units defines it on the compiler's command line (ABSENC_UNITS in CMakeLists.txt).
+// A line has the folder and the name of a unit's descriptor. ABSENC_UNITS in CMakeLists.txt may replace the list.
 // clang-format off
 #ifndef ABSENC_UNITS
 #define ABSENC_UNITS(one) \

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The list of all protocol units, over which for example the command line tool and the generic tests iterate.
+// The list of all protocol units.
 #pragma once
 
 #include <span>

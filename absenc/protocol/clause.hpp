@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Types that describe, as data, the clauses of protocol documents for encoders and hosts. client/conform tests them.
+// Types that describe the clauses of protocol documents as data.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace absenc {
 
-/// Kind of a clause for encoders: the behaviour that the document demands. Names in backquotes are members of Clause.
+/// Kind of a clause for encoders. Names in backquotes are members of Clause.
 enum class Demand : std::uint8_t {
   // Demands about readings of the position, and `does`, a demand about a command
   answered,  ///< the encoder answers each request, pulse or transfer
@@ -28,32 +28,28 @@ enum class Demand : std::uint8_t {
   // Demands about changes of the encoder, which the test undoes
   byte_written,  ///< the byte or word at `page` and `address` can be written and read back
   byte_alone,    ///< writing the byte or word at `page` and `address` leaves the four below it unchanged
-  page_alone,    ///< writing the byte at `page` and `address` leaves the byte at `address` of page `other` unchanged
-  /// While the byte at `page` and `address` is written, a request to read it gets a busy reply; later it can be read.
+  page_alone,    ///< a write to `page` leaves the byte at `address` of page `other` unchanged
+  /// While the byte at `page` and `address` is written, reading it gets a busy reply.
   byte_busy,
-  /// With `page` selected, the request `ask` for a byte that is not open for the user gets a reply to the command `as`;
-  /// the byte at `page` and `address` is open.
+  /// With `page` selected, the request `ask` for a closed byte gets a reply to the command `as`.
   page_closed,
-  set,  ///< the setting `setting` reads back as the value written: `value`, or `other` if it was `value` before
-  /// The zero command with the argument `value` makes the position about 0. That command changes the setting `setting`.
+  set,  ///< the setting `setting` reads back as the value written: `value` or `other`
+  /// The zero command with the argument `value` makes the position about 0.
   zeroed,
-  /// The position with one of the values `value` and `other` of the setting `setting` is the mirror of that with the
-  /// other value. The setting cannot be read.
+  /// The positions with `value` and with `other` in the setting `setting` are mirrored.
   mirrored,
-  /// After `command` with the argument `value` (half of it, if it is the present rate), the encoder sends that many
-  /// frames per second unsolicited; `stop` ends them.
+  /// `command` makes the encoder send as many unsolicited frames per second as its argument says.
   paced,
   // Demands about values that the test cannot restore
   zero,  ///< the position, which was not 0 before, is 0 after the zero command
-  /// The command of `verb` resets the alarms in the mask `value`, Verb::reset_multiturn also the turns; the position,
-  /// and turns that are not reset, stay.
+  /// The command of `verb` resets the alarms in the mask `value`, and leaves the position.
   reset,
-  restarts  ///< after `command` the encoder is silent at first; `value` ms later it reports the position from before
+  restarts  ///< after `command` the encoder is silent; `value` ms later it reports the former position
 };
 
 /// Returns whether testing a clause of this kind may change the encoder.
 [[nodiscard]] constexpr bool changes_encoder(Demand demand) { return demand >= Demand::byte_written; }
-/// Returns whether testing a clause of this kind may erase position, turns or alarms, which the test cannot restore.
+/// Returns whether testing a clause of this kind may erase what the test cannot restore.
 [[nodiscard]] constexpr bool loses(Demand demand) { return demand >= Demand::zero; }
 
 /// A set of errors: bit n is set if the enumerator of Error with the value n is in the set.
@@ -63,7 +59,7 @@ template <class... Some>
 [[nodiscard]] constexpr Errors any_of(Some... errors) {
   return ((Errors{1} << static_cast<unsigned>(errors)) | ...);
 }
-/// Errors in the content of a reply: fixed bits, echoes, ranges, counters, redundant values, or a stuck line.
+/// Errors in the content of a reply, apart from its checksum.
 inline constexpr Errors form_errors = any_of(Error::bad_framing, Error::unexpected_reply, Error::out_of_range,
                                              Error::sequence_mismatch, Error::cross_check_failed, Error::line_stuck);
 
@@ -71,16 +67,13 @@ inline constexpr Errors form_errors = any_of(Error::bad_framing, Error::unexpect
 struct Ask {
   /// The whole request on the wire: bytes in hexadecimal, "ea 00 ea", or a CAN frame, "1ff:022b".
   std::string_view wire{};
-  /// Name of the command whose request is sent if `wire` is empty and `make` is null; "": the command that reads the
-  /// position.
+  /// Without `wire` and `make`: name of the command that is sent; "": the one that reads the position.
   std::string_view command{};
   std::span<const std::int64_t> arguments{};  ///< Arguments of `command`; those left out have their defaults.
   bool wrong_end = false;                     ///< Whether the last byte has a wrong bit; not used with `wire`.
-  /// Writes the request into `request` and returns its length, for requests that depend on the options and that no
-  /// command sends. Null: `wire` or the request of `command` is sent.
+  /// Writes the request into `request` and returns its length; null: another member gives it.
   Result<std::size_t> (*make)(const Options& options, MutableBytes request) = nullptr;
-  /// Bit rate of the request in 1/1000 of the line's rate: at a suitable lower rate the last data bit is where the
-  /// receiver expects the stop bit. 0: the line's rate.
+  /// Bit rate of the request in 1/1000 of the line's rate; 0: the line's rate.
   std::uint32_t permille = 0;
 };
 
@@ -98,8 +91,7 @@ struct Clause {
   std::string_view paragraph;  ///< paragraph of the unit's document
   std::string_view words;      ///< Demand of the document, in words.
   Demand demand;               ///< Kind of the clause, which selects its test.
-  /// Conditions on the options of encoders to which the clause applies, separated by blanks: "carries=biss
-  /// crc_width!=0"; empty: it applies to all.
+  /// Conditions on options, separated by blanks: "carries=biss crc_width!=0"; empty: none.
   std::string_view needs{};
   Errors errors = 0;                     ///< demand as_drawn: errors of replies that break the clause; 0: form_errors
   Ask ask{};                             ///< Request that the test sends, for demands that name `ask`.
@@ -115,7 +107,7 @@ struct Clause {
   Verb verb = Verb::run;       ///< Demand reset: verb of the command that resets.
   std::string_view command{};  ///< Name of the command, for demands that name `command`.
   std::string_view stop{};     ///< Command that ends the unsolicited frames of `command`; empty: none.
-  /// Options of a virtual encoder that shows the case, if its defaults do not: "resolution=20&multiturn_bits=0".
+  /// Options of a virtual encoder that shows the case: "resolution=20&multiturn_bits=0".
   std::string_view shown_with{};
 };
 
@@ -126,21 +118,19 @@ enum class HostDemand : std::uint8_t {
   after_damage,   ///< the host sends further requests after a damaged reply
   after_refusal,  ///< the host sends further requests after the encoder refused a damaged one
   rule,           ///< the host never breaks `rule`
-  /// The host keeps `rule`, which is about consecutive requests. Requests during or soon after an injected fault do not
-  /// count, because a host may give up a sequence after an error.
+  /// The host keeps `rule`; requests during or soon after an injected fault do not count.
   row
 };
 
 /// A request of a host that ignores replies, and how often it is sent.
 struct HostStep {
   Time pause{};  ///< pause before the request, after the last sent character
-  /// Name of a command, whose encoded request is sent; or the bytes, or the CAN frame, to send: "1a 1a", "220:8020".
+  /// Name of a command, or the bytes or CAN frame to send: "1a 1a", "220:8020".
   std::string_view what{};
   std::span<const std::int64_t> arguments{};  ///< arguments; empty: required ones are 1, or their minimum if greater
   unsigned times = 1;                         ///< how often the request is sent, each time after `pause`
 };
-/// The steps of a scripted host that ignores replies, in order. Tests build hosts that break or keep a clause from
-/// them.
+/// The steps of a scripted host that ignores replies, in order.
 using HostScript = std::span<const HostStep>;
 
 /// A demand of a document on the host.
@@ -149,27 +139,25 @@ struct HostClause {
   std::string_view paragraph;  ///< Paragraph of the document.
   std::string_view words;      ///< Demand of the document, in words.
   HostDemand demand;           ///< Kind of the clause, which selects its test.
-  /// Demands rule and row: name of the rule. The virtual encoder checks it, or os::SpiDevice if it is `spi_mode_rule`.
+  /// Demands rule and row: name of the rule.
   std::string_view rule{};
   // Test hosts for this clause, if the hosts that the tests use for every clause do not break it.
   std::array<HostScript, 2> breaks{};  ///< scripted hosts that break this clause, or it and "asks"; empty: none
   HostScript keeps{};                  ///< requests like those of `breaks` that keep this clause; empty: none
-  /// Options of the virtual encoder in the tests of all host clauses of the unit: "acquisition_us=20000".
+  /// Options of the virtual encoder in tests of host clauses: "acquisition_us=20000".
   std::string_view options{};
 };
 
-/// Name of the rule that an SPI controller clocks and samples at the right edges. The virtual encoder cannot see the
-/// edges, so os::SpiDevice checks the rule.
+/// Rule that os::SpiDevice checks, because a virtual encoder cannot see the clock's edges.
 inline constexpr std::string_view spi_mode_rule = "clock or sampling in another SPI mode than the encoder's";
 
-/// The clauses of a unit. They are not in its descriptor, because firmware links the descriptor and tests nothing.
+/// The clauses of a unit; not in its descriptor, which firmware links.
 struct Clauses {
   std::span<const Clause> encoder{};   ///< Clauses for encoders, in the order in which they are tested.
   std::span<const HostClause> host{};  ///< Clauses for hosts.
 };
 
-/// Returns the clauses of this unit for encoders, in the order in which they are tested; empty if the unit has none.
-/// Defined in all.cpp, with the list of units.
+/// Returns the clauses of this unit for encoders, in the order of their tests; empty: none.
 [[nodiscard]] std::span<const Clause> clauses_of(const Unit& unit);
 /// Returns the clauses of this unit for hosts; empty if the unit has none.
 [[nodiscard]] std::span<const HostClause> host_clauses_of(const Unit& unit);

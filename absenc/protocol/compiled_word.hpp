@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A word format compiled into shifts and masks of one number, for formats that are chosen once and then decode many
-// words.
+// A word format compiled into shifts and masks of one number.
 #pragma once
 
 #include <array>
@@ -14,15 +13,13 @@
 
 namespace absenc {
 
-/// A word format of at most 64 bits, compiled. It gives the same values as `decode_word`, of a word that is one number
-/// already.
+/// A compiled word format; it gives the same values as `decode_word`.
 class CompiledWord {
  public:
   static constexpr unsigned maximum_bits = 64;  ///< Greatest number of bits of a word and the bits behind it.
 
   constexpr CompiledWord() = default;
-  /// Compiles `format` for numbers whose lowest `behind` bits follow the word. Both have at most `maximum_bits` bits
-  /// together.
+  /// Compiles `format` for numbers of at most 64 bits whose lowest `behind` bits follow the word.
   constexpr explicit CompiledWord(const WordFormat& format, unsigned behind = 0) : gray_(format.gray()) {
     const unsigned top = format.bits() + behind;
     unsigned place = top;
@@ -87,7 +84,7 @@ class CompiledWord {
     return numbers;
   }
 
-  // Decodes turns and position, which are one Gray-coded number; the first of the two on the wire is its upper part.
+  // Decodes turns and position, which are one Gray-coded number.
   constexpr void decode_gray(std::uint64_t& position, std::uint64_t& multiturn) const {
     const bool turns_first = multiturn_.shift > position_.shift;
     std::uint64_t& upper = turns_first ? multiturn : position;

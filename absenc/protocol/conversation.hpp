@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The two machines that each protocol unit provides: conversations (host side) and virtual encoders (device side).
+// The machines of protocol units: conversations (host side) and virtual encoders (device side).
 #pragma once
 
 #include <cstddef>
@@ -14,7 +14,7 @@
 
 namespace absenc {
 
-/// The last request of a conversation, empty if it only listens, and the items received after it.
+/// The last request of a conversation, and the items received after it; both may be empty.
 template <class Item>
 struct Exchange {
   std::span<const Item> sent{};      ///< Bytes or CAN frames of the request.
@@ -23,7 +23,7 @@ struct Exchange {
   Time received_at{};  ///< time at which the last received bit ended; if nothing was received, the end of the request
 };
 
-/// Two texts for people that explain an error better than the error's general text. Either may be empty.
+/// Two texts for people that explain an error; either may be empty.
 struct Explanation {
   std::string_view detail{};  ///< the step that failed, and the evidence for it
   std::string_view advice{};  ///< what to try, instead of the error's own advice
@@ -31,8 +31,7 @@ struct Explanation {
 
 /// Counts of a conversation that streams.
 struct StreamCounts {
-  /// Number of frames that were received damaged, also if no error reported them; estimated from the bytes that belong
-  /// to no valid frame.
+  /// Estimated number of frames that were received damaged.
   std::uint64_t discarded = 0;
 };
 
@@ -43,40 +42,33 @@ enum class ChangeSent : std::uint8_t {
   refused,  ///< the request was sent, but the encoder refused it, or reading back shows no change
 };
 
-/// Host side of one command: a machine that sends requests and receives replies. When it returns the step `emit` or
-/// `done`, `error`, `detail`, `advice`, `reading`, `report` and `exchange` describe the result, which is valid until
-/// `feed` or, after `emit`, `next` is called again.
+/// Host side of one command. Its result, at the step `emit` or `done`, is valid until the next call of `feed` or
+/// `next`.
 template <class Item>
 struct Conversation : Machine<Item> {
-  /// Returns why there is no result; `Error::none` if there is one. After the step `done` it is the error of the whole
-  /// command.
+  /// Returns why there is no result; `Error::none` if there is one.
   [[nodiscard]] virtual Error error() const = 0;
-  /// Returns a text for people that adds to the error's own text: the step that failed, and the evidence. May be empty.
+  /// Returns a text for people that adds to the error's own text; it may be empty.
   [[nodiscard]] virtual std::string_view detail() const { return {}; }
-  /// Returns a text for people: what to try instead of the error's general advice. Empty: the general advice stands.
+  /// Returns advice for people that replaces the error's general advice; empty: none.
   [[nodiscard]] virtual std::string_view advice() const { return {}; }
-  /// Returns the position that is the result; null after an error, or if the command does not read a position.
+  /// Returns the position that is the result; null: there is none.
   [[nodiscard]] virtual const Reading* reading() const { return nullptr; }
-  /// Returns the counts of a conversation that streams. Such a conversation ends by itself only after an error: each
-  /// `emit` is a result, and the next one follows when it is run further. Null: the conversation does not stream.
+  /// Returns the counts of a conversation whose every `emit` is a result; null: it does not stream.
   [[nodiscard]] virtual const StreamCounts* stream() const { return nullptr; }
   /// Returns whether the conversation streams, as `stream` describes.
   [[nodiscard]] bool streams() const { return stream() != nullptr; }
-  /// Returns whether a conversation that streams sends a request for each result. If so, the encoder sends nothing
-  /// while the conversation is not run.
+  /// Returns whether a conversation that streams sends a request for each result.
   [[nodiscard]] virtual bool asks() const { return false; }
   /// Puts every named value of the result into `sink`; nothing after an error.
   virtual void report(FieldSink& sink) const = 0;
   /// Returns the last request and the items received after it.
   [[nodiscard]] virtual Exchange<Item> exchange() const = 0;
-  /// Asks the conversation to end early. True: it first restores what it has changed in the encoder, and then ends by
-  /// itself. False: the call has no effect, and the conversation may be abandoned at any step.
+  /// Asks the conversation to end early; true: it restores the encoder first, then ends by itself.
   virtual bool abort() { return false; }
-  /// Returns whether a request that changes the encoder was sent, and whether it changed nothing. Valid at every step,
-  /// also after an exception of the port.
+  /// Returns whether a request that changes the encoder was sent; valid at every step.
   [[nodiscard]] virtual ChangeSent change_sent() const { return ChangeSent::no; }
-  /// Puts into `sink` the changes that the conversation leaves in the encoder if it cannot continue after the present
-  /// step. By default nothing.
+  /// Puts changes into `sink` that remain if the conversation ends now; by default none.
   virtual void report_left(FieldSink&) const {}
 
  protected:
@@ -110,27 +102,23 @@ struct Device : Machine<Item> {
   virtual void power_on(Time now, PowerOn kind) = 0;
   /// Switches the encoder off at `now`.
   virtual void power_off(Time now) = 0;
-  /// Raises the alarms `bits`, bits of the unit's alarm field; an encoder without alarms ignores the call. They stay
-  /// until `lower_alarms`, but a host or power off may clear some of them earlier.
+  /// Raises the alarms `bits` of the unit's alarm field.
   virtual void raise_alarms(std::uint32_t bits) = 0;
-  /// Ends the alarms `bits` that were raised, even if they are latched. An alarm that a condition causes may stay.
+  /// Ends raised alarms, even latched ones; one that a condition causes may stay.
   virtual void lower_alarms(std::uint32_t bits) = 0;
-  /// Sets the condition Unit::conditions[index] to `value`, which is within the condition's range. By default does
-  /// nothing.
+  /// Sets the condition Unit::conditions[index] to `value`, which is within its range.
   virtual void set_condition(std::size_t /*index*/, std::int64_t /*value*/, Time /*now*/) {}
-  /// Returns the memory of the encoder that survives power off. The caller may write it only while the encoder is off.
+  /// Returns the memory of the encoder that survives power off; writable only while it is off.
   [[nodiscard]] virtual MutableBytes memory() = 0;
   /// Returns a number that the encoder increments with every change that it makes to `memory`.
   [[nodiscard]] virtual std::uint32_t memory_version() const = 0;
-  /// Returns the first rule breaches of the host, in order of time. `violation_count` also counts those for which there
-  /// is no room.
+  /// Returns the first rule breaches of the host.
   [[nodiscard]] virtual std::span<const Violation> violations() const = 0;
   /// Returns how often the host broke a rule.
   [[nodiscard]] virtual std::uint32_t violation_count() const = 0;
-  /// Sets the observer of rule checks, which must outlive the encoder; null: none. By default does nothing.
+  /// Sets the observer of rule checks, which must outlive the encoder; null: none.
   virtual void watch_rules(RuleWatch* /*watch*/) {}
-  /// Returns how many answers the encoder has given. Unsolicited frames, and requests that get no reply, may
-  /// count too.
+  /// Returns at least how many answers the encoder has given.
   [[nodiscard]] virtual std::uint64_t answer_count() const = 0;
 
  protected:

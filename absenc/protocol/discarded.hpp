@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counts the discarded frames of a stream, from the number of bytes that belong to no valid frame.
+// Counts the discarded frames of a stream.
 #pragma once
 
 #include <cstddef>
@@ -7,8 +7,7 @@
 
 namespace absenc {
 
-/// Number of discarded frames: the skipped bytes after each valid frame, divided by the length of a frame and rounded
-/// up. Before the first valid frame it is rounded down, because a frame may have begun before the host listened.
+/// Number of discarded frames, estimated from the bytes that belong to no valid frame.
 class DiscardedFrames {
  public:
   /// Counts frames with a length of `frame_bytes` bytes.

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Types for the named values (fields) of a decoded frame. A unit describes each field once as data, and delivers each
-// value as a number, text or bytes.
+// Types for the named values (fields) of a decoded frame.
 #pragma once
 
 #include <cstdint>
@@ -17,14 +16,14 @@ namespace absenc {
 struct FlagInfo {
   std::string_view name;     ///< name of the flag; "": the bit has no meaning
   std::string_view meaning;  ///< what happened in the encoder if the bit is set, as a phrase
-  /// Action for the operator, with commands as "`absenc clear-alarms`"; "": none, the flag is no fault.
+  /// Action for the operator, with commands as "`absenc clear-alarms`"; "": none.
   std::string_view action;
   bool optional = false;  ///< true: some encoders that report the other flags never report this one
   /// For a status flag: bits of the unit's alarms whose occurrence this one bit reports; 0: none.
   std::uint32_t sums = 0;
 };
 
-/// The action of a status flag that only sums up alarms. Programs leave this text out where they also show the alarms.
+/// Action of a status flag that only sums up alarms.
 inline constexpr std::string_view read_the_alarms = "`absenc alarms` names the cause";
 
 /// Description of a field, which is a named value in requests, replies or results.
@@ -45,7 +44,7 @@ struct FieldInfo {
   std::string_view meaning;           ///< Meaning of the value, as a phrase.
   std::span<const FlagInfo> flags{};  ///< kind flags: descriptions of the bits, from bit 0 on
   Role role = Role::other;            ///< Role by which programs that do not know the unit find the field.
-  /// True: texts show the number in hexadecimal, as documents do; JSON and CSV have decimal numbers.
+  /// True: texts show the number in hexadecimal.
   bool in_hex = false;
 };
 
@@ -61,8 +60,7 @@ struct FieldValue {
 struct FieldSink {
   /// Takes the value of one field.
   constexpr virtual void put(const FieldValue& value) = 0;
-  /// Takes the reading of a valid reply: position and turns, or one of them, with their validity. It follows the fields
-  /// that show it; the same reading may be delivered twice. By default ignored.
+  /// Takes a reading; the same one may be delivered twice. Ignored by default.
   constexpr virtual void put_reading(const Reading&) {}
 
  protected:

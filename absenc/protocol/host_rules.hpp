@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counts the breaches of the rules that the host of a virtual encoder must keep, stores the first ones, and notifies an
-// observer of each check.
+// Counts the breaches of the rules that the host of a virtual encoder must keep.
 #pragma once
 
 #include <cstdint>
@@ -15,12 +14,10 @@ namespace absenc {
 /// The rule breaches of a virtual encoder's host, and the observer of rule checks.
 class HostRules {
  public:
-  /// Records that the host did at `at` what `rule` is about. `kept`: whether it kept the rule; false is stored as a
-  /// breach. Returns `kept`.
+  /// Records whether the host kept `rule` at the time `at`. Returns `kept`.
   bool expect(bool kept, std::string_view rule, Time at);
 
-  /// Notifies only the observer: breaking this rule is no violation, because the document permits a host to do so, or
-  /// the host may have given up after an error.
+  /// Notifies only the observer: breaking this rule is no violation.
   void note(bool kept, std::string_view rule) const;
 
   /// Returns the first 16 rule breaches of the host, in order of time.

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds where requests begin among the bytes that a virtual encoder receives while it sends, so that each request is
-// counted once, not each of its bytes.
+// Finds where requests begin among the bytes that a virtual encoder receives while it sends.
 #pragma once
 
 #include <cstddef>
@@ -18,9 +17,8 @@ class Interruption {
     received_at_.reset();
     due_ = 0;
   }
-  /// Returns whether the byte received at `at` begins a request. `length`: length of a request that begins with this
-  /// byte; 0 if none does, as when a collision on a half-duplex line garbled it. `character`: time of one
-  /// character. The first byte, and one that ends more than two characters after the byte before, always begins one.
+  /// Returns whether the byte received at `at` begins a request. `length`: length of a request that begins with it, or
+  /// 0; `character`: time of one character.
   bool begins_request(std::size_t length, Time at, Time character) {
     const bool begins_run = !received_at_ || at - *received_at_ > 2 * character;
     received_at_ = at;

@@ -17,8 +17,6 @@ Machine* make_in(std::span<std::byte> storage, const Parameters&... parameters) 
   return storage.size() < sizeof(Machine) ? nullptr : new (storage.data()) Machine(parameters...);
 }
 
-// Returns an Any that points to `machine`: with its member for CAN frames or that for bytes, by the items of the
-// machine.
 template <template <class> class Role, class Made>
 Any<Role> any_of(Made* machine) {
   if constexpr (std::is_base_of_v<Machine<CanFrame>, Made>) {
@@ -29,15 +27,13 @@ Any<Role> any_of(Made* machine) {
 }
 }  // namespace detail
 
-/// Constructs the conversation `Machine` from `parameters` in `storage`; returns an empty Any if the storage is too
-/// small.
+/// Constructs a conversation in `storage`; returns an empty Any if that is too small.
 template <class Machine, class... Parameters>
 [[nodiscard]] Any<Conversation> make_host(std::span<std::byte> storage, const Parameters&... parameters) {
   return detail::any_of<Conversation>(detail::make_in<Machine>(storage, parameters...));
 }
 
-/// Constructs the virtual encoder `Machine` from `parameters` in `storage`; returns an empty Any if the storage is too
-/// small.
+/// Constructs a virtual encoder in `storage`; returns an empty Any if that is too small.
 template <class Machine, class... Parameters>
 [[nodiscard]] Any<Device> make_device(std::span<std::byte> storage, const Parameters&... parameters) {
   return detail::any_of<Device>(detail::make_in<Machine>(storage, parameters...));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Limit and explanation for a line that is never silent. That is another fault than noise in a reply.
+// Limit and explanation for a line that is never silent.
 #pragma once
 
 #include "absenc/core/time.hpp"
@@ -9,8 +9,7 @@ namespace absenc {
 
 using namespace std::chrono_literals;
 
-/// A line without silence for this long is treated as never silent. The limit is long enough for a reply that arrives
-/// in pieces; slow characters need a longer one.
+/// Usual time without silence after which a line counts as never silent.
 inline constexpr Time noise_limit = 100ms;
 
 /// Texts that explain the error of a conversation on a line that is never silent.

@@ -13,7 +13,7 @@ OptionError parse_word(const Unit& unit, std::string_view text, WordFormat& word
   return {.kind = OptionError::Kind::bad_word, .text = text, .word = error};
 }
 
-// Returns an error if a model, or an option that describes the word, was given together with a word format.
+// Returns an error if a model, or an option for a word, was given with a word format.
 OptionError check_beside_word(const Unit& unit, std::string_view model, std::span<const bool> set) {
   for (std::size_t i = 0; i < unit.options.size(); ++i) {
     if (set[i] && unit.options[i].describes_word) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Options of a unit as data (numbers of bits, checks, profiles), models, which are named sets of option values, and the
-// functions that parse both.
+// Options and models of a unit as data, and their parsing.
 #pragma once
 
 #include <array>
@@ -19,16 +18,13 @@ namespace absenc {
 /// Choices of an option that is true or false; the value is the index.
 inline constexpr std::array<std::string_view, 2> boolean_choices{"false", "true"};
 
-/// Choices of an option that states whether other encoders share the line. `auto` becomes true if the caller knows that
-/// others do (`tell_shared`): from absenc.toml, an open link with several users, or a virtual line with several
-/// encoders.
+/// Choices of an option that states whether other encoders share the line. `tell_shared` replaces `auto`.
 inline constexpr std::array<std::string_view, 3> sharing_choices{"auto", "true", "false"};
-/// Values of an option with `sharing_choices`: unknown, other encoders share the line, the encoder is alone.
+/// Values of an option with `sharing_choices`: unknown, shared, alone.
 enum Sharing : std::int64_t { sharing_automatic, sharing_yes, sharing_no };
 
-/// Description of an option of a unit: a number in a range, or one of `choices` (the value is the index into it). With
-/// `decimals`, the user writes up to that many digits after the decimal point, and all values are in units of the last
-/// one.
+/// Description of an option of a unit: a number, or one of `choices` (the value is the index). With `decimals`, its
+/// values are in units of the last decimal digit.
 struct Option {
   std::string_view name;                        ///< Name of the option.
   std::string_view meaning;                     ///< Meaning of the option, with its unit.
@@ -59,7 +55,7 @@ struct Model {
   std::span<const OptionValue> values;  ///< Options that the model sets, with their values.
 };
 
-/// Greatest number of options of a unit: biss-chain has twelve, and seven for each of its eight words.
+/// Greatest number of options of a unit.
 inline constexpr std::size_t maximum_options = 68;
 
 /// Name of the option that gives a word format, for units that take one.
@@ -101,18 +97,15 @@ struct OptionError {
 
 struct Unit;
 
-/// Computes the values of all options from a model and single settings, which override the model, and stores them in
-/// `resolved`. Returns why it is impossible, or an error of kind `none`. Without a model name the first model that
-/// contradicts no setting is used, so a setting that fits only one model also selects the other values of that model;
-/// if no model fits, options that are not set have the unit's defaults. With a word format no model is used.
+/// Computes all options from a model and from settings, which override it, into `resolved`. Returns why that is
+/// impossible, or an error of kind `none`.
 [[nodiscard]] OptionError resolve_options(const Unit& unit, std::string_view model,
                                           std::span<const OptionText> settings, Options& resolved);
 
-/// Sets the options that state whether other encoders share the line to true, if their value is `auto`.
+/// Sets the options with `sharing_choices` that are `auto` to `true`.
 void tell_shared(const Unit& unit, Options& options);
 
-/// Parses an integer, decimal or 0x hexadecimal, with an optional minus sign. Error: invalid_argument (any other text,
-/// or a magnitude above INT64_MAX).
+/// Parses an integer, decimal or 0x hexadecimal, with an optional minus sign. Error: invalid_argument.
 [[nodiscard]] constexpr Result<std::int64_t> parse_number(std::string_view text) {
   const bool negative = text.starts_with('-');
   if (negative) text.remove_prefix(1);
@@ -135,8 +128,8 @@ void tell_shared(const Unit& unit, Options& options);
   return negative ? -value : value;
 }
 
-/// Parses a decimal number of 0 or more with at most `decimals` decimal digits, in units of the last digit: "0.05" with
-/// three decimals is 50. Error: invalid_argument.
+/// Parses a decimal number of 0 or more, in units of the last digit: "0.05" with three decimals is 50. Error:
+/// invalid_argument.
 [[nodiscard]] constexpr Result<std::int64_t> parse_decimal(std::string_view text, unsigned decimals) {
   const std::size_t point = index_of(text, '.');
   const std::string_view whole = first_of(text, point);
@@ -157,8 +150,7 @@ void tell_shared(const Unit& unit, Options& options);
   return value;
 }
 
-/// Parses the value of an option: a number that its range, step and `or_zero` permit, or one of its choices. Error:
-/// invalid_argument.
+/// Parses the value of an option. Error: invalid_argument.
 [[nodiscard]] constexpr Result<std::int64_t> parse_value(const Option& option, std::string_view text) {
   for (std::size_t i = 0; i < option.choices.size(); ++i) {
     if (option.choices[i] == text) return static_cast<std::int64_t>(i);

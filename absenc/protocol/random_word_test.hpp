@@ -11,7 +11,7 @@
 
 namespace absenc {
 
-/// Returns a format with a position, and any others of the possible fields, in any order. It has at most 115 bits.
+/// Returns a format with a position, and possibly other fields, in any order, of at most 115 bits.
 inline WordFormat random_word(sim::Random& random) {
   std::vector<Meaning> meanings{Meaning::position};
   for (const Meaning one : {Meaning::multiturn, Meaning::error, Meaning::warning, Meaning::parity}) {

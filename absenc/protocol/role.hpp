@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The meaning of a field, an option or an argument for code that knows no protocol. Names are for people: code that
-// handles all units finds the members of a unit by role.
+// The meaning of a field, an option or an argument for code that knows no protocol.
 #pragma once
 
 #include <cstdint>
@@ -8,14 +7,13 @@
 
 namespace absenc {
 
-/// Meaning of a field, option or argument for programs that do not know the unit. The kit (tests of every unit) finds
-/// commands whose fields or arguments lack the roles that they need.
+/// Meaning of a field, option or argument for programs that do not know the unit.
 enum class Role : std::uint8_t {
   other,  ///< no generic meaning: only the unit uses the value
   // Roles in a reading
   position,  ///< field: counts of the position, or the place of a linear encoder
   turns,     ///< field: turns
-  /// Field: valid only while the position is, as the position in degrees or that of a second channel.
+  /// Field: valid only while the position is, such as the position in degrees.
   of_position,
   sequence,      ///< field: counts the replies, so that a repeated reply can be detected
   life_counter,  ///< field: counts the frames, 0 to 63 and again from 0, by one for each frame
@@ -41,12 +39,12 @@ enum class Role : std::uint8_t {
   exchange,  ///< field: a part of the request or of its encoding, which says nothing about the encoder's state
 };
 
-/// Returns whether a field of this role is a part of a reading, and so valid only while that part is.
+/// Returns whether a field of this role is a part of a reading.
 [[nodiscard]] constexpr bool is_of_reading(Role role) {
   return role == Role::position || role == Role::turns || role == Role::of_position;
 }
 
-/// Returns the first element of `all` (fields, options or arguments) with the role `role`, or null.
+/// Returns the first of `all` (fields, options or arguments) with the role `role`, or null.
 template <class Named>
 [[nodiscard]] constexpr const Named* find_role(std::span<const Named> all, Role role) {
   for (const Named& one : all) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The descriptor of one protocol unit: properties of the protocol as data and functions, for the layers and commands
-// that know no protocol.
+// The descriptor of one protocol unit, for the layers and commands that know no protocol.
 #pragma once
 
 #include <cstddef>
@@ -32,7 +31,7 @@ enum class Verb : std::uint8_t {
   memory_write,
   config_get,
   config_set,
-  scan,  ///< finds the encoders on the line: reports a record for each, which begins with the encoder's address
+  scan,  ///< finds the encoders on the line: each record begins with the encoder's address
   run,   ///< a procedure with none of the purposes above; `absenc run` starts it by name
 };
 
@@ -47,7 +46,7 @@ struct Argument {
   Role role = Role::other;         ///< Role by which programs that do not know the unit find the argument.
 };
 
-/// Values of the arguments of a command: one for each Argument in their order, with defaults filled in.
+/// Values of the arguments of a command, with defaults, in the order of its Arguments.
 using Arguments = std::span<const std::int64_t>;
 
 /// Description of a command of a unit.
@@ -57,26 +56,20 @@ struct Command {
   std::uint8_t id;                        ///< number of the command within its unit: index into Unit::commands
   std::string_view meaning;               ///< Purpose of the command, as a phrase.
   std::span<const Argument> arguments{};  ///< Arguments of the command, in their order.
-  /// Whether the command is treated as a change of the encoder. A page or bank that it selects for reading is no
-  /// change.
+  /// Whether the command is treated as a change of the encoder.
   bool changes_encoder = false;
   bool repeatable = true;  ///< Whether the same command may be sent again after an error.
-  /// For verb config_set: name of the config_get command that reads the setting. "": no command reads it, and the
-  /// setting has the name of this command.
+  /// For verb config_set: name of the config_get command that reads the setting; "": none.
   std::string_view reads_back{};
-  /// For verb config_set: name of the option that the command changes to the value of its first argument, such as the
-  /// address. "": none.
+  /// For verb config_set: option that the command changes to its first argument; "": none.
   std::string_view changes_option{};
-  /// Warning for users: the possible effect of the command's requests on other devices on the line, a sentence without
-  /// its full stop; "": none.
+  /// Warning about other devices on the line, a sentence without its full stop; "": none.
   std::string_view disturbs{};
-  /// Whether, for verb read_part, the reading of this command has all alarms, although that of Verb::read may not.
+  /// For verb read_part: whether the reading has all alarms.
   bool reads_alarms = false;
 };
 
-/// A range of bytes in the encoder's memory. The commands memory_read and memory_write access it, and programs find
-/// their arguments by role: address, page, count, value, force. A memory of words has one word at each address, and
-/// `data` has the low byte of each word first.
+/// A range of bytes or words in the encoder's memory. In `data` the low byte of each word is first.
 struct MemoryArea {
   std::uint32_t page;            ///< first page of the area; 0 if the memory has no pages
   std::uint32_t first;           ///< First address of the area on its page.
@@ -85,9 +78,9 @@ struct MemoryArea {
   bool writable = true;          ///< Whether hosts may write the bytes.
   bool in_dump = true;           ///< whether a copy of the memory (`absenc memory dump`) includes the area
   std::uint32_t write_life = 0;  ///< number of writes that the document permits; 0: the document states none
-  /// Why memory_write needs its argument with the role force for this area; "": it does not need it.
+  /// Why memory_write needs its argument with the role force for this area; "": it needs none.
   std::string_view protection{};
-  /// Whether `write_life` counts the writes of all bytes together; false: the document does not state it.
+  /// Whether `write_life` counts the writes of all bytes together; false: not stated.
   bool life_in_total = false;
   std::uint32_t pages = 1;  ///< number of pages, from `page` on, with such an area; an encoder may have fewer
   std::uint8_t word = 1;    ///< bytes of the word at each address: 1, 2 or 4, the same in all areas of a unit
@@ -98,7 +91,7 @@ struct MemoryArea {
   }
 };
 
-/// A register of the encoder, accessed as a whole at its address by the commands memory_read and memory_write.
+/// A register of the encoder, accessed as a whole at its address.
 struct RegisterInfo {
   std::string_view name;  ///< Name of the register.
   std::uint32_t address;  ///< Address of the register.
@@ -107,8 +100,7 @@ struct RegisterInfo {
   bool writable = false;  ///< Whether hosts may write the register.
 };
 
-/// A property of a virtual encoder that can be set while it runs: a part of its environment, such as the temperature,
-/// or a fault.
+/// A property of a virtual encoder that can be set while it runs, such as its temperature.
 struct Condition {
   std::string_view name;  ///< Name of the condition.
   /// Unit of the value, as in FieldInfo::unit; "" for a plain number, and for yes (1) or no (0).
@@ -143,8 +135,8 @@ struct OpenBytes {
   std::size_t count = 0;  ///< Number of open bytes; 0: the frame is complete.
 };
 
-/// A test vector: a request, a reply or both, with the fields or the error that decoding must give. On clocked links
-/// request and reply are texts of 0 and 1; on CAN links texts such as "1ff:022b000000000000".
+/// A test vector: frames, with the fields or the error that decoding must give. On clocked links frames are texts of 0
+/// and 1; on CAN links texts such as "1ff:022b000000000000".
 struct Vector {
   std::string_view id;                 ///< Identifier of the vector, unique within the unit.
   std::string_view meaning;            ///< The case that the vector shows, as a phrase.
@@ -161,13 +153,13 @@ struct Vector {
   [[nodiscard]] constexpr bool is_complete() const { return open_request.count == 0 && open_reply.count == 0; }
 };
 
-/// A captured exchange on a link that carries bytes: a request and the reply to it. Either may be missing.
+/// A captured exchange on a link that carries bytes; request or reply may be missing.
 struct Capture {
   Bytes request{};  ///< Bytes of the request; empty: none was captured.
   Bytes reply{};    ///< Bytes of the reply; empty: none was captured.
 };
 
-/// Result of comparing captures with one value of one option: whether the captured encoder may have this value.
+/// Result of comparing captures with one value of one option.
 struct OptionEvidence {
   std::size_t option;    ///< index of the option in Unit::options
   std::int64_t value;    ///< value of the option that the evidence is about
@@ -185,8 +177,8 @@ struct EvidenceSink {
   ~EvidenceSink() = default;
 };
 
-/// A range of consecutive bits of a frame that carries a value, or a part of it. Bits are numbered as for
-/// `Unit::is_checked`. The last bit of a range is the most significant one; on clocked links, the first bit is.
+/// Consecutive bits of a frame that carry a value or a part of it, numbered as for `Unit::is_checked`. The most
+/// significant bit is the last; on clocked links it is the first.
 struct BitRange {
   std::size_t first = 0;  ///< Index of the first bit in the frame.
   std::size_t count = 0;  ///< Number of bits in the range.
@@ -201,19 +193,18 @@ struct Composed {
   Bytes request{};          ///< Bytes of the request of the composed frame.
   Bytes reply{};            ///< Bytes of the reply of the composed frame; empty: none.
   std::uint64_t first = 0;  ///< number of the exchange that carried the first byte
-  /// Error if the composed frame contradicts the exchanges that carried it, which its bytes alone do not show.
+  /// Error if the composed frame contradicts the exchanges that carried it.
   Error error = Error::none;
 };
 
-/// Finds composed frames in the valid exchanges of one encoder, which it takes in the order of the capture.
+/// Finds composed frames in the valid exchanges of one encoder, in the order of the capture.
 struct Follower {
-  /// Takes a valid exchange, or a reply without a request (`request` empty). `number`: number of the exchange in the
-  /// capture.
+  /// Takes a valid exchange with its number in the capture. `request` may be empty.
   virtual void follow(std::uint64_t number, Bytes request, Bytes reply) = 0;
   /// Notes that frames were lost or damaged between the exchange before and the next one.
   virtual void lose() = 0;
-  /// Stores in `one` the next composed frame that ended with the last exchange, and returns true; returns false if
-  /// there is no other. The frame is valid until the next exchange.
+  /// Stores the next composed frame in `one`, or returns false if there is none. The frame is valid until the next
+  /// exchange.
   virtual bool take(Composed& one) = 0;
 
  protected:
@@ -243,8 +234,7 @@ struct FrameEnd {
   std::size_t size = 0;  ///< Length in bytes, as `kind` describes it; 0 for `no_frame`.
 };
 
-/// Pointer to a machine (conversation or virtual encoder) for bytes or for CAN frames. Exactly one member is set; none
-/// if the machine could not be made.
+/// Pointer to a conversation or virtual encoder for bytes or for CAN frames, or to none.
 template <template <class> class Role>
 struct Any {
   Role<std::uint8_t>* bytes = nullptr;  ///< The machine, if its link carries bytes; else null.
@@ -264,7 +254,7 @@ struct Any {
 /// Greatest length in bytes of a request that Unit::encode writes.
 inline constexpr std::size_t longest_encoded = 1024;
 
-/// Resolution of an encoder: the numbers of bits of its position and turns, and the length of a linear count.
+/// Resolution of an encoder: bits of its position and turns, and the length of a linear count.
 struct Resolution {
   unsigned singleturn_bits = 0;   ///< Bits of the position within the turn, or of a linear encoder; 0: none.
   unsigned multiturn_bits = 0;    ///< Bits of the turns; 0: none.
@@ -282,8 +272,7 @@ struct ExtraWires {
 struct LineTiming {
   unsigned pause_bits = 15;  ///< shortest silence that ends a frame, in bit times
   Time frame_pause{};        ///< longest pause between the frames of one request; 0: a request is one frame
-  /// Time from the end of a request to the begin of its reply, as the document states it, at the default rate of the
-  /// line; 0: unknown.
+  /// Time from a request to its reply at the default rate of the line; 0: unknown.
   Time turnaround{};
   Time turnaround_limit = std::chrono::milliseconds(100);  ///< longest time that hosts wait for a reply to begin
 };
@@ -293,7 +282,7 @@ struct Unit {
   std::string_view id;        ///< Identifier: the part of an address before the colon.
   std::string_view name;      ///< names of maker and protocol, for people
   std::string_view document;  ///< title of the protocol's document
-  /// Other names by which users find the unit, such as those of makers and encoder families: "Tamagawa", "Smart-Abs".
+  /// Other names by which users find the unit, such as "Tamagawa" or "Smart-Abs".
   std::span<const std::string_view> known_as{};
   LinkKind link;      ///< Kind of link between host and encoder.
   LineSettings line;  ///< Default settings of the line. Rate 0: the document states none, so the user must.
@@ -301,101 +290,86 @@ struct Unit {
   std::span<const Model> models;      ///< Models of encoders, each of which sets several options by one name.
   std::span<const FieldInfo> fields;  ///< Fields that requests, replies and results can have.
   std::span<const Command> commands;  ///< Commands that hosts can run.
-  /// Areas of the encoder's memory that the commands memory_read and memory_write access, in order of pages.
+  /// Areas of the encoder's memory, in order of pages.
   std::span<const MemoryArea> memory{};
-  /// Registers that the commands memory_read and memory_write access, for encoders that have registers instead of
-  /// memory.
+  /// Registers of encoders that have registers instead of memory.
   std::span<const RegisterInfo> registers{};
   /// Test vectors: frames with the fields or the error that decoding must give.
   std::span<const Vector> vectors;
   const FieldInfo* status;  ///< field that describes the flags of Reading::status; null: the unit has no status
   const FieldInfo* alarms;  ///< Field that describes the flags of Reading::alarms; null: the unit has no alarms.
-  /// Returns the alarms (bits of `alarms`) that an encoder with these options can report. Null: all.
+  /// Returns the alarms that an encoder with these options can report. Null: all.
   std::uint32_t (*reportable)(const Options& options) = nullptr;
-  /// Field that describes the status flags of the second channel of an encoder with two; null: none. In a Reading their
-  /// bits follow those of the first channel in one number.
+  /// Field of the status flags of the second channel; null: none. Its bits follow those of the first.
   const FieldInfo* second_status = nullptr;
   const FieldInfo* second_alarms = nullptr;  ///< Field of the alarms of the second channel; null: none.
   std::size_t host_storage;                  ///< bytes of storage that `host` needs, aligned for any type
   std::size_t device_storage;                ///< bytes of storage that `device` needs, aligned for any type
 
-  /// Checks a reply against its request and puts the fields of the reply, and its reading, into `sink`; with an empty
-  /// reply, checks the request and puts its fields. Returns the first error; `Error::none` if the frame is valid.
+  /// Checks a reply, or a request if the reply is empty, and puts its fields, and the reading of a reply, into `sink`.
+  /// Returns the first error, or `Error::none`.
   Error (*decode)(const Options& options, Frame request, Frame reply, FieldSink& sink);
-  /// Constructs in `storage`, which has `decoder_storage` bytes, a decoder that decodes many frames of an encoder with
-  /// these options faster than `decode`. Null: the unit has none.
+  /// Constructs a decoder for encoders with these options in `storage` of `decoder_storage` bytes. Null: the unit has
+  /// none.
   FrameDecoder* (*decoder)(const Options& options, std::span<std::byte> storage) = nullptr;
   std::size_t decoder_storage = 0;  ///< Bytes of storage that `decoder` needs, aligned for any type.
-  /// Returns the error that `decode` returns, without delivering fields; `Error::none`: the reply, or with an empty
-  /// reply the request, is valid.
+  /// Returns the error that `decode` returns, without delivering fields.
   [[nodiscard]] Error check(const Options& values, const Frame& request, const Frame& reply) const {
     NoFields nowhere;
     return decode(values, request, reply, nowhere);
   }
-  /// Writes the request of a command into `request` and returns its length, at most `longest_encoded` bytes. On CAN and
-  /// clocked links it writes a text, as in vectors; the length may be 0 on clocked links. Errors: invalid_argument,
-  /// buffer_too_small, unsupported.
+  /// Writes the request of a command into `request` and returns its length, at most `longest_encoded` bytes; on CAN and
+  /// clocked links a text, as in vectors. Errors: invalid_argument, buffer_too_small, unsupported.
   Result<std::size_t> (*encode)(const Options& options, const Command& command, Arguments arguments,
                                 MutableBytes request);
   /// Returns where the frame ends that begins with the first of `bytes`.
   FrameEnd (*frame_end)(const Options& options, Direction direction, Bytes bytes);
-  /// Constructs the conversation of a command in `storage`, which has `host_storage` bytes. An empty Any: the options
-  /// contradict each other, or the command's request cannot be encoded with these arguments. If the encoder lacks the
-  /// command, or an argument is missing or outside its range, the conversation ends at once with an error.
+  /// Constructs the conversation of a command in `storage` of `host_storage` bytes; an empty Any if that is impossible.
   Any<Conversation> (*host)(const Options& options, const Command& command, Arguments arguments,
                             std::span<std::byte> storage);
-  /// Constructs a virtual encoder in `storage`, which has `device_storage` bytes; `shaft` must outlive it. Returns an
-  /// empty Any if the options contradict each other.
+  /// Constructs a virtual encoder in `storage` of `device_storage` bytes; an empty Any if that is impossible. `shaft`
+  /// must outlive it.
   Any<Device> (*device)(const Options& options, const Shaft& shaft, std::span<std::byte> storage);
-  /// Returns the resolution of an encoder with these options; numbers of bits that the options leave open are those of
-  /// the virtual encoder.
+  /// Returns the resolution of an encoder with these options.
   Resolution (*resolution)(const Options& options);
-  /// Returns whether the checks must detect that bit number `bit` of this valid reply was flipped. Null: they must
-  /// detect every bit. Bits count from the least significant of the first byte on; on clocked links in the order of the
-  /// wire.
+  /// Returns whether the checks must detect a flipped bit `bit` of this valid reply. Null: all bits. Bits count from
+  /// the least significant of the first byte on; on clocked links in the order of the wire.
   bool (*is_checked)(const Options& options, Frame request, Frame reply, std::size_t bit) = nullptr;
-  /// Returns the bits of this valid reply that carry `field`; none if the field has no fixed place, or is computed
-  /// (Gray code, decimal text). Null: unknown for all fields. The place may differ between frames.
+  /// Returns the bits of this valid reply that carry `field`; may be none. Null: unknown.
   BitRanges (*bits)(const Options& options, Frame request, Frame reply, const FieldInfo& field) = nullptr;
-  /// Returns the unit's explanation of the error of an exchange, whose reply may be missing. Null: the unit explains
-  /// none.
+  /// Returns the unit's explanation of the error of an exchange. Null: the unit explains none.
   Explanation (*explain)(const Options& options, Error error, Frame request, Frame reply) = nullptr;
   /// Returns the settings of the line with these options. Null: they are always `line`.
   LineSettings (*settings)(const Options& options) = nullptr;
-  /// The unit of the same encoder behind an SPI controller, if that is another unit; null: there is no such unit.
+  /// The unit of the same encoder behind an SPI controller, if that is another; null: none.
   const Unit* over_spi = nullptr;
-  /// Compares captures, which are in the order of time, with values of those options that frames can show, and puts the
-  /// evidence into `sink`. Returns whether the values that it then leaves in `options` explain all captures. The other
-  /// options must have their values before. Null: frames do not show option values.
+  /// Compares captures, in the order of time, with values of probeable options, and puts the evidence into `sink`.
+  /// Returns whether the values left in `options` explain all captures. Null: frames do not show option values.
   bool (*probe)(Options& options, std::span<const Capture> captures, EvidenceSink& sink) = nullptr;
   /// Returns the wires beside the data line that an encoder with these options needs. Null: none.
   ExtraWires (*extra_wires)(const Options& options) = nullptr;
   LineTiming timing{};  ///< Times of the line, which decoding captures needs.
-  /// Returns whether an encoder with these options sends unsolicited replies. Null: never. On clocked and CAN links a
-  /// reply without a request is always permitted.
+  /// Returns whether replies of an encoder with these options need no request. Null: they need one, except on clocked
+  /// and CAN links.
   bool (*streams)(const Options& options) = nullptr;
   /// Returns whether the encoder answers this valid request. Null: it answers every request.
   bool (*is_answered)(const Options& options, Frame request) = nullptr;
-  /// Returns how long after the last received item a host must wait before it repeats this valid request. Null: no
-  /// time.
+  /// Returns the shortest pause before this valid request is repeated. Null: none.
   Time (*pause)(const Options& options, Frame request) = nullptr;
   /// Conditions of the virtual encoder's environment, which can be set while it runs.
   std::span<const Condition> conditions{};
-  /// For clocked links on which the level of the clock line in each pause is a bit from the host (1: low): returns the
-  /// index of the bit in this reply that the encoder sends in exchange; nothing if this reply has none. The bits of
-  /// both sides, one per frame, are decoded as request and reply. Null: no reply of the unit has such a bit.
+  /// For links on which the clock line carries a bit of the host in each pause (1: low): returns the index of the bit
+  /// in this reply that answers it; nothing: it has none. Null: no reply of the unit has one.
   std::optional<std::size_t> (*control_bit)(const Options& options, Frame reply) = nullptr;
-  /// Returns the reading `now` of one reply, completed by those alarms in `before` that still apply and that this reply
-  /// does not report. `before`: the completed reading of the same encoder's previous reply. Null: readings are not
-  /// completed.
+  /// Returns the reading `now`, completed by alarms of `before`, the completed reading before it. Null: readings are
+  /// not completed.
   Reading (*remembered)(const Reading& before, Reading now) = nullptr;
-  /// Constructs a Follower in `storage`, which has `follower_storage` bytes, aligned for any type. Null: the unit has
-  /// none.
+  /// Constructs a Follower in `storage` of `follower_storage` bytes, aligned for any type. Null: the unit has none.
   Follower* (*follower)(const Options& options, std::span<std::byte> storage) = nullptr;
   std::size_t follower_storage = 0;  ///< Bytes of storage that `follower` needs; 0: there is none.
 };
 
-/// Returns whether the user may give a word format for `unit`, which replaces the options that describe a word.
+/// Returns whether the user may give a word format for `unit`.
 [[nodiscard]] constexpr bool takes_word(const Unit& unit) {
   for (const Option& option : unit.options) {
     if (option.describes_word) return true;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compares the decoded fields of a frame with those that its test vector expects, also at compile time.
+// Compares the decoded fields of a frame with those that its test vector expects.
 #pragma once
 
 #include <span>
@@ -10,8 +10,7 @@
 
 namespace absenc {
 
-/// A sink that compares each delivered field with the expected values, in any order; real numbers to 1e-9. Unexpected
-/// fields make the comparison fail.
+/// A sink that compares delivered fields with expected values; real numbers to 1e-9.
 struct VectorCheck final : FieldSink {
   /// Expects exactly the fields `wanted`.
   constexpr explicit VectorCheck(std::span<const Expected> wanted) : expected(wanted) {}
@@ -40,16 +39,14 @@ struct VectorCheck final : FieldSink {
   std::size_t count = 0;               ///< Number of delivered fields, expected or not.
 };
 
-/// Returns the bits of a test vector's text for a clocked link: at most 256 bits; the character 1 is a one, every other
-/// character a zero.
+/// Returns the bits of a test vector's text for a clocked link, at most 256.
 [[nodiscard]] constexpr BitBuffer<256> bits_of_text(Bytes text) {
   BitBuffer<256> bits;
   for (const std::uint8_t c : text) bits.append(c == '1' ? 1 : 0, 1);
   return bits;
 }
 
-/// Returns the CAN frame of a test vector's text such as "1ff:022b": identifier and data in hexadecimal. An identifier
-/// of more than three digits has 29 bits. Texts of another form are not detected.
+/// Returns the CAN frame of a text such as "1ff:022b"; more than three digits: a 29-bit identifier.
 [[nodiscard]] constexpr CanFrame can_frame_of_text(Bytes text) {
   CanFrame frame;
   std::size_t at = 0;

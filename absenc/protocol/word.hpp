@@ -23,7 +23,7 @@ struct WordWith {
   static constexpr std::size_t capacity = size;  ///< Number of elements of `values`.
   std::uint64_t position = 0;                    ///< Position in counts: within the turn, or of a linear encoder.
   std::uint64_t multiturn = 0;                   ///< Number of turns.
-  /// Whether the encoder reports an error, by the error bit or by another sign of its protocol (SSI: parity).
+  /// Whether the encoder reports an error, by the error bit or by another sign of its protocol.
   bool error = false;
   bool warning = false;  ///< Whether the warning bit reports a warning.
   /// Values of fields with Meaning::value, by the index of the field in the format.
@@ -39,14 +39,13 @@ using Word = WordWith<WordFormat::maximum_fields>;
 inline constexpr std::uint32_t word_error = 1;
 inline constexpr std::uint32_t word_warning = 2;  ///< Bit of Reading::alarms: the warning bit of a word.
 
-/// Names, meanings and actions of the alarms of a word, in the order of the bits word_error and word_warning.
+/// Descriptions of the alarms of a word, in the order of word_error and word_warning.
 inline constexpr std::array<FlagInfo, 2> word_flags{{
     {"error", "the encoder says that its position is wrong", "see the encoder's manual: its status tells the cause"},
     {"warning", "the encoder works near its limits", "check distance, dirt, temperature and supply", true},
 }};
 
-/// Types of the values of a word that are shown as fields, and of its alarms. Values with Meaning::value are not among
-/// them, because their names come from the word format.
+/// Types of the values of a word that are shown as fields, and of its alarms.
 struct WordValues {
   std::uint64_t multiturn;   ///< Number of turns.
   std::uint64_t singleturn;  ///< Position within the turn, in counts.
@@ -56,7 +55,7 @@ struct WordValues {
   double position_mm;        ///< Position of a linear encoder, in millimetres.
   bool error;                ///< Whether the encoder reports an error: WordWith::error.
   bool warning;              ///< Whether the warning bit reports a warning.
-  /// Alarms of a reading. Declared only for the descriptions of its flags; never delivered as a field.
+  /// Alarms of a reading; never delivered as a field.
   std::uint32_t alarms;
 };
 
@@ -87,8 +86,7 @@ struct PlacedField {
   bool active_low;    ///< Whether the field is sent inverted, so that 0 means that a flag is set.
 };
 
-/// Gives the functions of a position word access to a format that may be known at run time only. Known does the same
-/// for a format known at compile time; both have these members.
+/// A format for the functions of a position word, known at run time.
 template <class Format>
 struct Given {
   static constexpr bool is_known = false;  ///< Whether the format is known at compile time.
@@ -97,7 +95,7 @@ struct Given {
   const Format& format;    ///< Format of the encoder, of which the word format is a part.
   const WordFormat& word;  ///< Format of the position word.
 
-  /// Calls `use` with each field of the word in turn, until it returns false. Returns whether all calls returned true.
+  /// Calls `use` with each field of the word, until it returns false. Returns whether none did.
   template <class Use>
   constexpr bool each(Use use) const {
     unsigned first = 0;
@@ -110,15 +108,14 @@ struct Given {
   }
 };
 
-/// Gives the functions of a position word access to a format that is known at compile time, so that nothing of the
-/// format is computed at run time.
+/// A format for the functions of a position word, known at compile time.
 template <const auto& known>
 struct Known {
   static constexpr bool is_known = true;                 ///< Whether the format is known at compile time.
   static constexpr const auto& format = known;           ///< Format of the encoder, of which the word format is a part.
   static constexpr const WordFormat& word = known.word;  ///< Format of the position word.
   static constexpr std::size_t size = word.fields().size();  ///< Number of fields of the word.
-  /// Type of the decoded values of the word, without room for values of Meaning::value if the word has none.
+  /// Type of the decoded values of the word.
   using Word = WordWith<word.find(Meaning::value) == nullptr ? 0 : size>;
 
   /// The field `i` of the word, with its place as constants.
@@ -132,7 +129,7 @@ struct Known {
     static constexpr bool active_low = word.fields()[i].active_low;
   };
 
-  /// Calls `use` with each field of the word in turn, until it returns false. Returns whether all calls returned true.
+  /// Calls `use` with each field of the word, until it returns false. Returns whether none did.
   template <class Use>
   static constexpr bool each(Use use) {
     return each(use, std::make_index_sequence<size>{});
@@ -154,8 +151,7 @@ constexpr bool parity_of(const Bits& bits, std::size_t first, std::size_t end) {
   return odd ^ odd_parity(bits.load(first, static_cast<unsigned>(end - first)));
 }
 
-// Decodes or encodes a Gray-coded number whose bits are split into several fields: each field needs the last bit of the
-// part of the number before it.
+// Decodes or encodes a Gray-coded number whose bits are split into several fields.
 class GrayFields {
  public:
   constexpr std::uint64_t decode(std::uint64_t gray, unsigned bits) {
@@ -173,8 +169,7 @@ class GrayFields {
   bool odd_ = false;
 };
 
-// The `count` bits of a frame from bit `first` on; the frame must have all of them. Up to 64 bits are loaded once, as
-// one number, which is faster.
+// The `count` bits of a frame from bit `first` on; the frame must have all of them.
 class SomeBits {
  public:
   constexpr SomeBits(BitView bits, std::size_t first, unsigned count)
@@ -197,8 +192,7 @@ class SomeBits {
   std::size_t first_;
 };
 
-// Decodes the word that begins at bit `first` of `bits` into `word`. Returns wrong_length, bad_checksum (parity), or
-// none. `Bits` is BitView, BitNumber or SomeBits.
+// Decodes the word at bit `first` of `bits`. Returns wrong_length, bad_checksum, or none.
 template <class Source, class Bits>
 constexpr Error take_word(const Source& source, const Bits& bits, std::size_t first, typename Source::Word& word) {
   if (bits.size < first || bits.size - first < source.word.bits()) return Error::wrong_length;
@@ -222,15 +216,14 @@ constexpr Error take_word(const Source& source, const Bits& bits, std::size_t fi
 
 }  // namespace detail
 
-/// Decodes the word that begins at bit `first` of `bits`. Errors: wrong_length (too few bits), bad_checksum (parity).
+/// Decodes the word that begins at bit `first` of `bits`. Errors: wrong_length, bad_checksum.
 [[nodiscard]] constexpr Result<Word> decode_word(const WordFormat& format, BitView bits, std::size_t first = 0) {
   Word word;
   const Error error = detail::take_word(Given<WordFormat>{format, format}, bits, first, word);
   return error == Error::none ? Result(word) : error;
 }
 
-/// Appends the encoded word to `out`; values are cut to the bits of their field. Returns false, without a change, if
-/// `out` is too small.
+/// Appends the encoded word to `out`. Returns false, without a change, if `out` is too small.
 template <std::size_t Capacity>
 constexpr bool encode_word(const WordFormat& format, const Word& word, BitBuffer<Capacity>& out) {
   if (out.capacity() - out.size() < format.bits()) return false;
@@ -252,8 +245,7 @@ constexpr bool encode_word(const WordFormat& format, const Word& word, BitBuffer
   return true;
 }
 
-/// Puts the fields of the word into `sink`, in the order of the wire, without parity and skipped bits. A rotary
-/// position is also put as an angle, a linear one as a distance if the length of a count is known.
+/// Puts the fields of the word into `sink`, in the order of the wire.
 constexpr void put_word(FieldSink& sink, const WordFormat& format, const Word& word, const Scale& scale) {
   for (std::size_t i = 0; i < format.fields().size(); ++i) {
     const WordField& field = format.fields()[i];
@@ -290,7 +282,7 @@ struct WordContents {
   PositionBits bits{};         ///< Numbers of bits of position and turns.
   std::uint32_t reported = 0;  ///< alarms (word_error, word_warning) for which the word has a bit
 };
-/// Returns the numbers of bits of position and turns of a word, and the alarms that it can report.
+/// Returns the numbers of bits of position and turns, and the alarms that a word can report.
 [[nodiscard]] constexpr WordContents contents_of(const WordFormat& format) {
   WordContents contents;
   for (const WordField& field : format.fields()) {
@@ -316,19 +308,19 @@ template <std::size_t size>
           .alarms = (word.error ? word_error : 0) | (word.warning ? word_warning : 0),
           .alarms_reported = contents.reported};
 }
-/// Returns the reading of a word with this format. `word.error` makes position and turns invalid.
+/// Returns the reading of a word with this format.
 [[nodiscard]] constexpr Reading to_reading(const WordFormat& format, const Word& word, const Scale& scale) {
   return to_reading(contents_of(format), word, scale);
 }
 
-/// Puts the fields of the word as `put_word` does, and then the reading of the word, into `sink`.
+/// Puts the fields of the word, and then its reading, into `sink`.
 constexpr void put_position(FieldSink& sink, const WordFormat& format, const Word& word, const Scale& scale) {
   put_word(sink, format, word, scale);
   sink.put_reading(to_reading(format, word, scale));
 }
 
-/// Returns the values that a virtual encoder sends in its word at this state of the shaft. A linear encoder moves over
-/// its whole range in one revolution.
+/// Returns the values that a virtual encoder sends in its word. A linear encoder moves over its whole range in one
+/// revolution.
 [[nodiscard]] constexpr Word word_of(const WordFormat& format, const ShaftState& state, std::uint32_t alarms) {
   const unsigned bits = format.bits_of(Meaning::position);
   const auto fraction = static_cast<std::uint64_t>(state.position);
@@ -340,8 +332,7 @@ constexpr void put_position(FieldSink& sink, const WordFormat& format, const Wor
   return word;
 }
 
-/// Returns the format of a word that has only the position and, before or after it, the turns. A part of 0 or more than
-/// 64 bits is left out.
+/// Returns the format of a word with position and turns. A part of 0 or more than 64 bits is left out.
 [[nodiscard]] constexpr WordFormat word_format(const PositionBits& bits) {
   WordFormat format;
   const auto bits_of = [](unsigned count) { return static_cast<std::uint8_t>(count <= 64 ? count : 0); };

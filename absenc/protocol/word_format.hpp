@@ -28,7 +28,7 @@ enum class Meaning : std::uint8_t { position, multiturn, error, warning, parity,
 inline constexpr std::array<std::string_view, 7> meaning_names{"position", "multiturn", "error", "warning",
                                                                "parity",   "value",     "skip"};
 
-/// A name of at most 15 characters, stored in the object itself, so that a format can be a constant.
+/// A name of at most 15 characters, stored in the object itself.
 class WordFieldName {
  public:
   static constexpr std::size_t capacity = 15;  ///< Greatest number of characters of a name.
@@ -80,8 +80,7 @@ class WordFormat {
 
   constexpr WordFormat() = default;
 
-  /// Adds a field at the end. Returns why the field cannot follow those before it, and leaves the format unchanged; ""
-  /// if it was added.
+  /// Adds a field at the end. Returns why that is impossible, or "" if it was added.
   constexpr std::string_view add(const WordField& field) {
     const bool flag = field.meaning >= Meaning::error && field.meaning <= Meaning::parity;
     if (field.bits < 1 || field.bits > 64) return "a field has 1 to 64 bits";
@@ -153,8 +152,7 @@ constexpr WordFormatError check_name(std::string_view name) {
   return {};
 }
 
-// Parses `item`, "[name=]meaning:bits[!]" without spaces, into `field`. `at` of the returned error is an index into the
-// item.
+// Parses `item`, "[name=]meaning:bits[!]", into `field`.
 constexpr WordFormatError parse_word_field(std::string_view item, WordField& field) {
   const std::size_t equals = index_of(item, '=');
   const bool named = equals < item.size();
@@ -198,8 +196,8 @@ constexpr bool is_taken(std::string_view name, std::span<const FieldInfo> taken)
 
 }  // namespace detail
 
-/// Parses the text of a word format into `format`, which changes only if there is no error. Returns the error; its
-/// `reason` is empty if there is none. No field with Meaning::value may have a name of the fields `taken`.
+/// Parses the text of a word format into `format`, which stays unchanged on an error. Returns the error, with an empty
+/// `reason` if there is none. No value may have a name of the fields `taken`.
 [[nodiscard]] constexpr WordFormatError parse_word_format(std::string_view text, WordFormat& format,
                                                           std::span<const FieldInfo> taken = {}) {
   WordFormat parsed;
@@ -244,7 +242,7 @@ consteval WordFormat word_format_or_stop(std::string_view text) {
 }
 }  // namespace detail
 
-/// Returns the word format of a literal such as "position:24"_word: a wrong text does not compile.
+/// Returns the word format of a literal such as "position:24"_word.
 consteval WordFormat operator""_word(const char* text, std::size_t size) {
   return detail::word_format_or_stop({text, size});
 }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fuzz test: parses any text as a word format. An error must point into the text or to its end, and a parsed format
-// must decode and encode words.
+// Fuzz test: parses any text as a word format, and decodes and encodes words with it.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -15,8 +14,7 @@ void require(bool condition) {
   if (!condition) std::abort();
 }
 
-// Checks that encoding a decoded word gives the same bits again, apart from skipped bits and the parity, and that these
-// decode to the same word. Does nothing if the bits are no valid word.
+// Decodes a word, encodes it again, and compares.
 void decode_and_encode(const WordFormat& format, Bytes bits) {
   const BitView view{bits, bits.size() * 8};
   const Result<Word> word = decode_word(format, view);

@@ -81,8 +81,7 @@ Result<Word> decode(const WordFormat& format, Bytes bytes, std::size_t bits) {
 }
 
 TEST(Word, DecodesWhatEachFieldMeans) {
-  // The word has multiturn 5, position 0x14, error bit 1, warning bit 1, two skipped bits, and the value 3 sent
-  // inverted.
+  // Multiturn 5, position 0x14, error bit 1, warning bit 1, two skipped bits, inverted value 3.
   constexpr std::array<std::uint8_t, 2> bytes{0b01011010, 0b01111100};
   constexpr WordFormat format = "multiturn:4 position:5 error:1! warning:1! skip:2 name=value:3!"_word;
   const Result<Word> word = decode(format, bytes, 16);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Options and models that the units of clocked encoders with position words share, and functions of word formats for
-// them.
+// Options and models that the units of clocked encoders with position words share.
 #pragma once
 
 #include <array>
@@ -64,14 +63,13 @@ struct WordSettings : Format {
   std::uint8_t position_bits = 0;    ///< Bits of a linear position; 0: rotary encoder.
   std::int64_t unit_pm = 0;          ///< Picometres per count of a linear encoder; 0: not given.
 
-  /// Returns the numbers of bits of position and turns, and their order, as the options describe them.
+  /// Returns the numbers of bits of position and turns, and their order.
   [[nodiscard]] constexpr PositionBits bits() const {
     if (position_bits != 0) return {.position = position_bits};
     return {singleturn_bits, multiturn_bits, multiturn_first};
   }
-  /// Returns the protocol format with its position word: the word format in `values` if the user gave one, else
-  /// `described`, which the options describe. `linear`: whether these options describe a linear encoder; a given word
-  /// format is linear if `unit_pm` is set.
+  /// Returns the protocol format with its position word: that in `values`, or else `described`. `linear`: whether
+  /// `described` is of a linear encoder.
   [[nodiscard]] constexpr Format with_word(const Options& values, const WordFormat& described, bool linear) const {
     Format format = *this;
     format.word = values.has_word() ? values.word : described;
@@ -80,22 +78,20 @@ struct WordSettings : Format {
   }
 };
 
-/// Returns whether a word format has a position, and position and turns have at most 64 bits together.
+/// Returns whether a word has a position, and position and turns have at most 64 bits together.
 [[nodiscard]] constexpr bool is_usable(const WordFormat& word) {
   const unsigned position = word.bits_of(Meaning::position);
   return position > 0 && position + word.bits_of(Meaning::multiturn) <= 64;
 }
-/// Returns whether a position can be shown as an angle or a distance: for a linear encoder, micrometres per count must
-/// be known.
+/// Returns whether a position can be shown as an angle or a distance.
 [[nodiscard]] constexpr bool is_usable(const Scale& scale) { return !scale.linear || scale.unit_um > 0; }
 
-/// Returns the numbers of bits of position and turns of a word, and the scale of a linear encoder.
+/// Returns the resolution of an encoder with this word and scale.
 [[nodiscard]] constexpr Resolution resolution_of(const WordFormat& word, const Scale& scale) {
   return {word.bits_of(Meaning::position), word.bits_of(Meaning::multiturn), scale.linear ? scale.unit_um : 0};
 }
 
-/// Returns the bits of a frame that carry `field`, which belongs to a word that begins at bit `first`; none if the word
-/// lacks the field. Gray-coded values have no bits of their own.
+/// Returns the bits that carry `field` in a word that begins at bit `first`; may be none.
 [[nodiscard]] constexpr BitRanges place_in_word(const WordFormat& format, const FieldInfo& field, std::size_t first) {
   // Fields are compared by name, because stored frames have copies of the field descriptions.
   const auto is = [&field](const FieldInfo* shown) { return field.name == shown->name; };
@@ -124,7 +120,7 @@ struct WordSettings : Format {
   return ranges;
 }
 
-/// Models: the encoders of the four examples in RLS "E201-9S Decoding the BiSS information", which gives no speeds.
+/// Models: the four examples in RLS "E201-9S Decoding the BiSS information", which gives no speeds.
 inline constexpr std::array position_models{
     author::ModelText{"rotary-19", "single-turn, 19 bits (example 4)", 0,
                       "singleturn_bits=19 multiturn_bits=0 position_bits=0"},

@@ -22,15 +22,14 @@ constexpr Time time_of_guesses = std::chrono::seconds(60);
 constexpr std::size_t most_addresses = 1000;
 constexpr std::string_view wrong_token = "the token is wrong: the server's token file has no such token";
 
-// Returns whether host names, origins or authentication schemes are equal as HTTP defines it: ASCII, ignoring case.
+// Returns whether two texts are equal as HTTP defines it: ASCII, ignoring case.
 bool equals_ignoring_case(std::string_view one, std::string_view other) {
   const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; };
   return std::equal(one.begin(), one.end(), other.begin(), other.end(),
                     [&](char a, char b) { return lower(a) == lower(b); });
 }
 
-// Returns whether two secrets are equal. The comparison of secrets of one length takes the same time wherever they
-// differ, so that the time does not reveal how much of a guess is right.
+// Returns whether two secrets are equal; the time does not show where they differ.
 bool same_secret(std::string_view one, std::string_view other) {
   if (one.size() != other.size()) return false;
   unsigned difference = 0;
@@ -38,7 +37,7 @@ bool same_secret(std::string_view one, std::string_view other) {
   return difference == 0;
 }
 
-// Returns the host name without its port: "localhost" of "localhost:8420", "[::1]" of "[::1]:8420".
+// Returns the host name without its port: "localhost" of "localhost:8420".
 std::string_view host_name_in(std::string_view host) {
   const std::size_t bracket = host.find(']');
   const std::size_t end = host.find(':', bracket == std::string_view::npos ? 0 : bracket);
@@ -52,13 +51,12 @@ bool names_loopback(std::string_view host) {
 
 bool is_loopback_address(std::string_view address) { return address.starts_with("127.") || address == "::1"; }
 
-// Returns host and port of an origin: "encoders.example:8443" of "https://encoders.example:8443".
+// Returns the part of an origin behind "//": its host and port.
 std::string_view authority_of(std::string_view origin) {
   return origin.substr(std::min(origin.find("//") + 2, origin.size()));
 }
 
-// Returns the origin of a URL without a usual port; "" for "". Throws UsageError for other URLs than
-// "http(s)://host[:port][/path]".
+// Returns the origin of a URL without a usual port; "" for "". Throws UsageError.
 std::string origin_of(std::string_view url) {
   if (url.empty()) return {};
   const std::size_t host = url.starts_with("https://") ? 8 : url.starts_with("http://") ? 7 : 0;
@@ -103,9 +101,7 @@ std::uint64_t Access::wrong_tokens() const {
   return wrong_tokens_;
 }
 
-// Counts a wrong token and returns whether the address may try again; false also for an address that is not counted
-// because too many are. Until the count of an address ends, at most two of its guesses add an event to the history: the
-// first one, and the one that exceeds the limit.
+// Counts a wrong token, and returns whether the address may try again.
 bool Access::may_try_again(const std::string& peer) const {
   const Time now = os::now();
   const std::lock_guard lock(mutex_);
@@ -138,8 +134,7 @@ std::string Access::token_name(const Request& request) const {
   return name;
 }
 
-// Returns whether the header Host names this server. Otherwise a page of another site could make a browser send a
-// request under that site's own name and let the page read the response (DNS rebinding).
+// Returns whether the header Host names this server, against DNS rebinding.
 bool Access::names_this_server(std::string_view host) const {
   return names_loopback(host) || (!public_origin_.empty() &&
                                   equals_ignoring_case(host_name_in(host), host_name_in(authority_of(public_origin_))));
@@ -153,16 +148,12 @@ bool Access::is_from_own_page(const Request& request) const {
          (!public_origin_.empty() && equals_ignoring_case(request.origin, public_origin_));
 }
 
-// Returns whether the request needs a token: never with Right::open, always with Right::change or when the server is
-// not on loopback. Otherwise it needs one only if the server has tokens, and a proxy forwarded the request or is
-// configured: a proxy does not always add its header.
 bool Access::needs_token(const Request& request, Right right) const {
   if (right == Right::open || right == Right::change || !on_loopback_) return right != Right::open;
   return has_tokens() && (request.is_forwarded || !public_origin_.empty());
 }
 
-// Returns the address of the client. The last entry of X-Forwarded-For is the address that the proxy itself saw. That
-// entry is used only with a configured proxy and a request from this computer, because any client can send this header.
+// Returns the address of the client. Only the last entry of X-Forwarded-For is from the proxy.
 std::string Access::client_of(const Request& request) const {
   if (public_origin_.empty() || !is_loopback_address(request.peer)) return request.peer;
   const std::string& list = request.forwarded_for;

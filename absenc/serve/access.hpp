@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decides which requests are allowed. Requests for the page itself and the health check need no token. A request that
-// runs a command of an encoder or acknowledges an alarm needs one. Every other request needs one if the server does not
-// listen on loopback. If it listens on loopback, everybody on this computer may read and poll without a token, except
-// that a server with tokens demands one if a proxy is configured or has forwarded the request.
+// Decides which requests are allowed, and which need a token.
 #pragma once
 
 #include <cstdint>
@@ -34,18 +31,15 @@ class Access {
     std::string public_url{};  // URL at which a proxy on this computer shows the page; "": no proxy
     bool on_loopback = false;  // whether the server listens on loopback, so no other computer can reach it directly
   };
-  /// Throws Failure as `read_secrets` does, also for a token that is shorter than 16 characters; throws UsageError when
-  /// `choices` are inconsistent or `public_url` is invalid. `server_events` must outlive this object.
+  /// Throws Failure, UsageError. `server_events` must outlive this object.
   Access(const Choices& choices, ServerEvents& server_events);
 
-  /// Reads the token file again: a token that was removed from the file becomes invalid at once. Throws Failure like
-  /// the constructor; the previous tokens then stay valid.
+  /// Reads the token file again. Throws Failure; the previous tokens then stay valid.
   void reload();
 
-  /// Returns the response that refuses the request, and counts a wrong token; nothing if the request is allowed.
+  /// Returns the response that refuses the request; nothing if it is allowed.
   [[nodiscard]] std::optional<Response> refusal(const Request& request, Right right) const;
-  /// Returns the address of the client. With a `public_url`, for a request through a proxy on this computer, it is the
-  /// address that the proxy reports.
+  /// Returns the address of the client, which a proxy on this computer may report.
   [[nodiscard]] std::string client_of(const Request& request) const;
   /// Returns the name of the token in the request; "" without a valid token.
   [[nodiscard]] std::string token_name(const Request& request) const;

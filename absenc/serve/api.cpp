@@ -66,7 +66,7 @@ constexpr std::string_view encoders_path = "/api/encoders/";
 constexpr std::array<std::string_view, 10> parts_of_encoder{"acknowledge", "command", "doctor", "events",   "history",
                                                             "history.csv", "memory",  "points", "settings", "stream"};
 
-/// The parts of a path /api/encoders/NAME/PART. The name may contain slashes; the part is empty for the encoder itself.
+/// The parts of a path /api/encoders/NAME/PART. NAME may contain slashes; PART may be missing.
 struct Target {
   std::string_view name;
   std::string_view part;
@@ -94,7 +94,6 @@ std::shared_ptr<Watch> require_encoder(const Fleet& fleet, std::string_view name
   throw NotFound(fmt::format("there is no encoder \"{}\" here{}", name, suggestion(name, names)));
 }
 
-// Returns the error text for an unknown path, with the new location of a path of older versions.
 std::string unknown_path(const Request& request) {
   constexpr std::string_view api = "/api/";
   const std::string_view path = request.path;
@@ -216,8 +215,7 @@ void Api::post(const Request& request, const Reply& reply) {
   reply.send(response);
 }
 
-// Returns the response to a health check. The server is healthy while it can write the history and the spool of MQTT
-// and drops no readings for MQTT; a broker that is away does not count. Faults of encoders are in /metrics.
+// Returns the response to a health check; faults of encoders are in /metrics.
 Response Api::health() const {
   std::size_t live = 0;
   const Fleet::Watches watches = fleet_->all();
@@ -237,8 +235,7 @@ Response Api::health() const {
                            .set("mqtt_dropped", mqtt.dropped));
 }
 
-// Returns a response that states whether the server has tokens, and the name of the token in the request; refuses a
-// wrong token.
+// Returns a response with the name of the request's token; refuses a wrong token.
 Response Api::token(const Request& request) const {
   const std::string who = access_->token_name(request);
   if (who.empty() && !request.authorization.empty()) return access_->refuse_token(request);
@@ -280,8 +277,7 @@ void Api::acknowledge(Watch& watch, const Request& request, const Reply& reply) 
   chronicler_->when_written(server_events_->added(), answer);
 }
 
-// Starts an examination, unless other encoders are on the same line. The examination opens the port again with other
-// settings, so other encoders on the line would lose their port.
+// An examination opens the port again; other encoders on the line would lose theirs.
 void Api::doctor(Watch& watch, const Request& request, const Reply& reply) {
   const std::vector<std::string> others = fleet_->others_on_line(watch);
   if (others.empty()) return give(watch, examination_order(), request, reply);
@@ -291,8 +287,7 @@ void Api::doctor(Watch& watch, const Request& request, const Reply& reply) {
                        watch.name(), fmt::join(others, ", "), watch.name())));
 }
 
-// Queues `order` for its encoder; the response has status 409 if that refuses it. Without a `done` of its own the order
-// gets one that sends its JSON result or {"error":"..."}.
+// Queues `order` for its encoder. The response has status 409 if that refuses it.
 void Api::give(Watch& watch, Order order, const Request& request, const Reply& reply) {
   const std::string who = access_->token_name(request);
   order.who = who.empty() ? request.peer : fmt::format("{} from {}", who, request.peer);
@@ -301,7 +296,7 @@ void Api::give(Watch& watch, Order order, const Request& request, const Reply& r
       reply.send(done.good ? json_response(done.json) : error_response(502, done.text));
     };
   }
-  // The history records who changed what, so the response waits until the command is stored there, or cannot be stored.
+  // The history records who changed what: the response waits until that is stored, or cannot be.
   if (chronicler_ != nullptr && order.kind == Order::Kind::command) {
     order.done = [chronicler = chronicler_, server_events = server_events_,
                   answer = std::move(order.done)](const OrderResult& done) {

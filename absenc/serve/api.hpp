@@ -17,8 +17,7 @@
 
 namespace absenc::serve {
 
-/// Returns the state of all encoders, as in the event `state`: {"at_ms","encoders","history"}. `chronicler` is null
-/// without a history.
+/// Returns the state of all encoders, as in the event `state`. `chronicler` may be null.
 [[nodiscard]] client::Json state_json(const Fleet& fleet, const Chronicler* chronicler);
 
 class Api {

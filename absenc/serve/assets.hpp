@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The files of the web page in absenc/serve/page, which cmake/embed_page.py embeds into the program.
+// The files of the web page in absenc/serve/page, which are embedded into the program.
 #pragma once
 
 #include <span>

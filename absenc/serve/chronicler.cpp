@@ -69,8 +69,7 @@ void Chronicler::when_written(std::uint64_t added, std::function<void()> then) {
   changed_.notify_all();
 }
 
-// Returns whether a caller of `when_written` waits for events that can be written now. The caller of this function must
-// hold the mutex.
+// Returns whether a caller of `when_written` can be served. The mutex must be held.
 bool Chronicler::has_ready_caller() const {
   return std::any_of(waiting_.begin(), waiting_.end(), [this](const auto& one) { return one.first <= added_; });
 }

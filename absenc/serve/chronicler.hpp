@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes the history in its own thread, once a second and when a caller waits for it, so that a slow disk delays no
-// other thread.
+// Writes the history in a thread of its own.
 #pragma once
 
 #include <chrono>
@@ -24,8 +23,7 @@ class ClockWatch {
   // Smallest change of the calendar clock that counts as a jump, in milliseconds.
   static constexpr std::int64_t smallest_jump_ms = 10'000;
 
-  /// Returns the jump of the calendar clock since the last call, in milliseconds; 0 without one, and at the first call.
-  /// `now` is a time of os::now.
+  /// Returns the jump of the calendar clock since the last call, in milliseconds; 0: none. `now` is a time of os::now.
   std::int64_t check(std::int64_t calendar_ms, Time now);
 
  private:
@@ -36,17 +34,14 @@ class ClockWatch {
 
 class Chronicler {
  public:
-  /// `fleet` and `server_events` must outlive this object. Events about the history are added to `server_events`.
-  /// Throws HistoryInUse.
+  /// `fleet` and `server_events` must outlive this object. Throws HistoryInUse.
   Chronicler(const std::string& path, const HistoryLimits& limits, const Fleet& fleet, ServerEvents& server_events);
   /// Writes the remaining seconds and events.
   ~Chronicler();
 
-  /// Adds events that are written to the history. `added` is the number of events since the start, including
-  /// `server_events` (ServerEvents::added).
+  /// Adds events. `added`: number of events since the start with these (ServerEvents::added).
   void add(const std::vector<ServerEvent>& server_events, std::uint64_t added);
-  /// Calls `then` in the history thread, or in the destructor, once the first `added` server events are in the history
-  /// file, where kill -9 does not lose them, or writing them has failed.
+  /// Calls `then`, possibly in another thread, when the first `added` server events were written, or could not be.
   void when_written(std::uint64_t added, std::function<void()> then);
 
   struct Health {

@@ -41,8 +41,7 @@ bool Connections::end_oldest_idle(Id excluded, const std::function<bool(const Op
   return true;
 }
 
-// Finds the address with the most idle connections outside the reserve, and closes the one that is idle for longest
-// there: addresses with fewer keep theirs. Returns false if no connection is idle.
+// Closes an ordinary idle connection of the address with the most of them, or returns false.
 bool Connections::end_oldest_idle_of_busiest(Id excluded) {
   std::unordered_map<std::string, std::size_t> idle;
   for (const auto& [id, one] : open_) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Selects the HTTP connection to close when too many are open, so that one address cannot shut out others.
+// Selects the HTTP connection to close when too many are open.
 #pragma once
 
 #include <cstddef>
@@ -25,9 +25,7 @@ class Connections {
   /// `end` closes the connection of a socket; the server calls `remove` for it at once or later.
   explicit Connections(std::function<void(int socket)> end) : end_(std::move(end)) {}
 
-  /// Adds a connection. If the address of `peer` exceeds its limit, closes its connection that is idle for longest; if
-  /// all together exceed theirs, closes that of the address with the most idle ones. If none is idle, this connection
-  /// belongs to the reserve. If that is too large, closes its longest idle connection, or this one if none is idle.
+  /// Adds a connection. May close idle ones, put this one into the reserve, or close it.
   void add(Id id, int socket, std::string peer, Time now);
   void remove(Id id) { open_.erase(id); }
   /// Records that a whole request was received: the connection is not idle until `await_request`.

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Serializes numbers and texts one after the other. Numbers have the byte order of this computer, so the bytes cannot
-// be read on a computer with another byte order.
+// Serializes numbers and texts one after the other, in the byte order of this computer.
 #pragma once
 
 #include <cstddef>
@@ -32,7 +31,7 @@ class FieldReader {
   [[nodiscard]] std::uint64_t long_number();
   [[nodiscard]] std::string text();
   [[nodiscard]] bool at_end() const { return at_ == bytes_.size(); }
-  /// Checks that no bytes follow the last field that was read. Throws client::Failure if bytes follow.
+  /// Throws client::Failure if bytes follow the last field that was read.
   void end() const;
 
  private:

@@ -22,8 +22,7 @@ namespace {
 
 bool is_named(std::string_view name) { return name.find_first_of(":?") == std::string_view::npos; }
 
-// Returns a text of all settings of an encoder: if the texts before and after a reload are equal, no setting has
-// changed.
+// Returns a text that is the same after a reload if no setting of the encoder has changed.
 std::string description_of(const NamedEncoder& named) {
   std::string text = fmt::format("{} {} {}", named.address, named.rate_hz, named.has_company);
   for (const auto* settings : {&named.settings, &named.defaults}) {
@@ -51,7 +50,7 @@ Fleet::~Fleet() { end(); }
 
 void Fleet::end() {
   const Watches watches = all();
-  // All threads are requested to stop before the first one is waited for, so that they end at the same time.
+  // All are asked to stop before the first one is waited for.
   for (const auto& watch : watches) watch->request_stop();
   for (const auto& watch : watches) watch->wait();
 }

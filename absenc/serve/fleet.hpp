@@ -16,20 +16,18 @@ class Fleet {
  public:
   using Watches = std::vector<std::shared_ptr<Watch>>;
 
-  /// `names` are encoder addresses as for `absenc read`; empty: all encoders of absenc.toml. `rate`: readings per
-  /// second of encoders without `rate_hz` in the file; 0: as fast as possible. `server_events` must outlive this
-  /// object. Throws UsageError, os::Interrupted.
+  /// `names`: encoder addresses; empty: all encoders of absenc.toml. `rate`: readings per second without `rate_hz` in
+  /// the file; 0: as fast as possible. `server_events` must outlive this object. Throws UsageError, os::Interrupted.
   Fleet(std::vector<std::string> names, double rate, ServerEvents& server_events);
   ~Fleet();
   Fleet(const Fleet&) = delete;
   Fleet& operator=(const Fleet&) = delete;
 
-  /// Ends all reading threads and their orders. The statistics of the encoders can still be read afterwards.
+  /// Ends all reading threads and their orders.
   void end();
 
-  /// Reads absenc.toml again. Encoders with unchanged settings continue without interruption. Throws UsageError: then
-  /// all encoders continue as before. Throws os::Interrupted after SIGINT or SIGTERM. Returns the changes in words.
-  /// Call it from one thread only.
+  /// Reads absenc.toml again; encoders with unchanged settings continue. Returns the changes in words. Throws
+  /// UsageError, os::Interrupted. Call it from one thread only.
   std::string reload();
 
   [[nodiscard]] Watches all() const;

@@ -16,8 +16,7 @@ using namespace client;
 
 namespace {
 
-// Adds the row of a second. The same second occurs twice if the clock was set back or the server was restarted within
-// it. The row then combines the readings of both.
+// A second can occur twice: the clock was set back, or the server was restarted.
 constexpr const char* add_second = R"(
 INSERT INTO second SELECT id, ?, ?, ?, ?, ?, ?, ?, ?, ? FROM encoder WHERE name = ?
 ON CONFLICT (encoder, at) DO UPDATE SET
@@ -72,8 +71,7 @@ HistoryWriter::HistoryWriter(std::string path, const HistoryLimits& limits)
 }
 HistoryWriter::~HistoryWriter() = default;
 
-// Opens the history file. If it is damaged when this server opens it for the first time, it is not replaced: it may
-// belong to another program.
+// A file that is damaged at the first opening may belong to another program: it is kept.
 void HistoryWriter::open() {
   try {
     file_.emplace(path_);
@@ -89,7 +87,7 @@ void HistoryWriter::open() {
   reader_.accept();
 }
 
-// Ensures that the open history file is intact and still at the path; opens or creates another file if needed.
+// Ensures that an intact history file is open at the path.
 void HistoryWriter::require_file() {
   if (file_) {
     const HistoryFile::State state = file_->check();
@@ -201,8 +199,7 @@ void HistoryWriter::trim() {
   }
 }
 
-// Returns whether one encoder has rows in 24 different hours since `at_s`: a clock that is far ahead for a few hours
-// must not delete the whole history.
+// Returns whether one encoder has rows in 24 different hours since `at_s`.
 bool HistoryWriter::has_day_of_rows_since(std::int64_t at_s) {
   constexpr std::int64_t hours = 24;
   Statement encoders(file_->sqlite(), "SELECT id FROM encoder");
@@ -218,9 +215,7 @@ bool HistoryWriter::has_day_of_rows_since(std::int64_t at_s) {
   return false;
 }
 
-// Returns the time in seconds before which the oldest tenth of the rows of the encoder with the most rows lies; without
-// rows, the oldest tenth of the events. Counts rows instead of comparing times, because a wrong clock may have given
-// some rows any time.
+// Returns the time in seconds before which about a tenth of the rows, or of the events, lies.
 std::int64_t HistoryWriter::end_of_oldest_tenth() {
   Sqlite& sqlite = file_->sqlite();
   const std::int64_t most = sqlite.number(

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The history, one SQLite file: the minimum, mean and maximum of each second of every encoder, and the events.
+// The history, one SQLite file: seconds of the encoders, and events.
 #pragma once
 
 #include <cstdint>
@@ -31,28 +31,25 @@ struct Range {
 /// A reader of the history, for use while HistoryWriter writes it. Thread-safe.
 class HistoryReader {
  public:
-  /// Opens no file yet. A query opens the file if it is not open, and throws Failure if there is no history at `path`.
-  /// That an open file was removed is noticed only when the writer calls `refuse`.
+  /// Opens no file yet: the queries do, and throw Failure if that is impossible.
   explicit HistoryReader(std::string path);
   ~HistoryReader();
   HistoryReader(const HistoryReader&) = delete;
   HistoryReader& operator=(const HistoryReader&) = delete;
 
-  /// Returns {"encoder","step_s","rows"}: the history of an encoder in at most `most` rows; each row covers `step_s`
-  /// seconds: [[at_s, least, mean, greatest, speed least, mean, greatest, readings, errors],...]
+  /// Returns {"encoder","step_s","rows"} with at most `most` rows of `step_s` seconds: [[at_s, least, mean, greatest,
+  /// speed least, mean, greatest, readings, errors],...]
   [[nodiscard]] client::Json seconds(const std::string& encoder, Range range, std::int64_t most);
-  /// Returns at most `most` events of `encoder` in `range`, the newest first; for "" those of all encoders and of the
-  /// server.
+  /// Returns at most `most` events of `encoder` in `range`, the newest first; `encoder` "": all events.
   [[nodiscard]] client::Json server_events(const std::string& encoder, Range range, std::int64_t most);
-  /// Returns up to `most` rows of the history as CSV, and the time in seconds at which the next rows start; if there
-  /// were fewer than `most` rows, this time is later than `range.to_s`.
+  /// Returns up to `most` rows as CSV, and the time in seconds from which the next ones start; later than `range.to_s`:
+  /// there are none.
   [[nodiscard]] std::pair<std::string, std::int64_t> csv(const std::string& encoder, Range range, std::int64_t most);
   [[nodiscard]] static std::string_view csv_header();
 
  private:
   friend class HistoryWriter;
-  /// Closes the history file, because the writer may change to another file at the path. Until `accept`, each query
-  /// throws Failure with `why`.
+  /// Closes the history file. Until `accept`, each query throws Failure with `why`.
   void refuse(const std::string& why);
   void accept();
   Sqlite& database();
@@ -63,12 +60,10 @@ class HistoryReader {
   std::string refused_;
 };
 
-/// The writer of the history, used by one thread. After a power failure, but not after kill -9, the rows that the
-/// system had not yet written to the disk are missing (SQLite with synchronous = NORMAL).
+/// The writer of the history, used by one thread. A power failure can lose written rows; kill -9 does not.
 class HistoryWriter {
  public:
-  /// Throws HistoryInUse when another server writes to the history file. Any other error is stored in `trouble`, and
-  /// each `write` tries again.
+  /// Throws HistoryInUse when another server writes to the file. Other errors are stored in `trouble`.
   HistoryWriter(std::string path, const HistoryLimits& limits);
   ~HistoryWriter();
   HistoryWriter(const HistoryWriter&) = delete;
@@ -78,14 +73,12 @@ class HistoryWriter {
     std::string encoder;
     Second second;
   };
-  /// Writes all rows and events, or none on an error, and counts those that are lost. Starts a new file if the file
-  /// that this writer had opened was moved, removed or damaged; a damaged one is renamed.
+  /// Writes all rows and events, or counts them as lost.
   void write(const std::vector<Entry>& seconds, const std::vector<ServerEvent>& server_events);
-  /// Deletes rows and events beyond the limit of age, and the oldest ones if the file is too large. Age deletes nothing
-  /// unless there are newer rows from 24 different hours, because the clock may be wrong.
+  /// Deletes old rows and events, by the limits of age and size.
   void trim();
 
-  /// Returns why the constructor, the last `write` or `trim` failed; "" after a successful `write`.
+  /// Returns the last error that no successful `write` has ended; "": none.
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
   [[nodiscard]] std::uint64_t lost() const { return lost_; }
   /// Returns sentences about changes of the history file and about losses since the last call.

@@ -69,7 +69,7 @@ std::uint32_t big_endian(std::string_view bytes) {
 
 HistoryFile::HistoryFile(const std::string& path) : path_(path), owned_file_(lock(path)) {
   sqlite_.emplace("the history", path, Sqlite::For::writing);
-  // A write-ahead log preserves committed rows when the process is killed, and allows reading at the same time.
+  // With a write-ahead log, committed rows survive a kill, and others can read meanwhile.
   sqlite_->run("PRAGMA auto_vacuum = INCREMENTAL; PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL");
   const std::int64_t found = sqlite_->number("PRAGMA user_version");
   if (found > version) throw Failure(fmt::format("the history {} was written by a newer absenc", path));
@@ -83,8 +83,7 @@ HistoryFile::HistoryFile(const std::string& path) : path_(path), owned_file_(loc
   note_written();
 }
 
-// Returns whether the database file is shorter than its header states, or has no header. The header has the page size
-// at byte 16 and the number of pages at byte 28: https://www.sqlite.org/fileformat.html, 1.3.
+// Returns whether the file is cut off, by its header (https://www.sqlite.org/fileformat.html, 1.3).
 bool HistoryFile::is_truncated() const {
   constexpr std::string_view magic{"SQLite format 3\0", 16};
   const std::string header = owned_file_->beginning(32);
@@ -94,8 +93,7 @@ bool HistoryFile::is_truncated() const {
   return owned_file_->state().size < page * std::int64_t{big_endian(header.substr(28, 4))};
 }
 
-// Returns whether SQLite finds the database intact. Checks through a separate connection, which has no pages of the
-// file in memory.
+// Returns whether SQLite finds the database intact, read anew through a separate connection.
 bool HistoryFile::passes_quick_check() const {
   if (owned_file_->state().size == 0) return false;  // an empty database file is damaged; SQLite would delete its log
   try {
@@ -111,8 +109,7 @@ HistoryFile::State HistoryFile::check() const {
   if (!owned_file_->has_its_name()) {
     return os::identity_of(path_).number == 0 ? State::gone : State::replaced;
   }
-  // A different modification time can mean that SQLite in another program has changed the file, and may have written
-  // the log of this server into it, or that `cp` has overwritten it, which mixes the log into the new content.
+  // A different modification time can mean that another program has changed the file.
   const bool is_changed = owned_file_->state().modified_ns != modified_ns_;
   if (!is_changed && !is_truncated()) return State::whole;
   if (!passes_quick_check()) return State::damaged;
@@ -150,7 +147,7 @@ std::string HistoryFile::set_aside() {
   return name;
 }
 
-// Renames the history file and its log: SQLite would write a log of the old name into the next file there.
+// SQLite would write a log of the old name into the next file there.
 std::string HistoryFile::set_aside(const std::string& path) {
   std::string name = new_name_beside(path);
   rename_to(path, name);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The history file while it is open for writing. Other programs may move, remove, replace, overwrite or truncate it.
-// SQLite alone would continue to write to a file without a name, or mix its log into another file.
+// The history file while it is open for writing, which other programs may move or damage.
 #pragma once
 
 #include <cstdint>
@@ -34,18 +33,16 @@ class HistoryFile {
   };
   /// Returns how the file at the path differs from its state at the last `note_written`.
   [[nodiscard]] State check() const;
-  /// Stores the modification time of the history file. Call it after each transaction: a different time later means
-  /// that another program changed the file.
+  /// Stores the modification time of the history file. Call it after each transaction.
   void note_written();
 
   /// Closes a history file in state `changed`, and changes neither the file nor its log.
   void close();
-  /// Closes a history file in state `gone` or `replaced`. Writes the rows of the log into that file and removes the log
-  /// from the path; if the rows cannot be written, renames the log.
+  /// Closes a history file in state `gone` or `replaced`, and takes its log from the path.
   void close_moved();
-  /// Closes a history file in state `damaged` and renames it. Returns the new name. Throws Failure.
+  /// Renames and closes a damaged history file. Returns the new name. Throws Failure.
   std::string set_aside();
-  /// Renames the history file at `path`, and its log if there is one. Returns the new name of the file. Throws Failure.
+  /// Renames the history file at `path`, with its log. Returns the new name. Throws Failure.
   static std::string set_aside(const std::string& path);
 
  private:
@@ -53,7 +50,7 @@ class HistoryFile {
   [[nodiscard]] bool passes_quick_check() const;
 
   std::string path_;
-  // Stays open until the database is closed: closing a descriptor of the file would release SQLite's locks.
+  // Stays open until the database is closed: closing it would release SQLite's locks.
   std::unique_ptr<os::OwnedFile> owned_file_;
   std::optional<Sqlite> sqlite_;
   os::FileIdentity log_;    // identity of the write-ahead log of SQLite

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the history: wrong calendar clocks, the limits of age and size, a second writer, and repeated seconds.
+// Tests of the history and of ClockWatch.
 #include "absenc/serve/history.hpp"
 
 #include <gtest/gtest.h>
@@ -57,8 +57,7 @@ std::size_t seconds_in(HistoryWriter& writer, const std::string& encoder) {
   return static_cast<std::size_t>(std::count(rows.begin(), rows.end(), '\n'));
 }
 
-// Checks that after a start while the clock is 400 days ahead no older rows are deleted, but after a day of such rows
-// they are.
+// After a start with a clock that is 400 days ahead, no older rows are deleted at first.
 TEST(History, DeletesOldRowsOnlyAfterADayOfNewerRows) {
   const std::string path = new_path();
   {
@@ -81,7 +80,7 @@ TEST(History, DeletesOldRowsOnlyAfterADayOfNewerRows) {
   remove_history(path);
 }
 
-// Checks that the oldest tenth is deleted although one row is years ahead, as after a wrong clock.
+// One row is years ahead, as after a wrong clock.
 TEST(History, DeletesOldestTenthOfRowsBeyondSizeLimit) {
   const std::string path = new_path();
   HistoryLimits limits;

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// MQTT discovery of Home Assistant (https://www.home-assistant.io/integrations/mqtt/): one device for each encoder,
-// with entities for position, speed, turns (only of a rotary encoder) and alarms. An entity is unavailable while the
-// server is offline or the encoder is not live.
+// MQTT discovery of Home Assistant (https://www.home-assistant.io/integrations/mqtt/): one device for each encoder.
 #include <fmt/format.h>
 
 #include <string>
@@ -16,7 +14,7 @@ using namespace client;
 
 namespace {
 
-/// Returns `text` in the characters that an object id may have: letters, digits, - and _; any other byte becomes _XX.
+/// Returns `text` in the characters of an object id.
 std::string object_id(std::string_view text) {
   std::string id = topic_level(text);
   for (char& c : id) {

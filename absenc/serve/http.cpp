@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A request that waits for its answer is a suspended connection of libmicrohttpd, which needs memory but no thread.
+// A request that waits for its answer is a suspended connection, which needs no thread.
 #include "absenc/serve/http.hpp"
 
 #include <microhttpd.h>
@@ -20,10 +20,9 @@ namespace absenc::serve {
 
 namespace {
 
-// Greatest number of connections of libmicrohttpd, above the limits of Connections: at its own limit the library would
-// leave new connections unaccepted.
+// Above the limits of Connections: libmicrohttpd accepts no connection at its own limit.
 constexpr unsigned most_connections = Connections::most + Connections::reserve + 64;
-// Bytes for the headers and unsent output of a connection; larger headers are refused with status 431.
+// Memory of a connection in bytes, for headers and unsent output.
 constexpr std::size_t memory_for_each = 64 * 1024;
 // Greatest size of a request body in bytes; no request to this server needs a body.
 constexpr std::uint64_t most_body = 4096;
@@ -66,8 +65,6 @@ Request request_of(MHD_Connection* connection, const char* path, const char* met
   return request;
 }
 
-// Adds the content type to a response, and headers against caching, embedding in other pages, content sniffing,
-// referrers and external content.
 void add_headers(MHD_Response* response, const std::string& type) {
   ::MHD_add_response_header(response, "Content-Type", type.c_str());
   ::MHD_add_response_header(response, "Cache-Control", "no-store");
@@ -98,8 +95,7 @@ struct Stream::Sending {
   bool over = false;   // whether the connection of the stream has ended
   std::uint64_t dropped = 0;
 
-  // Resumes the suspended connection of the stream. The mutex must be held, so that the connection is never resumed
-  // before it is suspended.
+  // The mutex must be held.
   void resume() {
     if (suspended != nullptr) ::MHD_resume_connection(std::exchange(suspended, nullptr));
   }
@@ -303,8 +299,7 @@ struct HttpServer::Daemon {
       exchanges.emplace(exchange.get(), exchange);
       if (ending) return exchange->answer(Response{503, "text/plain", "the server is shutting down\n"}, nullptr);
     }
-    // The last copy of `reply` calls this deleter. If no copy has answered by then, the client gets the response with
-    // status 500.
+    // If no copy of `reply` has answered, the deleter of the last one does.
     const Reply reply(std::shared_ptr<Exchange>(exchange.get(), [exchange](Exchange*) {
       exchange->answer(Response{500, "text/plain", "the request got no answer\n"}, nullptr);
     }));
@@ -380,8 +375,7 @@ struct HttpServer::Daemon {
     static_cast<void>(listener.socket.release());  // the daemon closes the listening socket
   }
 
-  // Stops the HTTP server. Resumes all suspended connections first, because libmicrohttpd must not be stopped with
-  // suspended ones.
+  // libmicrohttpd must not be stopped while connections are suspended.
   void stop() {
     ::MHD_quiesce_daemon(daemon);
     std::vector<std::shared_ptr<Exchange>> waiting;

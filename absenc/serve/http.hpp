@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// HTTP server without knowledge of encoders: one thread for all connections, responses from any thread, and limits for
-// the resources that a client can use. Only http.cpp uses libmicrohttpd.
+// HTTP server without knowledge of encoders, with one thread for all connections. Only http.cpp uses libmicrohttpd.
 #pragma once
 
 #include <cstdint>
@@ -42,14 +41,13 @@ struct Response {
   std::vector<std::pair<std::string, std::string>> headers{};
 };
 
-/// The body of a response, which is produced while it is sent. Texts wait in a bounded queue until the earlier ones are
-/// sent. A slow client delays no thread: a full queue drops its second text, because a part of the first may be sent.
+/// The body of a response, produced while it is sent. A full queue drops its second text.
 class Stream {
  public:
   using Text = std::shared_ptr<const std::string>;
 
-  /// `most`: greatest number of queued texts, at least 2. `on_empty` is called in the connection thread when the queue
-  /// is empty and the stream has not ended; it must return quickly.
+  /// `most`: greatest number of queued texts, at least 2. `on_empty` runs in the connection thread and must return
+  /// quickly.
   explicit Stream(std::string type, std::size_t most = 64, std::function<void()> on_empty = {});
   ~Stream();
   Stream(const Stream&) = delete;
@@ -63,7 +61,7 @@ class Stream {
   /// Returns whether the connection of the stream has ended.
   [[nodiscard]] bool over() const;
   [[nodiscard]] std::uint64_t dropped() const;
-  /// Returns when the connection last asked for data of this stream; before that, when the stream was made.
+  /// Returns when the connection last asked for data, or when the stream was made.
   [[nodiscard]] Time taken_at() const;
 
  private:
@@ -72,8 +70,7 @@ class Stream {
   std::unique_ptr<Sending> sending_;
 };
 
-/// The means to answer one HTTP request, from any thread, immediately or later; only the first answer is sent. If the
-/// last copy of this object is destroyed without an answer, the server responds with status 500.
+/// The means to answer one HTTP request, from any thread; only the first answer counts.
 class Reply {
  public:
   void send(Response response) const;
@@ -90,16 +87,15 @@ class HttpServer {
  public:
   using Handler = std::function<void(const Request&, Reply)>;
 
-  /// `handler` is called in the connection thread for each request that the server does not refuse itself; it must
-  /// return quickly. `vital`: paths that are answered even when too many connections are open. Throws client::Failure.
+  /// `handler` runs in the connection thread and must return quickly. `vital`: paths that connections of the reserve
+  /// may request. Throws client::Failure.
   HttpServer(os::Listener listener, Handler handler, std::vector<std::string> vital);
-  /// Stops the server; responses that are still being sent may be cut off. Threads that write to a Stream must have
-  /// ended before.
+  /// Stops the server; responses that are still being sent may be cut off.
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;
 
-  /// Closes connections that have waited too long for a complete request. Call it about once a second.
+  /// Closes connections that wait too long for a complete request; to be called about once a second.
   void end_incomplete_requests();
 
  private:

@@ -21,8 +21,7 @@ class Headers {
   /// Returns the first value of the header `name`; "" if the request has none.
   [[nodiscard]] std::string first(std::string_view name) const;
 
-  /// Returns why a proxy could interpret this request differently (RFC 9112, 3.2 and 6.3); "" if no such reason is
-  /// known. `version`: "HTTP/1.1".
+  /// Returns why a proxy could interpret this request differently (RFC 9112, 3.2 and 6.3); "" if no reason is known.
   [[nodiscard]] std::string_view ambiguity(std::string_view version) const;
   /// Returns the announced length of the body in bytes; 0 without Content-Length.
   [[nodiscard]] std::uint64_t announced_length() const;

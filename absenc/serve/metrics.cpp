@@ -13,7 +13,7 @@ using namespace client;
 
 namespace {
 
-/// Returns a label value with the escapes that the Prometheus format requires: for backslash, quote and line feed.
+/// Escapes `text` as the Prometheus format requires.
 std::string label(std::string_view text) {
   std::string written;
   for (const char c : text) {
@@ -29,7 +29,7 @@ std::string label(std::string_view text) {
 
 class Page {
  public:
-  /// Begins a metric. The format requires all lines of a metric together, so the lines of all encoders follow.
+  /// The format requires all lines of a metric together.
   void metric(std::string_view name, std::string_view kind, std::string_view help) {
     fmt::format_to(std::back_inserter(text), "# HELP {} {}\n# TYPE {} {}\n", name, help, name, kind);
   }
@@ -47,8 +47,7 @@ struct EncoderState {
   Snapshot snapshot;
 };
 
-// Writes every alarm that the replies of a live encoder report, with 1 or 0. If only raised alarms were written, a
-// cleared alarm would look like an unknown one.
+// Cleared alarms are written too, as 0: without a line they would look unknown.
 void add_alarms(Page& page, const EncoderState& encoder_state) {
   if (encoder_state.snapshot.state != State::live) return;
   for (const Flags& flags : alarms_of(*encoder_state.unit, encoder_state.snapshot.last.reading)) {

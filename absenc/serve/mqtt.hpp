@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sends readings and events to an MQTT broker through a spool on disk, in threads of its own, so that neither the
-// broker nor the disk delays a reading.
+// Sends readings and events to an MQTT broker through a spool on disk, in threads of its own.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +19,7 @@ struct MqttHealth {
   std::string broker{};
   std::string prefix{};
   bool connected = false;
-  // Why the broker is not connected, what it refuses, or why the spool cannot be written; "" without an error.
+  // Known trouble with the broker or the spool; "" if there is none.
   std::string trouble{};
   bool failing = false;       // whether new readings cannot be spooled, or readings were dropped within the last 30 s
   std::uint64_t waiting = 0;  // number of messages in the spool
@@ -31,8 +30,7 @@ struct MqttHealth {
   // By encoder: number of its last reading that is on disk or was sent.
   std::map<std::string, std::uint64_t> taken{};
 
-  /// Returns the state of MQTT: "none" without a broker, "good", "away" while the broker is not connected (messages
-  /// then wait in the spool), or "failing" while `failing` is true.
+  /// Returns "none" (no broker is set), "failing", "good" or "away" (not connected).
   [[nodiscard]] std::string_view state() const;
   [[nodiscard]] client::Json json() const;
   /// Returns the metrics of MQTT in the text format of Prometheus.
@@ -41,8 +39,7 @@ struct MqttHealth {
 
 class Mqtt {
  public:
-  /// `fleet` and `server_events` must outlive this object. Throws Failure if the spool or a file of the connection
-  /// cannot be used, os::Failure if the MQTT client process cannot be started.
+  /// `fleet` and `server_events` must outlive this object. Throws Failure or os::Failure.
   Mqtt(const MqttSettings& settings, const Fleet& fleet, ServerEvents& server_events);
   /// Spools the remaining readings and events. A connected broker has one second to receive them.
   ~Mqtt();

@@ -19,12 +19,11 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Greatest size in bytes of a frame from the MQTT client process, which sends only numbers and short texts.
+// Greatest size of a frame in bytes.
 constexpr std::size_t most_in_frame = 4096;
 constexpr Time time_to_start = 10s;
 // Longest silence of the MQTT client process, which sends a sign of life each second.
 constexpr Time longest_silence = 10s;
-// Time for the MQTT client process to disconnect from the broker, or to end after its channel was closed.
 constexpr Time time_to_end = 500ms;
 
 // Replaces characters that are not printable ASCII: the text may come from the broker.
@@ -63,7 +62,7 @@ MqttClient::State MqttClient::work(Time longest) {
   if (state_ == State::lost) return state_;
   const os::Ready ready = os::wait_for_socket(process_.channel().get(), !outgoing_.empty(), longest);
   if (ready.to_read) receive();
-  // The MQTT client process may have ended: its last frames are received first, because they give the reason.
+  // Receives before it sends: the last frames of an ended process may give the reason.
   if (state_ != State::lost && !process_.channel().send(outgoing_)) note_end();
   if (state_ == State::connected && os::now() - last_frame_at_ > longest_silence) {
     process_.end({});
@@ -123,8 +122,6 @@ void MqttClient::lose(const std::string& why) {
   trouble_ = why;
 }
 
-// Waits for the end of the MQTT client process. If the connection was not lost before, records that the process ended
-// unexpectedly.
 void MqttClient::note_end() {
   const std::string how = process_.end(time_to_end);
   if (state_ == State::lost) return;

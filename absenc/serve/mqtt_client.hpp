@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One connection to a broker, by MQTT 5 or 3.1.1, with the functions that a sender needs. A separate process talks to
-// the broker (mqtt_process.hpp), so no packet of a broker can end the process that reads encoders.
+// One connection to a broker, by MQTT 5 or 3.1.1, through a separate process (mqtt_process.hpp).
 #pragma once
 
 #include <cstdint>
@@ -30,26 +29,23 @@ struct Broker {
 
 enum class MqttVersion : std::uint8_t { v5, v3_1_1 };
 
-/// Identity of an MQTT client. The broker publishes `will`, retained, if the connection ends without a DISCONNECT
-/// packet.
+/// Identity of an MQTT client, and its will, which is published with the retain flag.
 struct MqttIdentity {
   std::string id;
   std::string will_topic;
   std::string will;
 };
 
-/// A connection to a broker through the MQTT client process. Not thread-safe: one thread creates, uses and destroys it.
+/// A connection to a broker through the MQTT client process. Not thread-safe.
 class MqttClient {
  public:
-  /// Starts the MQTT client process. Throws client::Failure when a file that `broker` names cannot be used or the
-  /// process does not respond; throws os::Failure when it cannot be started.
+  /// Starts the MQTT client process. Throws client::Failure or os::Failure.
   MqttClient(const Broker& broker, const MqttIdentity& identity, MqttVersion version);
   MqttClient(const MqttClient&) = delete;
   MqttClient& operator=(const MqttClient&) = delete;
 
   enum class State : std::uint8_t { connecting, connected, lost };
-  /// Queues the request to connect to `host`, the broker's name or one of its addresses. `try_all`: all addresses of
-  /// the name are tried one after the other until one accepts the connection.
+  /// Queues a request to connect to `host`, a name or an address. `try_all`: each address of the name is tried in turn.
   void connect(const std::string& host, bool try_all);
   /// Waits at most `longest`, then sends and receives. Returns the state of the connection.
   State work(Time longest);
@@ -57,11 +53,10 @@ class MqttClient {
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
   /// Returns whether the broker does not support this version of MQTT.
   [[nodiscard]] bool wrong_version() const { return wrong_version_; }
-  /// Returns whether the MQTT client process ended unexpectedly: its library ends it at some malformed packets.
+  /// Returns whether the MQTT client process ended unexpectedly.
   [[nodiscard]] bool died() const { return died_; }
 
-  /// Queues a message for the broker, which `work` sends. Returns the number that the acknowledgement of this message
-  /// will have; with QoS 0 only a refusal is acknowledged.
+  /// Queues a message. Returns the number that its acknowledgement has, if there is one.
   int publish(const std::string& topic, const std::string& payload, int qos, bool retain);
 
   struct Acknowledgement {

@@ -63,8 +63,7 @@ void MqttCollector::work(const std::stop_token& stop) {
   }
 }
 
-// Returns the id of a message in its payload. The id contains a random part that changes with each start, because a
-// power failure may undo the last writes to the spool: the same number is then used again for a different message.
+// The run makes the id unique: after a power failure the spool may give a number again.
 std::string MqttCollector::id_text(std::int64_t id) const { return fmt::format("{}-{}", spool_->run(), id); }
 
 void MqttCollector::collect() {

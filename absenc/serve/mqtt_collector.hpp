@@ -46,10 +46,10 @@ class MqttCollector {
   const Fleet* fleet_;
   ServerEvents* server_events_;
 
-  // The members from here to `mutex_` are used by one thread at a time: the collector thread, then the destructor.
+  // Used by one thread at a time, up to `mutex_`: the collector thread, then the destructor.
   std::int64_t next_id_;
   std::map<std::string, std::uint64_t> next_numbers_;  // next number of a reading, by encoder
-  // By encoder: number of its last spooled reading. It goes to `Figures::taken` when no message waits in memory.
+  // By encoder: number of its last spooled reading, not yet in `Figures::taken`.
   std::map<std::string, std::uint64_t> not_on_disk_;
   Spool::Counts unreported_{};  // dropped messages and readings that no event has reported yet
   std::string unreported_reason_;

@@ -19,11 +19,10 @@ namespace absenc::serve {
 /// Returns a name as one level of a topic: each byte other than an ASCII letter or digit, - or _ becomes %XX.
 [[nodiscard]] std::string topic_level(std::string_view name);
 
-/// Returns the topic PREFIX/ENCODER/KIND; for the server itself, whose `encoder` is "", PREFIX/KIND.
+/// Returns the topic PREFIX/ENCODER/KIND, or PREFIX/KIND if `encoder` is "".
 [[nodiscard]] std::string topic_of(const std::string& prefix, std::string_view encoder, std::string_view kind);
 
-/// Returns the payload of a message with readings. `first` is the number of the first reading; each further reading has
-/// the next number.
+/// Returns the payload of a message with readings. `first`: number of the first reading.
 [[nodiscard]] std::string readings_text(const std::string& id, const Watch& watch, std::uint64_t first,
                                         std::span<const OutgoingReading> readings);
 [[nodiscard]] std::string event_text(const std::string& id, const ServerEvent& server_event);
@@ -31,18 +30,16 @@ namespace absenc::serve {
 /// Returns the payload of the server's state message; `state` is "online" or "offline".
 [[nodiscard]] std::string server_state_text(std::string_view state, std::string_view why);
 
-/// A retained message. The sender publishes it on each connection, and again when `condition` has changed.
+/// A retained message. A change of `condition` is a reason to publish it again.
 struct Retained {
   std::string topic;
   std::string condition;
   std::string payload;
 };
-/// Returns the retained message with the state of an encoder: whether it is live, its alarms and its status flags. The
-/// message contains no position, because a retained position would become outdated.
+/// Returns the retained state of an encoder. It has no position, which would become outdated.
 [[nodiscard]] Retained encoder_state(const std::string& prefix, const Watch& watch, const Snapshot& snapshot);
 
-/// Returns the discovery messages from which Home Assistant creates an encoder's entities. Their topics begin with the
-/// prefix of Home Assistant: homeassistant/sensor/.../config, homeassistant/binary_sensor/.../config.
+/// Returns the discovery messages from which Home Assistant creates an encoder's entities.
 [[nodiscard]] std::vector<Retained> home_assistant_entities(const MqttSettings& settings, const Watch& watch);
 /// Returns the topics of all discovery messages that an encoder of this name may have.
 [[nodiscard]] std::vector<std::string> home_assistant_topics(const MqttSettings& settings, std::string_view encoder);

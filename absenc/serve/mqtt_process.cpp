@@ -34,7 +34,7 @@ constexpr int keepalive_s = 15;
 // Greatest number of messages without acknowledgement; the broker may set a lower limit.
 constexpr int most_in_flight = 1000;
 constexpr const char* system_certificates = "/etc/ssl/certs";
-// Greatest memory of the process in bytes; an MQTT packet may have 256 MB, but none so large is expected.
+// Greatest memory of the process in bytes; an MQTT packet may have 256 MB.
 constexpr std::size_t most_memory = 128'000'000;
 constexpr std::size_t most_frame = 256'000'000;  // greatest size in bytes of a frame from the parent
 // Number of bytes waiting for the parent at which reading from the broker pauses.
@@ -65,8 +65,7 @@ class MqttProcess {
   }
 
  private:
-  // Waits for the parent or the broker, at most until the next sign of life is due, then exchanges frames with the
-  // parent. Returns false when the parent has ended.
+  // Returns false when the parent has ended.
   bool wait_and_exchange() {
     const int broker = client_ == nullptr || over_ ? -1 : ::mosquitto_socket(client_);
     const bool reads = outgoing_.size() < outgoing_limit;
@@ -88,8 +87,7 @@ class MqttProcess {
         break;
       case Wire::connect: {
         const std::string host = frame.text();
-        // mosquitto_connect tries each address of a name and waits for the connection; mosquitto_connect_async tries
-        // one address without waiting.
+        // mosquitto_connect tries each address of a name and blocks; mosquitto_connect_async tries one.
         const auto connect = frame.number() != 0 ? &::mosquitto_connect : &::mosquitto_connect_async;
         if (client_ != nullptr) note(connect(client_, host.c_str(), broker_.port, keepalive_s));
         break;
@@ -171,8 +169,7 @@ class MqttProcess {
       return lose(fmt::format("{}: {}", topic, ::mosquitto_strerror(error)));
     }
     if (qos != 0) numbers_[given] = number;
-    // The broker closed the connection before this message was sent. What it sent before, for example the reason or
-    // acknowledgements, is read next.
+    // The broker may have sent a reason or acknowledgements before it closed the connection.
     if (connection_failed) broker_events_ |= POLLHUP;
   }
 
@@ -180,7 +177,7 @@ class MqttProcess {
   void run_library() {
     if (client_ == nullptr || !connects_) return;
     if (::mosquitto_socket(client_) < 0) return lose("the connection was lost");
-    // After an error or the end of the connection mosquitto_loop_read is called, because it reports the reason.
+    // After the end of a connection, mosquitto_loop_read reports the reason.
     const bool is_over = (broker_events_ & (POLLERR | POLLHUP | POLLNVAL)) != 0;
     const bool reads = is_over || (broker_events_ & POLLIN) != 0;
     const bool writes = (broker_events_ & POLLOUT) != 0;
@@ -195,8 +192,7 @@ class MqttProcess {
     note(error);
   }
 
-  // Handles the broker's answer to the connection request. Reason codes of MQTT 3.1.1 are below 128 and have their own
-  // texts.
+  // Reason codes below 128 are those of MQTT 3.1.1, which have their own texts.
   void connect_answered(int reason) {
     if (reason == 0) {
       connected_ = true;

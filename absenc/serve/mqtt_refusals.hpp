@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Topics that the broker refuses. Each topic is tried again after a pause that doubles up to a minute; messages of
-// other topics are still sent.
+// Topics that the broker refuses. Each is tried again after a pause that doubles up to a minute.
 //
-// An MQTT 5 broker refuses a message with a reason. Other brokers just close the connection. From the second close in a
-// row on, if it comes soon after the start of the connection, every topic without an acknowledgement is a suspect.
-// Suspects are sent one at a time, until the broker has either acknowledged the topic or closed the connection at it.
+// Some brokers close the connection instead of refusing a message. Topics that may be the cause are suspects; these are
+// sent one at a time.
 #pragma once
 
 #include <cstddef>
@@ -24,8 +22,7 @@ class MqttRefusals {
     wait,  // the message waits until all messages sent so far are acknowledged
     skip,  // the message is skipped: its topic is refused, and the pause or a trial message is not over
   };
-  /// Returns whether a message of `topic` may be sent now. `on_their_way`: number of sent messages without
-  /// acknowledgement.
+  /// Returns whether a message of `topic` may be sent now. `on_their_way`: number of unacknowledged messages.
   [[nodiscard]] Verdict verdict(const std::string& topic, std::size_t on_their_way, Time now) const;
   void sent(const std::string& topic);
 
@@ -35,14 +32,13 @@ class MqttRefusals {
   bool take(const std::string& topic);
 
   void begin_connection();
-  /// Records the end of a connection; messages of the topics `on_their_way` were unacknowledged. `soon`: the end came
-  /// shortly after the start. Returns the topic that the broker refuses, if its refusal or the reason is new; otherwise
-  /// "".
+  /// Records the end of a connection, `soon` after its start or not. `on_their_way`: topics of unacknowledged messages.
+  /// Returns a topic whose refusal, or the reason for it, is new; otherwise "".
   std::string end_connection(const std::set<std::string>& on_their_way, bool soon, Time now);
 
   /// Returns whether the pause of a refused topic has ended; true only once for each pause.
   [[nodiscard]] bool take_due(Time now);
-  /// Returns a sentence that names one refused topic and the number of the others; "" if no topic is refused.
+  /// Returns a sentence about the refused topics; "" if there are none.
   [[nodiscard]] std::string text() const;
   [[nodiscard]] bool has_suspects() const { return !suspects_.empty(); }
 

@@ -32,10 +32,9 @@ constexpr Time first_pause = 500ms;  // first pause between attempts to connect;
 constexpr Time longest_pause = 5s;
 constexpr Time time_to_connect = 10s;
 constexpr Time time_to_finish = 1s;
-// A connection that lasted this long, and on which the broker acknowledged a spooled message, resets the pause.
+// A connection that lasted this long may reset the pause.
 constexpr Time stable_time = 10s;
-// Minimum time between two events that report a connection; only a connection that has lasted for `stable_time` is
-// reported sooner.
+// Shortest time between two events about connections, unless the later one is stable.
 constexpr Time connection_report_interval = 60s;
 
 }  // namespace
@@ -83,8 +82,6 @@ void MqttSender::work(const std::stop_token& stop) {
   }
 }
 
-// Handles one connection from its start to its end. The next connection sends spooled messages without acknowledgement
-// again.
 void MqttSender::run_connection(const std::stop_token& stop) {
   outstanding_.clear();
   messages_out_.clear();
@@ -137,8 +134,7 @@ void MqttSender::begin() {
   figures_.trouble = refusals_.text();
 }
 
-// Reports the connection by an event. After one event, a further event needs a lasting connection or a minute, so that
-// an unstable connection does not fill the history.
+// An unstable connection must not fill the history with events.
 void MqttSender::report_connected() {
   if (connection_reported_) return;
   if (os::now() < next_connection_report_ && os::now() - connected_at_ < stable_time) return;
@@ -177,7 +173,7 @@ void MqttSender::step(MqttClient& client) {
   throw Failure(client.trouble());
 }
 
-// Records a lost connection as a possible refusal: a broker may close the connection instead of refusing a message.
+// A broker may close the connection instead of refusing a message.
 void MqttSender::note_lost_connection() {
   std::set<std::string> topics;
   for (const auto& [number, sent] : outstanding_) topics.insert(sent.topic);
@@ -216,8 +212,6 @@ void MqttSender::send_states(MqttClient& client) {
   }
 }
 
-// Clears the retained messages of encoders that are no longer served; otherwise the broker would keep them. An encoder
-// with a topic that cannot be cleared now stays in `served_` and is tried again.
 void MqttSender::clear_unserved(MqttClient& client, const Fleet::Watches& watches) {
   std::set<std::string> now;
   for (const auto& watch : watches) now.insert(watch->name());
@@ -275,7 +269,7 @@ void MqttSender::send_messages(MqttClient& client) {
   }
 }
 
-// Handles acknowledgements. A message that the broker accepted leaves the spool; one that it refused stays there.
+// A refused message stays in the spool.
 void MqttSender::settle(MqttClient& client) {
   std::vector<std::int64_t> arrived;
   for (const MqttClient::Acknowledgement& one : client.take_acknowledgements()) {

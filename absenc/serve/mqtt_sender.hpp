@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sends messages from the spool to the broker, in its own thread, and publishes the retained states of the server and
-// of each encoder.
+// Sends spooled messages and retained states to the broker, in its own thread.
 #pragma once
 
 #include <condition_variable>
@@ -70,7 +69,7 @@ class MqttSender {
   const Fleet* fleet_;
   ServerEvents* server_events_;
 
-  // The members from here to `mutex_` are used by one thread at a time: the constructor, then the sender thread.
+  // Used by one thread at a time, up to `mutex_`: the constructor, then the sender thread.
   MqttVersion version_ = MqttVersion::v5;
   std::unordered_map<int, Outstanding> outstanding_;  // messages without acknowledgement, by their number at MqttClient
   std::set<std::int64_t> messages_out_;               // ids of the spooled messages in `outstanding_`

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames between `absenc serve` and its MQTT client process: size (4 bytes), kind (1 byte), fields. Each process checks
-// received frames like untrusted input.
+// Frames between `absenc serve` and its MQTT client process: size (4 bytes), kind (1 byte), fields.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +15,7 @@ namespace absenc::serve {
 /// The kind of a frame, with the fields that follow it.
 enum class Wire : std::uint8_t {
   // Frames to the MQTT client process:
-  begin,    // fields: host, port, tls, login_file, ca_file, cert_file, key_file, id, will topic, will, version
+  begin,    // fields: those of Broker, those of MqttIdentity, MQTT version
   connect,  // fields: host, whether to try all addresses of the host
   publish,  // fields: number, topic, payload, QoS, retain
   leave,    // no fields; the process disconnects from the broker and ends
@@ -62,8 +61,7 @@ class WireReader {
 
   /// Received bytes that `next` has not returned as a frame yet; the caller appends to them.
   std::string bytes{};
-  /// Returns the next complete frame; nothing if no frame is complete. Throws client::Failure at an invalid size or
-  /// kind.
+  /// Returns the next complete frame; nothing if there is none. Throws client::Failure.
   [[nodiscard]] std::optional<WireFields> next();
 
  private:

@@ -28,7 +28,6 @@ OrderResult success(const Command& command, const Answer& answer, const std::str
           change};
 }
 
-// Runs a command. A setting that it writes is read back and compared, if the setting can be read.
 OrderResult run_command(Encoder& encoder, const Order& order) {
   const Command& command = *order.command;
   if (command.verb != Verb::config_set) {
@@ -40,8 +39,7 @@ OrderResult run_command(Encoder& encoder, const Order& order) {
   return success(command, change.now, change.was_so ? "it had this value already" : change.note, change.state);
 }
 
-// Reads settings or registers, one request after the other, and continues after a request that fails or that the
-// options exclude; `done` returns the first reason if no request was answered.
+// Optional requests for settings or registers: `done` succeeds if one of them is answered.
 class OptionalReads {
  public:
   OptionalReads(Encoder& encoder, const Between& between) : encoder_(&encoder), between_(&between) {}
@@ -66,7 +64,7 @@ class OptionalReads {
 
   /// Returns why the last request of this object failed.
   [[nodiscard]] const std::string& reason() const { return last_; }
-  /// Returns false if the last request was not sent, because the options of the encoder exclude it.
+  /// Returns whether the options of the encoder permitted the last request.
   [[nodiscard]] bool was_sent() const { return was_sent_; }
   [[nodiscard]] OrderResult done(Json json) const {
     if (answered_) return {true, "read", std::move(json), ChangeState::none};
@@ -83,8 +81,6 @@ class OptionalReads {
   std::string last_;
 };
 
-// Returns the range of a setting, from the arguments of its setter: "degrees: degC, 1 to 127; 0: never (0 to 127)"; ""
-// if the setting is read-only.
 std::string range_of(const Unit& unit, const Command& getter) {
   std::vector<std::string> texts;
   for (const Command& setter : unit.commands) {
@@ -141,8 +137,7 @@ OrderResult read_settings(Encoder& encoder, const Command* wanted, const Between
   return reads.done(json.set("rows", rows).set("failed", failed));
 }
 
-// Reads all readable registers. The last field of a register's reply is its value, decoded if the unit describes the
-// register.
+// The last field of the reply is the value of the register.
 OrderResult read_registers(Encoder& encoder, const Between& between) {
   const Command& command = *find_command(encoder.unit(), Verb::memory_read);
   Json registers = Json::array();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Orders for an encoder besides its readings: a command, its settings, its memory, an examination.
+// Orders for an encoder: a command, or to read its settings or memory, or an examination.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace absenc::serve {
 
-/// Result of an order: whether it succeeded, a text for people, the data, and the state of a change.
+/// Result of an order, with a text for people.
 struct OrderResult {
   bool good = false;
   std::string text{};
@@ -25,8 +25,8 @@ struct OrderResult {
 struct Order {
   enum class Kind : std::uint8_t {
     command,
-    settings,  // reads all settings and identification; if `command` is set, only the setting that this command reads
-    memory,    // reads the memory bytes at `addresses`; for encoders with registers, all readable registers
+    settings,     // reads settings and identification, or only what `command` reads
+    memory,       // reads the memory bytes at `addresses`; for encoders with registers, all readable registers
     examination,  // runs the examination of `absenc doctor`
   };
 
@@ -43,26 +43,20 @@ struct Order {
   [[nodiscard]] bool changes_encoder() const { return kind == Kind::command && command->changes_encoder; }
 };
 
-/// Returns an order that reads settings. `setting` names the command that reads one setting; "": all settings and the
-/// identification. Throws UsageError if the unit has none of these, or not this setting.
+/// Returns an order that reads settings and identification, or only `setting`. Throws UsageError.
 [[nodiscard]] Order settings_order(const Unit& unit, std::string_view setting);
-/// Returns an order that reads memory page `page`; below 0: the addresses that a memory dump contains. Throws
-/// UsageError if the unit has no such memory, or the addresses are too many for one request. For a unit with registers
-/// the order reads all readable ones.
+/// Returns an order that reads registers, or the memory page `page` (below 0: what a dump contains). Throws UsageError.
 [[nodiscard]] Order memory_order(const Unit& unit, std::int64_t page);
 [[nodiscard]] Order examination_order();
 
-/// Carries out any order but an examination and returns its result. `between` is called between two requests of an
-/// order that reads, and may read the position. Throws the exceptions of the encoder and its port; a failed request for
-/// a setting or a register does not end the order.
+/// Carries out any order but an examination. `between` may be called between two requests. Throws the exceptions of the
+/// encoder, its port and `between`.
 [[nodiscard]] OrderResult carry_out(client::Encoder& encoder, const Order& order, const std::function<void()>& between);
 
-/// Returns the fields of a reply for people as a list of {"field","value","meaning"}, without the fields that describe
-/// the exchange; an invalid value is null.
+/// Returns the fields of a reply for people, as a list of {"field","value","meaning"}.
 [[nodiscard]] client::Json shown_values(const client::Answer& answer);
 
-/// Returns the names of the commands that read the settings and the identification of an encoder of this unit, and its
-/// memory: {"settings":[names],"memory":[{"page","pages","first","count","meaning","in_dump"}],"registers":n}
+/// Returns what can be read from a unit: {"settings":[names],"memory":[areas],"registers":count}.
 [[nodiscard]] client::Json readable_json(const Unit& unit);
 
 }  // namespace absenc::serve

@@ -24,8 +24,7 @@ struct OutgoingReading {
   std::optional<std::int64_t> turns{};
 };
 
-/// A bounded queue of readings. A consumer that takes readings too rarely loses the oldest, which are counted. `wanted`
-/// is false before the first `take` and after `close`: then the caller puts nothing.
+/// A bounded queue of readings, which drops the oldest. Callers put readings only while `wanted`.
 class Outbox {
  public:
   static constexpr std::size_t most = 2048;

@@ -128,8 +128,7 @@ Broker broker_of(const SectionValues& values) {
   return broker;
 }
 
-// Returns the default prefix of topics. It contains the host name, if that is known: two servers with the same prefix
-// would overwrite each other's state.
+// Two servers with the same prefix would overwrite each other's state.
 std::string usual_prefix() {
   std::string text = os::host_name();
   if (text.empty()) text = "server";

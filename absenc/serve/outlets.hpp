@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Settings for sending readings to other systems: [serve.mqtt] and [serve.udp] of absenc.toml, and the options of the
-// command that override them.
+// Settings of [serve.mqtt] and [serve.udp] in absenc.toml, and the options that override them.
 #pragma once
 
 #include <cstdint>
@@ -36,15 +35,14 @@ struct Outlets {
   std::optional<UdpSettings> udp{};
 };
 
-/// A command-line option that overrides a setting of absenc.toml: "mqtt", "broker", "mqtts://hall.example".
+/// A command-line option that overrides a setting: "mqtt", "broker", "mqtts://hall.example".
 struct OutletOption {
   std::string_view section;
   std::string_view setting;
   std::string value;
 };
 
-/// Reads absenc.toml, if it exists, applies the options, and returns the settings of MQTT and UDP. Throws UsageError,
-/// Failure (see `state_file`).
+/// Returns the settings of MQTT and UDP from absenc.toml and the options. Throws UsageError or Failure.
 [[nodiscard]] Outlets read_outlets(const std::vector<OutletOption>& options);
 
 }  // namespace absenc::serve

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files of names and secrets (tokens, passwords) that users outside the group of the file must not read.
+// Files of names and secrets (tokens, passwords).
 #pragma once
 
 #include <string>
@@ -12,13 +12,11 @@ struct Secret {
   std::string secret;
 };
 
-/// Reads a file of lines NAME SECRET and returns all of them. `least` is the minimum length of a secret; `title` names
-/// the secrets in errors. Throws Failure if the file cannot be read, users outside its group may access it, the group
-/// may write it, a line is invalid, or the file has no line.
+/// Reads a file of lines NAME SECRET. `least`: minimum length of a secret; `title`: name of the secrets in errors.
+/// Throws Failure, also if users outside the file's group may access it.
 [[nodiscard]] std::vector<Secret> read_secrets(const std::string& title, const std::string& path, std::size_t least);
 
-/// Returns user name and password from the first line of the file at `path` that is neither empty nor begins with #.
-/// Throws as `read_secrets` does.
+/// Returns the first user name and password in a file. Throws Failure.
 [[nodiscard]] Secret read_secret(const std::string& path);
 
 }  // namespace absenc::serve

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sends readings to other systems by MQTT and UDP. The settings can be changed while the server runs.
+// Sends readings to other systems by MQTT and UDP. The settings can change while it runs.
 #pragma once
 
 #include <memory>
@@ -17,10 +17,8 @@ class Sending {
   /// Both arguments must outlive this object. Nothing is sent before `change_to`.
   Sending(const Fleet& fleet, ServerEvents& server_events) : fleet_(&fleet), server_events_(&server_events) {}
 
-  /// Applies new settings of MQTT and UDP; an outlet with unchanged settings continues without interruption. Returns
-  /// the changes in words, each with a leading semicolon. Throws Failure, os::Failure: the outlet that could not be
-  /// started is then off. MQTT comes first: if MQTT fails, UDP is as before; if UDP fails, MQTT has its new settings.
-  /// Call it from one thread only.
+  /// Applies new settings of MQTT and UDP and returns the changes in words, each with a leading semicolon. An outlet
+  /// that cannot be started is then off, and Failure or os::Failure is thrown. To be called from one thread only.
   std::string change_to(const Outlets& outlets);
 
   void add(const std::vector<ServerEvent>& server_events);

@@ -65,7 +65,7 @@ struct Server::Parts {
     sending.change_to({});
   }
 
-  // Publishes the ports in use, so that a program that finds one of them busy can name this server.
+  // A program that finds a port busy can then name this server.
   void publish_ports() {
     std::vector<std::string> ports;
     for (const std::shared_ptr<Watch>& watch : fleet.all()) {

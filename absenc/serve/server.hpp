@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `absenc serve` without its command line: reads encoders and provides a page, HTTP, history, MQTT and UDP.
+// `absenc serve` without its command line.
 #pragma once
 
 #include <cstdint>
@@ -28,11 +28,9 @@ struct Choices {
 
 class Server {
  public:
-  /// Starts reading and serving: all threads run when it returns. Throws UsageError, Failure, os::Failure,
-  /// os::Interrupted.
+  /// Starts reading and serving. Throws UsageError, Failure, os::Failure or os::Interrupted.
   explicit Server(const Choices& choices);
-  /// Stops all threads. Waits for a reading or a command in progress, and up to a second for a broker to receive the
-  /// spooled messages.
+  /// Stops all threads. This may take some seconds, for encoders and a broker.
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
@@ -42,9 +40,8 @@ class Server {
   [[nodiscard]] std::size_t encoders() const;
   /// Returns why the history cannot be written; "" if it can, or if the server has no history.
   [[nodiscard]] std::string history_trouble() const;
-  /// Reads absenc.toml and the token file again and returns the changes in words. Throws UsageError if a file is
-  /// invalid: the encoders and outlets then continue as before. Throws Failure or os::Failure if an outlet cannot be
-  /// started, and os::Interrupted. Call it from one thread only.
+  /// Reads absenc.toml and the token file again and returns the changes in words. Throws UsageError, Failure,
+  /// os::Failure or os::Interrupted. To be called from one thread only.
   std::string reload();
 
  private:

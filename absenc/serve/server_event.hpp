@@ -24,8 +24,7 @@ namespace absenc::serve {
 struct ServerEvent {
   std::int64_t at_ms = 0;
   std::string encoder{};  // name of the encoder of the event; "": the server itself
-  // Kind of the event, one of alarm, alarm_over, acknowledged, failing, lost, back, restarted, ended, examined,
-  // command, change, history, mqtt, access.
+  // Kind of the event: alarm, lost, back, command, mqtt ...
   std::string kind{};
   std::string text{};
   std::string who{};  // user, or address of the client, that caused the event; "" if none did
@@ -40,8 +39,7 @@ struct ServerEvent {
   }
 };
 
-/// A bounded queue of events from all threads to the thread that distributes them. A flood of events drops the oldest
-/// instead of using memory without limit.
+/// A bounded queue of events between threads. A flood of events drops the oldest.
 class ServerEvents {
  public:
   static constexpr std::size_t most = 10'000;
@@ -61,8 +59,7 @@ class ServerEvents {
     return added_;
   }
 
-  /// Takes the queued events, oldest first, and if events were dropped, one more that tells how many. Sets `added` to
-  /// the number of events added since the start.
+  /// Takes the queued events, oldest first. `added`: number of events added since the start.
   [[nodiscard]] std::vector<ServerEvent> take(std::uint64_t& added) {
     const std::lock_guard lock(mutex_);
     added = added_;

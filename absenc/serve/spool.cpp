@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Approximate size of one write in bytes; it is small, because a nearly full disk may still accept a small one.
+// Approximate size of a write in bytes; a nearly full disk may still accept a small one.
 constexpr std::size_t write_size = 65536;
 
 std::int64_t memory_bytes(std::int64_t most) { return std::clamp<std::int64_t>(most / 16, 64'000, 4'000'000); }
@@ -97,11 +97,11 @@ void Spool::write_waiting() {
   notes_.push_back(fmt::format("the spool {} can be written again", path_));
 }
 
-// Writes the waiting messages that fit into one write. Returns false when neither a message nor a reading number waits.
+// Returns false when nothing waits.
 bool Spool::write_some() {
   if (memory_.empty() && unwritten_numbers_.empty()) return false;
   std::string bytes;
-  // The reading numbers come first: a truncated write may then skip numbers but never uses one twice.
+  // The reading numbers come first: a truncated write then uses no number twice.
   if (!unwritten_numbers_.empty()) bytes = spool_record({facts_.source, facts_.next_id, unwritten_numbers_});
   std::vector<std::size_t> offsets;
   const std::size_t start = newest_->log().size();
@@ -160,7 +160,7 @@ std::vector<Message> Spool::after(std::int64_t id, std::size_t most) {
       collect_from(part, id, most, found);
     } catch (const os::Failure&) {
       std::error_code error;
-      // The file still exists, so the error may be temporary: the next call of this function tries again.
+      // The file still exists, so the error may be temporary.
       if (fs::exists(path_of(part.number), error)) break;
       drop_part(i--, fmt::format("{} was removed", path_of(part.number)));
     }
@@ -228,7 +228,7 @@ void Spool::forget(const std::string& encoder) {
   facts_.next_numbers.erase(encoder);
   unwritten_numbers_.erase(encoder);
   if (newest_ == nullptr) return;
-  // Without free space the reading number stays in the newest file until the next file is started, which does no harm.
+  // If this fails, the number stays in the newest file, which does no harm.
   [[maybe_unused]] const int ignored = newest_->log().append(spool_record_without(encoder));
   parts_.back().bytes = newest_->log().size();
 }

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Stores messages on disk until a broker has acknowledged them: kill -9 loses no stored message.
+// Stores messages on disk until a broker has acknowledged them.
 //
-// The spool is a folder of append-only files (spool_file.hpp). Acknowledged messages are marked in place, and a file
-// whose messages are all acknowledged is deleted, except the newest one; so sending needs no free space on the disk.
-// While the disk cannot be written, new messages wait in memory, up to a limit, and are sent from there.
+// The spool is a folder of files (spool_file.hpp). Acknowledged messages are marked in place, so sending needs no free
+// space on the disk. While the disk cannot be written, new messages wait in memory, up to a limit.
 #pragma once
 
 #include <cstddef>
@@ -24,7 +23,7 @@
 
 namespace absenc::serve {
 
-/// A store of messages on disk. Thread-safe. Only the constructor throws: `condition` reports later disk errors.
+/// A store of messages on disk. Thread-safe. `condition` reports disk errors.
 class Spool {
  public:
   struct Counts {
@@ -35,9 +34,8 @@ class Spool {
     Counts& operator-=(const Counts& other);
   };
 
-  /// Opens the spool in the folder `path`; `bytes` limits the total size of its files. Throws Failure when another
-  /// process uses the spool or the parent folder is missing. A disk that is full or read-only is no error: messages
-  /// wait in memory.
+  /// Opens the spool in the folder `path`; `bytes` limits the size of its files. Throws Failure, but not for a full
+  /// disk.
   Spool(std::string path, std::int64_t bytes);
 
   /// Returns a random text of 16 characters that stays the same as long as the spool exists.
@@ -49,8 +47,7 @@ class Spool {
   /// Returns the smallest message id that is not used yet.
   [[nodiscard]] std::int64_t next_id();
 
-  /// Stores messages and the next reading number of each encoder. If the spool is full, its oldest messages are
-  /// dropped.
+  /// Stores messages, and the next reading numbers of encoders; may drop the oldest messages.
   void add(const std::vector<Message>& messages, const std::map<std::string, std::uint64_t>& next_numbers);
   /// Returns up to `most` messages with ids above `id`, in ascending order.
   [[nodiscard]] std::vector<Message> after(std::int64_t id, std::size_t most);

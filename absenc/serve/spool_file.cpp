@@ -19,7 +19,7 @@ constexpr std::size_t largest_body = 100'000'000;
 constexpr char kind_message = 'm', kind_facts = 'f', kind_forget = 'x';
 constexpr char is_waiting = 'w', has_arrived = 'a';
 
-// Returns the checksum of a record: FNV-1a over kind and body, to detect garbage and truncated records.
+// FNV-1a over kind and body.
 std::uint32_t checksum(char kind, std::string_view body) {
   std::uint32_t hash = 2166136261U;
   const auto take = [&](char one) { hash = (hash ^ static_cast<unsigned char>(one)) * 16777619U; };

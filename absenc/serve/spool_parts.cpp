@@ -16,8 +16,7 @@ namespace {
 
 constexpr std::string_view part_suffix = ".part";
 
-// Returns the size limit of one file of the spool. The limit is smaller if the disk has little free space, because only
-// deleting a whole file frees space.
+// The limit depends on the free space, because only deleting a whole file frees space.
 std::size_t part_bytes(std::int64_t most, const std::string& folder) {
   std::error_code error;
   const std::uintmax_t free = fs::space(folder, error).available;
@@ -27,8 +26,7 @@ std::size_t part_bytes(std::int64_t most, const std::string& folder) {
 
 }  // namespace
 
-// Opens the folder of the spool. A plain file at its path is renamed: it may be a spool of an older absenc, or no
-// spool.
+// A plain file at the path is renamed: it may be a spool of an older absenc, or no spool.
 void Spool::open_folder() {
   std::error_code error;
   if (fs::exists(path_, error) && !fs::is_directory(path_, error)) set_aside(path_);
@@ -78,8 +76,7 @@ void Spool::load_part(std::int64_t number) {
   }
 }
 
-// Handles a spool whose folder or newest file was removed or moved. The messages of the newest file, which is still
-// open, are kept in memory. If the folder was removed, those of the other files are lost.
+// The folder or the newest file may have been removed or moved.
 void Spool::check_folder() {
   if (folder_ && folder_->is_there() && (newest_ == nullptr || newest_->log().is_there())) return;
   if (folder_) {
@@ -150,7 +147,7 @@ void Spool::drop_part(std::size_t index, const std::string& why) {
   fs::remove(path_of(part.number), ignored);
 }
 
-// Counts the messages of `part` that are readable and not acknowledged; the unreadable ones are reported as dropped.
+// The unreadable messages are reported as dropped.
 void Spool::recount(Part& part) {
   Counts readable;
   std::int64_t bytes = 0;
@@ -170,9 +167,7 @@ void Spool::recount(Part& part) {
   drop(lost, fmt::format("{} cannot be read from byte {} of {} on", path_of(part.number), offset, part.bytes));
 }
 
-// Deletes files whose messages are all acknowledged, or renames them if they are damaged; but not the last file, which
-// has the reading numbers. If its messages are all acknowledged while the disk cannot be written, the last file is
-// shortened.
+// The last file stays, because it has the reading numbers.
 void Spool::tidy() {
   if (newest_ != nullptr && !condition_.trouble.empty() && parts_.back().waiting.messages == 0) {
     if (newest_->log().shrink_to(spool_record(facts_))) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The parts of SQLite that the history uses, with exceptions for errors. Only sqlite.cpp includes the library's header.
+// The parts of SQLite that the history uses. Only sqlite.cpp includes the library's header.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ struct DamagedFile : client::Failure {
   using client::Failure::Failure;
 };
 
-/// An open SQLite database. A function that fails throws client::Failure with SQLite's error text, or DamagedFile.
+/// An open SQLite database. Functions that fail throw client::Failure or DamagedFile.
 class Sqlite {
  public:
   enum class For : std::uint8_t { writing, reading };
@@ -32,9 +32,9 @@ class Sqlite {
   void run(const std::string& sql);
   /// Returns the number that a query with a single result yields; 0 if the query yields no row.
   [[nodiscard]] std::int64_t number(const std::string& sql);
-  /// Returns whether a transaction is open. After an error, such as a full disk, SQLite may have ended the transaction.
+  /// Returns whether a transaction is open. SQLite may end it after an error.
   [[nodiscard]] bool in_transaction() const;
-  /// Makes closing leave the write-ahead log unchanged: it is neither written into the database nor deleted.
+  /// Makes closing leave the write-ahead log unchanged.
   void keep_log_on_close();
 
  private:
@@ -58,7 +58,7 @@ class Statement {
   Statement& bind(int parameter, const std::string& value);
   Statement& bind_null(int parameter);
 
-  /// Moves to the next row of the result. Returns false behind the last row; the statement can then be run again.
+  /// Moves to the next row. Returns false behind the last row.
   bool next();
   /// Runs the statement to its end, ignoring its rows.
   void run();

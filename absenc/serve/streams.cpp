@@ -39,8 +39,7 @@ bool Streams::make_room(const std::string& peer) {
   return abort_slowest(peer, os::now() - stall_time);
 }
 
-// Closes the stream of `peer` whose connection asked for data longest ago, if that was before `taken_before`. Returns
-// false if no stream was closed.
+// Closes the slowest stream of `peer` that asked for no data since `taken_before`, if any.
 bool Streams::abort_slowest(const std::string& peer, Time taken_before) {
   auto slowest = open_.end();
   for (auto one = open_.begin(); one != open_.end(); ++one) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The open event streams, through which web pages get events. Each event is formatted once for all streams.
+// The open event streams, through which web pages get events.
 #pragma once
 
 #include <cstdint>
@@ -22,10 +22,8 @@ class Streams {
   // A stream whose connection asked for no data for this time may be closed for a new one.
   static constexpr Time stall_time = std::chrono::seconds(5);
 
-  /// Opens an event stream. `trace`: the encoder whose plot points the stream sends; "": none. `peer`: IP address of
-  /// the client. At the limit of streams, the address with the most streams loses one to an address with at least two
-  /// fewer. Otherwise, and at the limit of streams of one address, `peer` loses a stream whose client has stalled. If
-  /// no stream can be closed, returns null.
+  /// Opens an event stream; null if there are too many. May close another stream for it. `trace`: the encoder whose
+  /// plot points the stream sends; "": none. `peer`: IP address of the client.
   [[nodiscard]] std::shared_ptr<Stream> open(const std::string& trace, const std::string& peer);
 
   /// Sends a server-sent event to all streams.

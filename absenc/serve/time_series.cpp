@@ -60,7 +60,7 @@ void TimeSeries::end_second() {
 
 void TimeSeries::add_point(const Point& point) {
   const std::int64_t at_ms = point.at_ms;
-  // After the calendar clock was set back, a point is stored although it seems earlier than the one before.
+  // After the calendar clock was set back, a point seems earlier than the one before.
   const bool is_next =
       recent_.empty() || at_ms - recent_.back().at_ms >= between_recent_ms || at_ms < recent_.back().at_ms;
   if (is_next) {

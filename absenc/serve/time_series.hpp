@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Readings of one encoder over time: seconds for the history, the last minute, points for plots.
+// Readings of one encoder over time, for the history and for plots.
 #pragma once
 
 #include <array>
@@ -12,8 +12,7 @@
 
 namespace absenc::serve {
 
-/// A point of a plot: position, continued past the end of a turn, and speed; in degrees and rpm, for linear encoders mm
-/// and mm/s.
+/// A point of a plot: continued position and speed, in degrees and rpm, or in mm and mm/s.
 struct Point {
   std::int64_t at_ms = 0;  // calendar time of the reading, ms since 1970
   double place = 0;
@@ -53,11 +52,9 @@ class TimeSeries {
   [[nodiscard]] std::vector<Point> take_points();
   /// Returns the points of the last 20 seconds with readings, at least 10 ms apart, oldest first.
   [[nodiscard]] std::vector<Point> recent_points() const { return {recent_.begin(), recent_.end()}; }
-  /// Ends the current second if it is before `now_s`, and takes the completed seconds that were not taken yet, at most
-  /// the newest 120.
+  /// Takes the completed seconds, at most the newest 120. A second before `now_s` is complete.
   [[nodiscard]] std::vector<Second> take_seconds(std::int64_t now_s);
-  /// Returns the last 60 completed seconds with readings, oldest first. For a lost encoder these seconds are from
-  /// before the loss.
+  /// Returns the last completed seconds with readings, at most 60, oldest first.
   [[nodiscard]] std::vector<Second> last_minute() const { return {last_minute_.begin(), last_minute_.end()}; }
   [[nodiscard]] std::uint64_t errors_last_minute(std::int64_t now_s) const;
 

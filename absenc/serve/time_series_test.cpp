@@ -9,7 +9,7 @@ namespace {
 constexpr std::int64_t begin_s = 1'000'000;
 constexpr std::int64_t begin_ms = 1000 * begin_s;
 
-// Checks that a second that is taken as soon as it has ended, as the history does, is in the last minute.
+// The history takes each second as soon as it has ended.
 TEST(TimeSeries, LastMinuteIncludesSecondsTakenByHistory) {
   TimeSeries series;
   for (std::int64_t i = 0; i < 100; ++i) {

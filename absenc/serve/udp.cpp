@@ -11,8 +11,7 @@ namespace {
 
 constexpr auto between_sendings = std::chrono::milliseconds(20);
 
-// Returns a reading as a datagram for PlotJuggler, which takes the time from "timestamp" and makes a curve of every
-// other number, named by its path.
+// PlotJuggler takes the time from "timestamp".
 Json datagram(const std::string& encoder, const OutgoingReading& reading) {
   Json values = Json::object();
   if (reading.place) values.set("position", *reading.place);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sends good readings as JSON datagrams, one each, in the format of PlotJuggler, in its own thread. Datagrams without a
-// receiver are lost.
+// Sends good readings as JSON datagrams in the format of PlotJuggler, in its own thread.
 #pragma once
 
 #include <condition_variable>
@@ -15,7 +14,7 @@ namespace absenc::serve {
 
 class UdpSender {
  public:
-  /// Starts the sender thread. `fleet` must outlive this object. Throws os::Failure if the host is unknown.
+  /// Starts the sender thread. `fleet` must outlive this object. Throws os::Failure.
   UdpSender(const UdpSettings& settings, const Fleet& fleet);
   ~UdpSender();
 

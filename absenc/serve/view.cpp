@@ -17,8 +17,6 @@ namespace {
 
 double microseconds_of(Time time) { return static_cast<double>(time.count()) / 1e3; }
 
-// Adds to an alarm the time since which it is raised, and who acknowledged it and when; null for what is not known or
-// did not happen.
 void set_acknowledged(Json& json, const std::vector<RaisedAlarm>& raised, const FieldInfo& field,
                       const FlagInfo& flag) {
   const auto known = std::find_if(raised.begin(), raised.end(), [&](const RaisedAlarm& one) {
@@ -33,8 +31,7 @@ void set_acknowledged(Json& json, const std::vector<RaisedAlarm>& raised, const 
   json.set("acknowledged", acknowledged);
 }
 
-// Returns the raised alarms; null if none is raised but the replies do not report all alarms, or if the unit has no
-// alarms. `known`: raised alarms with their acknowledgements; null omits these.
+// Returns the raised alarms; null if they are unknown. `known`: acknowledgements, or null.
 Json alarms_json(const Unit& unit, const Reading& reading, const std::vector<RaisedAlarm>* known = nullptr) {
   Json all = Json::array();
   const std::vector<Flags> channels = alarms_of(unit, reading);
@@ -51,8 +48,7 @@ Json alarms_json(const Unit& unit, const Reading& reading, const std::vector<Rai
   return all;
 }
 
-// Returns the names of the status flags that are set; null if none is set and no field reports all its flags. Status
-// flags are no alarms, but encoders without alarms report their condition only by them.
+// Returns the names of the status flags that are set; null if these are unknown.
 Json status_json(const Unit& unit, const Reading& reading) {
   Json all = Json::array();
   const std::vector<Flags> channels = status_of(unit, reading);
@@ -131,7 +127,7 @@ Json errors_json(const host::Counters& counters) {
   return json;
 }
 
-// Returns the latency histogram with the count of each bucket, not cumulative; the last bucket has no upper limit.
+// The buckets are not cumulative; the last one has no upper limit.
 Json latency_json(const LatencyFigures& latency) {
   Json buckets = Json::array();
   std::uint64_t below = 0;
@@ -161,8 +157,6 @@ Json bad_json(const Details& details) {
   });
 }
 
-// Sets the number of positions per turn or along the scale, the length of the scale, and whether there are turns. The
-// number is null if only a reply reports it and no reply was received, or if it has more than 62 bits.
 void set_scale(Json& json, const Watch& watch, const Snapshot& snapshot) {
   Resolution known = watch.address().unit->resolution(watch.address().options);
   const Reading& reading = snapshot.last.reading;
@@ -179,7 +173,7 @@ void set_scale(Json& json, const Watch& watch, const Snapshot& snapshot) {
   json.set("has_turns", known.multiturn_bits != 0);
 }
 
-// Returns the last reading of an encoder that is not live. It must not be shown as the current position.
+// The last reading must not be shown as the current position.
 Json last_reading_json(const Sample& last) {
   const std::int64_t age_ms = std::chrono::duration_cast<std::chrono::milliseconds>(os::now() - last.at).count();
   Json json = Json::object().set("at_ms", calendar_ms() - age_ms);
@@ -203,8 +197,6 @@ Json condition_json(const Watch& watch, const Snapshot& snapshot) {
 
 namespace {
 
-// Sets whether a joint and a motor are configured, the position and the speed of the joint, and the electrical angle of
-// the motor. Values that are not configured, invalid or unknown are null.
 void set_angles(Json& json, const Watch& watch, const JointAngles& angles) {
   const auto value = [](const std::optional<double>& one) { return one ? Json(*one) : Json(); };
   const std::optional<Estimate>& speed = angles.joint_speed_mm_s ? angles.joint_speed_mm_s : angles.joint_speed_rpm;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// State of encoders and server, as JSON and for Prometheus. Position, speed and alarms of an encoder that is not live
-// are not shown as current.
+// State of encoders and server, as JSON and for Prometheus.
 #pragma once
 
 #include <span>
@@ -15,28 +14,23 @@ namespace absenc::serve {
 
 [[nodiscard]] inline double seconds_of(Time time) { return std::chrono::duration<double>(time).count(); }
 
-/// Returns the overview of an encoder. Values of its position, speed and alarms are null if the encoder is not live, or
-/// if the value is invalid or unknown.
+/// Returns the overview of an encoder. Its position, speed and alarms are null if it is not live.
 [[nodiscard]] client::Json overview(const Watch& watch, const Snapshot& snapshot);
 
-/// Returns the part of an encoder's overview that changes rarely: state, why the encoder is not live, alarms in words,
-/// status; no position.
+/// Returns the state, alarms and status of an encoder, without its position.
 [[nodiscard]] client::Json condition_json(const Watch& watch, const Snapshot& snapshot);
 
 /// Returns whether the encoder of `watch` is linear: its positions are in mm instead of degrees.
 [[nodiscard]] bool is_linear(const Watch& watch);
 
-/// Returns the overview of an encoder, its counters, latencies, last bad exchanges, the fields of a recent reply, which
-/// settings and memory can be read, and its commands with their arguments.
+/// Returns the overview of an encoder, with counters, latencies, a recent reply and commands.
 [[nodiscard]] client::Json details(const Watch& watch);
 
-/// Returns plot points of an encoder as {"encoder":name,"points":[[at_ms,position,speed,speed_uncertainty],...]}; an
-/// unknown speed is null.
+/// Returns plot points as {"encoder":name,"points":[[at_ms,position,speed,speed_uncertainty],...]}.
 [[nodiscard]] client::Json points(const Watch& watch, std::span<const Point> taken);
 
-/// Returns the last 60 seconds with readings of each encoder as
-/// {"encoders":[{"encoder":name,"seconds":[[at_s,position,speed],...]},...]}: the last position and the mean speed of
-/// each second; null if no position was valid or no speed was known.
+/// Returns the last minute with readings of each encoder, with the last position and the mean speed of each second:
+/// {"encoders":[{"encoder":name,"seconds":[[at_s,position,speed],...]},...]}.
 [[nodiscard]] client::Json last_minute(const Fleet::Watches& watches);
 
 /// Statistics of the server.

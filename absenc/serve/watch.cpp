@@ -328,8 +328,7 @@ void Watch::queue_outgoing(const Sample& sample) {
   }
 }
 
-// Adds an event for each alarm that was raised or cleared. An alarm stays raised until the encoder reports it as
-// cleared.
+// An alarm stays raised until it is reported clear.
 void Watch::report_alarms(const Reading& reading) {
   const std::uint32_t alarms = reading.alarms | (alarms_ & ~reading.alarms_reported);
   if (alarms == alarms_) return;
@@ -413,8 +412,7 @@ void Watch::carry_out(Encoder& live, const Order& order, const std::function<voi
   finish();
 }
 
-// Examines the encoder of this object. The examination opens the port itself, with settings that it chooses. Opening a
-// virtual encoder again would create a new one, so its open port is used.
+// Opening a virtual encoder again would create a new one, so its open port is used.
 OrderResult Watch::examine(Encoder& live, const std::stop_token& stop) {
   const std::string words = "the encoder is being examined, readings continue afterwards";
   set_state(State::examined, words);

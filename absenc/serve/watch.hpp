@@ -92,8 +92,8 @@ struct Details {
 
 class Watch {
  public:
-  /// Starts a thread that reads the encoder `rate` times per second; 0: as fast as possible. The first reading is
-  /// `offset` after the start. `server_events` must outlive this object.
+  /// Starts a thread that reads the encoder `rate` times per second; 0: as fast as possible. `offset`: time before the
+  /// first reading. `server_events` must outlive this object.
   Watch(std::string name, const client::EncoderAddress& address, double rate, Time offset, ServerEvents& server_events);
   ~Watch();
   Watch(const Watch&) = delete;
@@ -119,12 +119,11 @@ class Watch {
   /// Stops storing readings for `outlet` and drops the queued ones.
   void stop_outgoing(Outlet outlet);
 
-  /// Gives an order to the reading thread. Returns "" or why the order is refused: another order waits, an examination
-  /// runs, or the server no longer reads this encoder.
+  /// Gives an order to the reading thread. Returns "" or why the order is refused.
   [[nodiscard]] std::string_view give(Order order);
 
-  /// Acknowledges the alarm of this name, in all channels, until it is cleared; `who` is named in the event. Returns
-  /// "", or the reason of the refusal if the alarm is not raised.
+  /// Acknowledges the raised alarm of this name, in all channels. Returns "" or the reason of a refusal. `who`: user
+  /// named in the event.
   [[nodiscard]] std::string acknowledge(std::string_view alarm, const std::string& token, const std::string& who);
 
   [[nodiscard]] const std::string& name() const { return name_; }

@@ -18,8 +18,7 @@ class Worker {
 
   Worker() : thread_([this](const std::stop_token& stop) { work(stop); }) {}
 
-  /// Adds a job, which must not throw. Returns false if too many jobs wait. `always`: the job is added anyway, because
-  /// it continues a previous job.
+  /// Adds a job, which must not throw. Returns false if too many jobs wait, unless `always`.
   bool add(std::function<void()> job, bool always = false) {
     const std::lock_guard lock(mutex_);
     if (jobs_.size() >= most && !always) return false;

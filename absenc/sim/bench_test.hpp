@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Helpers for the tests of units: a shaft with a settable position, a host that sends any bytes, and fault rates
-// for campaigns, which are long runs with injected faults.
+// Helpers for the tests of units: a shaft, a host that sends any bytes, rates of faults.
 #pragma once
 
 #include <cstdint>
@@ -22,8 +21,7 @@ struct TestShaft final : Shaft {
     state.position += static_cast<std::int64_t>(revolutions * 4294967296.0);
     return state;
   }
-  /// Sets the position at the time of the last `spin` (of a still shaft: at all times) to `turns` whole turns and
-  /// `counts` of `singleturn_bits` bits.
+  /// Sets the position at the time of the last `spin`: whole turns, and counts within the turn.
   void put(std::int64_t turns, std::int64_t counts) {
     start.position = (turns << 32) + (counts << (32 - singleturn_bits));
   }
@@ -37,7 +35,7 @@ struct TestShaft final : Shaft {
   Time since{};
 };
 
-/// A host that sends one request of any bytes and stores the bytes received until the line is silent.
+/// A host that sends one request of any bytes and stores the reply.
 class RawHost : public Machine<std::uint8_t> {
  public:
   RawHost(std::vector<std::uint8_t> request, Time answer, Time gap, Time at)
@@ -72,7 +70,7 @@ class RawHost : public Machine<std::uint8_t> {
   bool done_ = false;
 };
 
-/// Returns rates that corrupt `share` of the replies; every other reply fault has a fifth of that probability.
+/// Returns fault rates of replies: `share` for corrupt ones, a fifth of that for other faults.
 inline FaultRates damaged_replies(double share) {
   FaultRates rates;
   for (const FaultKind kind : {FaultKind::drop, FaultKind::truncate, FaultKind::delay, FaultKind::echo,

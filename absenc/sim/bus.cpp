@@ -8,8 +8,7 @@ namespace absenc::sim {
 
 namespace {
 
-// A device's transfer is passed to the port at most this long before it begins. Passed earlier, it would block the
-// transfers of the other devices.
+// Longest time by which a transfer is given to the port early; it then blocks other devices.
 constexpr Time soon = std::chrono::milliseconds(1);
 
 // Returns the shorter of two limits; 0 means no limit.
@@ -38,8 +37,6 @@ void Bus::feed(const ByteEvent& event) {
   }
 }
 
-// Reports `sent` to the devices whose bytes were sent. The others that have not ended receive the bytes, and those
-// without a pending transfer `silence` at once, without waiting for their limits: the line is idle behind a transfer.
 void Bus::report_sent(const ByteEvent& event) {
   sending_ = false;
   for (Node& node : nodes_) {
@@ -100,7 +97,7 @@ Time Bus::first_begin() const {
   return first;
 }
 
-// Combines the pending transfer that begins first, and all that begin before the combined transfer ends, into one.
+// Combines pending transfers that overlap, from the first one on.
 void Bus::merge() {
   std::vector<Node*> pending;
   for (Node& node : nodes_) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Combines several devices on one half-duplex line into one machine, for a port that does not simulate bits, such as a
-// pseudo-terminal.
+// Several devices on one half-duplex line as one machine, for a port without bit timing.
 #pragma once
 
 #include <cstdint>
@@ -10,13 +9,13 @@
 
 namespace absenc::sim {
 
-/// Several devices on one half-duplex line, without bit timing. Not a Line, which is exact to the nanosecond.
+/// Several devices on one half-duplex line, without bit timing; Line has that.
 ///
-/// Every device receives the host's bytes and those of the other devices, except those that are sent together with its
-/// own. Characters that are sent at the same time reach the line as their AND, as in Line, but aligned to whole bytes.
+/// A device does not receive bytes that are sent together with its own. Bytes that are sent at the same time reach the
+/// line as their AND.
 class Bus final : public Machine<std::uint8_t> {
  public:
-  /// The machines in `devices` must outlive the bus. `character` is the duration of one byte on the line.
+  /// The machines in `devices` must outlive the bus. `character` is the duration of one byte.
   Bus(const std::vector<Machine<std::uint8_t>*>& devices, Time character);
 
   /// Processes an event that the port reports.

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests sim::Bus: the host must receive the same bytes as from devices on a sim::Line, and transfers that overlap are
-// merged.
+// Tests sim::Bus: the host must receive the same bytes as from devices on a sim::Line.
 #include "absenc/sim/bus.hpp"
 
 #include <gtest/gtest.h>
@@ -18,8 +17,7 @@ using Wire = std::vector<std::uint8_t>;
 
 constexpr LineSettings settings{.rate = 1'000'000};
 
-/// A device that sends `reply` a time `after` it received the byte `key`, if `key` is the first byte, or the first
-/// after silence or after a reply of its own.
+/// A device that sends `reply` a time `after` it received the byte `key` on an idle line.
 struct Responder final : Machine<std::uint8_t> {
   Responder(std::uint8_t its_key, Wire its_reply, Time its_after = 5us)
       : key(its_key), reply(std::move(its_reply)), after(its_after) {}

@@ -24,8 +24,7 @@ class StuffedBits {
   std::vector<bool> bits;
 
  private:
-  // Appends one bit, and behind five equal bits a stuff bit of the other level, which counts as the first of the next
-  // run.
+  // Behind five equal bits follows a stuff bit of the other level.
   void put(bool bit) {
     run_ = !bits.empty() && bits.back() == bit ? run_ + 1 : 1;
     bits.push_back(bit);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The bits of a classic CAN frame on the bus (ISO 11898-1, 10.4): 0 is dominant, 1 recessive and idle.
+// The bits of a classic CAN frame on the bus (ISO 11898-1, 10.4): 0 is dominant, 1 recessive.
 #pragma once
 
 #include <cstddef>
@@ -9,8 +9,7 @@
 
 namespace absenc::sim {
 
-/// Returns the bits of `frame` on the bus from its start to its end, with stuff bits and with the acknowledge bit of
-/// another node.
+/// Returns the bits of `frame` on the bus, with stuff bits and the acknowledge bit.
 [[nodiscard]] std::vector<bool> can_bits(const CanFrame& frame);
 
 /// Fewest recessive bits between two frames.

@@ -36,7 +36,7 @@ void FaultyDevice::feed(const Event<std::uint8_t>& event) {
   using Kind = Event<std::uint8_t>::Kind;
   switch (event.kind) {
     case Kind::received:
-      // A request that began while the device ignored the line is ignored up to a pause of more than two gaps.
+      // The end of a request whose beginning was ignored is ignored too.
       if (ignores_line_ || event.at - last_ignored_at_ <= 2 * device_gap_) {
         last_ignored_at_ = event.at;
       } else {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual encoder with injected faults: damages the replies that a device machine sends and the requests that it
-// receives.
+// A virtual encoder with injected faults.
 #pragma once
 
 #include <array>
@@ -16,7 +15,7 @@ namespace absenc::sim {
 
 /// Kind of an injected fault.
 enum class FaultKind : std::uint8_t {
-  drop,             ///< one byte of the reply is lost
+  drop,             ///< one character of the reply is lost
   corrupt,          ///< 1 to 3 bits of the reply are flipped
   truncate,         ///< the reply stops at a random character, at least one is sent
   delay,            ///< the reply is sent late
@@ -34,7 +33,7 @@ inline constexpr std::array<std::string_view, 9> fault_names{"drop",    "corrupt
 /// Number of injected faults, indexed by FaultKind.
 using FaultCounts = std::array<std::uint64_t, fault_names.size()>;
 
-/// Probabilities of the faults per reply, of `request_corrupt` per byte (CAN: per frame) received, and the `delay`.
+/// Probabilities of the injected faults, and the `delay` of late replies.
 struct FaultRates {
   /// Probability of each fault, 0 to 1, indexed by FaultKind.
   std::array<double, fault_names.size()> rates{};
@@ -54,20 +53,16 @@ struct FaultRate {
   double rate;     ///< Probability of the fault, 0 to 1.
 };
 
-/// Parses text like `corrupt=0.01`. Throws std::invalid_argument with a sentence that names the known kinds or the
-/// allowed range.
+/// Parses text like `corrupt=0.01`. Throws std::invalid_argument.
 [[nodiscard]] FaultRate parse_fault(std::string_view text);
 
-/// Flips 1 to 3 different bits of `bytes`, which are drawn from `random`. `bytes` must not be empty.
+/// Flips 1 to 3 different random bits of `bytes`, which must not be empty.
 void flip_bits(std::span<std::uint8_t> bytes, Random& random);
 
-/// A machine between a line and a device machine that injects faults. The device must outlive it. The same seed gives
-/// the same faults.
+/// A machine between a line and a device machine that injects faults. The device must outlive it.
 ///
 /// The faults strike each transfer of the device: on character links a reply, on clocked links the bits that the device
-/// drives. A reply that a fault makes longer or later does not follow the device's own timing. While such a reply, or
-/// the reply to a damaged request, is pending or being sent, the device receives no bytes, so it does not report a
-/// protocol violation by the host. A request that begins meanwhile is ignored as a whole.
+/// drives. A reply that a fault makes longer or later does not follow the device's own timing.
 class FaultyDevice final : public Machine<std::uint8_t> {
  public:
   /// Injects faults between `device` and its line. The same seed gives the same faults.
@@ -102,8 +97,7 @@ class FaultyDevice final : public Machine<std::uint8_t> {
   std::vector<std::uint8_t> reply_;
   std::vector<std::uint8_t> received_;  // bytes of the last received event as passed on to the device
   bool request_damaged_ = false;        // the request was damaged, so the device may answer while the host still sends
-  // The device receives no bytes while a reply that a fault made longer or later, or a reply to a damaged request, is
-  // pending or being sent.
+  // Whether received bytes are ignored, because the device does not expect them now.
   bool ignores_line_ = false;
   Time last_ignored_at_ = -std::chrono::hours(1);  // time of the last byte that was ignored
   Time device_gap_{};                              // longest `gap` that the device has requested so far

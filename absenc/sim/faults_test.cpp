@@ -24,8 +24,7 @@ using StepKind = Step<std::uint8_t>::Kind;
 const ByteVector request{0x32, 0x05};
 const ByteVector reply{0x11, 0x22, 0x33, 0x44};
 
-// A device that answers every two bytes 3 us later, and counts as violations the bytes and silences that are reported
-// to it before its reply ends.
+// A device that answers every two bytes 3 us later, and counts events that it must not get.
 class Device final : public Machine<std::uint8_t> {
  public:
   void feed(const Event<std::uint8_t>& event) override {
@@ -223,8 +222,7 @@ TEST_F(Faults, RequestCorruptReachesTheDeviceOnly) {
   EXPECT_EQ(faulty->count(FaultKind::request_corrupt), 2u);
 }
 
-// Checks that the device counts no violation by the host when the next request, 70 us or 150 us after the first, may
-// arrive before the delayed or repeated reply has ended.
+// The next request may arrive before the delayed or repeated reply has ended.
 TEST_F(Faults, StretchedReplyCausesNoViolation) {
   damage(FaultKind::delay);
   for (const FaultKind kind : {FaultKind::delay, FaultKind::repeat}) {
@@ -244,8 +242,7 @@ TEST_F(Faults, StretchedReplyCausesNoViolation) {
   EXPECT_EQ(device.violations, 0);
 }
 
-// Checks that the device receives no more bytes, and counts no violation, when it has taken the first half of a damaged
-// request for a whole request and answers while the host still sends.
+// The device takes the first half of a damaged request for all of it, and answers too early.
 TEST_F(Faults, DamagedRequestCausesNoViolation) {
   damage(FaultKind::request_corrupt);
   host.request_bytes = {1, 2, 3, 4};
@@ -255,8 +252,7 @@ TEST_F(Faults, DamagedRequestCausesNoViolation) {
   EXPECT_FALSE(device.sending);
 }
 
-// Checks that a request that begins at 90 us is ignored as a whole: the repeated reply ends at 103 us, during the
-// second byte of this request.
+// The request at 90 us begins before the repeated reply ends, at 103 us.
 TEST_F(Faults, RequestWithIgnoredBeginningIsIgnored) {
   damage(FaultKind::repeat);
   device.gap = microseconds(15);

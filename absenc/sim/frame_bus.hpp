@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Combines several nodes on one CAN bus into one machine, for a port that does not simulate bits: an adapter or a
-// virtual interface.
+// Several nodes on one CAN bus as one machine, for a port that does not simulate bits.
 #pragma once
 
 #include <deque>
@@ -10,13 +9,11 @@
 
 namespace absenc::sim {
 
-/// Several nodes on one CAN bus, without bit timing. Every node receives the host's frames and those of the other
-/// nodes. Arbitration and collisions are not simulated: of the next frames of all nodes, those due at the same time are
-/// sent one after the other, the lowest identifier first. A node whose `configure` step requests another bit rate than
-/// the bus has neither receives nor sends.
+/// Several nodes on one CAN bus, without bit timing, arbitration or collisions. A node with another bit rate than the
+/// bus neither receives nor sends.
 class FrameBus final : public Machine<CanFrame> {
  public:
-  /// The machines in `nodes` must outlive the bus. `rate` is the bit rate at which the port and all nodes begin.
+  /// The machines in `nodes` must outlive the bus. `rate`: first bit rate of the port and the nodes.
   FrameBus(const std::vector<Machine<CanFrame>*>& nodes, std::uint32_t rate);
 
   /// Processes an event that the port reports.

@@ -15,8 +15,6 @@ using StepKind = Step<CanFrame>::Kind;
 
 CanFrame frame(std::uint32_t id, std::uint8_t data) { return {.id = id, .size = 1, .data = {data}}; }
 
-// Returns the frames that `bus` sends, and its changes of the bit rate, until it waits; each frame is reported as
-// `sent` at once.
 std::string sent_by(FrameBus& bus, Time now) {
   std::string sent;
   for (auto step = bus.next(now); step.kind != StepKind::wait; step = bus.next(now)) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A port that delays or loses received items, like a USB hiccup or a network. It keeps their order and runs in virtual
-// time.
+// A port that delays or loses received items, in virtual time.
 #pragma once
 
 #include <algorithm>
@@ -16,8 +15,7 @@ namespace absenc::sim::testing {
 template <class Item>
 class LatePort final : public Port<Item> {
  public:
-  /// `delay` is called at the first item received after each request, and returns the delay of all items up to the next
-  /// request, or `never` if they are lost.
+  /// `delay` returns the delay of the items after a request, or `never` if they are lost.
   LatePort(SimPort<Item>& inner, std::function<Time()> delay) : inner_(&inner), delay_(std::move(delay)) {}
 
   Time now() override {
@@ -28,7 +26,7 @@ class LatePort final : public Port<Item> {
 
   void begin(const Step<Item>& step) override {
     if (step.kind == Step<Item>::Kind::transfer || step.kind == Step<Item>::Kind::pulse) {
-      // `rest` advances the time to `at` and stores the items that arrive until then, so that the transfer begins now.
+      // Stores the items that arrive before the transfer begins.
       rest(std::max(time_, step.at));
       quiet_since_ = time_;
       received_ = silence_reported_ = false;
@@ -67,7 +65,6 @@ class LatePort final : public Port<Item> {
     }
   }
 
-  /// Advances the time of the port to `until`; items received meanwhile are delivered later or lost.
   void rest(Time until) {
     while (time_ < until) {
       const Event<Item> event = inner_->wait({.at = until});

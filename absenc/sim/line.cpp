@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Main part of sim::Line: serves the machines, keeps the time and the deadlines. The wires are in line_wires.cpp.
+// Main part of sim::Line: machines, time and deadlines. The wires are in line_wires.cpp.
 #include "absenc/sim/line.hpp"
 
 #include <algorithm>
@@ -118,8 +118,7 @@ bool Line<Item>::step() {
   const Time time = next_event();
   if (time == never) return false;
   now_ = time;
-  // At equal times, timers and silences come after the scheduled events (the end of a character, for example) and
-  // before the arbitration of CAN frames.
+  // Order at one time: scheduled events, timers and silences, arbitration of CAN frames.
   const Node late = next_deadline();
   if (scheduled_.empty() || scheduled_.top().at > time ||
       (scheduled_.top().kind == Kind::arbitrate && nodes_[late]->due == time)) {
@@ -208,8 +207,6 @@ void Line<Item>::serve(Node node) {
   state.due = never;  // the machine is done: no later event wakes it
 }
 
-// Accepts a transfer or pulse of a node. Unless it is a device's transfer on an SPI or clocked link, it begins at its
-// time `at`, or now if that time has passed.
 template <class Item>
 void Line<Item>::accept_step(Node node, const Step<Item>& step) {
   State& state = *nodes_[node];
@@ -232,7 +229,7 @@ void Line<Item>::accept_step(Node node, const Step<Item>& step) {
   state.hold_low = step.hold_low;
   state.accepted_at = now_;
   ++state.begin_generation;
-  // The beginning is scheduled, so that a node that is attached next, at the same time, takes part.
+  // Scheduled, so that a node that is attached next, at the same time, takes part.
   if (!driven) schedule(ScheduledEvent::Kind::begin, step.at, node);
 }
 
@@ -251,7 +248,7 @@ void Line<Item>::deadline(Node node) {
     feed(node, {.kind = Event<Item>::Kind::timer, .at = now_});
     return;
   }
-  // No silence is reported while another node sends characters to this one: their end starts the limit again.
+  // No silence is reported while another node sends characters to this one.
   if (busy_towards(state)) {
     state.due = std::min(now_ + state.settings.byte_time(), state.timer_due);
     return;

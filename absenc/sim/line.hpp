@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A line in virtual time with any number of machines attached: every kind of link, exact to the nanosecond.
+// A line in virtual time with any number of machines, for every kind of link.
 #pragma once
 
 #include <cstdint>
@@ -16,28 +16,23 @@ namespace absenc::sim {
 /// Whether a node is host or device.
 enum class NodeRole : std::uint8_t { host, device };
 
-/// One shared line with the machines on it. Hosts and devices are machines of the same kind; the role only decides who
-/// drives the clock (SPI, clocked), and which pair a full-duplex node drives.
+/// One shared line with the machines on it.
 ///
-/// A character of more than 8 data bits carries two bytes, which arrive one after the other, each after half of the
-/// character's time.
-///
-/// Characters that overlap on one pair reach every receiver as the AND of both (an idle line is high); a character that
-/// begins during another one is received as part of that other one. CAN frames are arbitrated by identifier; frames
-/// that begin together with the same identifier but other data are a `line_error` for every node. A node receives its
-/// own characters only with `set_echo`, then before their `sent`. A machine that begins a transfer or pulse before its
-/// last one was sent causes a std::logic_error, except a transfer of a device on an SPI or clocked link.
+/// A character of more than 8 data bits carries two bytes, which arrive one after the other. Overlapping characters on
+/// one pair are combined by AND. CAN frames are arbitrated by identifier; frames that begin together with the same
+/// identifier but other data are a `line_error` for every node. A node receives its own characters only with
+/// `set_echo`. A machine that begins a transfer or pulse before its last one was sent causes a std::logic_error, except
+/// a transfer of a device on an SPI or clocked link.
 template <class Item>
 class Line {
  public:
   /// Index of a machine on the line.
   using Node = std::size_t;
-  /// Called at an `emit` step of a machine. Returns whether the machine continues; false: it is treated as done.
+  /// Called at an `emit` step of a machine. Returns false to end the machine.
   using OnEmit = std::function<bool()>;
   /// Called at the end of every byte of a character, and of every CAN frame, on the wire.
   using Observer = std::function<void(Node sender, Time start, Time end, const Item& item)>;
-  /// One transfer of SPI bytes or of `bits` clocks: the items that the host sent and received, the last byte
-  /// left-aligned. `lead` is the time from `start`, when the chip was selected, to the first clock.
+  /// One transfer of SPI bytes or clocked bits. The last byte is left-aligned.
   struct Transfer {
     Time start;                 ///< spi: time of chip select; clocked: time of the first clock edge
     Time end;                   ///< End of the last bit.
@@ -59,12 +54,11 @@ class Line {
   Line(const Line&) = delete;
   Line& operator=(const Line&) = delete;
 
-  /// Attaches a machine and takes its first steps at once. `machine` must outlive the line or be replaced.
+  /// Attaches a machine, which must outlive the line or be replaced.
   Node attach(NodeRole role, Machine<Item>& machine, const OnEmit& on_emit = {});
   /// Replaces the machine of `node`, from now on. A transfer of the old machine is cut off.
   void replace(Node node, Machine<Item>& machine);
-  /// Takes the steps of the node's machine until it waits or is done. Needed after something other than an event has
-  /// changed the machine.
+  /// Takes the steps of the node's machine. Needed after a change of the machine without an event.
   void wake(Node node);
   /// Sets whether a node receives what it sends.
   void set_echo(Node node, bool echo);
@@ -100,8 +94,7 @@ class Line {
     Time at;
     std::uint64_t order;  // events of the same time are handled in this order, but `arbitrate` last
     Node node;
-    // `begin_generation` of the node when the event was scheduled. If the node has another one now, the event does not
-    // concern its present transfer or pulse.
+    // `begin_generation` of the node when the event was scheduled.
     std::uint64_t generation;
     bool operator>(const ScheduledEvent& other) const {
       if (at != other.at) return at > other.at;

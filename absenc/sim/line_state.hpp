@@ -12,7 +12,7 @@ namespace absenc::sim {
 
 /// Returns the character on a line that two senders drive at once: 0 bits win.
 [[nodiscard]] inline std::uint8_t combine(std::uint8_t a, std::uint8_t b) { return a & b; }
-/// Returns `a`. Only makes `combine` exist for CAN frames, which are never combined: they are arbitrated.
+/// Returns `a`. CAN frames are arbitrated, never combined.
 [[nodiscard]] inline CanFrame combine(const CanFrame& a, const CanFrame&) { return a; }
 
 /// State of one node of a line.
@@ -30,8 +30,7 @@ struct Line<Item>::State {
   Silence silence;         ///< Silence timer of the node.
   Time due = never;        ///< time of the next `timer` or `silence` event
 
-  /// The sender whose character this node's receiver is synchronised to. A character that begins before the end of that
-  /// character is not received separately.
+  /// The sender whose character this node's receiver is synchronised to.
   Node framed_sender = 0;
   Time framed_from = never;  ///< Time at which the character of `framed_sender` begins.
   Time framed_until{};       ///< Time at which the character of `framed_sender` ends.
@@ -60,7 +59,7 @@ struct Line<Item>::State {
     return active_step == Step<Item>::Kind::transfer && begun && index < out.size();
   }
 
-  /// Returns `item` combined with the characters of this node's present or last frame that overlap [from, to).
+  /// Returns `item` combined with characters of this node that overlap [from, to).
   [[nodiscard]] Item overlaid(Item item, Time from, Time to) const {
     if (each.count() == 0) return item;
     const auto first = static_cast<std::size_t>(std::max<std::int64_t>(0, (from - start) / each));

@@ -57,8 +57,7 @@ TEST_F(LineTest, WakeTakesAStepWithoutAnEvent) {
   EXPECT_EQ(device.log, "17000 received 27000 received ");
 }
 
-// Checks a request in frames: the receiver gets each byte at its time, the sender gets `sent` once, and the pause is
-// silence.
+// The pause between two frames of a request is silence for the receiver.
 TEST_F(LineTest, SendsFramesWithPausesBetweenThem) {
   const std::vector<Byte> five{1, 2, 3, 4, 5};
   device.idle.gap = microseconds(7);
@@ -169,8 +168,7 @@ class CanPuppet final : public Machine<CanFrame> {
 struct CanLine : testing::Test {
   Line<CanFrame> line{LinkKind::can, {.rate = 1'000'000}};
   CanPuppet host{0, microseconds(1'000'000), false};
-  // Returns the time, in ns, at which a frame that began `after` us after the start is received, and its identifier, as
-  // `CanPuppet::log` has them.
+  // Returns the log entry of a frame that began `after` us after the start.
   static std::string seen(std::uint32_t id, std::size_t after) {
     return std::to_string((after + length(id)) * 1000) + ' ' + std::to_string(id) + ' ';
   }

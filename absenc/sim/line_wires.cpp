@@ -12,16 +12,14 @@ namespace absenc::sim {
 
 namespace {
 
-// Returns whether two UART settings are compatible: parity and data bits are equal, and the rates differ by at most
-// 5 %, because a UART samples the stop bit in its middle.
+// A UART samples the stop bit in its middle, so the rates may differ by 5 %.
 bool compatible(const LineSettings& a, const LineSettings& b) {
   const std::uint64_t larger = std::max(a.rate, b.rate);
   const std::uint64_t difference = larger - std::min(a.rate, b.rate);
   return difference * 20 <= larger && a.parity == b.parity && a.data_bits == b.data_bits;
 }
 
-// Returns the arbitration field as a number: 11 identifier bits, RTR or SRR, IDE, 18 identifier bits, RTR. The lower
-// number wins.
+// The lower number wins the arbitration.
 std::uint32_t arbitration_field(const CanFrame& frame) {
   const std::uint32_t remote = frame.remote ? 1 : 0;
   if (!frame.extended) return frame.id << 21 | remote << 20;
@@ -79,7 +77,6 @@ void Line<Item>::begin_characters(Node node) {
   frame_character(node);
 }
 
-// Synchronises every node that `sender` reaches and that is not receiving a character to the character beginning now.
 template <class Item>
 void Line<Item>::frame_character(Node sender) {
   for (const auto& receiver : nodes_) {
@@ -136,7 +133,7 @@ void Line<Item>::deliver(Node node, Node sender, const Item& item, bool garbled)
   }
 }
 
-// Begins a transfer on an SPI or clocked link: all items move at once, and only the duration is simulated.
+// All items of an SPI or clocked transfer move at once; only the duration is simulated.
 template <class Item>
 void Line<Item>::begin_transfer(Node node) {
   State& host = *nodes_[node];
@@ -220,9 +217,7 @@ void Line<Item>::end_frame(Node node) {
     State& sender = *nodes_[node];
     const CanFrame frame = sender.out[sender.index];
     if (observer_) observer_(node, sender.start, now_, frame);
-    // Nodes whose frames were pending when this one began, with the same arbitration field, sent them at the same time.
-    // If the rest of the frames is equal too, none of the nodes notices; otherwise all these frames are lost. No node
-    // repeats its frame, because the clash would never end.
+    // Frames of the same identifier that began together are all lost if they differ.
     std::vector<Node> senders;
     bool clash = false;
     for (Node other = 0; other < nodes_.size(); ++other) {

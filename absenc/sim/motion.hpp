@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Motion of a virtual encoder's shaft: still, at constant speed, as a sine, or along a path from a file.
+// Motion of a virtual encoder's shaft: still, constant speed, sine, or a path from a file.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +12,7 @@
 
 namespace absenc::sim {
 
-/// The motion of a shaft, as a value: copies move alike and independently. Positions are in 2^-32 revolution. Only the
-/// rounding of speed and frequency causes an error that grows with time. After 2^31 revolutions the position wraps.
+/// The motion of a shaft, as a value. Positions are in 2^-32 revolution and wrap at 2^31 revolutions.
 class Motion final : public Shaft {
  public:
   /// A point of a path: position of the shaft at `time`, relative to the start position.
@@ -24,20 +23,16 @@ class Motion final : public Shaft {
 
   /// Returns a shaft that stands at `start`, unit 2^-32 revolution.
   [[nodiscard]] static Motion still(std::int64_t start);
-  /// Returns a motion at -1 000 000 to 1 000 000 revolutions per minute, rounded to 1e-6 rpm. Throws
-  /// std::invalid_argument outside this range.
+  /// Returns a motion at `rpm`, rounded to 1e-6 rpm. Throws std::invalid_argument outside -1 000 000 to 1 000 000 rpm.
   [[nodiscard]] static Motion constant_speed(std::int64_t start, double rpm);
-  /// Returns the motion start + amplitude * sin(2 pi frequency t): 0 to 36 000 000 degrees, and 0 to 10 000 Hz rounded
-  /// to 1e-6 Hz. Throws std::invalid_argument outside this range.
+  /// Returns the motion start + amplitude * sin(2 pi frequency t), with the frequency rounded to 1e-6 Hz. Throws
+  /// std::invalid_argument outside 0 to 36 000 000 degrees or 0 to 10 000 Hz.
   [[nodiscard]] static Motion sine(std::int64_t start, double amplitude_degrees, double frequency_hz);
-  /// Returns a motion in straight lines between points `seconds,degrees` (degrees relative to `start`), one point per
-  /// line, seconds rising. The shaft stands still before the first and after the last point. A heading and lines that
-  /// begin with # are skipped. So are blank lines. Throws std::invalid_argument with `name` and the number of the
-  /// invalid line, or with `name` if there is no point.
+  /// Returns a motion in straight lines between points `seconds,degrees`, one per line, seconds rising; degrees are
+  /// relative to `start`. Lines that begin with # are skipped. Throws std::invalid_argument with `name`.
   [[nodiscard]] static Motion path(std::int64_t start, std::istream& csv, std::string_view name);
 
-  /// Starts the motion at `time`; until then the shaft rests at the position where the motion begins. Without this call
-  /// the motion begins at time 0, and also runs before it.
+  /// Starts the motion at `time`; until then the shaft rests.
   void begin_at(Time time) {
     begin_ = time;
     rests_before_ = true;
@@ -71,8 +66,7 @@ class Motion final : public Shaft {
   Kind kind_;
 };
 
-/// Parses `still`, `rpm=R`, `sine=DEGREES,HZ` or `file=CSV` (the file is opened and read here). Throws
-/// std::invalid_argument with a sentence that quotes `text` and states the mistake.
+/// Parses `still`, `rpm=R`, `sine=DEGREES,HZ` or `file=CSV`. Throws std::invalid_argument.
 [[nodiscard]] Motion parse_motion(std::string_view text, std::int64_t start_position);
 
 }  // namespace absenc::sim

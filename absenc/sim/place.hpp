@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Conversion of a shaft position to the counts of a reading, and comparison of readings with it and with each other.
+// Conversion of a shaft position to counts and turns, and comparison of readings with it.
 #pragma once
 
 #include <optional>
@@ -9,8 +9,7 @@
 
 namespace absenc::sim {
 
-/// Returns the single-turn counts of an encoder with `bits` bits at `position`, unit 2^-32 revolution. A linear encoder
-/// covers its whole scale in one revolution.
+/// Returns the single-turn counts of an encoder with `bits` bits at `position`, unit 2^-32 revolution.
 [[nodiscard]] constexpr std::uint64_t counts_at(std::int64_t position, unsigned bits) {
   const auto fraction = static_cast<std::uint64_t>(position) & 0xFFFF'FFFF;
   if (bits == 0) return 0;
@@ -18,13 +17,12 @@ namespace absenc::sim {
   return (bits <= 32 ? fraction >> (32 - bits) : static_cast<std::uint64_t>(position) << (bits - 32)) & low_mask(bits);
 }
 
-/// Returns the number of revolutions that an encoder with a turn counter of `bits` bits reports at `position`, unit
-/// 2^-32 revolution; 0 if `bits` is 0.
+/// Returns the turns of a counter with `bits` bits at `position`, unit 2^-32 revolution.
 [[nodiscard]] constexpr std::uint64_t turns_at(std::int64_t position, unsigned bits) {
   return bits == 0 ? 0 : static_cast<std::uint64_t>(position >> 32) & low_mask(bits);
 }
 
-/// Returns whether every valid part of `reading` equals the shaft's `position`, unit 2^-32 revolution.
+/// Returns whether the valid parts of `reading` equal `position`, unit 2^-32 revolution.
 [[nodiscard]] constexpr bool is_at(const Reading& reading, std::int64_t position) {
   if (reading.singleturn_bits != 0 && reading.singleturn_valid_bits != 0) {
     const unsigned open = reading.singleturn_bits - reading.singleturn_valid_bits;
@@ -33,8 +31,7 @@ namespace absenc::sim {
   return !reading.multiturn_valid || reading.multiturn == turns_at(position, reading.multiturn_bits);
 }
 
-/// Returns whether two readings are equal in every part (single-turn position, turns) of which both have valid bits;
-/// true if a reading is missing.
+/// Returns whether two readings agree in position and turns, as far as both have them.
 [[nodiscard]] constexpr bool same_place(const std::optional<Reading>& one, const std::optional<Reading>& other) {
   if (!one || !other) return true;
   if (one->singleturn_valid_bits != 0 && other->singleturn_valid_bits != 0 && one->singleturn != other->singleturn) {

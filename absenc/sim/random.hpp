@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A small pseudo-random generator (splitmix64) with the same numbers on every platform: a failure can be repeated from
-// its seed.
+// A small pseudo-random generator (splitmix64) with the same numbers on every platform.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +23,7 @@ class Random {
 
   /// Returns a number from 0 to limit - 1, each equally likely; `limit` must not be 0.
   constexpr std::uint64_t below(std::uint64_t limit) {
-    // 2^64 mod limit: the lowest `uneven` values are rejected, because they would make some results more likely.
+    // Rejects the lowest 2^64 mod `limit` values, which would make some results more likely.
     const std::uint64_t uneven = (0 - limit) % limit;
     std::uint64_t value = next();
     while (value < uneven) value = next();

@@ -8,8 +8,7 @@
 namespace absenc::sim {
 namespace {
 
-// Checks the first three numbers against the published values of splitmix64 for seed 1234567
-// (https://rosettacode.org/wiki/Pseudo-random_numbers/Splitmix64).
+// https://rosettacode.org/wiki/Pseudo-random_numbers/Splitmix64, for seed 1234567
 TEST(Random, NumbersAreThePublishedOnes) {
   Random random(1234567);
   EXPECT_EQ(random.next(), 6457827717110365317u);

@@ -13,7 +13,7 @@ namespace absenc::sim {
 
 namespace {
 
-// Copies `items` to `to`. The sizes of both are mostly equal, so resize rarely allocates or fills.
+// The sizes of both are mostly equal, so resize rarely allocates.
 template <class Item>
 void copy(std::span<const Item> items, std::vector<Item>& to) {
   to.resize(items.size());
@@ -90,7 +90,7 @@ void RoughLine<Item>::deliver_request(std::span<const Item> request) {
   feed({.kind = Kind::received, .at = time_, .items = request});
 }
 
-// Performs a transfer that the host clocks (SPI, clocked): the device's reply is complete at the end of the transfer.
+// The device's reply is complete at the end of the transfer.
 template <class Item>
 void RoughLine<Item>::transfer(const Step<Item>& step) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {

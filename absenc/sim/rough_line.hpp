@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A host port on a bad line in virtual time: one device, whole frames, damaged at random in transit.
+// A host port on a bad line in virtual time: one device, whole frames, damaged at random.
 #pragma once
 
 #include <cstdint>
@@ -12,16 +12,14 @@
 
 namespace absenc::sim {
 
-/// Probability, 0 to 1, of each kind of damage to data that is sent to the host: `bit` per data bit (CAN: per bit of
-/// the whole frame), all others per frame. Faults of the device itself are FaultRates, applied between device and line.
+/// Probabilities, 0 to 1, of damage to data for the host: `bit` per bit, the others per frame.
 struct RoughRates {
   double bit = 0;  ///< probability that a data bit is flipped
-  /// 2 to 16 adjacent bits are damaged: the first and last are flipped, each bit between them with probability 1/2.
+  /// Up to 16 adjacent bits are damaged.
   double burst = 0;
-  /// One byte or CAN frame arrives twice. On SPI and clocked links one bit arrives twice and the last bit is lost.
+  /// One byte or CAN frame arrives twice; on SPI and clocked links one bit, and the last is lost.
   double doubled = 0;
-  /// Another sender sends random bytes during a part of the frame and, except on SPI and clocked links, perhaps beyond
-  /// its end; the host receives the AND of both.
+  /// Another sender sends random bytes during a part of the frame.
   double talker = 0;
   double late = 0;  ///< the frame is 10 us to 10 s late, each decade equally likely; later frames do not overtake it
 };
@@ -34,10 +32,9 @@ struct RoughCounts {
   std::uint64_t late = 0;      ///< frames that were delayed
 };
 
-/// A line that damages frames to the host at random. It is simulated faster than Line, which moves single characters;
-/// use Line for collisions or single characters. A frame arrives in one piece at its end; if the ends have different
-/// rates it arrives as a `line_error`. On CAN the controllers check: a frame with flipped bits or another sender is a
-/// `line_error`. Clocked and SPI links have no late frames and only one rate.
+/// A line that damages frames to the host at random. A frame arrives in one piece at its end; use Line for collisions
+/// or single characters. On CAN, flipped bits make a frame a `line_error`. Clocked and SPI links have no late frames
+/// and only one rate.
 template <class Item>
 class RoughLine final : public Port<Item> {
  public:
@@ -53,7 +50,7 @@ class RoughLine final : public Port<Item> {
   [[nodiscard]] Event<Item> wait(const Step<Item>& step) override;
   /// Advances the time to `until` while the host is not waiting.
   void rest(Time until);
-  /// Discards frames that have arrived but were not reported, like a host that reads only the newest frame.
+  /// Discards frames that have arrived but were not reported.
   void drop();
 
   /// Marks all frames that the device began to send before now as old.
@@ -70,7 +67,7 @@ class RoughLine final : public Port<Item> {
   [[nodiscard]] std::size_t bits() const { return bits_; }
 
  private:
-  // A frame in transit to the host. Without items it arrives as a `line_error`, because the host cannot read it.
+  // A frame in transit to the host; without items it arrives as a `line_error`.
   struct InTransit {
     Time sent;   // time at which its transmission began
     Time first;  // arrival time of the first item

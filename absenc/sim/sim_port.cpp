@@ -27,8 +27,6 @@ SimPort<Item>::SimPort(LinkKind kind, LineSettings settings, Machine<Item>& devi
   if (real_time_.now) start_ = real_time_.now();
 }
 
-// With a real-time clock, advances the line to its time: all events up to that time have then happened, whether or not
-// a caller waited for them.
 template <class Item>
 void SimPort<Item>::keep_pace() {
   if (real_time_.now) line_.run_until(real_time_.now() - start_);
@@ -71,7 +69,7 @@ Event<Item> SimPort<Item>::wait(const Step<Item>& step) {
 
 template <class Item>
 void SimPort<Item>::advance(const Step<Item>& step) {
-  // The limits of silence apply only during this wait, so no silence is reported for a step that ended long ago.
+  // The limits of silence apply only during this wait.
   struct Disarm {
     SimPort& port;
     ~Disarm() {
@@ -88,8 +86,7 @@ void SimPort<Item>::advance(const Step<Item>& step) {
 template <class Item>
 template <class Done>
 void SimPort<Item>::run_until(const Done& done) {
-  // Duration of one sleep while the line has no scheduled event; short, so that `sleep_until` is called often and can
-  // end the wait by an exception.
+  // Sleep while the line has no event; short, because `sleep_until` may throw to end the wait.
   constexpr Time idle = std::chrono::milliseconds(100);
   while (!done()) {
     const Time due = line_.next_event();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The host's end of a simulated line as a Port: `sim:` encoders are read by the same code as real ones.
+// The host's end of a simulated line as a Port.
 #pragma once
 
 #include <deque>
@@ -11,29 +11,25 @@
 
 namespace absenc::sim {
 
-/// A clock of the caller's choice that virtual time follows. If both functions are empty, time jumps from event to
-/// event.
+/// A clock that virtual time follows. Without functions, time jumps from event to event.
 struct RealTime {
   /// Function that returns the time of the clock.
   std::function<Time()> now;
-  /// Function that sleeps until the given time of the clock. May return early, and may throw to end a wait.
+  /// Sleeps until the given time of the clock, or less. May throw to end a wait.
   std::function<void(Time)> sleep_until;
 };
 
-/// A port at the host's end of a private line with one device. Times are virtual, start at 0 when the port is made and
-/// are exact to the nanosecond. With a RealTime they follow its clock, also when the caller is late.
+/// A port at the host's end of a private line with one device, in virtual time from 0 on.
 template <class Item>
 class SimPort final : public Port<Item> {
  public:
-  /// Makes a line to `device`, which must outlive the port. Throws std::invalid_argument if `real_time` has only one of
-  /// its functions, or the settings have no rate.
+  /// Makes a line to `device`, which must outlive the port. Throws std::invalid_argument.
   SimPort(LinkKind kind, LineSettings settings, Machine<Item>& device, RealTime real_time = {});
 
   [[nodiscard]] Time now() override;
-  /// Begins a step. A transfer or pulse that begins during an abandoned one waits until the abandoned one has been
-  /// sent.
+  /// Begins a step. A transfer or pulse waits until an abandoned one has been sent.
   void begin(const Step<Item>& step) override;
-  /// Blocks until the next event. Without a RealTime, throws std::logic_error if no event can ever end the wait.
+  /// Blocks until the next event. Without a RealTime, throws std::logic_error if none can come.
   [[nodiscard]] Event<Item> wait(const Step<Item>& step) override;
 
   /// Returns the simulated line, so that callers can observe it.

@@ -37,7 +37,7 @@ class Responder final : public Machine<std::uint8_t> {
   bool pending_ = false;
 };
 
-// A host that sends a given number of requests, at least 100 us apart, and emits after each reply or silence.
+// A host that sends a number of requests, at least 100 us apart, and emits after each.
 class Requester final : public Machine<std::uint8_t> {
  public:
   explicit Requester(int times) : left_(times) {}
@@ -183,8 +183,7 @@ TEST(SimPort, LimitsRunOnlyDuringWaits) {
   EXPECT_EQ(port.wait(impatient).kind, Kind::silence);
 }
 
-// Checks that `wait` still reports a timer after a configure step has advanced the line to the present, past the time
-// of the timer.
+// The configure step advances the line to the present, here past the time of the timer.
 TEST(SimPort, ReportsTimerThatPassedMeanwhile) {
   SlowWorld world;
   Mute mute;

@@ -20,8 +20,7 @@ constexpr std::size_t cs = 0, sck = 1, mosi = 2, miso = 3;
 constexpr std::size_t clock = 0, data = 1;
 constexpr std::size_t can = 0;
 
-// Division of `length` into equal parts; the call operator returns the end of the first `part` parts, to the nearest
-// nanosecond.
+// Divides `length` into equal parts; returns the end of the first `part` parts, rounded to ns.
 struct EvenDivision {
   Time start;
   Time length;
@@ -116,7 +115,7 @@ void Waveform::byte(NodeRole sender, Time start, Time end, std::uint8_t byte) {
   first = {sender, start, end, byte};
 }
 
-// Draws the first byte of a character whose second byte was never sent: the line rests at 1 instead.
+// The second byte was never sent: the line rests at 1 instead.
 void Waveform::draw_lone(FirstByte& first) {
   if (first.start == never) return;
   const Time start = std::exchange(first.start, never);
@@ -173,7 +172,7 @@ void Waveform::draw_clocked(const Line<std::uint8_t>::Transfer& seen) {
   drive(data, last_edge, last_edge + seen.low_after);
 }
 
-// With CPHA 0 data is stable before the leading edge, which samples it. With CPHA 1 data changes at the leading edge.
+// With CPHA 0 the leading edge samples data; with CPHA 1 data changes at it.
 void Waveform::draw_spi(const Line<std::uint8_t>::Transfer& seen) {
   const std::int64_t phase = (settings_.spi_mode & 1) != 0 ? 0 : 1;
   const Time first = seen.start + seen.lead;

@@ -16,17 +16,13 @@
 
 namespace absenc::sim {
 
-/// A drawing of the wires of a line, as logic levels (an idle line and a mark are 1), from items that are passed to it
-/// or observed on a Line. It passes changes to its sink in the order of time, and stores those that a later item may
-/// still precede, because characters of two pairs overlap.
+/// A drawing of the wires of a line, as logic levels.
 ///
-/// - half duplex: `line`; full duplex: `host` and `device`, named by the sender that drives the pair
-/// - additional wires after the first pulse: `trigger`, `clear`, which a pulse pulls to 0
-/// - spi: `cs`, `sck`, `mosi`, `miso`; `miso` is 1 while no device drives it
-/// - clocked: `clock`, idle high, and `data`, which changes at its rising edges. The host samples each bit at the next
-/// falling edge. `idle_clocks` adds as many clocks before the first bit; without them that bit begins with the first
-/// clock edge. After the last edge the device may hold `data` low: the timeout of BiSS, the monoflop of SSI.
-/// - CAN: `can`, recessive is 1; every frame is acknowledged
+/// - half duplex: `line`; full duplex: `host` and `device`, named by the sender; idle is 1
+/// - spi: `cs`, `sck`, `mosi`, `miso`
+/// - clocked: `clock` and `data`, both idle high; `idle_clocks` adds clocks before the first bit
+/// - CAN: `can`, recessive is 1
+/// - for pulses: `trigger` and `clear`, pulled to 0
 class Waveform {
  public:
   /// A wire of a waveform, for example `clock`.
@@ -34,8 +30,7 @@ class Waveform {
     std::string_view name;  ///< name of the wire
     bool idle;              ///< level of the wire before its first change
   };
-  /// Receives level changes in the order of time, as soon as their order is known, and comments likewise. A comment
-  /// may come after changes of a later time.
+  /// Receiver of level changes and of comments, each in the order of time.
   struct Sink {
     /// Receives a level change of the wire with this index in `wires()`.
     virtual void change(Time at, std::size_t wire) = 0;
@@ -49,11 +44,9 @@ class Waveform {
   /// Makes a waveform without items. `sink` must outlive it.
   Waveform(LinkKind kind, const LineSettings& settings, Sink& sink);
 
-  /// Draws all items on `line`, which has the waveform's kind and settings, from now on. Replaces the observers of the
-  /// line; the waveform must outlive the line.
+  /// Draws all items on `line` from now on and replaces its observers. The waveform must outlive the line.
   void observe(Line<std::uint8_t>& line);
-  /// Draws all frames on `line`, which has the waveform's settings, from now on. Replaces the observer of the line; the
-  /// waveform must outlive the line.
+  /// Draws all frames on `line` from now on and replaces its observer. The waveform must outlive the line.
   void observe(Line<CanFrame>& line);
 
   /// Draws a byte of an asynchronous character; if two share one, when the second one is drawn.
@@ -67,7 +60,7 @@ class Waveform {
   /// Draws a pulse on an extra wire.
   void pulse(ExtraWire wire, Time start, Time end);
 
-  /// Passes all changes and comments before `time` to the sink. No item drawn later may begin before `time`.
+  /// Passes all changes and comments before `time` to the sink. No later item may begin before `time`.
   void settle(Time time);
   /// Passes all remaining changes and comments to the sink.
   void finish();
@@ -78,7 +71,7 @@ class Waveform {
   [[nodiscard]] Time end() const { return end_; }
 
  private:
-  // A drive of a wire away from its idle level (`by` 1) or its release (-1). A wire without any drive is idle.
+  // The begin (`by` 1) or the end (-1) of a drive of a wire away from its idle level.
   struct LevelChange {
     Time at;
     std::size_t wire;

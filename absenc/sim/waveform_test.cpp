@@ -71,7 +71,7 @@ TEST(Waveform, DrawsCharactersOfFiveToSixteenDataBits) {
     settings.data_bits = static_cast<std::uint8_t>(data_bits);
     settings.parity = Parity::odd;
     Picture picture(LinkKind::half_duplex, settings);
-    // All data bits but the highest are 1: the line is low in the start bit, in that bit, and in a parity bit of 0.
+    // The line is low in the start bit, in the highest data bit, and in a parity bit of 0.
     const unsigned value = (1u << (data_bits - 1)) - 1;
     picture.character(NodeRole::host, 0us, settings.character(), static_cast<std::uint16_t>(value));
     const bool parity = data_bits % 2 != 0;  // an even number of ones needs a 1
@@ -83,7 +83,7 @@ TEST(Waveform, DrawsCharactersOfFiveToSixteenDataBits) {
   }
 }
 
-// Checks that two bytes of a line share a character, and that a byte without a second one is drawn with ones.
+// Two bytes share a character; a byte without a second one is drawn with ones.
 TEST(Waveform, DrawsTwoBytesAsOneCharacterOfSixteenBits) {
   LineSettings settings = slow;
   settings.data_bits = 16;
@@ -204,8 +204,7 @@ TEST(Waveform, DataIsLowForTheTimeoutBehindTheLastEdge) {
   picture.transfer(seen);
   EXPECT_THAT(body(picture), ::testing::EndsWith("#3000\n0!\n#3500\n1!\n0\"\n#23500\n1\"\n#33500\n"));
 
-  // After the last bit the device holds the data line low. BiSS: for its fixed timeout (20 us by default) or one and a
-  // half clock periods. SSI: for the monoflop time, from the edge behind the last bit; with AfterWord::one not at all.
+  // Times for which the device holds the data line low after the last bit.
   biss::Format biss{};
   const auto biss_low = [&] {
     biss::testing::Bench bench(biss::line_settings, biss);
@@ -243,8 +242,7 @@ TEST(Waveform, PulsesHaveWiresOfTheirOwn) {
   EXPECT_EQ(body(waveform), "#0\n1!\n1\"\n1#\n1$\n#1000\n0#\n#3000\n1#\n#5000\n0$\n#6000\n1$\n#16000\n");
 }
 
-// Checks that the waveform passes changes to its sink while the line runs: stored until the end, they would fill the
-// memory.
+// Changes that are stored until the end would fill the memory.
 TEST(Waveform, PassesSettledChangesToSink) {
   struct Counter final : Waveform::Sink {
     void change(Time at, std::size_t) override {
@@ -325,7 +323,7 @@ TEST_F(Sigrok, ReadsTheBitsOfSsi) {
   ASSERT_EQ(read.error(), Error::none);
   const std::string bits = bits_of({read.exchange().received, 50});
   EXPECT_THAT(bits, ::testing::AllOf(HasSubstr("0 1"), HasSubstr("1 0")));
-  // A controller in mode 2, which samples at falling edges, reads the idle level first and then the word.
+  // A controller in mode 2 reads the idle level first and then the word.
   EXPECT_EQ(decode(waveform, "spi:clk=clock:miso=data:cpol=1:cpha=0:wordsize=51", "spi=miso-bits"), bits + "1 ");
 }
 

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A program without a standard library that decodes the first FRAMES of 64 BiSS frames with 32 bits, for count.sh.
-// DECODER selects the decoder: 0, a format known at compile time; 1, a format known at run time; 2, the peer of
-// bench/sampled_peer.hpp; 3, moteus' own function, whose header must be in an include folder. The exit status is 0 if
-// all positions are right.
+// A program without a standard library that decodes the first FRAMES of 64 BiSS frames, for count.sh. DECODER: 0, a
+// format known at compile time; 1, one known at run time; 2, the peer of bench/sampled_peer.hpp; 3, moteus' own
+// function. The exit status is 0 if all positions are right.
 #include "absenc/protocol/biss/frame.hpp"
 #include "bench/sampled_peer.hpp"
 #if DECODER == 3

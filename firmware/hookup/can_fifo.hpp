@@ -23,7 +23,7 @@ class CanFifo {
   void start(Machine<CanFrame>& machine, Time now) { carrier_.start(machine, now); }
   [[nodiscard]] bool is_busy() const { return carrier_.is_busy(); }
 
-  // ---- Functions that interrupts call; if one handler serves both, it calls `transmitted` before `pending`
+  // ---- Functions that interrupts call: `transmitted` before `pending` in one handler
 
   void tick(Time now) { carrier_.tick(now); }
   void transmitted(Time now) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A T-format encoder read from interrupts: the first lines of docs/firmware.md. tests/hookup_test.cpp runs them.
+// A T-format encoder read from interrupts, as in docs/firmware.md.
 #include <chrono>
 #include <cstdint>
 #include <optional>

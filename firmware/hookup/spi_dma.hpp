@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A hookup of the library to an SPI controller with DMA that reads BiSS or SSI. The controller clocks whole bytes; the
-// frame is a part of their bits.
+// A hookup of the library to an SPI controller with DMA that reads BiSS or SSI.
 #pragma once
 
 #include <algorithm>
@@ -30,7 +29,6 @@ class SpiDma {
 
   // ---- Functions that interrupts call
 
-  // Lets the carrier start a transfer that it delays: the encoder's timeout must expire before the next clock.
   void tick(Time now) { carrier_.tick(now); }
   void done(Time now) {
     align();
@@ -48,8 +46,7 @@ class SpiDma {
   void result(bool) {}
 
  private:
-  // Shifts the frame's first bit to the first bit of the first byte, because the first clocks return the idle line
-  // (SSI), and clears the bits after the frame.
+  // Shifts the frame to the first bit of the buffer.
   void align() {
     const std::size_t clocked = (idle_clocks_ + bits_ + 7) / 8;
     const std::size_t size = (bits_ + 7) / 8;

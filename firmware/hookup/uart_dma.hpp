@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A hookup of the library to a UART with DMA and an idle-line interrupt, behind an RS-485 transceiver.
+// A hookup of the library to a UART with DMA and an idle-line interrupt, on RS-485.
 #pragma once
 
 #include <algorithm>
@@ -24,24 +24,23 @@ namespace absenc::firmware {
 template <class Hardware>
 class UartDma {
  public:
-  /// `latency`: the idle time of one character, plus the period of the timer's tick. `hardware` must outlive this
-  /// object.
+  /// `latency`: idle time of one character, plus the period of the tick. `hardware` must outlive this object.
   UartDma(Hardware& hardware, Time latency) : hardware_(&hardware), carrier_(*this, latency) {}
 
-  /// Starts a conversation. Call it in the context of the interrupts, for example from a timer of the same priority.
+  /// Starts a conversation. To be called in the context of the interrupts.
   void start(Machine<std::uint8_t>& machine, Time now) { carrier_.start(machine, now); }
   [[nodiscard]] bool is_busy() const { return carrier_.is_busy(); }
 
   // ---- Functions that interrupts call
 
   void tick(Time now) { carrier_.tick(now); }
-  // Receiving starts before the driver releases the line, because the first character may follow after 3 us.
+  // Receives before the driver releases the line: the first character may follow after 3 us.
   void transmission_complete(Time now) {
     arm(expected_);
     hardware_->drive(false);
     carrier_.sent(now);
   }
-  // More bytes may follow at once, so the other buffer is made ready before the received bytes are evaluated.
+  // More bytes may follow at once, so the other buffer is made ready first.
   void arrived(Time now) {
     const MutableBytes buffer = buffers_[current_];
     const std::size_t count = hardware_->stop_receiving();
@@ -63,8 +62,7 @@ class UartDma {
   void result(bool) {}
 
  private:
-  // Starts receiving up to `count` bytes, 0: as many as the buffer holds. The hardware calls `arrived` when they are
-  // complete, or when the line is idle.
+  // Starts receiving up to `count` bytes; 0: as many as the buffer holds.
   void arm(std::size_t count) {
     const MutableBytes buffer = buffers_[current_];
     hardware_->receive(count == 0 ? buffer : buffer.first(std::min(count, buffer.size())));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Common parts of all Cortex-M machines: vectors, SysTick, and the breakpoint that calls the emulator.
+// Common parts of the Cortex-M machines: vectors, SysTick, calls of the emulator.
 #include <array>
 
 #include "firmware/machine/machine.hpp"
@@ -27,7 +27,7 @@ constexpr auto filled = []<std::size_t count>(std::array<void (*)(), count> all,
   return all;
 };
 
-// Interrupt vectors. Only the UART's device interrupts are enabled, so all device vectors call its handler.
+// Only the UART's device interrupts are enabled, so all device vectors call its handler.
 [[gnu::section(".vectors"), gnu::used]] const Vectors vectors{
     &stack_top, start, filled(std::array<void (*)(), 13>{}, fault), tick, filled(std::array<void (*)(), 32>{}, uart)};
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Interface of the programs to their machine: a clock with a tick, one UART, and QEMU for output and exit.
+// Interface of the programs to their machine: a clock with a tick, one UART, and the emulator.
 #pragma once
 
 #include <cstddef>
@@ -17,13 +17,12 @@ void print(std::string_view text);
 void print(std::uint64_t number);
 /// Ends the emulator with status 0 if `good`, otherwise 1.
 [[noreturn]] void end(bool good);
-/// Returns the number in the emulator's argument `index`, where 0 is the first after the program's name; `otherwise` if
-/// it is missing or does not begin with a digit.
+/// Returns the number in the emulator's argument `index`, from 0 on; `otherwise` if there is none.
 [[nodiscard]] std::uint32_t argument(unsigned index, std::uint32_t otherwise);
 
 /// Starts the clock: `on_tick` is called every `period`, at most 0.5 s.
 void start_clock(Time period);
-/// Returns the time since `start_clock`, with a resolution below one microsecond. Interrupts may call it, too.
+/// Returns the time since `start_clock`, with a resolution below one microsecond.
 [[nodiscard]] Time now();
 
 /// Starts the UART: from now on it calls `on_received` and `on_sent`.
@@ -36,7 +35,7 @@ void send(Bytes bytes);
 /// Restarts the measurement of `stack_used`.
 void paint_stack();
 
-/// Disables interrupts while an object of this class exists. Its destructor enables them, so locks must not be nested.
+/// Disables interrupts while an object of this class exists. Locks must not be nested.
 class InterruptLock {
  public:
   InterruptLock() { asm volatile("cpsid i" : : : "memory"); }
@@ -45,19 +44,19 @@ class InterruptLock {
   InterruptLock& operator=(const InterruptLock&) = delete;
 };
 
-// ---- Functions that the program provides; all interrupts have one priority, so none interrupts another
+// ---- Functions that the program provides; all interrupts have one priority
 
 void on_tick();
 void on_received(std::uint8_t byte);
 /// Called when the last bit of the bytes given to `send` is on the line.
 void on_sent();
 
-// ---- Functions that the machine provides: cortex_m.cpp with microbit.cpp or mps2.cpp; virt.cpp has only the first one
+// ---- Functions that the machine provides; virt.cpp has only the first one
 
 /// Calls the emulator's semihosting service `number` and returns its result.
 std::uint32_t call_emulator(std::uint32_t number, const void* parameter);
 
-/// Frequency of the clock that SysTick counts: in hertz, and as a ratio without rounding (`counts` per `nanoseconds`).
+/// Frequency of the clock that SysTick counts, in hertz and as an exact ratio.
 struct Frequency {
   std::uint32_t hertz;
   std::uint32_t nanoseconds;  // time that `counts` counts take

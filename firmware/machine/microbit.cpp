@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The machine micro:bit: Cortex-M0, nRF51822 (UART: nRF51 Series Reference Manual, 29). The real part has no SysTick;
-// the emulated one has, at 16 MHz.
+// The machine micro:bit: Cortex-M0, nRF51822 (UART: nRF51 Series Reference Manual, 29). The real part has no SysTick.
 #include "firmware/machine/machine.hpp"
 
 namespace absenc::machine {
@@ -31,8 +30,7 @@ void send(Bytes bytes) {
 }
 
 void handle_uart() {
-  // A late interrupt handler finds both events and must handle the end of transmission first. The receiver's state is
-  // read before that, because a byte that is received later may be the reply to the next byte that is sent.
+  // A late handler finds both events and must handle the end of transmission first.
   const bool has_received = register_at(received) != 0;
   while (register_at(sent) != 0) {
     register_at(sent) = 0;

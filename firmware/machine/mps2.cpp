@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The machines MPS2 of ARM with the images AN385 (Cortex-M3) and AN386 (Cortex-M4F), and their CMSDK UART.
+// The machines MPS2 with the images AN385 (Cortex-M3) and AN386 (Cortex-M4F), and their UART.
 #include "firmware/machine/machine.hpp"
 
 namespace absenc::machine {
@@ -28,8 +28,7 @@ void send(Bytes bytes) {
 }
 
 void handle_uart() {
-  // A late interrupt handler finds both events and must handle the end of transmission first. The receiver's state is
-  // read before that, because a byte that is received later may be the reply to the next byte that is sent.
+  // A late handler finds both events and must handle the end of transmission first.
   for (;;) {
     const bool has_received = (register_at(state) & receiver_is_full) != 0;
     while ((register_at(pending) & sent_bit) != 0) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Start-up of a program from reset to main. On a real part, the part's own start-up code replaces this file.
+// Start-up from reset to main. On a real part, its own start-up code replaces this file.
 #include "firmware/machine/machine.hpp"
 
 int main();

@@ -3,7 +3,7 @@
 #include "firmware/machine/machine.hpp"
 
 extern "C" {
-// Entry point of the program, at which QEMU starts; QEMU sets up neither a stack nor a trap vector.
+// QEMU starts here and sets up neither a stack nor a trap vector.
 [[gnu::naked, gnu::used, gnu::section(".vectors")]] void reset() {
   asm(".option arch, +zicsr\n"
       "la sp, stack_top\n"
@@ -17,7 +17,7 @@ extern "C" {
 
 namespace absenc::machine {
 
-// The semihosting call is a breakpoint between two no-op instructions, all uncompressed (RISC-V Semihosting, 2).
+// The semihosting call: a breakpoint between two uncompressed no-ops (RISC-V Semihosting, 2).
 [[gnu::noinline]] std::uint32_t call_emulator(std::uint32_t number, const void* parameter) {
   register std::uint32_t a0 asm("a0") = number;
   register const void* a1 asm("a1") = parameter;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The base with which the other readers are compared, a program without a reader: start-up, output, and three C library
-// functions that compilers call by themselves.
+// The base with which readers are compared: a program without a reader.
 #include <cstring>
 
 #include "firmware/readers/reader.hpp"

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Firmware that only reads a position. The size of the linked library is measured, and the instructions between two
-// marks are counted (firmware/count.cpp). No line exists: a good reply follows each request at once.
+// Firmware that only reads a position, for measurements. A good reply follows each request.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +11,7 @@
 #include "absenc/link/step.hpp"
 #include "firmware/machine/machine.hpp"
 
-// Functions that mark code: the instructions between their calls are counted. They must not be inlined.
+// Marks of code whose instructions are counted; they must not be inlined.
 extern "C" {
 [[gnu::noinline]] inline void count_begin() { asm volatile(""); }
 [[gnu::noinline]] inline void count_end() { asm volatile(""); }
@@ -20,8 +19,7 @@ extern "C" {
 
 namespace absenc::firmware {
 
-/// How a reply arrives: in one event, as by DMA, whose instructions are counted; or character by character, where the
-/// instructions for the second character are counted, with the following `next`.
+/// How a reply arrives: in one event, as by DMA, or character by character.
 enum class Delivery : std::uint8_t { whole, by_character };
 
 template <class Item, class Reader>
@@ -55,8 +53,7 @@ bool converse(Reader& reader, std::span<const Item> reply, Delivery delivery) {
   return false;
 }
 
-/// Measures a reader, then ends the emulator, with status 0 if each measurement read a position. `by_character`: also
-/// measures a line whose interrupts deliver single characters.
+/// Measures a reader, then ends the emulator. `by_character`: also measures single characters.
 template <class Item, class Reader, class... Parameters>
 [[noreturn]] void run(std::span<const Item> reply, bool by_character, const Parameters&... parameters) {
   alignas(Reader) static std::byte memory[sizeof(Reader)];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads T-format like tformat.cpp, but through the carrier that firmware calls from its interrupts.
+// Reads T-format like tformat.cpp, but through the carrier.
 #include <array>
 
 #include "absenc/host/carrier.hpp"

@@ -19,8 +19,7 @@
     recording["speed_rpm"][recording.good()]
 
 Encoder addresses are those of the command: "tformat:/dev/ttyUSB0?model=23-bit", "raa38-can:can0", "sim:esl", or a name
-in absenc.toml. Options may be given as keywords. An invalid position is None, or masked: never a number. Every wait
-releases the GIL and ends at Ctrl-C. Errors are raised as exceptions of `absenc.errors`.
+in absenc.toml. Options may be given as keywords. An invalid position is None, or masked: never a number.
 """
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ class Reading:
     def singleturn_bits(self) -> int: ...
     @property
     def singleturn_valid_bits(self) -> int:
-        """Number of valid bits of the position, from the highest; some encoders report fewer while they turn fast."""
+        """Number of valid bits of the position, from the highest."""
     @property
     def multiturn_bits(self) -> int: ...
     @property
@@ -44,11 +44,10 @@ class Reading:
         """Whether the revolutions are valid; None: not reported, or the encoder has none."""
     @property
     def alarms(self) -> Optional[list[str]]:
-        """Names of the raised alarms; []: all are reported clear; None: none is raised, but not all are reported."""
+        """Names of the raised alarms; []: all are reported clear; None: not known."""
     @property
     def status(self) -> Optional[list[str]]:
-        """Names of the status flags that are set; []: all are reported clear; None: none is set, but not all are
-        reported."""
+        """Names of the status flags that are set; []: all are reported clear; None: not known."""
     @property
     def time_s(self) -> float:
         """Time at which the position was latched, in seconds of time.monotonic()."""
@@ -58,10 +57,10 @@ class Sample:
 
     @property
     def kind(self) -> str:
-        """Kind of sample: "reading"; "failed": see `error`; "lost": the port has just disappeared; "absent"; "back"."""
+        """Kind of sample: "reading", "failed", "lost", "back" or "absent"."""
     @property
     def time_s(self) -> float:
-        """Time of the sample, in seconds of time.monotonic(); for a reading, when its position was latched."""
+        """Time of the sample, in seconds of time.monotonic()."""
     @property
     def reading(self) -> Optional[Reading]: ...
     @property
@@ -72,8 +71,7 @@ class Sample:
         """Speed in rpm, for linear encoders mm/s: `speed_rpm` or `speed_mm_s`."""
     @property
     def speed_rpm(self) -> Optional[float]:
-        """Mean speed over a short window, as it was `speed_delay_s` before `time_s`; None: not known yet, or the
-        encoder is linear."""
+        """Mean speed in rpm, as it was `speed_delay_s` before `time_s`; None: unknown, or not rotary."""
     @property
     def speed_uncertainty_rpm(self) -> Optional[float]:
         """Greatest difference of the true mean speed from `speed_rpm`, in rpm."""
@@ -87,8 +85,8 @@ class Sample:
     def speed_delay_s(self) -> Optional[float]: ...
     @property
     def joint_deg(self) -> Optional[float]:
-        """Angle of the joint: direction * (continued degrees - offset_deg) / gear; None: none of these is set, the
-        position is invalid, or the turns are unknown."""
+        """Angle of the joint in degrees: direction * (continued degrees - offset_deg) / gear; None: unknown, or not
+        set."""
     @property
     def joint_mm(self) -> Optional[float]:
         """Position of the joint of a linear encoder: direction * (position - offset_mm)."""
@@ -106,13 +104,13 @@ class Sample:
         """Greatest difference of the true mean speed from the speed of the joint."""
     @property
     def electrical_deg(self) -> Optional[float]:
-        """Electrical angle of the motor, 0 to below 360; None: invalid, or pole_pairs or pole_pair_mm is not set."""
+        """Electrical angle of the motor in degrees, 0 to below 360; None: not known."""
     @property
     def confirmed(self) -> bool:
-        """Whether another reading confirms the position: the two differ by no more than the speed limit permits."""
+        """Whether another reading confirms the position."""
     @property
     def restarted(self) -> bool:
-        """Whether `position` starts again, because it jumped or the travel since the last reading is unknown."""
+        """Whether `position` starts again instead of continuing."""
     @property
     def text(self) -> str:
         """Why the sample has no reading, or why `position` starts again; "" otherwise."""

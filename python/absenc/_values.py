@@ -11,20 +11,19 @@ from .errors import UsageError
 #: Value of an option; an iterable gives the option several times.
 Value = Union[str, int, float, bool, None, Iterable[str]]
 
-#: A number, a truth value, a text, bytes, or the names of flags; None: not reported, or invalid.
+#: Value of a field; flags are a tuple of names; None: not reported, or invalid.
 Field = Union[None, bool, int, float, str, bytes, tuple[str, ...]]
 
 
 def natural(name: str, value: float, least: int = 0, most: int = 2**32 - 1) -> int:
-    """Returns the argument `name` as int; 24e6 is as good as 24000000. Raises UsageError for another value: no whole
-    number, or outside of the limits."""
+    """Returns the argument `name` as int. Raises UsageError for no whole number within the limits."""
     if not isinstance(value, Real) or value != value // 1 or not least <= value <= most:
         raise UsageError(f"{name} is a whole number from {least} to {most}, not {value!r}")
     return int(value)
 
 
 def texts(options: Mapping[str, Value]) -> list[str]:
-    """Converts `singleturn=5, alarm=["a", "b"]` to "singleturn=5", "alarm=a", "alarm=b"; None is omitted."""
+    """Converts `alarm=["a", "b"]` to "alarm=a", "alarm=b"; None is omitted."""
     settings = []
     for name, value in options.items():
         if value is None:  # None is the default of keywords: the option is not given

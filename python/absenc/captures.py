@@ -71,14 +71,14 @@ class Capture(Table):
 
     Columns: `time_s`, `end_s`, `kind` ("exchange", "request", "reply", "noise"), `request` and `reply` (bytes; for CAN
     and clocked links text), `turnaround_us`, `angle_deg` (for linear encoders `position_mm`), each field of the unit,
-    and `error` with `message`, "" in good rows. Flags are numbers: `Protocol.flag_names` names them."""
+    and `error` with `message`. Flags are numbers: `Protocol.flag_names` names them."""
 
     def __init__(self, rows: Masked, columns: dict[str, Column], notes: list[str]) -> None:
         super().__init__(rows, columns)
         self.notes = notes  #: damage of the file, and settings that were detected
 
     def good(self) -> npt.NDArray[np.bool_]:
-        """Returns which rows have no error. Missing and invalid values in these rows are masked in the columns."""
+        """Returns which rows have no error."""
         return np.asarray(self.rows.data["error"] == "", np.bool_)
 
 
@@ -127,8 +127,8 @@ def decode(
     model: str = "",
     **options: Value,
 ) -> Capture:
-    """Decodes a whole capture: a sigrok session, VCD, CSV or binary export of a logic analyser, a candump log, or
-    bytes as text. Arguments that are not given are detected in the capture, or have the values of the protocol.
+    """Decodes a whole capture: a sigrok session, VCD, CSV or binary export of a logic analyser, a candump log, or bytes
+    as text.
 
     `channel` is "D0", "clock=D0", or several of these; `raw_channels` is the number of channels of a file with raw
     samples, `rate` its samples per second; `baud` and `parity` ("none", "odd", "even") describe the line. Other
@@ -153,8 +153,7 @@ def decode_batches(
     model: str = "",
     **options: Value,
 ) -> Iterator[Capture]:
-    """Decodes like `decode`, in captures of at most `rows` rows, for files larger than memory. The last
-    capture has the notes."""
+    """Decodes like `decode`, in captures of at most `rows` rows. The last capture has the notes."""
     most = natural("rows", rows, least=1)
     return _batches(_open(file, unit, channel, raw_channels, rate, baud, parity, model, options), most)
 

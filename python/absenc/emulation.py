@@ -12,8 +12,7 @@ from .protocols import Protocol, protocol
 
 
 class Emulation:
-    """A virtual encoder that replies in its own thread: the context manager that `emulate` returns. Changes are
-    effective when the call returns."""
+    """A virtual encoder that replies in its own thread: the context manager that `emulate` returns."""
 
     def __init__(self, text: str, link: str, tcp: Optional[int]) -> None:
         self._native: Optional[_absenc.Emulation] = _absenc.Emulation(text, link, tcp)
@@ -38,8 +37,7 @@ class Emulation:
 
     @property
     def path(self) -> str:
-        """Path of the pseudo-terminal, or of the link to it; for an encoder on CAN that of an emulated slcan
-        adapter."""
+        """Path of the pseudo-terminal or of the link to it; on CAN, of an emulated slcan adapter."""
         return self._emulation.path
 
     @property
@@ -66,8 +64,7 @@ class Emulation:
         self._emulation.power_on(real)
 
     def raise_alarm(self, name: str) -> None:
-        """Raises one of `protocol.alarms`. Raises UsageError for another name, with the most similar one, and for an
-        alarm that no reply reports with the options of this encoder."""
+        """Raises an alarm of `protocol.alarms`; UsageError if the encoder cannot report it."""
         self._emulation.raise_alarm(name)
 
     def lower_alarm(self, name: str) -> None:
@@ -75,12 +72,11 @@ class Emulation:
         self._emulation.lower_alarm(name)
 
     def set_condition(self, name: str, value: int) -> None:
-        """Sets one of `protocol.conditions`, such as "temperature" in degC, in the units of `absenc list`."""
+        """Sets one of `protocol.conditions`, such as "temperature", in the units of `absenc list`."""
         self._emulation.set_condition(name, value)
 
     def set_fault(self, kind: str, rate: float) -> None:
-        """Sets the share of replies, 0 to 1, with a kind of fault: "corrupt", "drop" ... For "request_corrupt" it is
-        the share of received bytes (CAN: frames). Other faults are unchanged."""
+        """Sets the probability of a kind of fault, 0 to 1: "corrupt", "drop" ..."""
         self._emulation.set_fault(kind, rate)
 
     def clear_faults(self) -> None:
@@ -117,8 +113,8 @@ def emulate(
 
     `motion` is "still", "rpm=R", "sine=DEGREES,HZ" or "file=CSV"; `conditions`, {"temperature": 80}, and `faults`,
     {"corrupt": 0.01}, apply from the start; `link` is the path of a symbolic link to the pseudo-terminal; with `tcp` it
-    also listens on that port of 127.0.0.1, 0: any free port. Other keywords are options of the unit, `model` and
-    `singleturn`, `multiturn`, `alarm`, `seed`, `echo`. Raises UsageError, PortError."""
+    also listens on that port of 127.0.0.1, 0: any free port. Other keywords are options of the unit or of the virtual
+    encoder, such as `model`, `alarm`, `seed`. Raises UsageError, PortError."""
     settings = [f"motion={motion}"]
     settings += [f"condition={name}={value}" for name, value in (conditions or {}).items()]
     settings += [f"fault={kind}={rate}" for kind, rate in (faults or {}).items()]

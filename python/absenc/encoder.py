@@ -20,7 +20,7 @@ Alarm = Flag
 
 
 class Info(NamedTuple):
-    """Identification of an encoder, and its replies to the commands that only read and need no arguments."""
+    """Identification of an encoder, and its replies to commands that only read."""
 
     address: str  #: address: "tformat:/dev/ttyUSB0"
     unit: str  #: id of the protocol: "tformat"
@@ -43,8 +43,7 @@ class Recorded(NamedTuple):
 
 
 class Samples:
-    """Samples at equal intervals, for `for` and `async for`; a missed sample is omitted. The iteration continues when
-    the port is lost and returns: check `Sample.kind`."""
+    """Samples of an encoder, for `for` and `async for`. They continue when the port is lost: check `Sample.kind`."""
 
     def __init__(self, encoder: _absenc.Encoder, rate: float, count: int) -> None:
         self._encoder = encoder
@@ -90,14 +89,14 @@ class Memory:
         self._encoder = encoder
 
     def read(self, address: int, count: int = 1, *, page: int = 0) -> bytes:
-        """Reads and returns the bytes at `count` addresses from `address` on: one each, or a word, low byte first."""
+        """Returns the bytes at `count` addresses: one each, or a word, low byte first."""
         return self._encoder.memory_read(
             natural("address", address), natural("count", count), natural("page", page)
         )
 
     def write(self, address: int, data: bytes, *, page: int = 0, force: bool = False) -> int:
-        """Writes the bytes that differ, reads back each, and reads all again at the end. Returns the number of
-        addresses at which they differed. `force` also writes protected bytes."""
+        """Writes the bytes that differ and reads them back. Returns the number of addresses at which they differed.
+        `force` also writes protected bytes."""
         return self._encoder.memory_write(natural("address", address), data, natural("page", page), force)
 
     def dump(self) -> dict[tuple[int, int], int]:
@@ -121,14 +120,12 @@ class Config:
         return self._encoder.settings_get(name)
 
     def set(self, name: str, *values: int, **named: int) -> dict[str, Field]:
-        """Writes a setting, unless it already has these values, and returns the values that are read back. It does not
-        ask for confirmation. After a change of the address or baud rate, later calls use the new value."""
+        """Writes a setting without asking for confirmation, and returns its values."""
         return self._encoder.settings_set(name, *values, **named)
 
 
 class Encoder:
-    """An open encoder: the context manager that `open` returns. Threads may share it, and take turns; `close` ends the
-    waits of other threads."""
+    """An open encoder: the context manager that `open` returns. Threads may share it."""
 
     def __init__(self, text: str, settings: list[str]) -> None:
         self._encoder = _absenc.Encoder(text, settings)
@@ -145,17 +142,16 @@ class Encoder:
         return f"<absenc.Encoder {self.address}>"
 
     def close(self) -> None:
-        """Closes the port. Calls that wait for a reply in other threads raise Cancelled; loops over samples, and
-        recordings, end."""
+        """Closes the port and ends calls in other threads."""
         self._encoder.close()
 
     def read(self) -> Reading:
-        """Reads the position with all alarms. A position that no second reading confirms is invalid:
-        `Reading.angle_deg` is None. Raises EncoderError, PortError, Cancelled; UsageError after `close`."""
+        """Reads the position with its alarms; an unconfirmed position is invalid. Raises EncoderError, PortError,
+        Cancelled or UsageError."""
         return self._encoder.read()
 
     def samples(self, *, rate: float = 0, count: int = 0) -> Samples:
-        """Returns readings with speed and a position continued past the end of the counter. `rate`: readings per
+        """Returns samples with speed and a position that continues past the end of the counter. `rate`: readings per
         second, 0: as fast as possible; `count`: 0 without limit."""
         return Samples(self._encoder, rate, natural("count", count))
 
@@ -172,9 +168,8 @@ class Encoder:
     ) -> Recorded:
         """Writes readings to a new file for `load`: "log.csv", "log.jsonl" (JSON lines), "log.h5" (HDF5). `rate`:
         readings per second, 0: as fast as possible. Writes every `every`th reading, and each change of the alarms. Ends
-        after `count` readings or `seconds`, by `close` in another thread, or by Ctrl-C, which is raised when all rows
-        are on disk. Losses of the port and missed readings are rows, too. After `part_bytes` or `part_seconds` the next
-        file is started: "log-0001.csv", "log-0002.csv". Raises UsageError, PortError."""
+        after `count` readings or `seconds`, or by `close` in another thread. After `part_bytes` or `part_seconds` the
+        next file is started: "log-0001.csv", "log-0002.csv". Raises UsageError, PortError."""
         size = None if part_bytes is None else natural("part_bytes", part_bytes, most=2**63 - 1)
         recorded = self._encoder.record(
             os.fspath(path), rate, natural("every", every, least=1), natural("count", count), seconds, size, part_seconds
@@ -182,19 +177,16 @@ class Encoder:
         return Recorded(*recorded)
 
     def run(self, command: str, *values: int, **arguments: int) -> dict[str, Field]:
-        """Runs a command of the unit (`commands`) and returns the fields of its reply. It does not ask for
-        confirmation, even if the command changes the encoder; written values are read back."""
+        """Runs a command of the unit and returns the fields of its reply. It does not ask for confirmation."""
         return self._encoder.run(command, *values, **arguments)
 
     def alarms(self) -> Optional[list[Alarm]]:
-        """Reads the raised alarms, with meaning and action; []: all are reported clear; None: none is raised, but not
-        all are reported."""
+        """Reads the raised alarms, with meaning and action; []: all are reported clear; None: not known."""
         names = self._encoder.read_alarms().alarms
         return None if names is None else [flag for flag in self.protocol.alarms if flag.name in names]
 
     def info(self) -> Info:
-        """Runs all commands that only read and need no arguments (identification, temperature, settings), and returns
-        their replies."""
+        """Runs commands that only read and need no arguments, and returns their replies."""
         answers: dict[str, dict[str, Field]] = {}
         failures: dict[str, EncoderError] = {}
         for name in self._encoder.questions():
@@ -221,8 +213,8 @@ class Encoder:
 
     @property
     def change(self) -> Optional[str]:
-        """State of the last call that changes the encoder: "not_sent", "confirmed", "refused", or "unknown" if it was
-        sent without a good reply. None: no such call. Exceptions of such a call have the same attribute."""
+        """State of the last call that changes the encoder: "not_sent", "confirmed", "refused" or "unknown". None: no
+        such call."""
         return self._encoder.change or None
 
     @property
@@ -258,7 +250,7 @@ class Encoder:
 
 def open(text: str, **options: Value) -> Encoder:
     """Opens "tformat:/dev/ttyUSB0?model=23-bit", "sim:esl", or a name in absenc.toml. Keywords are options. Raises
-    PortError; UsageError, which names the mistake and the most similar valid name."""
+    PortError or UsageError."""
     return Encoder(text, texts(options))
 
 

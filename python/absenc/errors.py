@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Exceptions of absenc. All are AbsencErrors; EncoderError has a subclass for each kind of error."""
+"""Exceptions of absenc; EncoderError has a subclass for each kind of error."""
 from __future__ import annotations
 
 from typing import Optional
@@ -8,13 +8,12 @@ from typing import Optional
 class AbsencError(Exception):
     """Base class of the exceptions of this package."""
 
-    #: State of a call that changes the encoder: "not_sent", "confirmed" (but reading back failed), "refused", or
-    #: "unknown" if it was sent without a good reply. None: the call changes nothing.
+    #: State of a call that changes the encoder: "not_sent", "confirmed", "refused", "unknown"; or None.
     change: Optional[str] = None
 
 
 class UsageError(AbsencError, ValueError):
-    """An argument is invalid. The text names the mistake and, for a wrong name, the most similar valid one."""
+    """An argument is invalid."""
 
 
 class Failure(AbsencError):

@@ -63,12 +63,11 @@ class Protocol:
         return f"<absenc.Protocol {self.id}: {self.name}>"
 
     def decode(self, reply: Frame, *, request: Frame = b"", model: str = "", **options: Value) -> dict[str, Field]:
-        """Checks a reply like a host and returns its fields; for an empty reply, those of the request. Invalid values
-        are None. Raises a subclass of EncoderError that names the kind of error; UsageError for wrong arguments."""
+        """Returns the fields of a reply, or of the request for an empty reply. Raises EncoderError or UsageError."""
         return _absenc.decode_frame(self.id, _plain(reply), _plain(request), model, texts(options))
 
     def encode(self, command: str, *values: int, model: str = "", **options: Value) -> Union[bytes, str]:
-        """Returns the request of a command: bytes, on CAN text, on clocked links the bits that the host sends."""
+        """Returns the request of a command: bytes; on CAN and clocked links text."""
         return _absenc.encode_request(self.id, command, list(values), model, texts(options))
 
     def flag_names(self, field: str, bits: int) -> list[str]:
@@ -115,8 +114,8 @@ def crc(
     refout: bool = False,
     xorout: int = 0,
 ) -> Union[int, npt.NDArray[np.uint16]]:
-    """Computes a CRC of 3 to 16 bits with the parameters of the Rocksoft model: a number for bytes, an array of n for
-    an array (n, length) of bytes."""
+    """Computes a CRC of 3 to 16 bits with the parameters of the Rocksoft model: a number for bytes, an array for an
+    array of rows."""
     rows = np.frombuffer(data, np.uint8) if isinstance(data, (bytes, bytearray)) else np.asarray(data, np.uint8)
     sums = _absenc.crc(np.atleast_2d(rows), width, poly, init, refin, refout, xorout)
     return int(sums[0]) if rows.ndim == 1 else sums

@@ -27,17 +27,15 @@ Cells = Mapping[str, Any]
 
 
 class Recording(Table):
-    """Readings and events in order of time: `recording["angle_deg"]` is a column, `rows` has all columns as one
-    structured masked array. A number that is missing or invalid is masked (and NaN in floats); a missing text is "".
+    """Readings and events: `recording["angle_deg"]` is a column, `rows` has all columns as one structured masked array.
+    A number that is missing or invalid is masked (and NaN in floats); a missing text is "".
 
     `event` is "" for a reading and "restarted" for one whose `position` starts again; "lost" and "back" concern the
-    port; "gap" counts in `missed` the readings that were due but not taken; all others are errors instead of a reading.
-    `header` has the values at the start of the file: "encoder", "protocol", "model", "options", "started" ... Flags are
-    numbers: `Protocol.flag_names` names them; 0: all are reported clear, masked: not all are reported.
+    port; "gap" counts in `missed` the readings that were due but not taken. Flags are numbers: `Protocol.flag_names`
+    names them.
 
-    `is_whole`: the file has an end mark and as many rows as this states. It is False for a recording that is still being
-    written, whose process was killed or whose disk was full, for a truncated file, and for files of absenc before 0.5.
-    `damage` describes an omitted last line that was truncated; it is "" otherwise."""
+    `is_whole`: the file has an end mark and as many rows as this states. `damage` describes an omitted last line that
+    was truncated; it is "" otherwise."""
 
     def __init__(
         self, rows: Masked, columns: dict[str, Column], header: dict[str, str], is_whole: bool = False, damage: str = ""
@@ -204,14 +202,10 @@ def _load_hdf5(path: Path) -> Recording:
 
 
 def load(file: Union[str, os.PathLike[str]]) -> Recording:
-    """Loads a recording of `absenc record`, whose name ends in .csv, in .jsonl or .ndjson for JSON lines, or in .h5 or
-    .hdf5. All formats give the same columns and types. Details that only JSON lines have (`message`, `sent` ...) are
-    omitted; times have a resolution of one microsecond in CSV.
+    """Loads a recording of `absenc record`, whose name ends in .csv, .jsonl, .ndjson, .h5 or .hdf5.
 
-    A last line without a line end may be incomplete: it is omitted, which a warning and `Recording.damage` report.
-    `Recording.is_whole` is False if rows may be missing.
-
-    Raises UsageError; Failure, which names the file, if it is no recording or damaged elsewhere; OSError."""
+    A last line without a line end is omitted, which a warning and `Recording.damage` report. Raises UsageError,
+    Failure, OSError."""
     path = Path(file)
     if path.suffix in (".h5", ".hdf5"):
         try:

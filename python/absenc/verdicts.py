@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Diagnosis (doctor), conformance tests, options found from frames, the ports of this computer, and waveform files of
-virtual encoders."""
+"""Diagnosis, conformance tests, options found from frames, ports, and waveform files."""
 from __future__ import annotations
 
 import json
@@ -67,7 +66,7 @@ class Conformance(NamedTuple):
 
 
 class OptionEvidence(NamedTuple):
-    """Evidence for or against one value of an option that the document leaves open: whether the frames permit it."""
+    """Evidence for or against one value of an option."""
 
     option: str
     value: Union[bool, int, str]
@@ -95,7 +94,7 @@ class Waved(NamedTuple):
 
 
 class Port(NamedTuple):
-    """A port of this computer, as `absenc ports --json` prints it. None: unknown, or not applicable to this kind."""
+    """A port of this computer. None: unknown, or not applicable."""
 
     port: str  #: name of the port: "/dev/ttyUSB0", "can0", "/dev/spidev0.0"
     kind: str  #: kind of port: "serial", "can", "spi"
@@ -115,9 +114,8 @@ class Port(NamedTuple):
 def doctor(
     text: str, *, seconds: float = 3, readings: int = 100_000, turning_s: float = 0, **options: Value
 ) -> Examination:
-    """Examines port, line and encoder, and reads for `seconds` or until it has `readings`; changes nothing. A port that
-    cannot be opened is a finding. With `turning_s` it reads for this time while the user turns the shaft. Text and
-    options are as for `open`. Raises UsageError."""
+    """Examines port, line and encoder; changes nothing. It reads for `seconds` or until it has `readings`; with
+    `turning_s` also while the user turns the shaft. Text and options are as for `open`. Raises UsageError."""
     if not seconds > 0:
         raise UsageError(f"seconds is greater than 0, not {seconds!r}")
     found = json.loads(
@@ -130,8 +128,8 @@ def doctor(
 def conform(
     text: str, *, readings: int = 100, changes: bool = False, resets: bool = False, **options: Value
 ) -> Conformance:
-    """Tests an encoder against the clauses of its document. `changes` permits writing, and restores what was written;
-    `resets` also permits tests that lose zero, turns and alarms. Raises UsageError, PortError, Failure."""
+    """Tests an encoder against the clauses of its document. `changes` permits writing; `resets` also permits tests that
+    lose zero, turns and alarms. Raises UsageError, PortError, Failure."""
     if resets and not changes:
         raise UsageError("resets needs changes: give both, or neither")
     found = json.loads(_absenc.conform(text, texts(options), natural("readings", readings, 1), changes, resets))
@@ -142,9 +140,8 @@ def conform(
 def probe(
     protocol: str, replies: Sequence[str], requests: Sequence[str] = (), *, model: str = "", **options: Value
 ) -> Probed:
-    """Finds options that the protocol's document leaves open, from captured frames. `replies` and `requests` are
-    frames as text (see `absenc.protocols.Frame`), in the same order; "" for one that is missing or unknown. Raises
-    UsageError."""
+    """Finds options that the protocol's document leaves open, from captured frames. `replies` and `requests`: texts in
+    the same order, "" for a missing frame. Raises UsageError."""
     found = json.loads(_absenc.probe(protocol, model, texts(options), list(replies), list(requests)))
     found["evidence"] = [OptionEvidence(**one) for one in found["evidence"]]
     return Probed(**found)
@@ -162,9 +159,8 @@ def wave(
     **options: Value,
 ) -> Waved:
     """Writes a conversation with a virtual encoder ("tformat", "sim:esl?fault=corrupt=0.1") as a waveform: .vcd, .sr
-    (sigrok) or .csv (Saleae Logic 2), by the end of the name. Without commands it reads, `count` results at `rate` per
-    second. Time is virtual and exact to the nanosecond. Raises UsageError, also if the file exists, unless `replaces`
-    is set."""
+    (sigrok) or .csv (Saleae Logic 2), by the end of the name. Without commands it reads `count` results at `rate` per
+    second. `replaces` permits an existing file. Raises UsageError."""
     return Waved(
         *_absenc.wave(
             text,
@@ -180,5 +176,5 @@ def wave(
 
 
 def ports() -> list[Port]:
-    """Returns the ports of this computer that an encoder may be connected to. It opens none of them."""
+    """Returns the ports of this computer that an encoder may be connected to."""
     return [Port(**json.loads(one)) for one in _absenc.ports()]

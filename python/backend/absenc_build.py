@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Build backend of the Python package (PEP 517): CMake builds the module, which is then packed into a wheel. Nothing is
-downloaded: all dependencies are Debian packages (command_packages in ./dev).
+"""Build backend of the Python package (PEP 517), for which CMake builds the module.
 
     pip install --no-build-isolation --no-index --no-deps .
     pip install ... --config-settings build-dir=build/release .     # uses a configured build tree

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads a turning virtual encoder at 100 Hz, records it, and shows the error after its supply has failed."""
+"""Reads a turning virtual encoder, records it, and shows an error."""
 import os
 import tempfile
 

@@ -32,7 +32,6 @@ void raise(const py::object& error) { PyErr_SetObject(py::type::of(error).ptr(),
 
 void raise(const char* name, const std::string& sentence) { raise(errors().attr(name)(sentence)); }
 
-// Sets the attribute `change` of the exception to the state of the change, if the call was to change the encoder.
 py::object changed(py::object error, const std::exception& failure) {
   if (const client::Change* change = client::change_of(failure)) {
     error.attr("change") = py::str(std::string(client::word_of(change->state)));

@@ -18,12 +18,10 @@ namespace absenc::python {
 
 namespace py = pybind11;
 
-/// An object that checks whether a Python signal handler has raised an exception, during waits without the GIL. Python
-/// runs handlers in its main thread only, so a check in another thread finds no new exception.
+/// A watch for exceptions of Python signal handlers, which run in the main thread only.
 class SignalWatch {
  public:
-  /// Returns whether a signal handler has raised an exception, so that the wait must end. Checks at most every 20 ms.
-  /// Call it without the GIL.
+  /// Returns whether a signal handler has raised an exception. To be called without the GIL.
   [[nodiscard]] bool wants_end();
   /// Throws the exception that the signal handler raised, if any. Call it with the GIL.
   void rethrow();
@@ -39,8 +37,7 @@ void register_exceptions();
 /// Returns an exception object of absenc.errors that describes a failed command.
 [[nodiscard]] py::object error_object(const client::Trouble& trouble);
 
-/// Converts a value to Python: numbers, truth values, texts and bytes; flags become a tuple of names; missing, invalid
-/// and unreported values become None.
+/// Converts a value to Python; flags become a tuple of names, missing and invalid values None.
 [[nodiscard]] py::object to_python(const client::Value& value);
 /// Returns the values of an answer as a dict by column name.
 [[nodiscard]] py::dict to_python(const client::Answer& answer);

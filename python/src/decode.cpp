@@ -78,8 +78,7 @@ struct Values {
     return objects();
   }
 
-  // Returns the values as Python objects. Equal values, such as most requests and texts, are one object; this holds for
-  // the first 256 different values.
+  // Equal values share an object, as long as there are few different ones.
   [[nodiscard]] py::object objects() const {
     py::list list(ends.size());
     std::unordered_map<std::string_view, py::object> known;
@@ -141,8 +140,7 @@ class Rows {
     return list;
   }
 
-  /// Returns a list with a tuple (values, missing) for each column, of at most `most` rows; None at the end of the
-  /// capture.
+  /// Returns a tuple (values, missing) for each column; None at the end of the capture.
   py::object take(std::size_t most) {
     std::vector<Values> columns;
     for (const Column& column : decoded_.columns()) columns.emplace_back(column.type);

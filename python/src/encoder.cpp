@@ -41,7 +41,7 @@ struct Closed : client::UsageError {
 /// An encoder that any Python thread may use. Threads take turns and wait without the GIL.
 class PyEncoder {
  public:
-  /// Calls `work` with the encoder, without the GIL, and returns its result, which must not contain Python objects.
+  /// Calls `work` without the GIL; its result must not contain Python objects.
   template <class Work>
   auto use(const Work& work) {
     try {
@@ -73,8 +73,7 @@ class PyEncoder {
     if (!std::exchange(closed_, true)) encoder_.disconnect();
   }
 
-  /// Ends the present and all later waits of the encoder if `stopping`; otherwise permits waits again. A loop over
-  /// samples ends without an exception.
+  /// Ends the waits of the encoder if `stopping`, else permits them.
   void stop(bool stopping) { stopping_ = stopping; }
 
   [[nodiscard]] const client::Encoder& encoder() const { return encoder_; }
@@ -127,8 +126,7 @@ std::int64_t whole_number(const Argument& argument, const py::handle& value) {
   }
 }
 
-/// Returns the arguments in the order of the command. Missing ones before a named one have their defaults; missing ones
-/// at the end are left out. Throws UsageError.
+/// Returns the arguments in the order of the command. Throws UsageError.
 std::vector<std::int64_t> arguments_of(const Command& command, const py::args& args, const py::kwargs& named) {
   std::vector<std::int64_t> values;
   if (args.size() > command.arguments.size()) {

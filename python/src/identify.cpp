@@ -30,8 +30,7 @@ py::tuple to_tuple(const client::Identified& identified) {
   return py::make_tuple(found, identified.notes, identified.is_complete);
 }
 
-/// Searches the line and returns the result as a tuple. A Python signal handler may end the search between two
-/// attempts.
+/// Searches the line. A Python signal handler may end the search between two attempts.
 py::tuple identify(const std::string& place, double limit_s) {
   SignalWatch watch;
   try {

@@ -17,7 +17,7 @@ namespace absenc::python {
 
 namespace {
 
-/// Returns a frame converted from bytes or text; an empty frame for an empty object. Throws UsageError.
+/// Converts bytes or text to a frame. Throws UsageError.
 client::WireFrame frame_of(LinkKind link, const char* what, const py::object& object) {
   if (py::len(object) == 0) return {};
   if (py::isinstance<py::str>(object)) return client::parse_wire_text(link, what, py::cast<std::string>(object));

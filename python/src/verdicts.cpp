@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Binds doctor, conform and probe, the ports of this computer, and waveforms to Python. Results are JSON with the texts
-// of the command, except that of `wave`.
+// Binds doctor, conform, probe, ports and wave to Python.
 #include "absenc/client/captures/probe.hpp"
 #include "absenc/client/conform/conform_text.hpp"
 #include "absenc/client/doctor/examine.hpp"
@@ -17,8 +16,7 @@ using SettingTexts = std::vector<std::string>;
 
 Time duration_of(double seconds) { return std::chrono::duration_cast<Time>(std::chrono::duration<double>(seconds)); }
 
-/// Runs `work` without the GIL and returns its result. `work` gets a function that returns whether a Python signal
-/// handler wants to end it.
+/// Runs `work` without the GIL. It gets a function that says whether a signal handler ends it.
 template <class Work>
 std::string watched(const Work& work) {
   SignalWatch watch;

@@ -51,8 +51,7 @@ def test_info_has_no_failures(address):
 
 
 def test_encodes_and_decodes_requests(unit):
-    """An encoded request is decoded. A changed one is refused: on CAN with 7 as first character, on links of bytes with
-    0xFF as first byte and a further 0xFF at the end."""
+    """Encodes requests and decodes them, also changed ones."""
     requests = []
     for command in unit.commands.values():
         if command.arguments:

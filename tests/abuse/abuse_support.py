@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Helpers of the abuse tests: makes the modules of tests/ importable, and selects the short or the full test."""
+"""Helpers of the abuse tests: the import path of tests/, and the short or the full test."""
 import os
 import pathlib
 import sys
@@ -9,7 +9,7 @@ ALL = bool(os.environ.get("ABSENC_ABUSE_ALL"))  # whether to run the full test, 
 
 
 def often(short, everything):
-    """Returns the number of repetitions of a test: `short` in the normal test run, `everything` with run.py --all."""
+    """Returns `short` in the normal test run, and `everything` with run.py --all."""
     return everything if ALL else short
 
 

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MQTT brokers that close connections, stop replying, are unreachable or restart, and `absenc serve` killed with
-SIGKILL: no reading may be lost, and none may arrive twice with different ids."""
+"""MQTT brokers that fail, and `absenc serve` killed with SIGKILL: no reading may be lost."""
 from abuse_support import often
 
 import os

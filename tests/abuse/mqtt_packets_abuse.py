@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Conversations in which a broker violates MQTT: no `absenc serve` may end, and no reading may be lost.
-ABSENC_ABUSE_SEED=N sets the first seed; conversation I of a run uses the seed N + I."""
+"""Conversations in which a broker violates MQTT: no `absenc serve` may end. ABSENC_ABUSE_SEED=N sets the first seed."""
 from abuse_support import often
 
 import os
@@ -69,8 +68,7 @@ def bad_packet(random_, kind, number):
 
 
 def acknowledged(stream):
-    """Returns the numbers of the messages that `stream`, the bytes sent by a broker, acknowledges, and the incomplete
-    packet at the end of `stream`."""
+    """Returns the acknowledged numbers in `stream`, and the incomplete packet at its end."""
     found = []
     while True:
         sizes = next((stream[1:end] for end in range(2, 6) if end <= len(stream) and stream[end - 1] < 128), None)
@@ -88,8 +86,7 @@ def acknowledged(stream):
 class Conversation:
     def __init__(self, seed):
         self.random = random.Random(seed)
-        # With 0 good packets, in three of eight conversations, the bad packet replaces the CONNACK or follows it
-        # directly.
+        # With 0, the bad packet replaces the CONNACK or follows it.
         self.good_packets = self.random.choice((0, 0, 0, 1, 2, 3, 5, 8))
         self.seen = 0
         self.ends = None
@@ -100,8 +97,7 @@ class Conversation:
         return [*sorted(self.received), NOBODYS]
 
     def truthful(self, data):
-        """Returns `data`, which is sent to the client. Raises Closed to close the connection if `data` acknowledges a
-        message that was not received, because no client could detect that loss."""
+        """Returns `data`. Raises Closed if it acknowledges a message that was not received."""
         found, self.rest = acknowledged(self.rest + data)
         if any(number != NOBODYS and number not in self.received for number in found):
             raise Closed
@@ -174,8 +170,7 @@ class Packets(ServeCase):
         messages = []
         last = 0
         while last < goal:
-            # Each new message extends the deadline. After refusals of a topic, a client waits for up to a minute before
-            # it retries.
+            # After refusals of a topic, a client waits for up to a minute before it retries.
             late = time.monotonic() + 90 + PATIENCE
             while not (new := self.broker.after(topic, len(messages))):
                 self.assertLess(time.monotonic(), late, f"reading {goal} comes after {last}: {server.json('/api/mqtt')}")

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Spool files of `absenc serve` that are changed, truncated, overwritten, removed or replaced, while the server has
-them open and between two runs. The server must run, publish readings, empty its spool, and use no id twice."""
+"""Damaged spool files: the server must run, empty its spool, and use no id twice."""
 from abuse_support import often
 
 import os
@@ -78,8 +77,7 @@ class Spool(MqttCase):
         wait_until(lambda: (numbers(broker.all("/readings"), ONE) or [0])[-1] > first, "what is read comes")
         wait_until(lambda: self.mqtt(server)["waiting"] < 50, "the spool empties")
         found = numbers(broker.all("/readings"), ONE)
-        # A reading's number may repeat only if its spool file was damaged: the numbers then restart, but each message
-        # has a new id.
+        # After damage the numbers of readings may repeat, but each message has a new id.
         ids = [one["id"] for one in broker.all("/readings")]
         self.assertEqual(len(set(ids)), len(ids), "no id comes twice")
         self.assertGreater(len(found), 0)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the abuse tests (*_abuse.py) of this folder one after another. Usage: run.py [--all] [part of a name...]"""
+"""Runs the abuse tests of this folder: run.py [--all] [part of a name...]"""
 import os
 import pathlib
 import subprocess

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The history file of a running `absenc serve` is moved, removed, replaced, truncated or overwritten, and the server is
-killed with SIGKILL. Readings must continue, the history must be recorded again within seconds, and no acknowledged
-command may be lost from it."""
+"""The history file of a running `absenc serve` is damaged, or the server is killed."""
 from abuse_support import often
 
 import contextlib
@@ -20,7 +18,7 @@ SEED = int(os.environ.get("ABSENC_ABUSE_SEED", "1"))
 
 
 def harm(random_, path):
-    """Moves, removes, replaces or damages the history file. Returns a text that names what was done."""
+    """Moves, removes, replaces or damages the history file. Returns what was done."""
     way = random_.choice(("move", "move all", "remove", "remove all", "replace", "cut off", "overwrite"))
     size = os.path.getsize(path)
     if way.startswith("move"):

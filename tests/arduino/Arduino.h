@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Stub of the part of Arduino's core that a sketch with a serial port needs, with the macros of real cores. An encoder
-// on Serial1 sends one reply to every position request that comes at 2500000 baud with the direction pin high; in every
-// third reply one bit is flipped.
+// Stub of the part of Arduino's core that a sketch with a serial port needs. An encoder on Serial1 replies to requests;
+// in every third reply one bit is flipped.
 #pragma once
 
 #include <cstddef>
@@ -31,8 +30,7 @@ inline int direction = -1;
 inline void pinMode(int, int) {}
 inline void digitalWrite(int, int value) { direction = value; }
 
-// Each call advances the clock by 10 us, so that a loop which only polls the clock ends. The counter wraps around as on
-// a real board.
+// Each call advances the clock by 10 us, so that a loop which only polls the clock ends.
 inline std::uint32_t microseconds_passed = 0xFFFF'0000;
 inline std::uint32_t micros() { return microseconds_passed += 10; }
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that a user can follow the advice for each alarm and error, and that following that for an alarm has an effect
-// or an explanation.
+// Checks the advice for alarms and errors.
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -94,12 +93,11 @@ std::string unquoted(std::string_view text) {
 
 // ---- Rules for the wording of every advice
 
-/// Phrases that refer the reader to the alarms. No advice may have them, because that of an alarm would refer to
-/// itself.
+/// Phrases that no advice may have: the advice for an alarm would refer to itself.
 constexpr auto circular_phrases =
     std::to_array<std::string_view>({"read the alarms", "look at the alarms", "the other alarms", "see the alarms"});
 
-/// Checks the wording of one advice. `what` names what has this advice, such as an alarm or error.
+/// Checks the wording of one advice. `what` names its owner in the findings.
 void check_words(const Unit& unit, const std::string& what, std::string_view advice, Findings& findings) {
   const auto require = [&](bool holds, std::string_view text) {
     findings.require(holds, [&] { return what + " is advised \"" + std::string(advice) + "\": " + std::string(text); });
@@ -165,9 +163,7 @@ bool reports_more(const ReportedFields& result, const ReportedFields& reading) {
                      [&](const auto& field) { return !reading.fields.contains(field.first); });
 }
 
-/// Runs the commands that the advice of alarm `bit` names, in order. Returns whether the alarm has ended; false also if
-/// the encoder does not exist or does not show the alarm. Adds a finding if the advice names commands, but the alarm
-/// remains and none of them explains its failure or reports a further field.
+/// Runs the commands that the advice of alarm `bit` names. Returns whether the alarm has ended.
 template <class Item>
 bool follow_advice(const Unit& unit, const Configuration& configuration, std::size_t bit, Findings& findings) {
   const FlagInfo& flag = unit.alarms->flags[bit];
@@ -213,7 +209,7 @@ void check_alarms(const Unit& unit, Findings& findings) {
   }
 }
 
-/// Checks, for each alarm, that a reading reports an alarm if the advice of a set status flag refers to the alarms.
+/// Checks that an alarm is reported wherever the advice of a status flag refers to the alarms.
 template <class Item>
 void check_status(const Unit& unit, const Configuration& configuration, Findings& findings) {
   if (unit.alarms == nullptr || unit.status == nullptr) return;
@@ -255,8 +251,7 @@ void check_message(const Unit& unit, const std::string& what, const Command& com
   }
 }
 
-/// Calls `use(name, spoil)` for no problem, all alarms together, the least and greatest value of each condition, and
-/// each fault of the line. `spoil(world)` causes the problem.
+/// Calls `use(name, spoil)` for each problem and for none. `spoil(world)` causes the problem.
 template <class Item, class Use>
 void for_each_problem(const Unit& unit, Use use) {
   use(std::string("nothing"), [](World<Item>&) {});
@@ -277,8 +272,7 @@ void for_each_problem(const Unit& unit, Use use) {
   }
 }
 
-// Time limit of one conversation: a host that polls ten thousand times a second is slow to simulate, and a failing
-// conversation fails early.
+// Time limit of one conversation: a host that polls often is slow to simulate.
 constexpr Time time_limit = std::chrono::milliseconds(100);
 
 template <class Item>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks the effect of commands that change an encoder: zero, resets, writes of memory bytes and of settings. The
-// effect is read over a line without faults.
+// Functions that check the effect of commands that change an encoder.
 #pragma once
 
 #include <algorithm>
@@ -11,8 +10,7 @@
 
 namespace absenc::kit {
 
-/// Returns a pointer to the value, in `values`, of the command's argument with this role; null if there is no such
-/// argument.
+/// Returns the value of the argument with this role, in `values`; null if there is none.
 [[nodiscard]] inline std::int64_t* argument(const Command& command, Values& values, Role role) {
   const Argument* const found = find_role(command.arguments, role);
   return found != nullptr ? &values[static_cast<std::size_t>(found - command.arguments.data())] : nullptr;
@@ -32,8 +30,7 @@ namespace absenc::kit {
   return values;
 }
 
-/// Returns random arguments that the command accepts; for a write to the memory those of a writable byte, or no value
-/// if the unit declares none.
+/// Returns random arguments for the command; none for a memory write without a writable byte.
 [[nodiscard]] inline std::optional<Values> change_arguments(const Unit& unit, const Command& command,
                                                             sim::Random& random) {
   if (command.verb != Verb::memory_write) return random_arguments(command, random);
@@ -47,8 +44,7 @@ namespace absenc::kit {
   return memory_arguments(command, area, address, static_cast<std::uint8_t>(random.below(256)));
 }
 
-/// Applies the new value of a setting to the host's options too, if the command declares such an option
-/// (`changes_option`), for example the address.
+/// Sets the option that the setting changes (`changes_option`), if any, for the host too.
 template <class Item>
 void apply_to_host(World<Item>& world, const Unit& unit, const Command& setter, Arguments arguments) {
   if (setter.changes_option.empty()) return;
@@ -66,8 +62,7 @@ void apply_to_host(World<Item>& world, const Unit& unit, const Command& setter, 
   world.set_options(options);
 }
 
-/// Runs the command until it succeeds, four times at most, and returns the last result. An unsolicited frame of the
-/// encoder may interrupt a command; a session repeats it in that case too.
+/// Runs the command four times at most, because unsolicited frames may interrupt it.
 template <class Item>
 ConversationResult run_repeated(World<Item>& world, const Command& command, Arguments arguments) {
   ConversationResult result = world.run(command, arguments);
@@ -78,7 +73,7 @@ ConversationResult run_repeated(World<Item>& world, const Command& command, Argu
   return result;
 }
 
-/// Returns the fields that the setting's `config get` command reports, or no field if the setting cannot be read.
+/// Returns the fields that the setting's `config get` command reports, if there is one.
 template <class Item>
 ReportedFields read_setting(World<Item>& world, const Unit& unit, const Command& setter) {
   const Command* getter = find_command(unit, setter.reads_back);
@@ -92,8 +87,7 @@ ReportedFields read_setting(World<Item>& world, const Unit& unit, const Command&
   });
 }
 
-/// Returns a text that names the promise which the successful command broke, or an empty text if no broken promise is
-/// found. The line must have no faults.
+/// Returns the promise that the successful command broke on a good line, or an empty text.
 template <class Item>
 std::string broken_promise(World<Item>& world, const Unit& unit, const Command& command, Values values,
                            const ReportedFields& written) {
@@ -138,8 +132,7 @@ std::string broken_promise(World<Item>& world, const Unit& unit, const Command& 
       const ReportedFields now = read_setting(world, unit, command);
       if (!command.reads_back.empty() && now.fields.empty()) return "it cannot be read";
       for (const auto& [name, value] : now.fields) {
-        // A numbered field is one of several frames, and a position field depends on the shaft: neither needs to be
-        // equal to the written field.
+        // A repeated field is one of several frames, and a position depends on the shaft.
         if (name.find('#') != std::string::npos || is_of_reading(value.role)) continue;
         const auto found = written.fields.find(name);
         if (found != written.fields.end() && !(found->second == value)) return name + " reads differently";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that commands succeed and report true values, with the virtual encoder on a line without faults.
+// Checks the commands with the virtual encoder on a line without faults.
 #include <algorithm>
 
 #include "absenc/sim/place.hpp"
@@ -9,19 +9,18 @@
 namespace absenc::kit {
 namespace {
 
-/// Returns whether the kit requires that this command succeeds with each model, unless `is_refused`.
+/// Returns whether the command must succeed with each model, unless `is_refused`.
 bool is_plain(const Command& command) {
   return command.verb == Verb::read || command.verb == Verb::read_part || command.verb == Verb::info ||
          command.verb == Verb::temperature || command.verb == Verb::config_get;
 }
 
-// Returns whether `error` of a command other than `read` may mean that the caller must do an earlier step.
+// Returns whether `error` is an acceptable refusal of the command.
 bool is_refused(const Command& command, Error error) {
   return command.verb != Verb::read && (error == Error::unsupported || error == Error::invalid_argument);
 }
 
-// Runs every command that does not change the encoder. An unusual option (such as a reply time of one second) may make
-// a command fail, but must never make its result wrong.
+// Unusual options may make a command fail, but never make its result wrong.
 template <class Item>
 void run_commands(const Unit& unit, const Configuration& configuration, Findings& findings) {
   sim::Random random(7);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that a host can observe each condition of a virtual encoder in the result of some command.
+// Checks that a host can observe the conditions of a virtual encoder.
 #include <algorithm>
 #include <array>
 #include <set>
@@ -25,7 +25,7 @@ class ConditionedEncoder {
 
   [[nodiscard]] bool made() const { return world_.made(); }
   void move() { world_.move(world_.place() + some_turns); }
-  // Switches the encoder off, turns the shaft by `some_turns`, switches the encoder on, and waits 1 ms.
+  // Turns the shaft while the encoder is off.
   void lose_power() {
     world_.device().power_off(now());
     move();
@@ -52,8 +52,7 @@ std::uint32_t all_alarms(const Unit& unit) {
   return bits;
 }
 
-// Returns whether any reset, or any command that changes nothing, except a scan, reports different results for two
-// encoders that are treated equally: at once, after a power cycle, with all alarms raised, and after resets.
+// Returns whether some command reports different results for two equally treated encoders.
 template <class Item>
 bool reports_differ(const Unit& unit, ConditionedEncoder<Item>&& one, ConditionedEncoder<Item>&& other) {
   if (!one.made()) return false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks what a unit declares about memory, registers, settings and roles, and the requests of its commands.
+// Checks what a unit declares, and the requests of its commands.
 #include <algorithm>
 #include <array>
 #include <set>
@@ -84,7 +84,7 @@ void declared_settings(const Unit& unit, Findings& findings) {
   }
 }
 
-// Checks that no two members of a list have the same role, except Role::other: a search by role finds only the first.
+// Checks that no role but Role::other occurs twice: a search by role finds only the first.
 template <class Named>
 void declared_once(std::span<const Named> all, std::string_view whose, Findings& findings) {
   for (const Named& one : all) {
@@ -94,7 +94,7 @@ void declared_once(std::span<const Named> all, std::string_view whose, Findings&
   }
 }
 
-// Checks that the unit has the arguments, fields and options that callers of its commands search for by role.
+// Checks that the unit declares the roles that callers of its commands search for.
 void declared_roles(const Unit& unit, Findings& findings) {
   declared_once(unit.options, unit.id, findings);
   const auto has_field = [&](Role role) { return find_role(unit.fields, role) != nullptr; };
@@ -151,8 +151,7 @@ void request_of(const Unit& unit, const Configuration& configuration, const Comm
   if (error == Error::invalid_argument) return;  // no encoder has this combination of options
   findings.require(error == Error::none && !seen.fields.empty(),
                    [&] { return what() + "is " + std::string(text_of(error).name); });
-  // A field that belongs to every request may have the name of an argument, and the argument's value stand in another
-  // field. So any field with the value counts.
+  // Any field with the value counts: another one may have the argument's name.
   for (std::size_t i = 0; i < values.size(); ++i) {
     const Argument& one = command.arguments[i];
     if (!seen.fields.contains(std::string(one.name)) || (!one.required && values[i] == one.default_value)) continue;
@@ -162,7 +161,6 @@ void request_of(const Unit& unit, const Configuration& configuration, const Comm
   }
 }
 
-// Checks that the command refuses an argument outside its range, a missing argument and an extra argument.
 void refused_arguments(const Unit& unit, const Configuration& configuration, const Command& command,
                        Findings& findings) {
   std::vector<std::byte> storage(unit.host_storage);

@@ -41,8 +41,7 @@ class Decoding {
       close("reply", reply, vector_.open_reply, is_as_stated);
   }
 
-  // Checks that a request without a reply is no evidence against the options of the vector it comes from, unless it is
-  // with its reply too.
+  // Checks that a request alone does not speak against options that its reply leaves possible.
   void unanswered() {
     if (unit_.probe == nullptr) return;
     struct Against final : EvidenceSink {
@@ -64,7 +63,7 @@ class Decoding {
             [&] { return "its request alone speaks against its options: " + std::string(why); });
   }
 
-  // Checks that the decoder refuses an incomplete or extended request of bytes and reports no field of it.
+  // Checks that the decoder refuses incomplete and extended requests of bytes.
   void good_request() {
     if (request_.empty() || request_.can || unit_.link == LinkKind::clocked) return;
     const auto unknown = [&](const OwnedFrame& request, std::string_view what) {
@@ -102,8 +101,7 @@ class Decoding {
   }
 
  private:
-  // Tries each value of the open bytes of a frame, if they have at most 16 bits, and reports the first good frame.
-  // Returns whether there is one, to which `frame` then is set; true if the frame has no open bytes.
+  // Searches open bytes for a value that makes the frame good, and stores it in `frame`.
   template <class IsGood>
   bool close(std::string_view name, std::vector<std::uint8_t>& frame, OpenBytes open, IsGood is_good) {
     if (open.count == 0) return true;
@@ -143,7 +141,7 @@ class Decoding {
     findings_.require(holds, [&] { return std::string(vector_.id) + " " + text(); });
   }
 
-  // Decodes the frame, and checks that the decoder of many frames, if there is one, gives the same.
+  // Decodes the frame, if possible also with the decoder of many frames, which must agree.
   Error decode(const OwnedFrame& reply, ReportedFields& seen) {
     const Error error = unit_.decode(options_, request_.frame(), reply.frame(), seen);
     if (decoder_ == nullptr) return error;
@@ -154,7 +152,7 @@ class Decoding {
     return error;
   }
 
-  // Checks that the decoder refuses the frame, and reports no field or reading together with the error.
+  // Checks that the decoder refuses the frame and reports nothing of it.
   template <class Text>
   void refused(const OwnedFrame& reply, Text&& text) {
     ReportedFields seen;
@@ -184,8 +182,7 @@ class Decoding {
     }
   }
 
-  // Checks that the decoder refuses the frame if it is extended, remote, or has one bit of its identifier flipped. Bits
-  // are flipped only in vectors with a request, which determines the identifier of its reply.
+  // Checks that the decoder refuses other identifiers, extended frames and remote frames.
   void other_frames() {
     for (unsigned bit = 0; bit < 11 && !request_.empty(); ++bit) {
       OwnedFrame other = reply_;
@@ -201,8 +198,7 @@ class Decoding {
     refused(remote, [] { return std::string("as a remote frame"); });
   }
 
-  // Returns whether the reply of any vector without an error has this identifier: some requests may be answered on one
-  // of several identifiers.
+  // Returns whether the good reply of any vector has this identifier.
   [[nodiscard]] bool is_of_a_vector(std::uint32_t id) const {
     return std::any_of(unit_.vectors.begin(), unit_.vectors.end(), [&](const Vector& one) {
       const OwnedFrame reply = frame_of(unit_, one.reply);

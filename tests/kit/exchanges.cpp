@@ -52,7 +52,7 @@ struct Tally {
   std::map<std::string, Command> commands{};
 };
 
-/// Difference between the result of a conversation and the true values; an empty text means no difference.
+/// Difference between a result and the truth; an empty text means none.
 struct Difference {
   std::string text{};
   bool position = false;
@@ -104,8 +104,7 @@ class Campaign {
     if (unit.link == LinkKind::spi) rates = {};
     rates[FaultKind::corrupt] = unit.link == LinkKind::can ? 0 : 0.1;  // CAN's own checksum detects damaged frames
     if (test.requests_too) rates[FaultKind::request_corrupt] = 0.02;
-    // With odd seeds, unless requests are damaged too, delayed replies come after the host's timeout. CAN and encoders
-    // with unsolicited frames are excluded, because a host cannot determine the age of such a frame.
+    // A host cannot determine the age of a frame on CAN or of an unsolicited frame.
     const bool unsolicited = unit.link == LinkKind::can || (unit.streams != nullptr && unit.streams(options));
     if (test.seed % 2 == 1 && !test.requests_too && !unsolicited) rates.delay = unit.timing.turnaround_limit * 3 / 2;
     return rates;
@@ -121,7 +120,7 @@ class Campaign {
     if (!unit_.alarms->flags[bit].name.empty()) world_.device().raise_alarms(1u << bit);
   }
 
-  // Records what repeatable commands (`is_repeatable`) report on an undamaged line. Long commands are often left out.
+  // Records what repeatable commands report on an undamaged line; leaves out most long ones.
   void record_truth() {
     for (std::int64_t& place : places_) place = static_cast<std::int64_t>(random_.next());
     for (const Command& command : unit_.commands) {
@@ -130,8 +129,7 @@ class Campaign {
       if (cost > 20 && !random_.chance(0.1)) continue;
       Query query{&command,
                   command.verb == Verb::memory_read ? least_arguments(command) : random_arguments(command, random_)};
-      // Except for `read`, the results at the other positions are recorded on first use, because some commands take a
-      // hundred exchanges.
+      // Only `read` is recorded at all positions here: some commands take a hundred exchanges.
       if (!record_truth_at(query, 0)) continue;
       cost = query.cost;
       if (command.verb == Verb::read) {
@@ -199,8 +197,7 @@ class Campaign {
                       [&] { return where(query) + "has a reading before any reply, or with an error"; });
     if (!result.good()) return;
     ++tally_.accepted;
-    // The command `info` may send several requests, and a fault may remove one of the replies: the result may then lack
-    // fields.
+    // A fault may remove one of several replies to `info`.
     const bool may_miss = query.command->verb == Verb::info && result.faults != 0;
     const Difference wrong = difference(query, result, may_miss);
     if (wrong.text.empty()) return;
@@ -215,8 +212,7 @@ class Campaign {
     ++(wrong.position ? command.wrong_positions : command.wrong_values);
   }
 
-  // Returns whether the encoder reports the fields `seen` on a good line too: an earlier damaged request may have
-  // changed it. If so, discards the recorded truth of all commands.
+  // Returns whether the fields `seen` come on a good line too; if so, discards all recorded truth.
   bool is_true_now(const Query& query, const ReportedFields& seen) {
     world_.set_rates({});
     const ConversationResult now = world_.run(*query.command, query.arguments);
@@ -228,13 +224,12 @@ class Campaign {
     return true;
   }
 
-  // Runs commands that change the encoder, except those of the unit alone (Verb::run), over the faulty line, and
-  // verifies each reported success over a good line.
+  // Runs commands that change the encoder, except Verb::run, over the faulty line.
   void change() {
     for (const Command& command : unit_.commands) {
       if (!command.changes_encoder || command.verb == Verb::run) continue;
       for (unsigned i = 0; i < runs_per_change && findings_.count() == 0; ++i) {
-        // Every second run has fewer faults, because some changes need a hundred good exchanges in a row.
+        // Every second run has fewer faults: some changes need a hundred good exchanges.
         sim::FaultRates rates = rates_;
         for (double& rate : rates.rates) rate *= i % 2 == 0 ? 1 : 0.03;
         change(command, rates);
@@ -285,8 +280,7 @@ class Campaign {
     return {};
   }
 
-  // Returns whether `seen` reports only a part of the alarms that `truth` reports, and agrees with it in all alarms and
-  // status flags that both report.
+  // Returns whether `seen` reports fewer alarms than `truth`, and no flag differently.
   [[nodiscard]] static bool is_part_of(const Reading& seen, const Reading& truth) {
     const std::uint32_t reported = seen.alarms_reported;
     if (reported == truth.alarms_reported || (reported & ~truth.alarms_reported) != 0) return false;
@@ -294,13 +288,12 @@ class Campaign {
            ((seen.status ^ truth.status) & seen.status_reported & truth.status_reported) == 0;
   }
 
-  // Returns the key of the command's counters in `Tally::commands`. The key includes options other than a model's,
-  // because they may select the frame check.
+  // Options other than a model's are in the key, because they may select the frame check.
   [[nodiscard]] std::string counter_key(const Query& query) const {
     return std::string(query.command->name) + (configuration_.is_model ? "" : " " + configuration_.text);
   }
 
-  // Counts the damaged replies. Measures once for each `counter_key` how often the frame check accepts damaged replies.
+  // Counts damaged replies, and measures once per `counter_key` how many the check accepts.
   void measure_check(const Query& query, std::uint64_t damaged) {
     Tally::Command& command = tally_.commands[counter_key(query)];
     command.damaged_reply_count += damaged;
@@ -330,8 +323,7 @@ class Campaign {
 
   [[nodiscard]] std::vector<std::pair<OwnedFrame, OwnedFrame>> frames_of(const Query& query);
 
-  // Counts the host's violations of rules in a conversation with the options of a model. One before the first fault of
-  // the line is a finding.
+  // Counts the rules that the host broke with a model's options.
   void judge_rules(const Query& query, bool had_faults, std::uint32_t before) {
     const std::uint32_t new_violations = world_.device().violation_count() - before;
     faultless_ = faultless_ && !had_faults;
@@ -353,13 +345,13 @@ class Campaign {
   sim::FaultRates rates_;
   std::array<std::int64_t, places> places_{};
   unsigned place_ = 0;
-  // True until the first fault; after a fault the reply guard may repeat a request whose reply was late.
+  // False once a conversation had faults.
   bool faultless_ = true;
   std::vector<Query> queries_;
   std::vector<std::size_t> reads_;  // indexes in `queries_` of the commands that read the position
 };
 
-/// Returns at most four replies of the command's conversation on a line without faults, each with its request.
+/// Returns at most four replies to the command on a line without faults, with their requests.
 template <class Item>
 std::vector<std::pair<OwnedFrame, OwnedFrame>> Campaign<Item>::frames_of(const Query& query) {
   World<Item> world(unit_, configuration_.options, 1);
@@ -424,8 +416,7 @@ void exchange(const Unit& unit, const ExchangeTest& test, Tally& tally, Findings
       findings.add("too few exchanges per round");
       break;
     }
-    // Even rounds use only the first configurations, which are those of the models, or the defaults if the unit has
-    // none; odd rounds use all.
+    // Even rounds prefer the models, which are the first configurations.
     const Configuration& configuration = round % 2 == 0
                                              ? setups[round / 2 % std::max<std::size_t>(1, unit.models.size())]
                                              : setups[round / 2 % setups.size()];
@@ -450,12 +441,9 @@ Findings check_exchanges(const Unit& unit, const ExchangeTest& test) {
     exchange<std::uint8_t>(unit, test, tally, findings);
   }
   judge_undetected_damage(tally, findings);
-  // A damaged request may itself violate a rule, so the encoder may count as many violations as request bytes were
-  // damaged.
+  // A damaged request may itself violate a rule.
   findings.require(tally.rule_violations <= tally.damaged_request_bytes,
                    [&] { return std::to_string(tally.rule_violations) + " rules broken: " + tally.violated_rule; });
-  // Where a host reads a written value back, it reports a false success only after two damaged replies that both look
-  // good.
   findings.require(tally.failed_changes == 0, [&] {
     return std::to_string(tally.failed_changes) + " changes were not made: " + tally.broken_promise_text;
   });

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Collects the defects ("findings") that the kit finds in a unit, as texts. A unit's test expects no finding; the kit's
-// own tests expect a finding for each toy unit with a mistake.
+// Collects the defects ("findings") that the kit finds in a unit, as texts.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Types of the kit: frames of any link type that own their bytes, the fields that a unit decodes from a frame, and the
-// configurations of a unit that the tests use.
+// Types of the kit: frames that own their bytes, decoded fields, and configurations of a unit.
 #pragma once
 
 #include <map>
@@ -16,8 +15,7 @@ namespace absenc::kit {
 
 using Wire = std::vector<std::uint8_t>;
 
-/// A frame of any link type that owns its bytes. The elements of a frame, counted by `elements`, are bits on a clocked
-/// link, otherwise bytes.
+/// A frame of any link type that owns its bytes. Its elements are bits on a clocked link, else bytes.
 struct OwnedFrame {
   LinkKind link{};
   Wire bytes{};
@@ -30,7 +28,7 @@ struct OwnedFrame {
   [[nodiscard]] std::size_t bit_count() const;
   /// Returns a frame with the first `count` elements of this one.
   [[nodiscard]] OwnedFrame cut(std::size_t count) const;
-  /// Returns the frame with one bit inverted. `Unit::is_checked` numbers the bits in the same manner.
+  /// Returns the frame with one bit inverted, numbered as in `Unit::is_checked`.
   [[nodiscard]] OwnedFrame flipped(std::size_t bit) const;
   /// Returns the frame with extra bytes before and after its own. Only for links that carry bytes.
   [[nodiscard]] OwnedFrame between(Bytes before, Bytes after) const;
@@ -39,7 +37,7 @@ struct OwnedFrame {
 /// Returns the frame whose bytes a vector states for its request or reply.
 [[nodiscard]] OwnedFrame frame_of(const Unit& unit, Bytes text);
 
-/// Value of one field. A real number is rounded to a float, so that small differences do not count.
+/// Value of one field; real numbers are compared as floats.
 struct Value {
   std::int64_t number = 0;
   float real = 0;
@@ -51,8 +49,7 @@ struct Value {
   }
 };
 
-/// Stores every field that a decoder reports, by its name. If a name is reported repeatedly, as in a scan, a number is
-/// added to it from the second time on.
+/// Stores every field that a decoder reports, by its name; repetitions get a number.
 struct ReportedFields final : FieldSink {
   void put(const FieldValue& value) override;
   void put_reading(const Reading& one) override {
@@ -71,7 +68,7 @@ struct ReportedFields final : FieldSink {
 
 [[nodiscard]] std::map<std::string, Value> expected_fields(const Vector& vector);
 
-/// Returns the options in a text of the form "name=value name=value", or no value if the unit does not accept them.
+/// Returns the options in a text "name=value name=value", or no value if the unit refuses them.
 [[nodiscard]] std::optional<Options> options_of(const Unit& unit, std::string_view text);
 
 /// One configuration of a unit that the tests use: its options, and a text that names it.
@@ -80,16 +77,14 @@ struct Configuration {
   Options options;
   bool is_model = false;
 };
-/// Returns the configurations of a unit, without repetitions: each model, or the defaults if it has none; and the first
-/// of these with each choice of each option or, for an option without choices, its minimum and maximum.
+/// Returns models or the defaults, and then variants of the first in one option.
 [[nodiscard]] std::vector<Configuration> configurations(const Unit& unit);
 
 using Values = std::vector<std::int64_t>;
-/// Returns arguments for the command: the default of each optional argument and the minimum of each required one.
+/// Returns the default of each optional argument and the minimum of each required one.
 [[nodiscard]] Values least_arguments(const Command& command);
 [[nodiscard]] Values most_arguments(const Command& command);
-/// Returns random arguments for the command, each within its range. About a quarter of the values are the minimum or
-/// maximum.
+/// Returns random arguments within their ranges; minima and maxima are frequent.
 [[nodiscard]] Values random_arguments(const Command& command, sim::Random& random);
 /// Returns the bytes of the command's request, or the error of `Unit::encode`.
 [[nodiscard]] Result<Wire> encoded(const Unit& unit, const Options& options, const Command& command, Arguments values);

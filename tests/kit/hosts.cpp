@@ -65,9 +65,7 @@ struct VectorReplay {
     return unit.decode(options, request.frame(), frame.frame(), seen);
   }
 
-  // Checks that the fields that the conversation and the vector share are equal. A command that reads must also report
-  // the fields of the position, and the same position as the decoded frame. Other commands may report fields under
-  // other names, such as a temperature read from memory.
+  // Checks that the fields that the conversation and the vector share are equal.
   void require_report(const Outcome& outcome) const {
     const bool reads = command.verb == Verb::read || command.verb == Verb::read_part;
     unsigned shared = 0;
@@ -86,7 +84,7 @@ struct VectorReplay {
     const bool has_reading = decoded(reply, frame) == Error::none && frame.reading.has_value();
     require(!reads || outcome.seen.reading.has_value() == has_reading, [] { return "has another reading"; });
     if (!reads || !has_reading || !outcome.seen.reading) return;
-    // The conversation may know the position's validity from an earlier reply, so only position and turns are compared.
+    // The validity is not compared: it may come from an earlier reply.
     require(outcome.seen.reading->singleturn == frame.reading->singleturn &&
                 outcome.seen.reading->multiturn == frame.reading->multiturn,
             [] { return "reads another position"; });
@@ -107,14 +105,12 @@ struct VectorReplay {
   void characters() const {
     const Outcome whole = converse({reply.bytes});
     require(request.empty() || whole.tested_requests > 0, [] { return "is not sent"; });
-    // Only a command of `is_one_question` must end with the error of the vector: a longer procedure may continue after
-    // a good reply, and may repeat its request after a bad one.
+    // Other commands may continue after a good reply, or repeat their request.
     if (is_one_question()) {
       require(whole.error == vector.error, [&] { return "ends with " + std::string(text_of(whole.error).name); });
     }
     if (whole.error == Error::none && vector.error == Error::none) require_report(whole);
-    // If extra bytes follow a complete reply, they belong to the next reply, and a byte-by-byte conversation ends
-    // before them.
+    // Extra bytes after a complete reply belong to the next one.
     const FrameEnd end = unit.frame_end(options, Direction::reply, vector.reply);
     if (end.kind != FrameEnd::Kind::complete || end.size >= reply.bytes.size()) {
       const Outcome pieces = converse(bytewise(reply.bytes));
@@ -146,8 +142,7 @@ struct VectorReplay {
         reply.between({}, reply.bytes), [] { return std::string("takes a reply that comes twice"); }, false);
   }
 
-  // Checks that the conversation refuses the frame as a whole and, if `in_pieces`, byte by byte. A frame that the
-  // decoder accepts, because no check covers the change, is skipped.
+  // Checks that the conversation refuses the frame, unless the decoder accepts it.
   template <class Text>
   void refused(const OwnedFrame& frame, Text&& text, bool in_pieces = true) const {
     ReportedFields ignored;
@@ -157,8 +152,7 @@ struct VectorReplay {
     require(converse(bytewise(frame.bytes)).error != Error::none, [&] { return text() + ", byte by byte"; });
   }
 
-  // ---- Unsolicited frames. `stream` sends eight frames without a pause, at most one of them damaged. Every reported
-  // position must be that of the good frames.
+  // ---- Unsolicited frames: streams of eight frames, at most one of them damaged
 
   void stream() const {
     if (vector.error != Error::none) return;
@@ -175,8 +169,7 @@ struct VectorReplay {
       stream_with(reply.between(std::array{byte}, {}), [] { return std::string("with garbage between"); });
     }
   }
-  // Sends seven good frames and, as the fifth, the frame `odd`: once frame by frame and once byte by byte. Returns how
-  // many good results the host emitted in both runs together.
+  // Sends seven good frames and `odd`, twice. Returns the number of good results.
   template <class Text>
   unsigned stream_with(const OwnedFrame& odd, Text&& text) const {
     unsigned good = 0;
@@ -205,8 +198,7 @@ struct VectorReplay {
     return good;
   }
 
-  // ---- Conversations on clocked links. The host reads as many bits as it expects; after the frame the line has its
-  // idle level.
+  // ---- Conversations on clocked links
 
   [[nodiscard]] bool bits() const {
     const bool taken = same_as_decoded(reply);
@@ -230,8 +222,7 @@ struct VectorReplay {
       });
       ReportedFields seen;
       const Error error = decoded(clocked, seen);
-      // A conversation may refuse a frame that the decoder accepts, because it also checks, for example, that a life
-      // counter advances.
+      // A conversation may check more than the decoder, such as a life counter.
       const bool as_decoded = error == Error::none && outcome.seen.fields == seen.fields;
       require(outcome.error != Error::none || as_decoded, [&] {
         return "makes " + to_text(outcome.seen.fields) + " of " + to_text(clocked) + ", which is " +
@@ -254,7 +245,7 @@ struct VectorReplay {
         return pieces;
       });
     };
-    // A vector with an error is skipped: other nodes may send such frames, and the conversation ignores them.
+    // A vector with an error is skipped: other nodes may send such frames.
     if (vector.error != Error::none) return;
     const CanFrame other{.id = 0x7A5, .size = 8, .data = {1, 2, 3, 4, 5, 6, 7, 8}};
     std::vector<CanFrame> echo = requests;
@@ -275,8 +266,7 @@ struct VectorReplay {
   }
 };
 
-/// Returns the arguments with which the command sends this vector's request, or waits for its unsolicited frame; no
-/// value if it does neither.
+/// Returns arguments with which the command has this vector's exchange, or no value.
 std::optional<Values> arguments_for(const Unit& unit, const Options& options, const Command& command,
                                     const Vector& vector) {
   ReportedFields request_fields;
@@ -328,8 +318,7 @@ void feed_vector(const Unit& unit, const Vector& vector, const Options& options,
   }
 }
 
-// Returns how long the unit's `read` command waits for the first byte of a reply, or no value if it sends no request or
-// does not wait after it.
+// Returns how long `read` waits for a reply after its request, or no value if it does not wait.
 template <class Item>
 std::optional<Time> wait_for_reply(const Unit& unit, const Options& options) {
   using Kind = typename Step<Item>::Kind;
@@ -353,8 +342,7 @@ std::optional<Time> wait_for_reply(const Unit& unit, const Options& options) {
   return step.answer != Time{} ? step.answer : step.gap;
 }
 
-// Compares `turnaround_limit`, after which a decoded capture calls a reply late, with the longest timeout of the host
-// in any configuration: each must be at least three quarters of the other. Skips links whose clock the host drives.
+// Compares `turnaround_limit`, which captures use, with the longest timeout of the host.
 void compare_limits(const Unit& unit, Findings& findings) {
   std::optional<Time> longest;
   for (const Configuration& configuration : configurations(unit)) {
@@ -369,7 +357,7 @@ void compare_limits(const Unit& unit, Findings& findings) {
   });
 }
 
-// Checks that every command has a request in some configuration, or that `encode` reports it as unsupported.
+// Checks that every command has a request, unless `encode` calls it unsupported.
 void find_requests(const Unit& unit, Findings& findings) {
   const std::vector<Configuration> setups = configurations(unit);
   for (const Command& command : unit.commands) {

@@ -80,8 +80,7 @@ TEST_P(Kit, AdviceCanBeFollowed) {
 TEST_P(Kit, ZeroIsRefusedForInvalidPosition) { expect_none(check_zero(unit)); }
 TEST_P(Kit, MemoryReadsBackAsWritten) { expect_none(check_memory(unit)); }
 
-/// Parameters of a test of `check_exchanges`: the number of the fault series and the unit. Sanitizer builds run only
-/// the first series (CMakePresets.json).
+/// Parameters of a test of `check_exchanges`: the number of the fault series and the unit.
 using Series = std::tuple<unsigned, const Unit*>;
 
 class KitExchanges : public ::testing::TestWithParam<Series> {};

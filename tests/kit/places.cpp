@@ -15,7 +15,7 @@ bool bit_of(const OwnedFrame& frame, std::size_t bit) {
   return (bytes[bit / 8] & (frame.link == LinkKind::clocked ? 0x80u >> bit % 8 : 1u << bit % 8)) != 0;
 }
 
-/// Returns the value of the bits at these positions, at most 64, and sets `width` to their number.
+/// Returns the value of at most 64 bits at these positions, and sets `width` to their number.
 std::uint64_t bits_at(const OwnedFrame& frame, const BitRanges& ranges, unsigned& width) {
   std::uint64_t value = 0;
   width = 0;
@@ -33,8 +33,7 @@ class Places final : public FieldSink {
  public:
   Places(const Unit& unit, Findings& findings) : unit_(unit), findings_(findings) {}
 
-  /// Checks the bit positions of the frame's fields. Returns false if the frame is invalid, because it has no fields
-  /// then.
+  /// Checks the bit positions of the frame's fields. Returns whether the frame is valid.
   bool check_frame(const Options& options, const OwnedFrame& request, const OwnedFrame& reply) {
     if (unit_.check(options, request.frame(), reply.frame()) != Error::none) return false;
     options_ = &options;
@@ -82,7 +81,7 @@ class Places final : public FieldSink {
   std::set<Role> placed_;
 };
 
-// Checks the valid replies of the vectors, and each of them with one bit flipped if it is still valid.
+// Checks the replies of the vectors, whole and with one bit flipped, if they are valid.
 void check_vectors(const Unit& unit, Places& places) {
   for (const Vector& vector : unit.vectors) {
     const std::optional<Options> options = options_of(unit, vector.options);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Plays the encoder's side of one conversation. A reply supplied by the test, in pieces, answers the request under
-// test; a virtual encoder, if there is one, gets every other request.
+// Plays the encoder's side of one conversation.
 #pragma once
 
 #include <algorithm>
@@ -20,8 +19,7 @@ template <class Item>
 class Player {
  public:
   using Pieces = std::vector<std::vector<Item>>;
-  /// Function that returns the pieces of the reply to the request under test. Its argument is the number of bits or
-  /// items that the host clocks or expects, 0 if unknown.
+  /// Function that returns the pieces of the reply under test; `clocks` is 0 if unknown.
   using Reply = std::function<Pieces(std::size_t clocks)>;
 
   /// Creates a player without a virtual encoder: only the request under test gets a reply.
@@ -31,8 +29,7 @@ class Player {
     if (device_ != nullptr) device_->power_on(now_, Device<Item>::PowerOn::skip);
   }
 
-  /// Runs the conversation and returns whether it ended. An empty `request` means that the conversation under test
-  /// sends a pulse, or only waits. `on_emit` is called for each result of a streaming conversation.
+  /// Runs the conversation. Returns whether it ended within `most_steps`.
   template <class OnEmit>
   bool run(Conversation<Item>& conversation, const std::vector<Item>& request, const Reply& reply, OnEmit&& on_emit,
            unsigned most_steps = 2000) {

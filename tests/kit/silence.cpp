@@ -6,7 +6,7 @@
 namespace absenc::kit {
 namespace {
 
-// Runs a command on a line without an encoder. It must end, with a timeout error if it expects a reply.
+// Runs a command on a line without an encoder; it must end.
 template <class Item>
 void meet_silence(const Unit& unit, const Configuration& configuration, const Command& command, Findings& findings) {
   std::vector<std::byte> storage(unit.host_storage);
@@ -23,7 +23,7 @@ void meet_silence(const Unit& unit, const Configuration& configuration, const Co
     return std::string(command.name) + " of \"" + configuration.text + "\" without an encoder: ";
   };
   findings.require(ended, [&] { return where() + "does not end"; });
-  // A command that expects no reply succeeds. A command that stops a stream succeeds when no byte arrives.
+  // A command that expects no reply, or stops a stream, may succeed.
   const bool wants_none = command.verb == Verb::run && conversation->reading() == nullptr;
   const Error error = conversation->error();
   findings.require(!ended || error == Error::timeout || (wants_none && error == Error::none),
@@ -34,7 +34,7 @@ void meet_silence(const Unit& unit, const Configuration& configuration, const Co
 
 Findings check_silence(const Unit& unit) {
   Findings findings;
-  // On clocked and SPI links the host always reads some level, even without an encoder, so it cannot detect silence.
+  // On clocked and SPI links the host always reads some level, even without an encoder.
   const bool can_be_silent = unit.link != LinkKind::clocked && unit.link != LinkKind::spi;
   if (!can_be_silent) return findings;
   for (const Configuration& configuration : configurations(unit)) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that readings report the three states of an alarm correctly: reported and clear, reported and raised, not
-// reported.
+// Checks how readings report the three states of an alarm: clear, raised, not reported.
 #include <algorithm>
 
 #include "tests/kit/kit.hpp"
@@ -9,8 +8,7 @@
 namespace absenc::kit {
 namespace {
 
-/// The alarm or status flags of one channel of a reading: `field` names the flags, `bits` has the set ones, `reported`
-/// those that the reply reports.
+/// Flags of one channel of a reading: `bits` has the set ones, `reported` those in the reply.
 struct Flags {
   const FieldInfo* field;
   std::uint32_t bits;
@@ -41,7 +39,7 @@ std::vector<Flags> status_of(const Unit& unit, const Reading& reading) {
   return channels_of(unit.status, unit.second_status, reading.status, reading.status_reported);
 }
 
-/// Two results of a command: its live reading, and the fields of its last reply, decoded as from a capture.
+/// A command's live reading, and the fields of its last reply, decoded as from a capture.
 struct LiveAndCaptured {
   std::optional<Reading> live;
   ReportedFields captured;
@@ -133,8 +131,7 @@ class States {
     if (!is_raised) require(!is_shown, "it is reported raised and is not");
   }
 
-  // Returns a mask of the optional alarms in `field` that `reading` does not report, or of its status flags that
-  // summarize such alarms.
+  // Returns the flags of `field` that stand for optional alarms that `reading` does not report.
   [[nodiscard]] std::uint32_t absent(const FieldInfo& field, const Reading& reading) const {
     std::uint32_t alarms = 0;
     for (std::size_t i = 0; i < unit_.alarms->flags.size(); ++i) {
@@ -148,8 +145,7 @@ class States {
     return mask;
   }
 
-  // Checks that the reading of a reply reports each named flag that the reply also carries as a field, with the same
-  // value, except flags that `absent` returns.
+  // Checks that the reading and the fields of a reply have the same flags, except `absent` ones.
   void check_carried_flags(const ReportedFields& seen) {
     if (!seen.reading) return;
     const auto agrees = [&](const Flags& state) {
@@ -173,7 +169,7 @@ class States {
             "a part reports valid turns, the whole invalid ones");
   }
 
-  // Checks a reading from a capture that is completed with the alarms of the previous reply to `read`.
+  // Checks a captured reading that is completed with the alarms of an earlier one.
   void check_completed(const LiveAndCaptured& before, const LiveAndCaptured& now, std::size_t bit, bool is_raised) {
     if (unit_.remembered == nullptr || !before.captured.reading || !now.captured.reading) return;
     const Reading reading = unit_.remembered(*before.captured.reading, *now.captured.reading);

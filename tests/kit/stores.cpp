@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that settings and memory of the virtual encoder can be written and read back, and that conversations and
-// devices stay within their storage.
+// Checks settings and memory of the virtual encoder, and the storage of hosts and devices.
 #include <set>
 
 #include "tests/kit/changes.hpp"
@@ -39,8 +38,7 @@ void change(const Unit& unit, const Configuration& configuration, const Command&
     apply_to_host(world, unit, command, values);
     const std::string broken = broken_promise(world, unit, command, values, result.seen);
     findings.require(broken.empty(), [&] { return what() + broken; });
-    // The setting may have had the written value already: then it reads the same as before, or cannot be read. Writing
-    // the same value violates the rules of some encoders, so a violation is accepted then.
+    // Some encoders forbid to write a value that is set already.
     const std::string now = to_text(read_setting(world, unit, command).fields);
     findings.require(world.device().violation_count() == 0 || (command.verb == Verb::config_set && now == before),
                      [&] { return what() + std::string(world.device().violations()[0].rule); });
@@ -110,7 +108,7 @@ void try_registers(const Unit& unit, const Configuration& configuration, Finding
 
 constexpr std::byte untouched{0xA5};
 
-/// Storage of a given size, followed by bytes with a known value: a changed one reveals a write beyond the storage.
+/// Storage followed by bytes with a known value: a changed one reveals a write beyond it.
 struct Fenced {
   Fenced(std::size_t size_given, std::size_t behind) : bytes(size_given + behind + 64, untouched), size(size_given) {}
   [[nodiscard]] std::span<std::byte> given() { return std::span(bytes).first(size); }
@@ -152,7 +150,7 @@ void store(const Unit& unit, const Configuration& configuration, const Command& 
     return std::pair(result.error, result.seen.fields);
   };
   const auto roomy = end(unit.host_storage);
-  // A later part of a procedure may need more storage than its start. It must then end with the error buffer_too_small.
+  // A later part of a procedure may need more storage than its start.
   const auto tight = needed == unit.host_storage ? roomy : end(needed);
   findings.require(tight == roomy || tight.first == Error::buffer_too_small,
                    [&] { return std::string(command.name) + ": ends differently in the smallest storage"; });

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A complete toy unit with one selectable mistake, which the kit must find. Its request is one byte. Its reply is a
-// 16-bit position with a 16-bit CRC; with weak_check, one 14-bit word with two parity bits that may begin with any
-// byte.
+// A complete toy unit with one selectable mistake.
 #pragma once
 
 #include <array>
@@ -281,8 +279,7 @@ inline constexpr Unit unit = [] {
   return made;
 }();
 
-/// The descriptor, without functions, of an encoder with memory on a shared line. The role `forgotten` is missing, but
-/// every field, option and argument has its name.
+/// The descriptor, without functions, of an encoder that lacks the role `forgotten`.
 template <Role forgotten>
 struct Declared {
   static constexpr Role unless_forgotten(Role role) { return role == forgotten ? Role::other : role; }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the kit itself with toy units: it must find their mistakes, and report nothing for a correct unit or for one
-// whose check is only weak.
+// Tests the kit with toy units.
 #include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 
@@ -32,8 +31,7 @@ void expect_no_finding() {
 
 TEST(KitToys, ReportsNothingForCorrectUnit) { expect_no_finding<Mistake::none>(); }
 
-// A reply may begin with any byte, and its weak check accepts some wrong replies. The kit must tolerate the number of
-// accepted wrong replies that is expected by chance.
+// The kit must tolerate as many accepted wrong replies as chance explains.
 TEST(KitToys, AllowsWeakFrameCheck) {
   expect_no_finding<Mistake::weak_check>();
   EXPECT_THAT(check_exchanges(toy::unit<Mistake::weak_check>, few).notes(),

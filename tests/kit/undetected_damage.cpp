@@ -30,7 +30,7 @@ class FixedReplyDevice final : public Machine<Item> {
   bool reply_due_ = false;
 };
 
-/// Says whether a damaged reply decoded to a wrong position, and whether to the right one with a wrong other field.
+/// Says whether a decoded position is wrong, or only another field.
 struct WrongValues {
   bool position = false;
   bool others = false;

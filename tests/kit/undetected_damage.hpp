@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures how often a unit's frame check accepts damaged replies. The replies are damaged with the same fault rates as
-// in `check_exchanges`.
+// Measures how often a unit's frame check accepts damaged replies.
 #pragma once
 
 #include <cmath>
@@ -18,9 +17,7 @@ struct DamageCount {
 
   [[nodiscard]] double chance() const { return static_cast<double>(wrong) / static_cast<double>(damaged); }
 
-  /// Returns how many of `trials` further damaged replies may have a wrong value, if the probability is the same as in
-  /// this measurement: the expected number, `wrong` * trials / damaged, plus five standard deviations and ten (times
-  /// trials / damaged if that is above 1).
+  /// Returns how many of `trials` further damaged replies may be wrong at the same probability.
   [[nodiscard]] std::uint64_t allowed(std::uint64_t trials) const {
     const double ratio = static_cast<double>(trials) / static_cast<double>(damaged);
     const double deviation = std::sqrt(static_cast<double>(wrong) * ratio * (1 + ratio));
@@ -28,8 +25,7 @@ struct DamageCount {
   }
 };
 
-/// Rates of undetected damage: how often a damaged reply decodes to another position, and how often to the right
-/// position with another value of another field.
+/// Rates of undetected damage: of the position, and of other fields alone.
 struct UndetectedDamage {
   DamageCount position{};
   DamageCount others{};
@@ -41,8 +37,7 @@ struct UndetectedDamage {
   }
 };
 
-/// Returns the rates measured with `samples` replies. On a line of characters a host may accept a prefix of the damaged
-/// bytes as a frame, or any part of them if the encoder sends unsolicited frames.
+/// Returns the rates measured with `samples` replies.
 [[nodiscard]] UndetectedDamage measure_undetected_damage(const Unit& unit, const Options& options,
                                                          const OwnedFrame& request, const OwnedFrame& reply,
                                                          const sim::FaultRates& rates, unsigned samples);

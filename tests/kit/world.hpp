@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Simulates a unit's virtual encoder and host in virtual time, from the unit's descriptor alone. A test sets the
-// position of the shaft and the faults of the line, and runs conversations one after another.
+// Simulates a unit's virtual encoder and host in virtual time.
 #pragma once
 
 #include <cstring>
@@ -71,8 +70,7 @@ class World {
   [[nodiscard]] const Options& options() const { return options_; }
   void set_rates(const sim::FaultRates& rates) { faulty_->set_rates(rates); }
   void pass(Time time) { line_->run_until(line_->now() + time); }
-  /// Sets the position of the shaft. Then waits 5 ms if the encoder sends unsolicited frames, and on CAN: frames on
-  /// their way still have the old position.
+  /// Sets the position of the shaft. Waits where frames on their way may have the old one.
   void move(std::int64_t position) {
     shaft_.position = position;
     const bool unsolicited = is_can || (unit_.streams != nullptr && unit_.streams(options_));
@@ -88,7 +86,7 @@ class World {
     line_->run(node_, line_->now());
   }
 
-  /// Runs one conversation to its end, or a streaming conversation up to its first result, for at most `limit`.
+  /// Runs one conversation to its end, or to the first result of a stream, for at most `limit`.
   ConversationResult run(const Command& command, Arguments arguments, Time limit = std::chrono::seconds(100)) {
     return run_in(host_storage_, command, arguments, limit);
   }
@@ -133,8 +131,7 @@ class World {
     return result;
   }
 
-  /// Returns the number of faults that can cause a wrong result. Delays, echoes, missing and repeated replies leave
-  /// frames intact, except where the host clocks the line: there each such fault changes the bits that the host reads.
+  /// Returns the number of faults that change bits.
   [[nodiscard]] std::uint64_t changed_bytes() const {
     using sim::FaultKind;
     std::uint64_t sum = 0;
@@ -172,8 +169,7 @@ class World {
     LineSettings line_;
     bool done_ = false;
   };
-  /// A machine that occupies the host's end of the line between conversations: a finished conversation must not stay
-  /// attached, because its storage is reused.
+  /// Occupies the host's end of the line between conversations, whose storage is reused.
   struct Idle final : Machine<Item> {
     void feed(const Event<Item>&) override {}
     Step<Item> next(Time) override { return {.kind = Step<Item>::Kind::done}; }
@@ -181,7 +177,7 @@ class World {
   };
 
   [[nodiscard]] LineSettings settings() const { return line_settings(unit_, options_).with_some_rate(); }
-  // Returns whether the reply guard covers conversations of the command, by the same rule as in `host::Session`.
+  // Returns whether the reply guard covers the command, by the rule of `host::Session`.
   [[nodiscard]] bool guarded(const Command& command) const {
     if (is_can) return command.verb == Verb::read || command.verb == Verb::read_part;
     return unit_.link != LinkKind::spi && unit_.link != LinkKind::clocked;
@@ -190,7 +186,7 @@ class World {
     if (node_ == none) {
       node_ = line_->attach(sim::NodeRole::host, idle_, [this] { return !on_emit_ || on_emit_(); });
     }
-    // On SPI the chip must stay deselected between two conversations; controlling that time is the caller's task.
+    // On SPI the chip must stay deselected for a time between two conversations.
     if (unit_.link == LinkKind::spi) pass(std::chrono::microseconds(20));
     line_->replace(node_, machine);
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that a host never sets the zero from an invalid position, because that would leave a wrong zero permanently.
+// Checks that a host never sets the zero from an invalid position.
 #include "absenc/sim/place.hpp"
 #include "tests/kit/kit.hpp"
 #include "tests/kit/world.hpp"
@@ -15,8 +15,7 @@ std::optional<Reading> read_position(World<Item>& world, const Unit& unit) {
   return world.run(read, least_arguments(read)).seen.reading;
 }
 
-/// Checks that the zero command is refused if the position is invalid after `spoil`, and leaves the position unchanged.
-/// `mend` reverses `spoil`.
+/// Tries the zero command where `spoil` makes the position invalid. `mend` reverses `spoil`.
 template <class Item, class Spoil, class Mend>
 void try_zero(const Unit& unit, const Configuration& configuration, const std::string& what, Spoil spoil, Mend mend,
               Findings& findings) {

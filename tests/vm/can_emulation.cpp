@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Program that runs a virtual encoder of the library on a CAN interface until standard input ends. It prints the
-// encoder's address and position, then switches the encoder's power off and on for each byte of input. Usage:
-// can_emulation INTERFACE
+// Virtual encoder of the library on CAN, for can_test.py. Usage: can_emulation INTERFACE
 #include <cstdio>
 #include <string>
 #include <vector>

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc` with SocketCAN: with can-utils on virtual buses, and with a serial adapter behind slcand."""
+"""Tests `absenc` with SocketCAN."""
 import contextlib
 import json
 import os
@@ -16,8 +16,7 @@ from doctor_test import doctor, ids
 from record_test import read_csv, rows_so_far, wait_until
 
 BUS = "vcan0"
-# Address of the encoder. The latency allows for a busy machine; with the speed limit the turns stay known across a late
-# reading.
+# The latency allows for a busy machine.
 ENCODER = f"raa38-can:{BUS}?latency=2000&max_rpm=60"
 HASTY = f"raa38-can:{BUS}"
 # A position request to node 0x20, and its reply with position 9799.
@@ -44,7 +43,7 @@ def receivers(interface):
 
 
 def losses(rows):
-    """Returns the events for a lost encoder and its return, without the gaps that a busy machine causes."""
+    """Returns the events for a lost encoder and its return."""
     return [row["event"] for row in rows if row["event"] in ("lost", "back")]
 
 
@@ -193,8 +192,7 @@ class Verbs(VirtualBus):
         counts = [int(row["position"]) for row in rows]
         moments = [float(row["time_s"]) for row in rows]
         self.assertEqual(counts, sorted(counts))
-        # The shaft makes half a turn (of 16384 counts) per second. The tolerance is the motion in 20 ms, which a busy
-        # machine keeps.
+        # The shaft makes half a turn (of 16384 counts) per second.
         for moment, count in zip(moments, counts):
             self.assertAlmostEqual(count - counts[0], 8192 * (moment - moments[0]), delta=8192 * 0.02)
         self.assert_no_rule_broken(emulator)
@@ -215,8 +213,7 @@ class Verbs(VirtualBus):
         self.assert_no_rule_broken(emulator)
 
     def test_interface_whose_bit_rate_needs_ip(self):
-        """absenc takes the interface for a hardware adapter because of its name, and must recommend the program
-        `ip`."""
+        """absenc takes the interface for a hardware adapter because of its name."""
         self.add("can7")
         self.emulator(interface="can7")
         encoder = "raa38-can:can7?latency=2000"
@@ -276,8 +273,7 @@ class CanUtils(VirtualBus):
         seen = []
         while not seen or seen[-1][2] != last:
             seen.append(self.line(listener).split())
-        # Each kind of frame is compared alone: a request is logged with the time before it was sent, so a frame of
-        # another node at that time may come before or after the request.
+        # A frame that another node sends at the same time may be logged before or after a request.
         for kind in (ASKING, ANSWER, "121#4D00000000000000"):
             times, seen_times = ([float(line[0].strip("()")) for line in lines if line[2] == kind]
                                  for lines in (logged, seen))
@@ -287,8 +283,7 @@ class CanUtils(VirtualBus):
                 self.assertAlmostEqual(moment, seen_moment, delta=0.04)
 
     def test_no_reply_is_lost_on_busy_bus(self):
-        """cangen sends an extended frame each millisecond. It has the number of the node's replies as identifier and
-        contains position 1, so absenc must ignore it."""
+        """cangen sends extended frames with the identifier of the replies: absenc must ignore them."""
         emulator = self.emulator("--singleturn", "9799")
         cangen = self.popen("cangen", BUS, "-g", "1", "-e", "-I", "120", "-L", "8", "-D", "01".ljust(16, "0"))
         before = self.frames()
@@ -298,7 +293,7 @@ class CanUtils(VirtualBus):
         self.assertIsNone(cangen.poll(), "cangen has ended")
         self.assertGreater(load, 50)
         self.assertEqual([line["singleturn"] for line in json_lines(result.stdout)], 200 * [9799])
-        # The first reading needs two requests, each other one needs one. The test permits hardly any further requests.
+        # The first reading needs two requests, each other one needs one.
         self.assertRegex(emulator.end()[2], r"^absenc: 20[0-2] requests answered")
 
     @staticmethod

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Program inside the virtual machine that runs the tests, and prints for each "ok NAME", or "not ok NAME: WHY" with
-details in lines that begin with #."""
+"""Runs the tests inside the virtual machine, and prints "ok NAME" or "not ok NAME: WHY"."""
 import fnmatch
 import os
 import subprocess
@@ -15,8 +14,7 @@ def kernel_log():
 
 
 class Result(unittest.TestResult):
-    """A result of unittest that collects failures, including those of subtests, and skipped tests as failures. A test
-    without a failure is reported as ok."""
+    """A result of unittest that collects failures, and skipped tests as failures."""
 
     def startTest(self, test):
         super().startTest(test)

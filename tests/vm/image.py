@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Builds the image that the virtual machine boots: Debian's kernel, and an initramfs with this computer's programs and
-the tests."""
+"""Builds the image that the virtual machine boots: Debian's kernel and an initramfs."""
 import contextlib
 import glob
 import importlib.util
@@ -16,13 +15,9 @@ import zlib
 TESTS = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 CACHE = os.path.join(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "absenc")
 
-# Why the machine is built this way: the initramfs contains the programs and the Python of this computer, because the
-# tests in it share modules with the other tests (tests/command_support.py). The kernel is Debian's, so that no test
-# depends on the running kernel, to which a container cannot add modules. QEMU emulates the processor (run.py): KVM is
-# not available to every user.
+# The kernel is Debian's, because a container cannot add modules to the running kernel.
 
-# Kernel modules for the tests. Modules that they depend on are added automatically, except those that the kernel itself
-# loads on demand: the functions of g_serial.
+# Kernel modules for the tests, with those that the kernel itself loads on demand.
 MODULES = ["can", "can-raw", "vcan", "slcan", "fuse", "cuse", "dummy_hcd", "cdc-acm", "usb_f_acm", "usb_f_serial",
            "usb_f_obex", "g_serial"]
 # Programs of this computer that are copied into the initramfs.
@@ -51,8 +46,7 @@ def program(name):
 
 
 def kernel_package():
-    """Returns Debian's current kernel package from the cache or the server. Without a server, the newest one of the
-    cache."""
+    """Returns Debian's current kernel package; without a server, the newest one of the cache."""
     if platform.machine() != "x86_64":
         raise Missing(f"the machine is x86_64, the programs of this computer are {platform.machine()}")
     os.makedirs(CACHE, exist_ok=True)
@@ -97,8 +91,7 @@ def download(package, path):
 
 @contextlib.contextmanager
 def own_folder(path):
-    """Context with a new folder beside `path` that only this run uses, so that parallel runs do not interfere. The folder
-    is deleted at the end, so that an interrupted run leaves nothing that looks complete."""
+    """Context with a new folder beside `path`, which is deleted at the end."""
     folder = f"{path}.{os.getpid()}"
     os.makedirs(folder)
     try:
@@ -108,8 +101,7 @@ def own_folder(path):
 
 
 def unpacked_kernel():
-    """Returns a folder with vmlinuz, the modules as NAME.ko, and the file `order`, which lists the modules in the order
-    in which they must be loaded."""
+    """Returns a folder with vmlinuz, modules as NAME.ko, and `order`, in which they are loaded."""
     package = kernel_package()
     folder = f"{package.removesuffix('.deb')}.{zlib.crc32(' '.join(MODULES).encode()):08x}"
     if os.path.exists(folder):
@@ -162,8 +154,7 @@ def libraries(path):
 
 
 def python_files(scripts):
-    """Returns the paths of the interpreter, of every file that these scripts import, and of its compiled form if this
-    computer has one."""
+    """Returns the files of the interpreter and of what these scripts import."""
     finder = modulefinder.ModuleFinder(path=[os.path.join(TESTS, "vm"), TESTS, *sys.path[1:]])
     for script in scripts:
         finder.run_script(script)
@@ -176,7 +167,7 @@ def python_files(scripts):
 
 
 class Image:
-    """An initramfs that is being built, with programs and libraries at the same paths as on this computer."""
+    """An initramfs with programs and libraries at the same paths as on this computer."""
 
     def __init__(self, folder):
         self.root = make(folder)

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tests the kernel's own interfaces in a virtual machine. Usage: run.py [part of a test's name...]
 
-The last line states how many tests passed. Exit status: 0 all tests passed, 1 a test failed or the machine did not
-finish, 77 the machine cannot be built on this computer."""
+Exit status: 0 all tests passed, 1 not all passed, 77 the machine cannot be built on this computer."""
 import os
 import re
 import signal
@@ -20,8 +19,7 @@ BUSY = "no_timer_check"  # kernel option without which a busy computer delays th
 
 
 def boot(kernel, initramfs, folder):
-    """Runs the machine to its end. Returns its console output, and the reason if the output is incomplete, otherwise
-    None."""
+    """Runs the machine to its end. Returns its output, and why it is incomplete, or None."""
     line = os.path.join(folder, "line")
     command = [
         image.program("qemu-system-x86_64"), "-accel", "tcg", "-m", "512", "-no-reboot", "-nodefaults", "-display",
@@ -47,8 +45,7 @@ def boot(kernel, initramfs, folder):
 
 
 def judge(output, trouble):
-    """Prints the failed tests. Returns how many tests passed and how many failed; incomplete output counts as a
-    failure."""
+    """Prints the failed tests. Returns how many tests passed and how many failed."""
     good = re.findall(r"^ok (.*)$", output, re.MULTILINE)
     bad = re.findall(r"^not ok .*\n(?:#.*\n)*", output, re.MULTILINE)
     for report in bad:

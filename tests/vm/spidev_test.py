@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc emulate --spidev` on a CUSE device: with absenc's hosts, spi-tools, and an independent client."""
+"""Tests `absenc emulate --spidev` on a CUSE device."""
 import ctypes
 import errno
 import fcntl
@@ -43,8 +43,7 @@ def crc8(data):
 
 
 class Transfer:
-    """One transfer of an SPI message. `out`: bytes to send, None for no buffer. `take`: False passes no buffer for
-    received bytes."""
+    """One transfer of an SPI message. `out`: bytes to send; `take`: whether to receive."""
 
     def __init__(self, out=None, size=None, take=True, speed=0, delay=0, bits=0, change=0, wires=0):
         size = len(out) if size is None else size
@@ -164,8 +163,7 @@ class Command(SpidevCase):
         self.assertNotIn("rules", self.summary(process))
 
     def test_registers_of_biss(self):
-        """During the timeout, a control bit of 1 needs a clock that idles low, so the host changes the SPI mode between
-        two messages."""
+        """A control bit of 1 needs a clock that idles low, so the host changes the SPI mode."""
         process = self.serve("biss", "--motion", "rpm=60")
         encoder = "biss:spi:/dev/spidev9.0"
         info = json.loads(self.good("info", encoder, "--json").stdout)["answers"]["info"]["fields"]
@@ -175,7 +173,7 @@ class Command(SpidevCase):
         self.assertNotIn("rules", self.summary(process))
 
     def test_identify(self):
-        """identify must find an unknown BiSS encoder by its word, and read the serial number from its registers."""
+        """identify must find an unknown BiSS encoder and read its serial number."""
         self.serve("biss", "--motion", "rpm=60")
         candidates = json.loads(self.good("identify", "spi:/dev/spidev9.0", "--json").stdout)["candidates"]
         found = candidates[0]
@@ -200,8 +198,7 @@ class Command(SpidevCase):
                 self.assertRegex(self.summary(process), r"messages in another SPI mode than the encoder's, which is 1: \d+\n")
 
     def test_wrong_mode_of_ssi_is_in_summary(self):
-        """In mode 0 each bit of SSI arrives one clock late, which shifts a one into the position. SSI has no check, so
-        only the emulator's summary can report it."""
+        """In mode 0 each bit of SSI arrives one clock late, and SSI has no check."""
         process = self.serve("ssi", "--singleturn", "2748")
         self.assertEqual(self.reading("ssi:spi:/dev/spidev9.0?spi_mode=0")["singleturn"], (0x1000 | 2748) >> 1)
         self.assertRegex(self.summary(process), r"another SPI mode than the encoder's, which is 3: \d+\n")
@@ -255,8 +252,7 @@ class Command(SpidevCase):
 
 
 class Doctor(SpidevCase):
-    """Tests findings of `absenc doctor` for a kernel device. No test has a clock that is too fast, because this device
-    follows every clock."""
+    """Tests findings of `absenc doctor` for a kernel device, which follows every clock."""
 
     def assert_found(self, encoder, *wanted):
         result, found = doctor(encoder)
@@ -289,8 +285,7 @@ class Lifecycle(SpidevCase):
         self.assertIn("exists", self.failed("emulate", "ssi", "--spidev", "spidev9.0").stderr)
 
     def test_reports_refusal_by_kernel(self):
-        """The node of the device was removed, but the device still exists, so the kernel makes no node for another
-        device of that name."""
+        """The device still exists without its node, so the kernel makes no other of that name."""
         self.serve("ssi")
         os.remove("/dev/spidev9.0")
         self.assertIn("the kernel did not make /dev/spidev9.0", self.failed("emulate", "ssi", "--spidev", "spidev9.0").stderr)
@@ -305,7 +300,7 @@ class Lifecycle(SpidevCase):
         self.assertIn("no permission to open /dev/cuse", result.stderr)
 
     def test_runs_as_ordinary_user(self):
-        """A user with access to /dev/cuse may create the device, but the kernel creates its node for root only."""
+        """The kernel creates the node of the device for root only."""
         os.chmod("/dev/cuse", 0o666)
         self.addCleanup(os.chmod, "/dev/cuse", 0o600)
         self.serve("ssi", "--singleturn", "77", user=65534)
@@ -428,8 +423,7 @@ class SpidevInterface(SpidevCase):
         self.assertEqual(fcntl.ioctl(self.spi.descriptor, request(False, 0, 0), 0), 0)
 
     def test_sent_bytes_arrive(self):
-        """Bytes sent by the host must reach the encoder: the first one requests the identity, which follows in the next
-        message."""
+        """The first byte requests the identity, which follows in the next message."""
         self.spi.message(Transfer(b"\xBB", take=False), Transfer(b"\x00", take=False), Transfer(size=5))
         self.check_identity(self.spi.exchange(bytes(19)))
 

@@ -22,7 +22,7 @@ CLOCK = 115200  # the UART's baud rate with a divisor of 1
 NOBODY = 65534
 PARITY = termios.PARENB | termios.PARODD
 
-# Constants of <asm-generic/ioctls.h>, <asm-generic/termbits.h>, <linux/serial.h> and <linux/tty_flags.h>
+# From <asm-generic/ioctls.h>, <asm-generic/termbits.h>, <linux/serial.h>, <linux/tty_flags.h>
 TCGETS2, BOTHER, BAUD_MASK = 0x802C542A, 0o010000, 0o010017
 TIOCGSERIAL, TIOCSSERIAL, ASYNC_LOW_LATENCY = 0x541E, 0x541F, 1 << 13
 SERIAL_STRUCT = struct.Struct("iiIiiiiiHcciPHIL")
@@ -30,7 +30,7 @@ FLAGS = 4  # index of the flags in struct serial_struct
 
 
 def settings(path):
-    """Returns struct termios2: flags of input, output, control and local, line discipline, characters, both rates."""
+    """Returns the members of struct termios2."""
     descriptor = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
     try:
         return struct.unpack("IIIIB19sII", fcntl.ioctl(descriptor, TCGETS2, bytes(44)))
@@ -69,8 +69,7 @@ def divisor():
 
 
 class EncoderAtOneRate(threading.Thread):
-    """A fake encoder at the port OTHER that replies correctly only while the port PORT has the encoder's baud rate. At
-    other rates it sends garbled frames itself, because the UARTs of a virtual machine do not garble them."""
+    """A fake encoder that replies correctly only while PORT has the encoder's baud rate."""
 
     # Reply to 1A: 17 bits of position and 16 bits of turns, both 0, without an alarm.
     REPLY = bytes.fromhex("1a 00000000 11 000000 00 0b")
@@ -110,15 +109,13 @@ class Uart(EncoderCase):
         return absenc("read", f"tformat:{PORT}?latency=2000&{more}", *arguments)
 
     def reader(self, more):
-        """Starts an endless `read` with a long interval and waits for its first reading: accesses to the UART after it
-        disturb no transfer."""
+        """Starts an endless `read` with a long interval, and waits for its first reading."""
         process = self.start("read", f"tformat:{PORT}?latency=2000&{more}", "--count", "0", "--rate", "0.01")
         self.first_line(process)
         return process
 
     def test_baud_rates(self):
-        """Sets three baud rates: one with a name in <termios.h>, which the kernel then reports, and two without a
-        name."""
+        """Only the first of the three rates has a name in <termios.h>."""
         for baud, name in ((38400, termios.B38400), (23040, BOTHER), (14400, BOTHER)):
             with self.subTest(baud):
                 emulator = self.emulator("--singleturn", "1000", baud=baud)
@@ -161,8 +158,7 @@ class Uart(EncoderCase):
         self.assertEqual(settings(PORT), before)
 
     def test_new_baud_rate_keeps_parity(self):
-        """A change of the baud rate must keep the parity, on both sides: the host that sets the rate, and the encoder
-        that follows."""
+        """A change of the baud rate must keep the parity of host and encoder."""
         emulator = Emulator("/dev", protocol="raa38-modbus", name=f"{OTHER}?parity=odd", line="--port")
         self.addCleanup(emulator.end)
         address = f"raa38-modbus:{PORT}?latency=2000&parity=odd"
@@ -203,7 +199,7 @@ class Uart(EncoderCase):
         self.assert_good(self.read("baud=115200"))
 
     def test_port_is_exclusive(self):
-        """While absenc uses the port, other users cannot open it; afterwards they can. Root may always open it."""
+        """While absenc uses the port, other users cannot open it, except root."""
         os.chmod(PORT, 0o666)
         self.addCleanup(os.chmod, PORT, 0o600)
         self.emulator(baud=115200)
@@ -229,7 +225,7 @@ class TapOnUart(TapCase):
     BAUD = 57600  # a baud rate that both protocols support
 
     def test_shows_every_exchange(self):
-        """A receiver taps the line, for two protocols. tap must show every exchange of the known bytes on the line."""
+        """tap must show every exchange of the known bytes on the line."""
         for protocol in ("tformat", "raa38-modbus"):
             with self.subTest(protocol):
                 emulator = self.emulator(protocol, "--motion", "rpm=60", name=f"e-{protocol}")

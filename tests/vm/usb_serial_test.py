@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests `absenc` on a USB serial port that can be unplugged: /dev/ttyACM0 of the host, connected to /dev/ttyGS0 of a
-virtual USB gadget."""
+"""Tests `absenc` on a USB serial port that can be unplugged, with a virtual gadget."""
 import contextlib
 import json
 import os
@@ -33,8 +32,7 @@ class UsbSerial(EncoderCase):
     def setUp(self):
         super().setUp()
         self.addCleanup(plug)
-        # Unplugs and plugs the cable once before the test: closing the gadget's end drops the carrier, and a late
-        # hang-up could otherwise hit the next user of the port.
+        # A late hang-up of the gadget's end could otherwise hit the next user of the port.
         with self.without_cable():
             pass
 
@@ -58,7 +56,7 @@ class UsbSerial(EncoderCase):
 
     @contextlib.contextmanager
     def without_gadget(self):
-        """Removes the gadget instead of the cable, as if the computer that emulates the USB device were off."""
+        """Removes the gadget, as if the computer that emulates it were off."""
         subprocess.run(["rmmod", "g_serial"], check=True, timeout=PATIENCE)
         self.assertFalse(os.path.exists(GADGET))
         try:

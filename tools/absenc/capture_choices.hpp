@@ -10,8 +10,7 @@
 
 namespace absenc::tool {
 
-/// Returns `path` and the values of the options --channel, --raw-channels, --rate, --baud and --parity. Throws
-/// UsageError if one is invalid, or if --raw-channels is given without --rate.
+/// Returns `path` and the values of the options of captures. Throws UsageError.
 [[nodiscard]] CaptureChoices capture_choices(const Invocation& invocation, std::string_view path);
 
 }  // namespace absenc::tool

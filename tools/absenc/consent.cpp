@@ -38,8 +38,6 @@ bool says_yes(const std::string& question) {
   return is_yes(answer);
 }
 
-// Returns whether the requests of `command` may disturb other devices on the line. False for a sim: encoder, which is
-// alone on its line.
 bool disturbs(const EncoderAddress& uri, const Command& command) {
   return !command.disturbs.empty() && uri.port_kind != PortKind::sim;
 }

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::string_view spaces = " \t\r";
 
-// Removes the first word, and the blanks before it, from `line` and returns the word; "" if `line` has no word.
+// Removes the first word from `line` and returns it; "" if `line` has no word.
 std::string_view take_word(std::string_view& line) {
   line.remove_prefix(std::min(line.find_first_not_of(spaces), line.size()));
   const std::string_view word = line.substr(0, line.find_first_of(spaces));
@@ -114,7 +114,7 @@ std::string Console::condition(VirtualDevice& device, std::string_view line, Tim
 std::string Console::alarms(VirtualDevice& device, std::string_view names, bool raise) const {
   std::vector<std::string> all;
   while (!is_blank(names)) all.emplace_back(take_word(names));
-  // An alarm that has no flag with the encoder's options cannot be raised, but a command to lower it succeeds.
+  // An alarm that has no flag with the encoder's options can be lowered, but not raised.
   const std::uint32_t bits = raise ? require_alarms(unit_, device.options(), all) : require_alarms(unit_, all);
   if (bits == 0) {
     throw UsageError(fmt::format("which alarm? There are {}", fmt::join(flag_names(*unit_.alarms, ~0ull), ", ")));
@@ -123,8 +123,7 @@ std::string Console::alarms(VirtualDevice& device, std::string_view names, bool 
   return fmt::format("{} {}", raise ? "raised" : "lowered", fmt::join(all, ", "));
 }
 
-// Sets the rates of the faults named in `wanted`, such as "drop=0.1 corrupt=0.01"; faults that are not named keep their
-// rates, "none" sets all rates to 0. Returns all faults with a rate above 0.
+// Sets the rates of named faults, such as "drop=0.1". Returns all faults with a rate above 0.
 std::string Console::faults(VirtualDevice& device, std::string_view wanted) {
   sim::FaultRates rates = device.fault_rates();
   for (std::string_view rest = wanted; !is_blank(rest);) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Executes commands from lines of standard input while virtual encoders run: conditions, power, alarms and faults.
+// Executes commands from standard input while virtual encoders run.
 #pragma once
 
 #include <string>
@@ -16,16 +16,15 @@ using namespace client;
 
 class Console {
  public:
-  /// `unit` and the encoders must outlive the console. The encoders all belong to `unit` and are numbered from 1.
+  /// `unit` and the encoders must outlive the console; all encoders belong to `unit`.
   Console(const Unit& unit, std::vector<VirtualDevice*> devices) : unit_(unit), devices_(std::move(devices)) {}
 
-  /// Executes the lines that wait on standard input, and prints one line to standard output for each that is not blank.
+  /// Executes the lines that wait on standard input, and prints the answers.
   void look(Time now);
   /// Returns whether standard input has ended or standard output was closed.
   [[nodiscard]] bool ended() const { return lines_.ended() || unheard_; }
 
-  /// Executes `line` for all encoders, or for one if its number precedes, as in "2:". Returns the answer in words,
-  /// mostly the new state. Throws UsageError if a word, a value or the number of the encoder is not possible.
+  /// Executes `line` for all encoders, or for one as in "2:". Returns the answer. Throws UsageError.
   [[nodiscard]] std::string carry_out(std::string_view line, Time now);
 
  private:

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Help texts of the command, made from the same data as the parser of the command line. The man page contains parts of
-// them.
+// Help texts of the command, made from the same data as the parser of the command line.
 #pragma once
 
 #include <array>
@@ -60,7 +59,7 @@ inline constexpr std::array<std::string_view, 4> exit_statuses{
 
 /// Returns a parameter as help shows it: "<encoder>", "--count N".
 [[nodiscard]] std::string title(const Parameter& parameter);
-/// Returns a parameter's meaning, its default, and whether an option may be given more than once.
+/// Returns a parameter's meaning, default and repeatability in words.
 [[nodiscard]] std::string words(const Parameter& parameter);
 
 }  // namespace absenc::tool

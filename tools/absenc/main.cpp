@@ -31,7 +31,7 @@ namespace {
 
 bool asks_for_help(std::string_view word) { return word == "--help" || word == "-h"; }
 
-/// A parser of the words after a verb. It reports a wrong name before a parameter that is missing because of that name.
+/// A parser of the words after a verb; it reports a wrong name before a missing parameter.
 class ArgumentParser {
  public:
   explicit ArgumentParser(const Subcommand& subcommand) : subcommand_(&subcommand) {
@@ -94,9 +94,7 @@ class ArgumentParser {
     if (!parameter.repeatable) ++taken_;
   }
 
-  // Splits "tformat?model=23-bit&motion=rpm=60", the spelling of sim: addresses, into the protocol and its settings.
-  // The model and settings of the virtual encoder become the verb's option of that name, if the verb has it; all others
-  // become values of --option.
+  // Splits "tformat?model=23-bit&motion=rpm=60", as in sim: addresses, into protocol and settings.
   void take_protocol(std::string_view word) {
     constexpr std::string_view sim = "sim:";
     if (word.starts_with(sim)) word.remove_prefix(sim.size());
@@ -141,8 +139,7 @@ class ArgumentParser {
     throw UsageError(fmt::format("{} has no option {}{}", subcommand_->name, name, suggestion(name, names)));
   }
 
-  // Throws UsageError if there are too many arguments, if a required parameter is missing, if an option was given twice
-  // that may be given once, or if an option without a value was given one.
+  // Throws UsageError for a wrong number of parameters or values.
   void refuse_numbers() const {
     if (extra_) {
       throw UsageError(fmt::format("\"{}\" is too much: usage is {}", *extra_, usage(*subcommand_)));
@@ -169,7 +166,7 @@ class ArgumentParser {
   Invocation invocation_;
 };
 
-// Throws UsageError: no verb begins with `words`. `group` is the first word of a two-word verb, or "".
+// Throws UsageError: after `group`, which may be "", no verb continues with `words`.
 [[noreturn]] void refuse_verb(std::string_view group, std::span<char*> words) {
   const std::vector<std::string_view> verbs = words_after(group);
   if (words.empty()) {
@@ -195,16 +192,13 @@ class ArgumentParser {
                                suggestion(name, std::span(options).first(group.empty() ? 2 : 1))));
 }
 
-// Throws UsageError if a word follows --help or --version, where these stand in place of a verb.
+// Throws UsageError if a word follows --help or --version in place of a verb.
 void require_last(std::span<char*> words) {
   if (words.size() == 1) return;
   throw UsageError(fmt::format("\"{}\" is too much behind {}", words[1], words[0]));
 }
 
-/// Returns the verb at the beginning of `words`, and leaves the verb's last word as the first of `words`. Returns null
-/// if the user requested help or the version, which are printed then. `understood` receives the recognised part of the
-/// verb, also if an exception is thrown. Throws UsageError. An unknown word is an error and is not skipped, because the
-/// next word may be a verb that changes an encoder.
+/// Returns the verb, or null if none is to be run. An unknown word is never skipped.
 const Subcommand* find_verb(std::span<char*>& words, std::string& understood) {
   for (;;) {
     if (words.empty()) refuse_verb(understood, words);
@@ -246,8 +240,7 @@ Json failure(std::string_view name, const std::exception& failed) {
   return json;
 }
 
-// Runs the verb and returns its exit status. With --json a failure is printed as JSON on standard output instead of
-// being thrown.
+// Runs the verb and returns its exit status; with --json also for a failure.
 int run(const Subcommand& subcommand, const Invocation& invocation) {
   const bool json = invocation.has("--json");
   try {
@@ -265,15 +258,14 @@ int run(const Subcommand& subcommand, const Invocation& invocation) {
   return exit_failed;
 }
 
-// Prints the ports for a command line without any word: the user has probably just connected an adapter.
+// Without any word, the user has probably just connected an adapter.
 int welcome() {
   const int status = ports_subcommand.run({});
   print_line("\n`absenc --help` shows all that absenc does, `absenc list` all encoders.");
   return status;
 }
 
-/// Runs a whole command line and returns the exit status. `understood` receives the recognised part of the verb, also
-/// if an exception is thrown.
+/// Returns the exit status. `understood` receives the recognised part of the verb.
 int run_command_line(std::span<char*> words, std::string& understood) {
   if (words.empty()) return welcome();
   const Subcommand* subcommand = find_verb(words, understood);

@@ -12,7 +12,7 @@ inline constexpr Parameter encoder{"encoder", "",
                                    "", true};
 inline constexpr Parameter option{
     "--option", "NAME=VALUE", "sets an option of the protocol or of the port, as behind the encoder", "", false, true};
-/// The option --command of verbs that read repeatedly; it sets the setting `command` of the encoder's address.
+/// The option --command of verbs that read repeatedly.
 inline constexpr Parameter read_command{
     "--command", "COMMAND", "what to read, instead of the position with all alarms: a command that yields positions"};
 inline constexpr Parameter yes{"--yes", "", "do not ask before the encoder is changed"};

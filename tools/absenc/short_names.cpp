@@ -28,8 +28,7 @@ std::size_t count_different(std::span<const std::string> names) {
   return std::set<std::string_view>(names.begin(), names.end()).size();
 }
 
-// Returns the names, with those of more than `width` bytes cut to this width, all at the same place and as near to the
-// middle as possible, so that different names stay different. Returns nothing if no place achieves that.
+// Returns the names cut to `width` bytes at one place that keeps them different, or nothing.
 Names cut_in_the_middle(std::span<const std::string> names, std::size_t width) {
   const std::size_t different = count_different(names);
   const std::size_t most = width - gap.size();
@@ -73,8 +72,7 @@ Names middles(std::span<const std::string> names) {
   return cuts;
 }
 
-// Returns the names cut to `width` bytes, each after the number of its first occurrence in the list: "3 tfo..=7" is the
-// third name.
+// Returns the names cut to `width` bytes, each after its number, as "3 tfo..=7".
 Names numbered(std::span<const std::string> names, std::size_t width) {
   Names cuts;
   for (const std::string& name : names) {

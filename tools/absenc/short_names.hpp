@@ -9,8 +9,7 @@
 
 namespace absenc::tool {
 
-/// Returns each name in at most `width` (8 or more) bytes, in the order of `names`; ".." replaces each part that was
-/// cut. Different names remain different: where cutting alone would make some equal, each name begins with its number.
+/// Returns each name in at most `width` (8 or more) bytes; different names remain different.
 [[nodiscard]] std::vector<std::string> short_names(std::span<const std::string> names, std::size_t width);
 
 }  // namespace absenc::tool

@@ -60,7 +60,7 @@ std::string_view first_word(const Subcommand& subcommand) {
 }
 
 std::string_view last_word(const Subcommand& subcommand) {
-  // For a name without a blank, `find` returns npos, and npos + 1 is 0: the result is the whole name.
+  // Without a blank, `find` returns npos, and npos + 1 is 0: the whole name.
   return subcommand.name.substr(subcommand.name.find(' ') + 1);
 }
 

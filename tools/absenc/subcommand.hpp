@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Describes a subcommand as data, from which main.cpp parses the command line and help.cpp prints help.
+// Describes a subcommand as data, for the parser and for help.
 #pragma once
 
 #include <cstdint>
@@ -36,8 +36,7 @@ class Invocation {
   /// Returns the last value that the user gave for a parameter, or `fallback` without a value.
   [[nodiscard]] std::string_view text(std::string_view name, std::string_view fallback = {}) const;
   [[nodiscard]] std::span<const std::string> texts(std::string_view name) const;
-  /// Returns the last value of a parameter as a number, written in decimal or with 0x, or `fallback` without a value.
-  /// Throws UsageError if the value is no number or is outside `minimum` to `maximum`.
+  /// Returns the last value as a number, decimal or with 0x, or `fallback`. Throws UsageError.
   [[nodiscard]] std::int64_t number(std::string_view name, std::int64_t fallback, std::int64_t minimum,
                                     std::int64_t maximum) const;
   [[nodiscard]] double real(std::string_view name, double fallback, double minimum, double maximum) const;
@@ -58,11 +57,11 @@ struct Subcommand {
 /// All subcommands in the order of help; those with the same first word are adjacent.
 [[nodiscard]] std::span<const Subcommand* const> all_subcommands();
 
-/// Returns the first word of a verb of two words, "memory" for "memory read"; "" for a verb of one word.
+/// Returns the first word of a verb of two words, "memory" for "memory read", otherwise "".
 [[nodiscard]] std::string_view first_word(const Subcommand& subcommand);
 /// Returns the last word of a verb: "read" for "memory read" and for "read".
 [[nodiscard]] std::string_view last_word(const Subcommand& subcommand);
-/// Returns the words that may follow `first` in a verb; for "" the words with which a verb may begin.
+/// Returns the words that may follow `first` in a verb; for "" the first words of verbs.
 [[nodiscard]] std::vector<std::string_view> words_after(std::string_view first);
 
 extern const Subcommand ports_subcommand;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The virtual encoders of `emulate` on one line: one from the verb's options, one for each option --also.
+// The virtual encoders of `emulate` on one line.
 #pragma once
 
 #include <memory>
@@ -15,12 +15,12 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// Returns the settings of the virtual encoders that the verb's options state. Throws UsageError.
+/// Returns the settings of virtual encoders in the verb's options. Throws UsageError.
 [[nodiscard]] DeviceSettings device_settings(const Invocation& invocation);
-/// Returns the sim: address of one more encoder on the line, from the value `further` of --also. Throws UsageError.
+/// Returns the sim: address of one more encoder, from a value of --also. Throws UsageError.
 [[nodiscard]] EncoderAddress further_encoder(const Unit& unit, const Invocation& invocation, const std::string& further,
                                              const DeviceSettings& settings);
-/// Prints how many answers one device has given, the time since `start`, its faults, and the rules that its host broke.
+/// Prints a device's answers, time since `start`, faults, and the rules that its host broke.
 void print_summary(const VirtualDevice& device, std::string_view name, Time start);
 
 template <class Item>

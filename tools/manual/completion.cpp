@@ -12,9 +12,7 @@ namespace absenc::tool {
 
 namespace {
 
-// Functions of the completion script. Bash also splits words at : and =. The script joins `word` again as the user
-// wrote it, and removes the part before the last : or = from its replies, because bash replaces only the rest. Bash
-// does not split inside quotes.
+// Bash also splits words at : and =, except inside quotes, and replaces only the last part.
 constexpr std::string_view functions = R"bash(
 _absenc_file() {
   compopt -o filenames
@@ -201,8 +199,7 @@ std::string_view second_word(std::string_view name) {
   return name.substr(std::min(first_word(name).size() + 1, name.size()));
 }
 
-// Returns the kind of value to complete: "model", "setting", the name of an argument, or the placeholder of an option's
-// value in help.
+// Returns the kind of value to complete, such as "model" or "setting".
 std::string_view kind_of(const Subcommand& subcommand, const Parameter& parameter) {
   if (parameter.name == "--model") return "model";
   if (parameter.name == "name" && first_word(subcommand.name) == "config") return "setting";
@@ -225,8 +222,7 @@ std::string description(const Subcommand& subcommand) {
                      subcommand.name, fmt::join(arguments, " "), fmt::join(options, " "), repeats);
 }
 
-// Returns a bash table "declare -gA _absenc_models=(['tformat']='TS5700N8500 23-bit' ...)". -g, because a function may
-// source the script.
+// -g, because a function may source the script.
 template <class Names>
 std::string by_protocol(std::string_view name, std::span<const Unit* const> units, const Names& names) {
   std::string text = fmt::format("declare -gA _absenc_{}=(\n", name);
@@ -246,7 +242,7 @@ std::vector<std::string_view> command_names(const Unit& unit) {
   return names;
 }
 
-// Returns the names of makers, families and models, each once, without names of several words, which bash would split.
+// Leaves out names of several words, which bash would split.
 std::set<std::string_view> known_names(std::span<const Unit* const> units) {
   std::set<std::string_view> names;
   for (const Unit* unit : units) {
@@ -258,8 +254,6 @@ std::set<std::string_view> known_names(std::span<const Unit* const> units) {
   return names;
 }
 
-// Returns the names of settings for `config get` and `config set`: commands that read a setting, and those that write a
-// setting which cannot be read (only for `config set`).
 std::vector<std::string_view> setting_names(const Unit& unit) {
   std::vector<std::string_view> names;
   for (const Command& command : unit.commands) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Splits characters into runs: handles pauses, the beginning and the end of the capture, and finds which channel
-// carries requests.
+// Splits the characters of a capture into runs, and finds which channel carries the requests.
 #include "absenc/capture/annotate/annotate.hpp"
 
 #include <algorithm>
@@ -10,7 +9,7 @@ namespace absenc::capture {
 
 namespace {
 
-// number of characters of both channels after which, at the latest, the channel of the requests is decided
+// most characters that are stored before the channel of the requests is decided
 constexpr std::size_t enough_characters = 2000;
 
 struct Score final : AnnotationSink {
@@ -75,8 +74,6 @@ void Annotator::store_undecided(const Character& character) {
   if (undecided_.size() == enough_characters) find_roles();
 }
 
-// Decodes the stored characters once for each assignment of requests and replies to the channels, and takes the
-// assignment whose annotations score more points.
 void Annotator::find_roles() {
   constexpr std::array<std::array<Carries, 2>, 2> assignments{
       {{Carries::requests, Carries::replies}, {Carries::replies, Carries::requests}}};
@@ -100,7 +97,6 @@ Tick Annotator::pause_of(const Channel& channel) const {
   return channel.synchronised ? settings_.ticks.pause : std::max(settings_.ticks.pause, settings_.ticks.character);
 }
 
-// Returns whether the run ends with a complete good request, behind which another sender may begin.
 bool Annotator::ends_with_request(const Channel& channel) {
   const Bytes bytes = channel.run.bytes();
   for (std::size_t size = 1; size <= bytes.size(); ++size) {
@@ -109,8 +105,7 @@ bool Annotator::ends_with_request(const Channel& channel) {
   return false;
 }
 
-// Returns whether a silence until `begin` ends the run. A longer one is needed within a request of several frames, and
-// between replies of several encoders.
+// Returns whether a silence until `begin` ends the run.
 bool Annotator::is_over(const Channel& channel, Tick begin) {
   if (channel.run.empty()) return false;
   const Tick end = channel.run.end();
@@ -154,8 +149,7 @@ void Annotator::parse(Channel& channel, bool whole, bool cut) {
   at_ = last_reply_size_ = 0;
   whole_ = whole;
   cut_ = cut;
-  // The frame boundaries of a run without a pause before it are unknown: if it ends before it is full, it is
-  // reported as cut. A full run is parsed in spite of that.
+  // No pause was seen before this run, so the boundaries of its frames are unknown.
   if (whole && !channel.synchronised && !settings_.by_arrival) {
     const Run& run = channel.run;
     const Piece all{run.bytes(), run.begin(0), run.end()};

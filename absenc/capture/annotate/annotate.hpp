@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds the frames of a protocol among the characters of a line, pairs requests with their replies, and decodes them
-// with the functions of the protocol's unit.
+// Finds frames among the characters of a line, and pairs requests with their replies.
 #pragma once
 
 #include <array>
@@ -21,25 +20,14 @@ enum class Carries : std::uint8_t {
   both,
   requests,
   replies,
-  detect,  // unknown which of two channels carries the requests and which the replies; detected from the characters
+  detect,  // unknown; detected from the characters of both channels
 };
 
-/// Returns the times of the unit's line in ticks of a capture. `ticks_per_bit` 0: the bit time is not known, and
-/// characters with a silence of a tick or more between them belong to different frames. `ticks_per_second` 0: the line
-/// has the unit's own rate.
+/// Returns the times of the unit's line in ticks of a capture. An argument of 0 means not known.
 [[nodiscard]] LineTicks line_ticks(const Unit& unit, double ticks_per_bit, std::uint64_t ticks_per_second);
 
-/// Converts characters to annotated exchanges. Memory does not grow with the length of the capture.
-///
-/// A pause on the line ends a frame. The first characters of a capture, up to the first pause, may be the end of a
-/// frame or no characters at all: they are reported as cut, unless the line was silent before them. On a line that
-/// never pauses, the first frame is accepted only if more good frames follow it, because a weak checksum finds frames
-/// everywhere. On a line with both directions the bytes of a frame do not always show whether it is a request or a
-/// reply: some replies equal their requests.
-///
-/// With arrival times (`by_arrival`) a pause may lie within a frame and be missing between two frames. Frames are then
-/// separated by length and content, and pauses only help to judge bytes that are no good frame and requests without a
-/// reply: see annotate_arrival.cpp.
+/// Converts characters to annotated exchanges. Memory does not grow with the length of the capture. Some replies equal
+/// their requests, so that bytes alone do not always show the sender.
 class Annotator {
  public:
   struct Settings {
@@ -48,10 +36,9 @@ class Annotator {
     LineTicks ticks{};
     Tick begin = 0;              // first tick of the capture
     bool begins_silent = false;  // the line was silent before the capture
-    // A character's times are those of its arrival at a program, not those on the line; only for one channel.
+    // characters have times of arrival at a program, not those on the line; only for one channel
     bool by_arrival = false;
-    // by_arrival: shortest pause that must come from the line, because the transport from line to program does not
-    // cause such pauses.
+    // by_arrival: shortest pause that the transport to the program does not cause
     Tick gap = 1;
   };
 
@@ -64,11 +51,9 @@ class Annotator {
   void put(const Character& character);
   /// Ends the capture at `end`.
   void finish(Tick end);
-  /// by_arrival: reports the good frames that the added characters certainly complete, without waiting for further
-  /// characters. A reply of another length than the last one may be reported later.
+  /// by_arrival: reports complete frames; some only after further characters.
   void report_complete();
-  /// by_arrival: reports everything received so far. Call it when the line was silent for so long that no frame
-  /// continues and no reply can follow.
+  /// by_arrival: reports everything received so far. Call it when no frame or reply can continue.
   void report_after_silence();
   /// Returns which frames `channel` carries; `detect` while they are not known.
   [[nodiscard]] Carries carries(std::size_t channel) const { return channels_[channel].carries; }
@@ -87,8 +72,7 @@ class Annotator {
   void store_undecided(const Character& character);
   void find_roles();
 
-  // These functions split the characters into runs. A run has no pause between its characters, except with arrival
-  // times.
+  // These functions split the characters into runs.
   void take(const Character& character);
   [[nodiscard]] Tick pause_of(const Channel& channel) const;
   [[nodiscard]] bool ends_with_request(const Channel& channel);
@@ -96,8 +80,7 @@ class Annotator {
   void close(Channel& channel, bool cut);
   void parse(Channel& channel, bool whole, bool cut);
 
-  // These functions parse the run from index `at_` on. Those that return a `std::size_t` return how many characters
-  // they consumed or would consume, 0 for none.
+  // These functions parse the run from index `at_` on. A returned size is 0 if nothing matches.
   std::size_t next_frame();
   std::size_t whole_frame();
   std::size_t match_reply();

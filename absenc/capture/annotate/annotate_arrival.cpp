@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Parsing of characters with arrival times at a program. Adapters, the kernel and other programs pass on several frames
-// at once, and parts of one frame with pauses between them. So a good frame is found by its length and content. Where
-// bytes form no good frame, the characters after them decide, or a silence that cannot occur within a frame; the bytes
-// are then cut at pauses.
+// Parses characters with arrival times at a program: the way there may join and split frames.
 #include <algorithm>
 
 #include "absenc/capture/annotate/annotate.hpp"
@@ -27,15 +24,12 @@ bool Annotator::has_gap(std::size_t before) const {
   return before == 0 || (before < run.size() && run.begin(before) - run.begin(before - 1) >= settings_.gap);
 }
 
-// Returns whether the `size` bytes at `at_` have before them a pause or the beginning of the run, and behind them a
-// pause or the end of a run that no longer grows.
 bool Annotator::stands_alone(std::size_t size) const {
   const bool is_end = whole_ && size == rest(at_).size();
   return has_gap(at_) && (is_end || has_gap(at_ + size));
 }
 
-// Returns the size of the good frame at `at_`, after it reported a reply or stored a request; 0 if the characters added
-// so far do not show such a frame for certain.
+// Takes the good frame at `at_` and returns its size; returns 0 if it takes none.
 std::size_t Annotator::whole_frame() {
   if (!channel_->at_frame_start) return 0;
   const auto answered = [&](std::size_t size) {
@@ -43,7 +37,7 @@ std::size_t Annotator::whole_frame() {
     return reply_at(request, at_ + size, reply_sizes_[size_index(request)]) != 0;
   };
   const std::size_t size = request_at(at_);
-  // Returns whether the request at `at_` stands alone and the same bytes follow: its host had a timeout.
+  // A request that comes again shows that its host had a timeout.
   const auto repeats = [&] {
     if (size == 0 || !stands_alone(size) || rest(at_ + size).size() < size) return false;
     const Bytes behind = rest(at_ + size);

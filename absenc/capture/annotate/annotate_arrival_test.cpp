@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests annotation by arrival times: frames that arrive in parts or several at once, captures that begin within an
-// exchange, damaged replies, requests without replies, unsolicited frames.
+// Tests annotation of characters with arrival times at a program.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -38,8 +37,7 @@ std::string hex(const Wire& wire) {
   return text;
 }
 
-// Returns the first difference between found and expected exchanges, "" if there is none; the lists are too long to
-// print.
+// Returns the first difference between found and expected exchanges; "" if there is none.
 std::string difference(const std::vector<Exchange>& found, const std::vector<Exchange>& exchanges) {
   const auto text = [](const std::vector<Exchange>& all, std::size_t i) {
     return i < all.size() ? hex(all[i].request) + " > " + hex(all[i].reply) : std::string("nothing");
@@ -63,8 +61,7 @@ class Arrival : public ::testing::TestWithParam<const Unit*> {
     annotator = std::make_unique<Annotator>(unit, options, settings, collector);
   }
 
-  // Returns about `count` good exchanges of one request and one reply between host and virtual encoder; none if the
-  // encoder only sends unsolicited frames.
+  // Returns good exchanges between the unit's host and virtual encoder, possibly none.
   std::vector<Exchange> talk(std::size_t count, std::uint64_t seed) {
     Talker talker(unit, options, {}, seed);
     std::vector<Exchange> exchanges;
@@ -178,8 +175,6 @@ TEST_P(Arrival, CaptureBeginsWithinAnExchange) {
   }
 }
 
-// Checks that replies with a flipped bit cost no other exchange, on one channel with both directions, as a tap on one
-// pair of wires receives it.
 TEST_P(Arrival, ADamagedReplyCostsNoOtherExchange) {
   if (unit.link != LinkKind::half_duplex) return;
   const std::vector<Exchange> exchanges = talk(400, 5);
@@ -265,8 +260,7 @@ TEST_P(Arrival, ReportsUnsolicitedFrames) {
   }
 }
 
-// Checks that exchanges of two commands whose replies differ in length are each reported when complete: in Modbus RTU
-// the address comes before the command.
+// Checks that replies of two lengths, each to its own command, are reported when complete.
 TEST(ArrivalOfCommands, ReplyHasUsualLengthOfItsCommand) {
   const Unit& unit = *find_unit("raa38-modbus");
   const std::vector<Exchange> exchanges{

@@ -8,9 +8,7 @@ namespace absenc::capture {
 
 // ---- Bursts
 
-// Returns the word in a burst, without the bits of the idle line that the first clocks sample, and without the bit that
-// is sampled when a clock that was held low rises again. With `with_last` the word also includes the level of the data
-// line behind the last clock. Without it, a burst that has no more bits than those is returned unchanged.
+// `with_last` appends the level of the data line behind the last clock.
 Frame BurstAnnotator::word_of(const Burst& burst, bool with_last) {
   const bool rises = burst.low_before && judge_.unit().control_bit != nullptr;
   const std::size_t idle = judge_.unit().line.idle_clocks + (rises ? 1u : 0u);
@@ -43,8 +41,7 @@ void BurstAnnotator::put(const Burst& burst) {
   sink_.put(annotation);
 }
 
-// Decodes the word in `burst`; returns its error. `word` receives the decoded bits, in which the encoder's control
-// communication bit is cleared while a control frame is in progress. `answered` receives the bit as it was sampled.
+// `answered` receives whether the encoder's control bit was sampled as 1.
 Error BurstAnnotator::decode_as(const Burst& burst, bool with_last, Frame& word, bool& answered) {
   word = word_of(burst, with_last);
   const std::optional<std::size_t> place = judge_.control_bit(word);
@@ -112,8 +109,7 @@ bool ControlFrames::settle(bool fell) {
   return !open_;
 }
 
-// Returns the control frame decoded, or with the error of its first bad word: a lost word is a missing bit, so the host
-// discards the control frame.
+// A control frame with bad words has the error of the first one.
 Annotation ControlFrames::annotation(Judge& judge) const {
   Annotation annotation{.kind = Annotation::Kind::exchange,
                         .error = error_,
@@ -169,7 +165,7 @@ void CanAnnotator::finish(Tick end) {
     report_unanswered(0, end > requests_[0].at + ticks_.limit ? Remark::unanswered : Remark::cut);
 }
 
-// Pairs the frame with the oldest outstanding request that it answers. Returns false if it answers none.
+// Pairs the frame with the oldest request that it answers; returns false if there is none.
 bool CanAnnotator::pair_reply(const CanRecord& record) {
   const Frame reply{.bytes = record.frame.bytes(), .can = &record.frame};
   for (std::size_t i = 0; i < request_count_; ++i) {
@@ -181,8 +177,7 @@ bool CanAnnotator::pair_reply(const CanRecord& record) {
   return false;
 }
 
-// Pairs a bad frame with the newest outstanding request that the frame would answer if its content were good. Returns
-// false if no request fits.
+// Pairs a bad frame with the newest request that it may answer; returns false if there is none.
 bool CanAnnotator::pair_bad_reply(const CanRecord& record) {
   const Frame reply{.bytes = record.frame.bytes(), .can = &record.frame};
   for (std::size_t i = request_count_; i-- > 0;) {
@@ -194,8 +189,7 @@ bool CanAnnotator::pair_bad_reply(const CanRecord& record) {
   return false;
 }
 
-// Reports earlier requests with the identifier of `request` as unanswered: a host that sends a new request no longer
-// expects their replies.
+// Reports earlier requests with the identifier of `request` as unanswered.
 void CanAnnotator::end_earlier_requests(const CanFrame& request) {
   for (std::size_t i = 0; i < request_count_;) {
     const CanFrame& sent = requests_[i].frame;

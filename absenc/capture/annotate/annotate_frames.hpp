@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Annotators for links whose frame boundaries are known: SPI exchanges and clocked words, and CAN frames.
+// Annotators for links whose frame boundaries are known: SPI, clocked words, CAN.
 #pragma once
 
 #include <array>
@@ -15,25 +15,22 @@
 
 namespace absenc::capture {
 
-/// Collects control frames of clocked links: the host sends one bit in each pause (its clock is low for a 1), the
-/// encoder one bit in each word. A control frame begins with a 1 behind `zeros` zeros, and ends with
-/// `zeros` zeros.
+/// Collects control frames of clocked links: one bit of the host in each pause, one bit of the encoder in each word. A
+/// frame begins with a 1 of the host behind `zeros` zeros, and ends with `zeros` zeros.
 class ControlFrames {
  public:
   static constexpr unsigned zeros = 14;
 
   /// Returns whether a control frame is in progress, so that the encoder's control bit may be 1.
   [[nodiscard]] bool may_answer() const { return open_; }
-  /// Adds the next word: `answered` is the encoder's control bit, `error` the word's error. Call `settle` before the
-  /// next word.
+  /// Adds a word with the encoder's control bit and its error. Call `settle` before the next word.
   void put(const Burst& burst, bool answered, Error error);
-  /// Completes the last added word at the beginning of the next word or at the end; `fell` is whether the clock fell in
-  /// the pause behind the last added word. Returns true if that word is the last of a control frame.
+  /// Completes the added word; `fell`: the clock fell in the pause behind it. Returns whether a control frame ends with
+  /// it.
   bool settle(bool fell);
   /// Ends the capture. Returns true if a control frame was in progress, which stays incomplete.
   bool finish() { return std::exchange(open_, false); }
-  /// Returns the last control frame, complete or not, decoded unless one of its words was bad. Valid until the next
-  /// word and until `judge` decodes again.
+  /// Returns the last control frame. Valid until `settle` is called or `judge` decodes again.
   [[nodiscard]] Annotation annotation(Judge& judge) const;
 
  private:
@@ -44,7 +41,7 @@ class ControlFrames {
     [[nodiscard]] Frame frame() const { return {.bytes = bytes, .bits = size}; }
   };
 
-  // A word that was added but not completed by `settle`, because the pause behind it has not ended.
+  // An added word that `settle` has not completed.
   struct Pending {
     Tick begin;
     Tick end;
@@ -63,8 +60,7 @@ class ControlFrames {
   bool open_ = false;
 };
 
-/// Annotates SPI exchanges, each a reply and, if the host's data line was captured, its request; and clocked words,
-/// which have no request, with the control frames that they carry.
+/// Annotates SPI exchanges and clocked words, and the control frames that clocked words carry.
 class BurstAnnotator {
  public:
   /// `unit` and `sink` must outlive the annotator.
@@ -87,7 +83,7 @@ class BurstAnnotator {
   ControlFrames control_;
 };
 
-/// Annotates CAN frames of any number of encoders, which answer in any order or send unsolicited frames.
+/// Annotates CAN frames of one or several encoders.
 class CanAnnotator {
  public:
   CanAnnotator(const Unit& unit, const Options& options, const LineTicks& ticks, AnnotationSink& sink)

@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Feeds any bytes, with pauses or without, as characters of each half-duplex or full-duplex unit's line: the
-// annotations must contain as many bytes as were fed (an echo before a late reply may be missing), if these are no more
-// than a stored request holds. A frame that is annotated as good, neither cut nor undocumented, must pass the unit's
-// checks.
+// Fuzzes the annotation of characters, for every half-duplex and full-duplex unit.
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -82,7 +79,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       settings.channel_count = 2;
     }
     annotate(*unit, options, settings, bytes, true, 1);
-    // Tests a line with both directions that never pauses; only for a sixteenth of the sizes, because it takes long.
+    // A line that never pauses takes long, so only one size in sixteen is tested.
     if (carries == Carries::both && size % 16 == 5) {
       annotate(*unit, options, settings, bytes, false, 1 + 2 * Run::capacity / size);
     }

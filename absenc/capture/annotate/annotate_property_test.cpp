@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Captures random exchanges, with faults or without, of every unit that does not use CAN. The annotators must find each
-// good exchange at its times, and an error at the place of each bad one.
+// Compares annotations of random exchanges with those expected; units that use CAN are absent.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -161,8 +160,6 @@ class Truth {
     add(Kind::reply, Remark::none, error, sent, reading(error));
   }
 
-  // Adds a disturbance and the frame behind it as two annotations: the frame is valid, because a listening host accepts
-  // it.
   void add_disturbed(const Transmission& sent, Wire::const_iterator middle, const Wire& last) {
     const Wire before(sent.bytes.begin(), middle);
     const Tick each = (sent.end - sent.begin) / sent.bytes.size();
@@ -202,7 +199,7 @@ class Truth {
       one.remark = Remark::undocumented;
     }
     one.reading = reading(one.error);
-    // A late reply that equals its request may also be the repeated request: two unanswered requests are expected.
+    // A late reply that equals its request looks like the request again.
     if (one.error == Error::none && *one.turnaround > static_cast<Tick>(limit_.count()) && one.request == one.reply) {
       add(Kind::request, Remark::unanswered, Error::timeout, request_sent, {});
       return add(Kind::request, Remark::unanswered, Error::timeout, sent, {});
@@ -225,8 +222,7 @@ class Truth {
 
 // ---- Comparison of found and expected annotations
 
-// Requires every good exchange to be found as expected, and an error at the place of each expected error. Several
-// faults together may look like another error, so only a `share` of the bad exchanges must match exactly.
+// Only a `share` of bad exchanges must match exactly: several faults may look like another one.
 void expect_same(const std::vector<OwnedAnnotation>& found, const std::vector<OwnedAnnotation>& expected,
                  double share = 1) {
   std::size_t next = 0;
@@ -250,8 +246,7 @@ void expect_same(const std::vector<OwnedAnnotation>& found, const std::vector<Ow
     if (share == 1) ADD_FAILURE() << context << "\nfound " << to_text(found[next]);
     const std::size_t first = next;
     bool has_error = false;
-    // A host may repeat its request during a doubled reply: an annotation that matches the next expected exchange is
-    // not part of the present one.
+    // A host may repeat its request during a doubled reply.
     const std::string following = i + 1 < expected.size() ? to_text(expected[i + 1]) : "";
     for (; next < found.size() && found[next].begin >= one.begin && found[next].end <= one.end; ++next) {
       if (to_text(found[next]) == following) break;
@@ -276,7 +271,7 @@ sim::FaultRates faults_of(const Unit& unit, const Options& options) {
   sim::FaultRates rates = sim::testing::damaged_replies(0.05);
   rates[sim::FaultKind::request_corrupt] = 0.005;
   rates.delay = unit.timing.turnaround_limit * 3 / 2;
-  // In a stream, a frame sent twice looks the same as two frames, and a late frame looks the same as one in time.
+  // In a stream, a frame sent twice looks like two frames, and a late frame like one in time.
   if (unit.streams != nullptr && unit.streams(options)) {
     rates[sim::FaultKind::repeat] = rates[sim::FaultKind::delay] = 0;
   }
@@ -305,7 +300,7 @@ class Characters : public ::testing::TestWithParam<const Unit*> {
   const Unit& unit = *GetParam();
   Options options = testing::options_of(unit);
 
-  /// Runs commands until at least `exchanges` annotations are expected; conversations with collisions are left out.
+  /// Runs commands until at least `exchanges` annotations are expected.
   void talk(const sim::FaultRates& rates, std::size_t exchanges, std::uint64_t seed) {
     Talker talker(unit, options, rates, seed);
     while (truth.expected.size() < exchanges) {
@@ -337,8 +332,7 @@ TEST_P(Characters, EveryExchangeWithoutFaults) {
   expect_same(annotate(settings_of(unit)), truth.expected);
 }
 
-// Returns whether, for a test vector, more than 1/64 of random replies of the length of its reply pass the check: too
-// many damaged replies then look good.
+// Returns whether many random replies pass the check: damaged replies would look good too.
 bool has_weak_check(const Unit& unit, const Options& options) {
   NoFields nowhere;
   sim::Random random(1);
@@ -364,8 +358,6 @@ TEST_P(Characters, FindsEveryErrorAtItsPlace) {
   EXPECT_GT(errors[Error::none], 2000);
 }
 
-// Checks that a recording of the encoder's pair of wires only (full duplex) gives at least as many positions as the
-// encoder sent.
 TEST_P(Characters, FindsRepliesWithoutRequests) {
   talk({}, 500, 3);
   if (unit.link != LinkKind::full_duplex) return;
@@ -404,8 +396,6 @@ TEST_P(Characters, DamagedCharacters) {
   expect_same(annotate(settings_of(unit)), expected);
 }
 
-// Checks captures that begin at some of the first 200 characters: no error and no false exchange may be found, and at
-// most two annotations may be missing.
 TEST_P(Characters, BeginsAnywhere) {
   talk({}, 300, 5);
   const std::vector<Character> all = characters;

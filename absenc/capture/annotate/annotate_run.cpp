@@ -8,8 +8,7 @@ namespace absenc::capture {
 
 namespace {
 
-// On a line without pauses, frames are searched while more than this number of characters is left in the run: more than
-// two frames of usual length.
+// characters to look ahead: more than two frames of usual length
 constexpr std::size_t lookahead = 160;
 
 }  // namespace
@@ -21,9 +20,7 @@ Piece Annotator::piece(std::size_t size) const {
   return {rest(at_).first(size), run.begin(at_), run.end(at_ + size - 1)};
 }
 
-// Returns the size of a good reply to `request` that begins at `from`, or 0. A reply that ends with the finished run,
-// or has the size `usual` (0: not known), is preferred: where only a checksum gives the size, a shorter match may be an
-// accident.
+// Returns the size of a good reply to `request` at `from`, or 0. `usual`: its likely size or 0.
 std::size_t Annotator::reply_at(Bytes request, std::size_t from, std::size_t usual) {
   const Bytes bytes = rest(from);
   const auto is_good = [&](std::size_t size) {
@@ -46,8 +43,7 @@ std::size_t Annotator::request_at(std::size_t from) {
   return size != 0 && channel_->run.clean(from, size) ? size : 0;
 }
 
-// Returns whether plausible consecutive good frames begin at `from`: three frames, or two if they end with the run. One
-// frame, or two with weak checksums, may be an accident.
+// Returns whether several good frames follow from `from` on: a single one may be an accident.
 bool Annotator::good_from(std::size_t from) {
   const std::size_t end = channel_->run.size();
   const auto is_end = [&](std::size_t at) { return whole_ && at == end; };
@@ -69,8 +65,6 @@ bool Annotator::good_from(std::size_t from) {
   return second != 0 && (is_end(third) || reply_at({}, third) != 0);
 }
 
-// Returns whether another sender may begin at `at`: at least a quarter of the document's turnaround time must be silent
-// before it.
 bool Annotator::may_turn(std::size_t at) const {
   const Run& run = channel_->run;
   return at < run.size() && run.begin(at) - std::min(run.begin(at), run.end(at - 1)) >= settings_.ticks.turnaround / 4;
@@ -94,8 +88,7 @@ std::size_t Annotator::next_frame() {
   return taken != 0 ? taken : take_bad();
 }
 
-// Returns the index of the newest outstanding request that ended at or before `begin`, or nothing: a host that sends
-// another request no longer expects earlier replies.
+// Returns the index of the newest outstanding request that ended by `begin`, or nothing.
 std::optional<std::size_t> Annotator::request_before(Tick begin) const {
   const auto waiting = exchanges_.waiting();
   for (std::size_t i = waiting.size(); i-- > 0;) {
@@ -120,11 +113,9 @@ std::size_t Annotator::match_reply() {
   const std::size_t size = reply_at(pending.bytes(), at_, usual);
   const bool leaves_rest = whole_ && size < rest(at_).size();
   if (size == 0 || leaves_rest) {
-    // A reply that leaves characters of the run may match by accident. Then an echo of the request with a reply that
-    // leaves none is preferred, but not to a match no longer than the request: some replies equal their requests, and a
-    // reply may be sent twice.
+    // Some replies equal their requests, and a reply may be sent twice: these are no echoes.
     const bool may_be_accident = size == 0 || size > pending.bytes().size();
-    // Bytes that equal the request and begin later than twice the turnaround time after it are the repeated request.
+    // So late, bytes that equal the request are the request again, no echo.
     const bool is_late = settings_.ticks.turnaround != 0 && begin > pending.end + 2 * settings_.ticks.turnaround;
     // A tap (arrival times) receives no echo: bytes that equal the request are a repeated request.
     const bool may_be_echo = !is_late && !settings_.by_arrival;
@@ -132,7 +123,7 @@ std::size_t Annotator::match_reply() {
     if (echoed != 0 && (size == 0 || echoed == rest(at_).size())) return match_echoed_reply(*which, echoed);
     if (size == 0) return 0;
   }
-  // Some replies equal their requests. If the reply is overdue, such bytes are the repeated request.
+  // Some replies equal their requests; an overdue one is rather a request.
   if (overdue && channel_->carries == Carries::both && request_at(at_) == size) return 0;
   if (leaves_rest && usual != 0 && size != usual && !is_followed_by_frame(size)) return 0;
   last_reply_at_ = at_;
@@ -149,8 +140,7 @@ std::size_t Annotator::match_reply() {
   return size;
 }
 
-// Returns whether a good request, or the same reply again, follows the reply of `size` bytes at `at_`: then the reply's
-// unusual size is no accident.
+// Returns whether a good request or the same reply again follows the `size` bytes at `at_`.
 bool Annotator::is_followed_by_frame(std::size_t size) {
   const Bytes behind = rest(at_ + size);
   const Bytes reply = rest(at_).first(size);
@@ -165,8 +155,7 @@ bool Annotator::is_refusal(Bytes request, std::size_t from) {
          judge_.decode({.bytes = request}, {.bytes = bytes}) == Error::request_rejected;
 }
 
-// Returns the size of an echo of `request` at `from` together with the good reply or the refusal behind the echo, or 0.
-// Adapters and some encoders send echoes.
+// Returns the size of an echo of `request` at `from` with the reply or refusal behind it, or 0.
 std::size_t Annotator::echoed_reply_size(Bytes request, std::size_t from) {
   const Bytes bytes = rest(from);
   if (bytes.size() <= request.size() || !std::equal(request.begin(), request.end(), bytes.begin())) return 0;
@@ -192,7 +181,7 @@ std::size_t Annotator::match_repeated() {
   const Bytes before = channel_->run.bytes().subspan(last_reply_at_, size);
   if (!std::equal(before.begin(), before.end(), rest(at_).begin())) return 0;
   if (judge_.streams()) return 0;
-  // A request that equals the reply before it may follow directly; a good reply behind it shows that it is a request.
+  // A request may equal the reply before it; a good reply behind it shows that it is a request.
   if (channel_->carries == Carries::both && may_turn(at_ + size) && reply_at(rest(at_).first(size), at_ + size) != 0) {
     return 0;
   }
@@ -204,16 +193,14 @@ std::size_t Annotator::match_request() {
   const std::size_t size = request_at(at_);
   if (size == 0 || !is_request(size)) return 0;
   if (channel_->carries == Carries::both) exchanges_.report_unanswered(exchanges_.waiting().size());
-  // Some replies equal their requests. The first frame of the capture may be such a reply, whose request lies before
-  // the capture.
+  // The capture may begin with a reply that equals its request.
   const bool may_be_reply = is_first_ && channel_->carries == Carries::both && reply_at({}, at_) == size;
   exchanges_.add_request(piece(size), Error::none, may_be_reply ? Remark::cut : Remark::none, true);
   last_reply_size_ = 0;
   return size;
 }
 
-// Returns whether the bytes at `at_`, which have the form of a good request of `size` bytes, are a request. On a line
-// with both directions they may also be the beginning of a reply.
+// Returns whether the good request at `at_` is one: its bytes may also begin a reply.
 bool Annotator::is_request(std::size_t size) {
   const Channel& channel = *channel_;
   const bool is_rest = whole_ && size == rest(at_).size();
@@ -221,11 +208,11 @@ bool Annotator::is_request(std::size_t size) {
   if (is_rest) {
     const auto waiting = exchanges_.waiting();
     if (waiting.empty() || at_ != 0) return channel.at_frame_start;
-    // No host repeats a request within twice the turnaround time: bytes after a shorter silence are part of the reply.
+    // It is assumed that no host repeats a request within twice the turnaround time.
     const Tick silence = channel.run.begin(at_) - std::min(channel.run.begin(at_), waiting.back().end);
     return settings_.ticks.turnaround == 0 || silence > 2 * settings_.ticks.turnaround;
   }
-  // With arrival times: after a complete exchange the host is the next sender, even if the frame could also be a reply.
+  // Unless the encoder streams, the host is the next sender after a complete exchange.
   const bool is_turn_of_host = settings_.by_arrival && channel.at_frame_start && channel.last_size == 0 &&
                                exchanges_.has_request() && exchanges_.waiting().empty() && !judge_.streams();
   if (is_turn_of_host) return true;
@@ -271,13 +258,9 @@ std::size_t Annotator::take_bad() {
   return size;
 }
 
-// Returns the number of bad bytes from `at_` on: up to the next likely frame, to a pause (arrival times only), or to
-// the end of the run; if the run still grows, at most to half of the look-ahead before its end. Outside a stream of
-// unsolicited frames a single good reply does not end them: garbage before a good reply makes the exchange bad, like in
-// live reading.
 std::size_t Annotator::bad_size() {
   const std::size_t left = rest(at_).size();
-  // In a stream of unsolicited frames, the next frame begins one frame size behind the beginning of the bad frame.
+  // In a stream, a bad frame mostly has the size of the others.
   const std::size_t period = channel_->last_size;
   if (channel_->at_frame_start && period != 0 && period < left && reply_at({}, at_ + period) != 0) return period;
   // A good unsolicited frame may end with the run: the bytes before it are the bad ones.

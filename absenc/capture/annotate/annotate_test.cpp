@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests cases that simulated conversations do not contain, for example lines that never pause, bytes without times,
-// unnamed wires, noise, CAN.
+// Tests annotation in special cases, such as lines without pauses, bytes without times, CAN.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -91,8 +90,6 @@ std::vector<const Unit*> units_of_characters() {
 
 constexpr Tick length = 100;  // duration of a character in ticks
 
-// Checks that from the 200th character on every annotation is a good frame, for an encoder that sends positions without
-// a pause; the capture begins at each of the first characters in turn.
 TEST_P(OfUnit, ALineThatNeverPauses) {
   std::vector<Character> characters;
   std::vector<Tick> begins;
@@ -145,8 +142,6 @@ TEST_P(OfUnit, ALineThatNeverPauses) {
   }
 }
 
-// Checks that each annotation has the bytes of whole transmissions, and no error, if bytes have no times, as from a
-// terminal program or a dump: both directions in one sequence.
 TEST_P(OfUnit, BytesWithoutTimes) {
   std::vector<Character> characters;
   std::vector<Transmission> transmissions = talk(1200, 2);
@@ -203,7 +198,6 @@ TEST_P(OfUnit, FindsWireOfRequests) {
   }
 }
 
-// Checks that noise between two exchanges, as from a plug or a motor, is reported and affects neither exchange.
 TEST_P(OfUnit, NoiseBetweenExchanges) {
   const auto begins_nothing = [&](std::uint8_t byte) {
     for (const Direction direction : {Direction::request, Direction::reply}) {
@@ -267,8 +261,7 @@ TEST_P(OfUnit, NoiseBetweenExchanges) {
 
 INSTANTIATE_TEST_SUITE_P(Units, OfUnit, ::testing::ValuesIn(units_of_characters()), name_of);
 
-// ---- CAN: a toy protocol. Node n gets requests on 0x200 + n, and sends replies with the same data and unsolicited
-// frames on 0x100 + n.
+// ---- CAN: a toy protocol; requests on 0x200 + node, replies of equal data on 0x100 + node
 
 Error decode_toy(const Options&, Frame request, Frame reply, FieldSink& sink) {
   if (reply.can == nullptr) return (request.can->id & 0x700) == 0x200 ? Error::none : Error::unexpected_reply;
@@ -332,8 +325,6 @@ TEST(Can, NodesAnswerInAnyOrder) {
   EXPECT_EQ(collector.ids, (std::vector<std::uint32_t>{0x102, 0x202, 0x102, 0x201, 0x101, 0x333, 4, 0x203, 0x204}));
 }
 
-// Checks readings of toy encoders with one alarm: a position's validity is known if its reply, or an earlier good reply
-// of the same node since the last unanswered request, reports the alarm.
 TEST(CompletedReadings, CompletesAReadingByWhatTheSameEncoderReported) {
   static constexpr std::array<FieldInfo, 1> fields{
       {{.name = "node", .kind = FieldInfo::Kind::number, .unit = "", .meaning = "", .role = Role::encoder}}};
@@ -368,8 +359,6 @@ TEST(CompletedReadings, CompletesAReadingByWhatTheSameEncoderReported) {
   EXPECT_TRUE(is_known_after(1, 0));
 }
 
-// Checks that counter_overflow of an ID 3 reply is remembered for ID 0 replies, which do not carry that alarm, until a
-// request that resets all errors is answered.
 TEST(CompletedReadings, ForgetsAlarmsThatWereCleared) {
   const Unit& unit = *find_unit("tformat");
   const Options options = testing::options_of(unit);
@@ -403,8 +392,6 @@ TEST(CompletedReadings, ForgetsAlarmsThatWereCleared) {
   EXPECT_EQ(cleared.alarms_reported & counter_overflow, 0u) << "not reported by any reply since";
 }
 
-// Checks that a new request ends the wait for the reply to an earlier one, and that a bad reply is paired with its
-// request.
 TEST(Can, EachReplyBelongsToTheNewestRequest) {
   const Unit& unit = *find_unit("raa38-can");
   Options options;

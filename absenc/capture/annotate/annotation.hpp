@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An annotation: a request with its reply, or a request or reply alone, decoded by the protocol's unit; or noise.
+// An annotation: a request with its reply, one of them alone, or noise.
 #pragma once
 
 #include <cstddef>
@@ -51,14 +51,14 @@ struct Annotation {
   bool composed = false;      // the frame was composed of several exchanges that carried one byte of it each
   Tick begin = 0;
   Tick end = 0;
-  // The bytes and fields that the members below refer to are valid only during the call of AnnotationSink::put.
+  // The members below refer to data that is valid only during the call of AnnotationSink::put.
   Frame request{};
   Frame reply{};
   Contents contents{};               // decoded content of request and reply; empty for bad frames
   std::optional<Tick> turnaround{};  // ticks from the request's end to its reply's begin; CAN: between their times
 };
 
-/// Receives annotations, mostly in the order of their end times: a request without a reply may follow later ones.
+/// Receives annotations, not always in the order of their times.
 struct AnnotationSink {
   virtual void put(const Annotation& annotation) = 0;
 

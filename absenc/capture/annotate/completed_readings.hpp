@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Completes good readings of a capture with the alarms that earlier replies of the same encoder reported. Applies to
-// units with `remembered`.
+// Completes the readings of a capture with alarms of earlier replies of the same encoder.
 #pragma once
 
 #include <algorithm>
@@ -15,14 +14,8 @@
 
 namespace absenc::capture {
 
-/// Passes annotations on to a sink and completes their readings with alarms of earlier replies. It stands behind the
-/// annotators.
-///
-/// A reply that has the alarms and no position completes the readings behind it.
-///
-/// No frame reports that an encoder was switched off and on, but the encoder sends no replies while it is off: an
-/// unanswered request clears the stored alarms of all encoders. A request that clears alarms or resets the turns clears
-/// those of its encoder after its reply, if this has a reading. Otherwise the encoder is assumed to have stayed on.
+/// Passes annotations on to a sink, with good readings completed by alarms of earlier replies of the same encoder, if
+/// the unit has `remembered`. An unanswered request clears the stored alarms of all encoders.
 class CompletedReadings final : public AnnotationSink {
  public:
   /// `unit` and `sink` must outlive this object.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests that a reply with alarms and without a position completes later readings, with frames of Nikon's A-format.
+// Tests that alarms of one reply complete later readings, with frames of Nikon's A-format.
 #include <gtest/gtest.h>
 
 #include <optional>
@@ -13,7 +13,7 @@
 namespace absenc::capture {
 namespace {
 
-// Requests and replies. Each position but the first has a status bit, which does not name the alarm.
+// The status bit of a position does not name the alarm.
 constexpr auto read_0 = hex<"0200">;
 constexpr auto position_0 = hex<"04004523710000fe">;
 constexpr auto position_0_with_status = hex<"04104523710000ae">;

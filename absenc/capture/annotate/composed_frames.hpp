@@ -12,8 +12,7 @@
 
 namespace absenc::capture {
 
-/// Passes annotations on to a sink. Before the annotation whose byte completes a composed frame, it inserts an
-/// annotation of the composed frame.
+/// Passes annotations on to a sink, and inserts annotations of the frames that they compose.
 class ComposedFrames final : public AnnotationSink {
  public:
   /// `unit` and `sink` must outlive this object.

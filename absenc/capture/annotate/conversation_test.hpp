@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Test helper: random conversations of a unit's own host and virtual encoder in virtual time, captured together with
-// the true sender of each byte.
+// Test helper: random conversations of a unit's host and virtual encoder in virtual time.
 #pragma once
 
 #include <algorithm>
@@ -30,8 +29,7 @@ inline Options options_of(const Unit& unit, const std::vector<OptionText>& setti
 /// Returns the line settings of `unit`, with a default rate if the unit's document states none.
 inline LineSettings line_of(const Unit& unit) { return unit.line.with_some_rate(); }
 
-/// Bytes that host or encoder sent without a pause longer than those between frames of a request, with the times in
-/// ticks.
+/// Bytes that host or encoder sent together; times in ticks.
 struct Transmission {
   sim::NodeRole by;
   std::vector<std::uint8_t> bytes;
@@ -73,7 +71,7 @@ class Talker {
     }
   }
 
-  /// Runs one random command to its end, waits (for late replies too on a line of characters), and returns the traffic.
+  /// Runs one random command and returns the traffic.
   TalkRecord talk() {
     record_ = {};
     shaft_.put(static_cast<std::int64_t>(random_.below(60'000)), static_cast<std::int64_t>(random_.below(4096)));

@@ -17,7 +17,7 @@ namespace absenc::capture {
 
 namespace {
 
-// Writes `number` to `file` in 7-bit groups, with as few bytes as possible: most stored times are small differences.
+// Writes `number` in groups of 7 bits, lowest first; bit 7 is set in all bytes but the last.
 void put_number(std::FILE* file, std::uint64_t number) {
   for (; number > 0x7F; number >>= 7) std::putc(static_cast<int>(number & 0x7F) | 0x80, file);
   std::putc(static_cast<int>(number), file);
@@ -46,7 +46,7 @@ void begin_reading(std::FILE* file) {
   if (std::fflush(file) != 0 || std::fseek(file, 0, SEEK_SET) != 0) fail_scratch(std::strerror(errno));
 }
 
-/// The levels of all wires of a drawing at one time, which moves forward through the drawing's changes.
+/// The levels of all wires of a drawing at one time, which only moves forward.
 class WireLevels {
  public:
   explicit WireLevels(Drawing& drawing) : drawing_(drawing) {
@@ -82,8 +82,7 @@ class WireLevels {
   std::uint64_t taken_ = 0;
 };
 
-// Returns a wire's identifier for the value change dump: printable characters from '!' on, more than one for large
-// numbers.
+// Returns a wire's identifier for the value change dump: printable characters from '!' on.
 std::string identifier(std::size_t trace) {
   constexpr std::size_t digits = 94;
   std::string text(1, static_cast<char>('!' + trace % digits));
@@ -137,7 +136,6 @@ class Samples {
     const std::uint64_t whole = time / nanoseconds_a_second * rate;
     return whole + (time % nanoseconds_a_second * rate + nanoseconds_a_second - 1) / nanoseconds_a_second;
   }
-  // Applies all changes that the present sample shows, and finds the first sample that shows the next change.
   void take_change() {
     while (true) {
       const Tick next = levels_.next_change();
@@ -274,8 +272,7 @@ bool Drawing::next_label(Tick& at, std::string& words) {
 
 void write_vcd(std::ostream& out, Drawing& drawing) {
   out << "$version absenc $end\n$timescale 1 ns $end\n";
-  // All comments are written before the changes: the standard allows comments among the changes too, but sigrok's
-  // reader stops at such a comment.
+  // Comments stand before all changes: sigrok's reader stops at a comment among the changes.
   drawing.rewind_labels();
   Tick labelled = 0;
   for (std::string words; drawing.next_label(labelled, words);) {
@@ -336,7 +333,7 @@ void write_sigrok(const std::string& path, Drawing& drawing, std::uint64_t rate)
     add(archive.get(), path, ("logic-1-" + std::to_string(parts.size())).c_str(),
         zip_source_function(archive.get(), provide, parts.back().get()));
   }
-  // zip_close compresses and writes all files of the archive, in the order in which they were added.
+  // zip_close reads the parts in the order in which they were added, as Samples requires.
   if (zip_close(archive.get()) != 0) {
     if (samples.exception != nullptr) std::rethrow_exception(samples.exception);
     fail(path, zip_strerror(archive.get()));

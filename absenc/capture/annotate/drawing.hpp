@@ -24,12 +24,10 @@ struct CloseFile {
 /// A file handle that closes its file.
 using ScratchFile = std::unique_ptr<std::FILE, CloseFile>;
 
-/// Creates a temporary file, which disappears when it is closed or the process ends. Returns null on failure.
+/// Creates a temporary file, which disappears when it is closed; returns null on failure.
 [[nodiscard]] inline ScratchFile temporary_file() { return ScratchFile(std::tmpfile()); }
 
-/// Level changes of wires, and labels at times; ticks are nanoseconds. Changes and labels are stored in temporary
-/// files, because they are written only when all wires and the end time are known; so memory does not grow with the
-/// length.
+/// Level changes of wires, and labels, stored in temporary files. Ticks are nanoseconds.
 class Drawing {
  public:
   struct Wire {
@@ -41,15 +39,14 @@ class Drawing {
   explicit Drawing(std::string title, ScratchFile changes = temporary_file(), ScratchFile labels = temporary_file());
 
   void add_wire(std::string name, bool before) { wires_.push_back({std::move(name), before}); }
-  /// Inverts the level of the wire with index `wire` at the time `at`; the wire may be added later. Times must not
-  /// decrease. Throws std::runtime_error if the disk is full; a full disk may be noticed only by `rewind_changes`.
+  /// Inverts the level of the wire with index `wire` at `at`; the wire may be added later. Times must not decrease.
+  /// Throws std::runtime_error, perhaps only in `rewind_changes`.
   void change(Tick at, std::size_t wire);
-  /// Adds the label `words` at the time `at`. Times must not decrease. Throws std::runtime_error if the disk is full; a
-  /// full disk may be noticed only by `rewind_labels`.
+  /// Adds the label `words` at `at`. Times must not decrease. Throws std::runtime_error, perhaps only in
+  /// `rewind_labels`.
   void label(Tick at, std::string_view words);
   void set_end(Tick end) { end_ = end; }
-  /// Sets a function that reports the progress while the drawing is written to a file; an exception thrown by the
-  /// function ends the writing.
+  /// Sets a function that is called repeatedly while the drawing is written; its exceptions end the writing.
   void watch(std::function<void()> report_progress) { on_progress_ = std::move(report_progress); }
 
   [[nodiscard]] const std::string& title() const { return title_; }
@@ -59,10 +56,9 @@ class Drawing {
     if (on_progress_) on_progress_();
   }
 
-  /// Sets the position of `next_change` to the first level change. Throws std::runtime_error if the disk is full.
+  /// Makes `next_change` begin with the first level change. Throws std::runtime_error.
   void rewind_changes();
-  /// Reads the next level change into `at` and `wire`; returns false if no change follows. Throws std::runtime_error if
-  /// the disk fails.
+  /// Reads the next level change; returns false if there is none. Throws std::runtime_error.
   [[nodiscard]] bool next_change(Tick& at, std::size_t& wire);
   void rewind_labels();
   [[nodiscard]] bool next_label(Tick& at, std::string& words);
@@ -78,8 +74,7 @@ class Drawing {
   std::function<void()> on_progress_;
 };
 
-/// Stores the changes and comments of a sim::Waveform, or of a class with the same members, in a drawing. All times are
-/// increased by `lead`, which leaves the line idle before the first change.
+/// Stores the changes and comments of a waveform in a drawing, all of them `lead` later.
 template <class Waveform>
 class WaveformSink final : public Waveform::Sink {
  public:
@@ -88,8 +83,7 @@ class WaveformSink final : public Waveform::Sink {
   void change(Time at, std::size_t wire) override { drawing_->change(tick(at), wire); }
   void comment(Time at, std::string_view words) override { drawing_->label(tick(at), words); }
 
-  /// Adds the wires and ends the drawing `margin` after the waveform's end, for decoders that wait for an idle line,
-  /// but not before `least`, for example the end of a host's wait for a reply that does not come.
+  /// Adds the wires and ends the drawing `margin` after the waveform, but not before `least`.
   void finish(Waveform& waveform, Time margin, Time least = {}) {
     waveform.finish();
     for (const auto& wire : waveform.wires()) drawing_->add_wire(std::string(wire.name), wire.idle);
@@ -103,17 +97,14 @@ class WaveformSink final : public Waveform::Sink {
   Time lead_;
 };
 
-/// Writes `drawing` as a value change dump (IEEE 1364, clause 18), exact to the nanosecond; labels become comments
-/// before the changes.
+/// Writes `drawing` as a value change dump (IEEE 1364, clause 18); labels become comments.
 void write_vcd(std::ostream& out, Drawing& drawing);
 
-/// Writes `drawing` as digital channels like the CSV export of Saleae Logic 2: one line for time 0, for each time with
-/// changes and for the end, exact to the nanosecond.
+/// Writes `drawing` like the CSV export of Saleae Logic 2.
 void write_saleae_csv(std::ostream& out, Drawing& drawing);
 
-/// Writes `drawing` as a sigrok session with `rate` samples per second (at most 1 GHz). Replaces the file at `path`.
-/// Throws std::runtime_error with a sentence if the file cannot be written, and passes on exceptions of the function
-/// set by `Drawing::watch`.
+/// Writes `drawing` as a sigrok session with `rate` samples per second, at most 1 GHz. Replaces the file at `path`.
+/// Throws std::runtime_error, and exceptions of the function set by `Drawing::watch`.
 void write_sigrok(const std::string& path, Drawing& drawing, std::uint64_t rate);
 
 }  // namespace absenc::capture

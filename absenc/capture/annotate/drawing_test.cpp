@@ -106,7 +106,6 @@ TEST_F(SigrokSession, ErrorStatesReason) {
   }
 }
 
-// Checks that an exception thrown while libzip requests samples is passed on, and that no file is left.
 TEST_F(SigrokSession, CanBeCancelled) {
   Drawing drawing = three_wires();
   drawing.set_end(100'000'000);

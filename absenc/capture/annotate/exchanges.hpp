@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Outstanding requests of a capture, and the annotations that are made of requests and their replies.
+// Outstanding requests of a capture, and annotations made of them and their replies.
 #pragma once
 
 #include <array>
@@ -47,7 +47,6 @@ class Exchanges {
     [[nodiscard]] Bytes bytes() const { return {storage.data(), size}; }
   };
 
-  /// This object has its own judge, because it decodes requests while another judge holds the contents of a reply.
   /// `sink` must outlive this object.
   Exchanges(Judge judge, const LineTicks& ticks, AnnotationSink& sink)
       : judge_(std::move(judge)), ticks_(ticks), sink_(sink) {}
@@ -55,23 +54,20 @@ class Exchanges {
   [[nodiscard]] std::span<const PendingRequest> waiting() const { return {pending_.data(), count_}; }
   /// Returns whether a good request was added so far.
   [[nodiscard]] bool has_request() const { return has_request_; }
-  /// Returns whether `pending` has had no reply for so long, at the time `now`, that no host expects one.
+  /// Returns whether, at `now`, no host expects a reply to `pending` any more.
   [[nodiscard]] bool overdue(const PendingRequest& pending, Tick now) const { return now > pending.end + ticks_.limit; }
 
-  /// Adds an outstanding request. If four are outstanding, `report_unanswered` reports the oldest of them before.
+  /// Adds an outstanding request; if there are already four, reports the oldest of them.
   void add_request(const Piece& request, Error error, Remark remark, bool is_request);
-  /// Reports `reply` as the reply to `waiting()[which]`, after `report_unanswered` for all older outstanding requests.
-  /// `contents` must be empty with an error. A damaged reply counts as a reply. A good reply after the limit is paired
-  /// too, but with the error timeout, unless it is cut: no host would accept it.
+  /// Reports `reply` as the reply to `waiting()[which]`, and reports all older requests. `contents` must be empty if
+  /// `error` is not none.
   void report_reply(std::size_t which, const Piece& reply, Error error, Remark remark, const Contents& contents);
-  /// Reports the `count` oldest outstanding requests without a reply: as good if they need none, with their own error
-  /// if they are bad, as cut if their remark is `cut`, else as unanswered.
+  /// Reports the `count` oldest outstanding requests, without replies.
   void report_unanswered(std::size_t count);
   /// Reports bytes that belong to no outstanding request.
   void report_unpaired(Annotation::Kind kind, const Piece& piece, Error error, Remark remark,
                        const Contents& contents = {});
-  /// Ends the capture at `end`. Reports the outstanding requests like `report_unanswered`, but as cut those whose reply
-  /// may follow after the capture.
+  /// Ends the capture at `end` and reports the outstanding requests.
   void finish(Tick end);
 
  private:

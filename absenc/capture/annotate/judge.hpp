@@ -30,7 +30,7 @@ class Judge {
 
   [[nodiscard]] const Unit& unit() const { return *unit_; }
 
-  /// Decodes a request and its reply with the unit, and returns the error. `contents` then returns the decoded content.
+  /// Decodes a request and its reply, and returns the error; see `contents`.
   Error decode(const Frame& request, const Frame& reply) {
     decoded_.clear();
     const Error error = decoder_ != nullptr ? decoder_->decode(request, reply, decoded_)
@@ -38,13 +38,12 @@ class Judge {
     if (error != Error::none) decoded_.clear();
     return error;
   }
-  /// Returns the content of the last decoded frame, empty if it was bad. Valid until the next call of `decode` or
-  /// `request_size`.
+  /// Returns the content of the last decoded frame, until `decode` or `request_size` is called.
   [[nodiscard]] Contents contents() const {
     return {decoded_.fields, decoded_.has_reading ? &decoded_.reading : nullptr};
   }
 
-  /// Returns the size of the complete frame, good or not, that begins with the first of `bytes`; 0 if none does.
+  /// Returns the size of the complete frame, good or not, that `bytes` begin with, or 0.
   [[nodiscard]] std::size_t frame_size(Direction direction, Bytes bytes) const {
     const FrameEnd end = unit_->frame_end(options_, direction, bytes);
     return end.kind == FrameEnd::Kind::complete && end.size <= bytes.size() ? end.size : 0;
@@ -53,13 +52,13 @@ class Judge {
   [[nodiscard]] bool is_incomplete(Direction direction, Bytes bytes) const {
     return unit_->frame_end(options_, direction, bytes).kind == FrameEnd::Kind::incomplete;
   }
-  /// Returns the size of the complete good request that begins with the first of `bytes`; 0 if none does.
+  /// Returns the size of the complete good request that `bytes` begin with, or 0.
   [[nodiscard]] std::size_t request_size(Bytes bytes) {
     const std::size_t size = frame_size(Direction::request, bytes);
     return size != 0 && decode({.bytes = bytes.first(size)}, {}) == Error::none ? size : 0;
   }
 
-  /// Returns the index of the encoder's control communication bit in a reply, or nothing; see Unit::control_bit.
+  /// Returns the index of the encoder's control bit in a reply, or nothing; see Unit::control_bit.
   [[nodiscard]] std::optional<std::size_t> control_bit(const Frame& reply) const {
     return unit_->control_bit != nullptr ? unit_->control_bit(options_, reply) : std::nullopt;
   }
@@ -88,8 +87,7 @@ class Judge {
       reading = one;
       has_reading = true;
     }
-    // Copies the bytes of the newest field, because the unit's bytes are valid only during its call of the sink. All
-    // views are set again, because the storage may have moved.
+    // The unit's bytes are valid only during its call of the sink; the storage of copies may move.
     void store_bytes() {
       const Bytes added = fields.back().bytes;
       bytes.insert(bytes.end(), added.begin(), added.end());
@@ -99,8 +97,7 @@ class Judge {
         at += field.bytes.size();
       }
     }
-    // Copies the description of the newest field, because that of a word described by the user is valid only during the
-    // unit's call of the sink.
+    // The description of a user's word is valid only during the unit's call of the sink.
     void store_info() {
       described.push_back({std::string(fields.back().info->name), *fields.back().info});
       described.back().info.name = described.back().name;

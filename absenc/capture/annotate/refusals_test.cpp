@@ -25,8 +25,7 @@ Wire joined(const Wire& first, const Wire& second) {
   return both;
 }
 
-/// Annotates a good exchange, the bytes of `runs` and a good exchange. The bytes of each run follow without a pause.
-/// Checks that the three annotations are the two exchanges with the refused request between them.
+/// Checks that `runs`, between two good exchanges, are annotated as one refused request.
 void expect_refusal(const std::vector<Wire>& runs, Remark remark) {
   std::vector<Wire> all{request, reply};
   all.insert(all.end(), runs.begin(), runs.end());

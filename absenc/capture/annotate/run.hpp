@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Characters of one channel without a pause between them (with arrival times also with pauses), in separate arrays for
-// values and times.
+// Consecutive characters of one channel.
 #pragma once
 
 #include <algorithm>
@@ -15,8 +14,6 @@ namespace absenc::capture {
 
 class Run {
  public:
-  /// Largest number of characters, longer than any frame: without arrival times only a line without a pause for that
-  /// many characters fills the run.
   static constexpr std::size_t capacity = 512;
 
   void push(const Character& character) {
@@ -55,8 +52,7 @@ class Run {
   [[nodiscard]] Tick end(std::size_t index) const { return ends_[index]; }
   [[nodiscard]] Tick end() const { return ends_[size_ - 1]; }
 
-  /// Returns whether none of the `count` characters from `first` on had a wrong parity or stop bit or was
-  /// a break.
+  /// Returns whether none of the `count` characters from `first` on is damaged.
   [[nodiscard]] bool clean(std::size_t first, std::size_t count) const {
     if (damages_ == 0) return true;
     const auto from = damaged_.begin() + static_cast<std::ptrdiff_t>(first);

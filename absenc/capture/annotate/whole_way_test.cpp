@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the whole path from wires to annotations: conversations of every unit that does not use CAN are drawn as a
-// waveform, read back, decoded to characters or bursts, and annotated, as they are annotated without the waveform.
+// Tests the whole path from wires to annotations, for all units that do not use CAN.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,7 +24,7 @@ namespace {
 using testing::Talker;
 using testing::TalkRecord;
 
-/// Annotations as lines of text. Their times are stored separately, because a waveform rounds times.
+/// Annotations as lines of text; their times are separate, because a waveform may round them.
 struct Lines final : AnnotationSink {
   void put(const Annotation& one) override {
     std::string line = std::to_string(static_cast<int>(one.kind)) + " " + std::string(text_of(one.error).name) + " ";
@@ -112,7 +111,7 @@ class WholeWay : public ::testing::TestWithParam<const Unit*> {
     return memory_source({written.begin(), written.end()});
   }
 
-  // Requires `reader` to give every expected annotation with its bytes, error and position, at its time up to a bit.
+  // Requires `reader` to give the expected annotations, at their times up to a bit.
   void expect_same(Reader& reader, const Lines& expected) {
     const double ticks_per_ns = static_cast<double>(reader.layout().ticks_per_second) / 1e9;
     const LineTicks in_ns = settings.ticks;

@@ -35,8 +35,7 @@ bool append_byte(std::string_view digits, CanFrame& frame) {
   return true;
 }
 
-// Parses the data behind '#' in a log line: "R", "R4", "1122", "11.22", each optionally with the raw length code of
-// newer logs ("_9"). Returns false if the data is invalid.
+// Parses the data behind '#' in a log line, like "R", "R4", "1122", "11.22".
 bool parse_compact(std::string_view data, CanFrame& frame) {
   if (data.size() >= 2 && data[data.size() - 2] == '_' && hex_digit(data.back()) > 8) data.remove_suffix(2);
   if (data.starts_with('R')) {
@@ -61,8 +60,7 @@ bool parse_log(std::string_view identifier, std::string_view data, CandumpLine& 
   return parse_identifier(identifier, parsed.record) && parse_compact(data, parsed.record.frame);
 }
 
-// Parses the text behind the identifier in a line of screen output: "[3]  11 22 33", "[0]  remote request"; text that
-// option -a or an error frame adds is ignored. Returns false if the text is invalid.
+// Parses the text behind the identifier in a line of screen output, like "[3]  11 22 33".
 bool parse_screen(std::string_view rest, CandumpLine& parsed) {
   const std::string_view length = take_word(rest);
   if (length.size() == 4 && length.front() == '[') {  // a length with two digits, "[08]", is CAN FD
@@ -110,15 +108,13 @@ class CandumpReader final : public ParsedReader {
         break;
       }
     }
-    // The next frame may have the same time as the last frame of this block, so the block ends at that time.
+    // The next frame may have the same time as the last one of this block.
     block.end = at_ + (timed_ && done_ ? 1 : 0);
     return true;
   }
 
  private:
-  // Finds the interfaces, and whether lines have times, in the first 64 KiB. If one of these times, other than 0 and
-  // below a day, is less than the one before it, or equal to it on the same interface, all times are those since the
-  // previous frame.
+  // Finds the interfaces and the kind of the times in the first 64 KiB.
   void look_ahead(std::string_view name) {
     TextLines lines(*source_);
     std::string_view line;
@@ -134,7 +130,7 @@ class CandumpReader final : public ParsedReader {
       if (find(parsed.channel) == layout_.channels.size() && layout_.channels.size() < 255) {
         layout_.channels.emplace_back(parsed.channel);
       }
-      // Times on one clock rise from frame to frame; only frames of different interfaces may have the same time.
+      // On one clock, only frames of different interfaces may have the same time.
       const bool zero = parsed.at.seconds == 0 && parsed.at.picoseconds == 0;
       constexpr std::int64_t day = 86400;
       if (last && !zero && parsed.at.seconds < day) {

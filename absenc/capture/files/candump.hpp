@@ -23,7 +23,6 @@ struct CandumpLine {
   CanRecord record;
 };
 
-/// Parses one line of candump's output into `parsed`. Returns false if the line has another form.
 [[nodiscard]] bool parse_candump(std::string_view line, CandumpLine& parsed);
 
 /// Reads lines of these forms, either all with a time in parentheses or all without:
@@ -31,13 +30,8 @@ struct CandumpLine {
 ///     (1436509052.249713) vcan0 044#2A366C2B            candump -l and -L; #R or #R4: remote; bytes also with points
 ///      (000.001021)  can0  RX - -  12345678   [3]  1A 00 35   '..5'     to the screen, with -t a, A, d or z, -x, -a
 ///
-/// An identifier of three digits is a standard one, of eight digits an extended one, or with bit 29 an error frame.
-/// Ticks are nanoseconds from the first frame on; without times all are 0. If a time in the first 64 KiB, other than 0
-/// and less than a day, is before the time before it, or equal to it on the same interface, all times are those of -t
-/// d: each is the time since the previous frame. Channels are the interfaces named in the first 64 KiB; frames of other
-/// interfaces, and those of CAN FD and CAN XL, are left out, with a note. A line of another form, or a time before that
-/// of the previous line, is a damage: the lines before it are valid. Blank lines are skipped. Throws OpenError if there
-/// is no other line, or the first of them has another form.
+/// Ticks are nanoseconds from the first frame on; without times all are 0. Channels are the interfaces that the
+/// beginning of the file names. Throws OpenError.
 [[nodiscard]] std::unique_ptr<Reader> read_candump(std::unique_ptr<Source> source, std::string_view name);
 
 }  // namespace absenc::capture

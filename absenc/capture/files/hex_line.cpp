@@ -23,8 +23,6 @@ std::optional<Number> number_in(std::string_view text, int base) {
   return value;
 }
 
-// Appends the bytes of a group of hexadecimal digits, which may have a prefix such as 0x. Returns false if the group is
-// invalid.
 bool append_digits(std::string_view group, std::vector<std::uint8_t>& bytes) {
   bool prefixed = true;
   if (group.starts_with("0x") || group.starts_with("0X") || group.starts_with("\\x")) {
@@ -59,7 +57,7 @@ bool append_groups(std::string_view text, std::vector<std::uint8_t>& bytes) {
   }
 }
 
-// Parses a line of hexdump -C or od, like "00000010  48 65 6c  |Hel|". Returns false if the line has another form.
+// Parses a line of hexdump -C or od, like "00000010  48 65 6c  |Hel|".
 bool parse_dump(std::string_view line, HexLine& parsed) {
   if (line == "*") {
     parsed.problem = "'*' stands for lines that the dump left out: write it with hexdump -v -C or od -v";
@@ -78,8 +76,7 @@ bool parse_dump(std::string_view line, HexLine& parsed) {
   return true;
 }
 
-// Parses a line of xxd, like "00000010: 4865 6c6c 6f0a            Hello."; the text begins behind two blanks. Returns
-// false if the line has another form.
+// Parses a line of xxd, like "00000010: 4865 6c6c 6f0a            Hello."
 bool parse_xxd(std::string_view line, HexLine& parsed) {
   if (line == "*") {
     parsed.problem = "'*' stands for lines that the dump left out: write it without -a";
@@ -92,7 +89,7 @@ bool parse_xxd(std::string_view line, HexLine& parsed) {
   return parsed.offset && append_groups(line.substr(0, line.find("  ")), parsed.bytes);
 }
 
-// Parses a line of sigrok-cli, like "210-290 uart-1: rx-data: 1A". Returns false if the line has another form.
+// Parses a line of sigrok-cli, like "210-290 uart-1: rx-data: 1A".
 bool parse_sigrok(std::string_view line, HexLine& parsed) {
   std::string_view rest = line;
   const std::string_view range = take_word(rest);

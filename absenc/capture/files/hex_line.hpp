@@ -26,8 +26,8 @@ struct HexLine {
   std::string problem;  // reason why the line is invalid, as words; "" if no reason is known
 };
 
-/// Parses a group of hexadecimal digits and appends its bytes: pairs of digits, with or without a prefix (1A, 1A00,
-/// 0x1A, \x1A, $1A), or a prefix and one digit. Returns false and leaves `bytes` unchanged if the group is invalid.
+/// Appends the bytes of a group of hexadecimal digits, like 1A, 1A00, 0x1A, \x1A or $1A. Returns false and leaves
+/// `bytes` unchanged if the group is invalid.
 bool append_group(std::string_view group, std::vector<std::uint8_t>& bytes);
 
 /// Returns `line` without its comment and without blanks around the rest.
@@ -36,8 +36,7 @@ bool append_group(std::string_view group, std::vector<std::uint8_t>& bytes);
 /// Returns the form of a file whose first line is `line`; nothing if the form is unknown.
 [[nodiscard]] std::optional<HexForm> hex_form(std::string_view line);
 
-/// Parses a line of the given form into `parsed`. Returns false if the line does not have this form; `parsed.problem`
-/// may then contain the reason.
+/// Parses a line of the given form; returns false, perhaps with `parsed.problem`, if that fails.
 [[nodiscard]] bool parse_hex_line(HexForm form, std::string_view line, HexLine& parsed);
 
 }  // namespace absenc::capture

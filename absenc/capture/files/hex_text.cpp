@@ -16,8 +16,7 @@ namespace {
 
 constexpr std::size_t bytes_at_once = 1 << 16;
 
-// Returns the part of `line` to parse. Comments are not removed from dumps: the text beside the bytes may contain any
-// character.
+// The text beside the bytes of a dump may contain any character, so `#` begins no comment.
 std::string_view content_of(std::string_view line, std::optional<HexForm> form) {
   if (form == HexForm::dump || form == HexForm::xxd) return trim(line);
   return strip_comment(line);
@@ -40,8 +39,7 @@ class HexTextReader final : public ParsedReader {
     const std::optional<HexForm> form = first_form(line);
     if (!form) throw OpenError(std::string(name) + " holds no bytes as text");
     form_ = *form;
-    // The first line with bytes decides which items (time, port, direction) the lines have: a decoder may print other
-    // annotations before it.
+    // A decoder may print other annotations before the first line with bytes.
     constexpr std::uint64_t far_enough = 1 << 16;
     do {
       if (!parse_hex_line(form_, content_of(line, form_), line_)) break;

@@ -27,8 +27,7 @@ class LevelWriter {
     block_->changes[channel].before = level;
   }
 
-  /// Sets the level of a channel at the time `at`. Times must not decrease; a level that returns to its value at the
-  /// same time is no change.
+  /// Sets the level of a channel at the time `at`. Times must not decrease.
   void set(std::size_t channel, bool level, Tick at) {
     if ((levels_[channel] != 0) == level) return;
     levels_[channel] = level ? 1 : 0;
@@ -41,7 +40,7 @@ class LevelWriter {
     }
   }
 
-  /// Returns the number of level changes of all channels in the present block, including those that cancel each other.
+  /// Returns the number of level changes in the present block, cancelled ones included.
   [[nodiscard]] std::size_t changes() const { return changes_; }
 
  private:

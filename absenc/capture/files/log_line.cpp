@@ -31,8 +31,7 @@ std::string quoted(std::string_view text) {
 
 // ---- Bytes
 
-// Appends the bytes of a group with separators, like "1A:00:35" or "1A-00-35". Returns false if the group has another
-// form.
+// Appends the bytes of a group like "1A:00:35" or "1A-00-35"; returns false for another form.
 bool append_joined(std::string_view group, std::vector<std::uint8_t>& bytes) {
   const std::size_t before = bytes.size();
   if (group.size() < 5 || (group[2] != ':' && group[2] != '-')) return false;
@@ -54,7 +53,7 @@ bool is_bytes(std::string_view word) {
   return append_any(word, bytes);
 }
 
-// Returns whether `text` is what a terminal shows for `bytes`; the end of the text may have been removed as a comment.
+// Returns whether a terminal may show `bytes`, or the first of them, as `text`.
 bool is_text_of(std::string_view text, Bytes bytes) {
   std::string letters;
   for (const char c : text) {
@@ -85,8 +84,7 @@ bool is_column(std::string_view text, Bytes bytes) {
   return trim(text).empty() || is_text_of(trim(text), bytes);
 }
 
-// Parses the rest of a line as bytes, perhaps followed by their text. Returns false, with a problem, if the rest is
-// something else or ambiguous.
+// Parses the rest of a line: bytes, perhaps followed by their text.
 bool take_bytes(std::string_view text, HexLine& parsed) {
   constexpr std::string_view between = " \t,;";
   for (;;) {
@@ -117,12 +115,11 @@ struct ParsedTime {
   std::size_t size = 0;  // number of characters that the time takes
 };
 
-// Returns the number of characters at the beginning of `text` that may be a clock time: "17:55:24.123", "17:55:24,123",
-// "17:55:24:123", "5:55:24". The caller checks whether they are one.
+// Returns how many first characters of `text` may be a clock time like "17:55:24.123".
 std::size_t clock_size(std::string_view text) {
   std::size_t size = std::min(text.find_first_not_of("0123456789:."), text.size());
   const bool seconds = size > 3 && text[size - 3] == ':' && std::count(text.begin(), text.begin() + size, ':') == 2;
-  // A comma begins a fraction of a second only before three or six digits; otherwise it begins another field.
+  // A comma begins a fraction only before three or six digits.
   if (seconds && text.substr(size).starts_with(',')) {
     const std::string_view behind = text.substr(size + 1);
     const std::size_t digits = std::min(behind.find_first_not_of("0123456789"), behind.size());
@@ -154,8 +151,7 @@ ParsedTime match_clock(std::string_view text, const std::string& date) {
   return {parse_clock(date.empty() ? clock : date + ' ' + clock), size};
 }
 
-// Returns the date at the beginning of `text` in the form "2026-11-21", converted from forms such as "2026/11/21",
-// "21.11.2026" and "11/21/2026"; "" if there is none.
+// Returns the date at the beginning of `text` in the form "2026-11-21"; "" if there is none.
 std::string match_date(std::string_view text) {
   if (text.size() < 10) return "";
   text = text.substr(0, 10);
@@ -237,7 +233,7 @@ bool is_port(std::string_view word) {
   return false;
 }
 
-// Returns whether the word has no meaning for the bytes: a line number, a length, or a word like "data".
+// Returns whether the word is a line number, a length, or a word like "data".
 bool is_filler(std::string_view word) {
   const std::string lower = lower_case(word);
   if (all_digits(lower)) return true;
@@ -248,7 +244,7 @@ bool is_filler(std::string_view word) {
   return lower == "byte" || lower == "bytes" || lower == "data" || lower == "hex" || lower == "-";
 }
 
-/// Parses a log line from left to right: time, direction, port and fillers in any order, then the bytes.
+/// The parser of a log line: time, direction, port and fillers in any order, then the bytes.
 class Prefix {
  public:
   Prefix(std::string_view text, HexLine& parsed) : text_(text), parsed_(parsed) {}
@@ -335,8 +331,7 @@ class Prefix {
     parsed_.source += name;
   }
 
-  // Removes and handles a word that is a direction, a port, a filler or a label, like "RX", "COM3:", "COM3>". Returns
-  // false, with a problem, for another word or for a direction other than the one found before.
+  // Handles a direction, port, filler or label; returns false if there is a problem.
   bool take_word_of_prefix(std::string_view word) {
     text_.remove_prefix(word.size());
     const bool label = word.ends_with(':') || word.ends_with('=');
@@ -358,8 +353,7 @@ class Prefix {
     return false;
   }
 
-  // Handles text in brackets: at the end of the line the bytes, elsewhere known items or else a source. Returns true
-  // after the bytes.
+  // Handles text in brackets; returns true if the line is complete.
   bool take_bracket() {
     const char closing = text_[0] == '[' ? ']' : ')';
     const std::size_t end = text_.find(closing);
@@ -393,7 +387,7 @@ class Prefix {
     return lower_case(trim(text_.substr(word.size()))).starts_with("byte");
   }
 
-  // Returns whether bytes or nothing follow the word: then the word itself is a byte too, not a line number.
+  // Returns whether bytes or nothing follow the word.
   [[nodiscard]] bool bytes_follow(std::string_view word) const {
     std::string_view rest = text_.substr(word.size());
     rest.remove_prefix(std::min(rest.find_first_not_of(separators), rest.size()));

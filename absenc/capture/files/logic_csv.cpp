@@ -53,7 +53,7 @@ bool names_kinds(std::string_view line) {
   return first == "logic" || (first != line && (find_unit(first) != nullptr || first == "samples"));
 }
 
-// Time that a row states: in seconds, as a count of time units, or none (each row is one sample).
+// Time of a row: seconds or a clock time, a count of time units, or the row's own number.
 enum class RowTime : std::uint8_t { seconds, counts, rows };
 
 class LogicCsv final : public ParsedReader {
@@ -84,7 +84,7 @@ class LogicCsv final : public ParsedReader {
     levels_->begin(block);
     const std::uint64_t begin = lines_.offset();
     const Tick first = at_;
-    // A block ends before a row with a later time, so that all level changes of one time are in one block.
+    // All level changes of one time must be in one block.
     Tick last = first;
     do {
       if (at_ != last && lines_.offset() - begin >= text_at_once) {
@@ -167,7 +167,6 @@ class LogicCsv final : public ParsedReader {
     return false;
   }
 
-  // Reads the next row and its time. Returns false at the end of the file or if the file is damaged from here on.
   bool next_row() {
     std::string_view row;
     do {

@@ -34,8 +34,7 @@ struct Wires {
   [[nodiscard]] std::size_t ticks() const { return levels.front().size(); }
 };
 
-/// Returns the level changes in the samples from `first` to `end` - 1, found by comparing each sample with the previous
-/// one; `before` is the level before sample `first`.
+/// Returns the level changes of the samples `first` to `end` - 1; `before`: the level before.
 inline Changes changes_of(const Drawn& levels, bool before, std::size_t first, std::size_t end) {
   Changes found{before, {}};
   bool level = before;
@@ -48,8 +47,7 @@ inline Changes changes_of(const Drawn& levels, bool before, std::size_t first, s
 
 class MemoryReader final : public Reader {
  public:
-  /// Reads blocks of random sizes from 1 to `most` ticks. Ticks set by `leave_out` are skipped, as if the file were
-  /// damaged there.
+  /// Reads blocks of random sizes up to `most` ticks, without the ticks set by `leave_out`.
   MemoryReader(const Wires& wires, Content content, std::size_t most, std::uint64_t seed)
       : wires_(wires), most_(most), random_(seed) {
     layout_.content = content;

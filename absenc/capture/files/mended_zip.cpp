@@ -53,8 +53,7 @@ struct Header {
   [[nodiscard]] Bytes name() const { return Bytes(bytes).subspan(local_bytes, number(bytes, 26, 2)); }
   [[nodiscard]] Bytes extra() const { return Bytes(bytes).last(number(bytes, 28, 2)); }
 
-  // Reads the local header at offset `at`. Returns false if no valid header is at that place, or if the entry's sizes
-  // are stored behind its data.
+  // Reads the local header at offset `at`; returns false if there is none that can be used.
   [[nodiscard]] bool read(Source& source, std::uint64_t at) {
     bytes.resize(local_bytes);
     if (source.read(at, bytes) != local_bytes || number(bytes, 0, 4) != local_signature) return false;
@@ -84,7 +83,7 @@ void add_entry(Directory& directory, const Header& header, std::uint64_t at, std
   directory.put(directory_signature, 4).put(zip64_version, 2);
   directory.put(Bytes(header.bytes).subspan(4, 14)).put(in_zip64, 4).put(in_zip64, 4);
   directory.put(header.name().size(), 2).put(28, 2);  // lengths of the name and of the zip64 extra field
-  // The next fields are comment, disk and attributes, all 0, and the entry's offset, which is in the extra field.
+  // Comment, disk and attributes are 0; the entry's offset is in the extra field.
   directory.put(0, 10).put(in_zip64, 4);
   directory.put(header.name()).put(1, 2).put(24, 2).put(header.size, 8).put(packed, 8).put(at, 8);
 }

@@ -17,9 +17,8 @@ struct MendedZip {
   std::optional<std::uint64_t> cut_entry;  // index of the last entry, if the file ends within it
 };
 
-/// Builds a new directory for a zip archive from the local headers of its entries. The directory ends before an invalid
-/// header, and before an entry whose size is stored behind its data, as in no session that a known program writes.
-/// Memory grows with the number of entries, up to 64 MiB (700'000 pieces of a session); later entries count as missing.
+/// Builds a new directory of a zip archive from the local headers of its entries, up to the first that cannot be used.
+/// The directory takes about 64 MiB at most.
 [[nodiscard]] MendedZip mend_zip(std::unique_ptr<Source> source);
 
 }  // namespace absenc::capture

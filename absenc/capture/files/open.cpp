@@ -39,8 +39,7 @@ bool is_text(std::string_view head) {
   });
 }
 
-// Opens a logic analyser's file that states its channels itself (sigrok, Saleae, VCD, CSV); returns nullptr, and leaves
-// `source` as it is, if the file has none of these formats.
+// Returns nullptr, and leaves `source`, if the file is none of sigrok, Saleae, VCD and CSV.
 std::unique_ptr<Reader> open_logic(std::unique_ptr<Source>& source, std::string_view head, std::string_view name,
                                    const OpenChoices& choices) {
   if (is_zip(head)) return read_sigrok(std::move(source), name, choices.samples_per_second);
@@ -63,8 +62,7 @@ std::unique_ptr<Reader> checked(std::unique_ptr<Reader> reader, std::string_view
   return reader;
 }
 
-// Opens a folder exported by Logic 2, which contains digital_0.bin, digital_1.bin ...; channels are in the order of the
-// numbers.
+// Opens a folder of Logic 2's digital_0.bin, digital_1.bin ...; the numbers give the order.
 std::unique_ptr<Reader> open_folder(const std::filesystem::path& folder, const OpenChoices& choices) {
   std::vector<std::pair<unsigned, std::filesystem::path>> files;
   std::error_code error;

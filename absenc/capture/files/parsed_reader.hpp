@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Common parts of readers: the list of damages, and the layout of readers that parse a file in `claim`, because each
-// part of the file depends on the previous one.
+// Common parts of the readers of capture files.
 #pragma once
 
 #include <algorithm>
@@ -29,8 +28,7 @@ class Damages {
   std::vector<Damage> list_;
 };
 
-/// An event in a file that may occur often. It is reported only once, with its count and the place of its first
-/// occurrence.
+/// An event in a file that may occur often, reported once with its count and first place.
 struct Occurrences {
   std::uint64_t count = 0;
   std::uint64_t offset = 0;
@@ -47,8 +45,7 @@ struct Occurrences {
   }
 };
 
-/// A reader that does all its work in `claim`, one thread at a time. Several parser threads would have to pass levels,
-/// times and damages from part to part in order.
+/// A reader that does all its work in `claim`, one thread at a time.
 class ParsedReader : public Reader {
  public:
   [[nodiscard]] const Layout& layout() const override { return layout_; }
@@ -60,8 +57,7 @@ class ParsedReader : public Reader {
   Damages damages_;
 };
 
-/// Sets index, begin and end of a block for the next part of the file, and clears its content, except the level before
-/// the changes of each channel, and the samples with their size, whose storage is reused as it is.
+/// Prepares a block for reuse; keeps its samples, and the levels before its changes.
 inline void begin_block(Block& block, std::uint64_t index, Tick first) {
   block.index = index;
   block.first = first;

@@ -12,8 +12,7 @@ namespace absenc::capture {
 
 namespace {
 
-// Number of bytes in a block: few enough to fit into the cache of a core, so that the decoder finds the data there;
-// enough that the cost of a call does not matter.
+// number of bytes in a block, which may stay in the cache until it is decoded
 constexpr std::uint64_t block_bytes = 1 << 20;
 
 class RawReader final : public Reader {
@@ -47,7 +46,7 @@ class RawReader final : public Reader {
     return true;
   }
 
-  // `block.samples` keeps its size from one block to the next, so `resize` rarely has bytes to clear.
+  // The size of `block.samples` mostly stays the same, so `resize` rarely has bytes to clear.
   void fill(Block& block) override {
     block.samples.resize(static_cast<std::size_t>(block.file_size));
     const std::size_t got = source_->read(block.file_offset, block.samples);

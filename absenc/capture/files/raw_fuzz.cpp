@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Opens any bytes with a stated number of channels: if they are in none of a logic analyser's formats, as raw samples
-// of 1, 2, 4 and 8 bytes.
+// Opens any bytes with stated numbers of channels, which makes most of them raw samples.
 #include "absenc/capture/files/raw.hpp"
 
 #include "absenc/capture/files/test_files.hpp"

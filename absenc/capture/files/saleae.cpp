@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Implements the reader of Saleae's binary export, with layouts as in Saleae's "Binary Export Format - Version 0" and
-// "Binary and CSV Export Formats - 2025 Update" (version 1).
+// Implements the reader of Saleae's binary export, with layouts as in "Binary Export Format - Version 0" and "Binary
+// and CSV Export Formats - 2025 Update" (version 1).
 #include "absenc/capture/files/saleae.hpp"
 
 #include <algorithm>
@@ -37,7 +37,6 @@ double load_double(const std::uint8_t* bytes) { return std::bit_cast<double>(loa
 
 bool is_time(double seconds) { return std::isfinite(seconds) && std::abs(seconds) < longest_seconds; }
 
-// Converts seconds, which may be negative, to picoseconds, rounded because a double is rarely exact.
 std::int64_t to_picoseconds(double seconds) { return std::llround(seconds * ticks_per_second); }
 
 /// The transitions in the file of one channel, of which some are read ahead.
@@ -77,14 +76,13 @@ class TransitionStream {
   [[nodiscard]] std::int64_t end() const { return end_; }
   [[nodiscard]] bool exhausted() const { return remaining_ == 0 && chunks_ == 0; }
   [[nodiscard]] bool damaged() const { return !damage_.what.empty(); }
-  /// Returns the time of the last good transition, or of the chunk's begin, in picoseconds: a damage is reported there.
+  /// Returns the time of the last good transition, or of the chunk's begin, in picoseconds.
   [[nodiscard]] std::int64_t last() const { return last_; }
   [[nodiscard]] Damage damage() const { return damage_; }
-  /// Returns the time before which all transitions are known, in picoseconds: that of the last transition read ahead,
-  /// or of the chunk's begin.
+  /// Returns the time before which all transitions are known, in picoseconds.
   [[nodiscard]] std::int64_t known() const { return last_; }
 
-  /// Reads ahead until a transition before the time `known` is available, or the file ends or is damaged.
+  /// Reads ahead until a transition before `known()` is available, the file ends or is damaged.
   void refill(std::int64_t origin) {
     times_.erase(times_.begin(), times_.begin() + static_cast<std::ptrdiff_t>(next_));
     next_ = 0;

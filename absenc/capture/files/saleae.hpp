@@ -17,11 +17,10 @@ struct SaleaeChannel {
   std::unique_ptr<Source> source;
 };
 
-/// Returns true if a file that begins with `head` is a binary export of Saleae, digital or analog.
+/// Returns whether a file that begins with `head` is a binary export of Saleae.
 [[nodiscard]] bool is_saleae(std::string_view head);
 
-/// Returns the channel name for a file name without ".bin": "Channel 3" for "digital_3", as Logic 2 names its files;
-/// any other name unchanged.
+/// Returns "Channel 3" for "digital_3", as Logic 2 names its files; another name unchanged.
 [[nodiscard]] std::string saleae_channel_name(std::string_view stem);
 
 /// Reads binary exports of versions 0 and 1, little endian, after "<SALEAE>", int32 version and int32 type (0:
@@ -29,11 +28,10 @@ struct SaleaeChannel {
 ///
 /// - 0: uint32 initial state, double begin and end in seconds, uint64 number of transitions, a double with the time of
 ///   each transition
-/// - 1: uint64 number of chunks; each like version 0, with a double sample rate behind the initial state. Between
-///   chunks the level is constant, and the gap is noted.
+/// - 1: uint64 number of chunks; each like version 0, with a double sample rate behind the initial state
 ///
-/// Ticks are picoseconds from the earliest begin of all channels. If one channel is damaged or cut off, all channels
-/// end there. Throws OpenError if the beginning of a file is invalid.
+/// Ticks are picoseconds from the earliest begin of all channels. If one channel is damaged, all channels end there.
+/// Throws OpenError.
 [[nodiscard]] std::unique_ptr<Reader> read_saleae(std::vector<SaleaeChannel> channels);
 
 }  // namespace absenc::capture

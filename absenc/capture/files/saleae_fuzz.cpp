@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Opens any bytes, and valid binary exports of Saleae of both versions with some bytes changed, as a capture and as one
-// channel of an export.
+// Fuzzes the reader of Saleae's binary exports, as captures and as single channels.
 #include "absenc/capture/files/saleae.hpp"
 
 #include "absenc/capture/files/test_files.hpp"

@@ -45,7 +45,6 @@ TEST(Saleae, OneChannel) {
   EXPECT_TRUE(reader->damages().empty());
 }
 
-// Checks the changes of channels that change often and rarely, some at equal times, read in many blocks.
 TEST(Saleae, ManyChannelsAreMerged) {
   std::mt19937 random(5);
   std::vector<FileBytes> files;

@@ -23,12 +23,11 @@ namespace absenc::capture {
 
 namespace {
 
-// Limit in bytes for a piece that a block holds as a whole. Such a piece takes memory in each thread, because
-// libdeflate can expand it only as a whole: larger pieces are expanded by libzip in parts.
+// most bytes of a piece that is expanded as a whole, which takes its memory in each thread
 constexpr std::uint64_t largest_piece = 1 << 24;  // sigrok-cli writes pieces of 4 MiB, PulseView of 10 MiB
 constexpr std::uint64_t streamed_bytes = 1 << 22;
 constexpr std::uint64_t longest_metadata = 1 << 20;
-// Limit for the number of bytes of a capture: a larger sum, which only a damaged file states, is reduced to it.
+// limit for the number of bytes of a capture; only a damaged file states more
 constexpr std::uint64_t believable = std::uint64_t{1} << 60;
 constexpr const char* copy_again = "copy the file again from where it came";
 
@@ -74,7 +73,6 @@ Metadata parse_metadata(std::string_view text) {
   return found;
 }
 
-// Widens samples of 3, 5, 6 or 7 bytes in place to 4 or 8 bytes; they are packed at the beginning of `samples`.
 void widen(std::vector<std::uint8_t>& samples, std::size_t count, std::size_t from, std::size_t to) {
   for (std::size_t i = count; i-- > 0;) {
     std::memmove(&samples[i * to], &samples[i * from], from);
@@ -153,7 +151,7 @@ class SigrokReader final : public Reader {
     std::string name;
     ZipArchive::Entry entry{};
     Tick first = 0;
-    // Number of bytes of split samples at the borders of this piece: sigrok splits samples of 3 bytes between pieces.
+    // sigrok may split a sample between two pieces.
     unsigned skip = 0;  // bytes at the beginning of the piece that belong to the last sample of the previous piece
     unsigned tail = 0;  // bytes of this piece's last sample that are in the next piece
   };
@@ -227,9 +225,7 @@ class SigrokReader final : public Reader {
     return numbers;
   }
 
-  // Leaves a gap in the capture for missing pieces. All pieces but the last have equal length, so each missing piece is
-  // taken to be as long as the last piece before the gap or, if there is none, the piece `next`. Returns the number of
-  // bytes of samples before the piece `next`.
+  // Leaves a gap for missing pieces; returns the number of sample bytes before the piece `next`.
   std::uint64_t leave_gap(ZipArchive& archive, const std::string& name, const std::string& next,
                           std::pair<unsigned, unsigned> missing_numbers, std::uint64_t before) {
     ZipArchive::Entry neighbour;
@@ -304,19 +300,17 @@ class SigrokReader final : public Reader {
 
   [[nodiscard]] bool is_cut(const SamplePiece& piece) const { return cut_ && cut_->cut_entry == piece.entry.index; }
 
-  // Returns whether a piece that was read is the one that the end of a cut file shortened, and is correct up to the
-  // cut.
+  // Returns whether a piece ended because the file is cut off there.
   [[nodiscard]] bool ends_at_cut(const SamplePiece& piece, const ZipArchive* archive) const {
     return is_cut(piece) && archive != nullptr && archive->ran_out();
   }
 
-  // Returns the number of bytes from offset `bytes` of the data to the next border between samples; 0 at a border.
+  // Returns the number of bytes from offset `bytes` to the next border between samples.
   [[nodiscard]] unsigned missing(std::uint64_t bytes) const {
     return static_cast<unsigned>((unit_size_ - bytes % unit_size_) % unit_size_);
   }
 
-  // Reads the part of a piece's last sample that is in the next piece into `into`, and returns the number of bytes:
-  // fewer if the next piece is damaged, which is reported for that piece.
+  // Reads the part of a piece's last sample that is in the next piece; may return fewer bytes.
   [[nodiscard]] std::size_t read_tail(ZipArchive& archive, std::size_t index, std::span<std::uint8_t> into) const {
     return into.empty() || !archive.open(pieces_[index + 1].entry) ? 0 : archive.read(into);
   }
@@ -381,8 +375,6 @@ class SigrokReader final : public Reader {
                           ", is damaged: " + why});
   }
 
-  // Reports that the file is cut off. Data before the cut is as it was written: a disk that lost other parts leaves
-  // complete pieces with wrong checksums.
   void report_cut(const SamplePiece& piece, Tick at, bool checked) {
     damages_.add({.offset = cut_->end,
                   .tick = at,
@@ -391,7 +383,7 @@ class SigrokReader final : public Reader {
                           copy_again});
   }
 
-  // Takes an unused libzip handle, which only one thread may use at a time, or opens one; null if that fails.
+  // Returns a handle that no other thread uses; null if none can be opened.
   std::unique_ptr<ZipArchive> take_handle() {
     {
       const std::lock_guard lock(mutex_);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files that sigrok-cli writes from raw samples (sessions, VCD, CSV, the text of its UART decoder) must be read as the
-// levels or bytes of those samples. Sessions that are cut off must be read up to the cut.
+// Tests that files of sigrok-cli are read as the levels or bytes of its samples.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,8 +23,7 @@ class SigrokCli : public testing::Test {
   }
   ~SigrokCli() override { std::filesystem::remove_all(folder_); }
 
-  // Returns samples of `channels` lines whose levels change rarely, with as many bytes per sample as sigrok needs, and
-  // writes them to the file `samples`.
+  // Returns random samples of `channels` lines, and writes them to the file `samples`.
   FileBytes make_samples(unsigned channels, std::size_t count) {
     std::mt19937_64 random(channels);
     const unsigned bytes = (channels + 7) / 8;
@@ -87,8 +85,6 @@ TEST_F(SigrokCli, Sessions) {
   }
 }
 
-// Checks that sessions of two writers, sigrok-cli and this library, cut off as by an interrupted copy, are read up to
-// about the cut, which is the only damage.
 TEST_F(SigrokCli, CutSessions) {
   make_samples(8, 9'000'000);
   ASSERT_NO_FATAL_FAILURE(write_session(8));

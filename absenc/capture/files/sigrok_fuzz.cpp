@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Opens any bytes as a capture; a complete or a cut sigrok session with some bytes changed; and sessions with any
-// metadata.
+// Fuzzes the reader of sigrok sessions: any bytes, changed sessions, and any metadata.
 #include "absenc/capture/files/sigrok.hpp"
 
 #include <algorithm>

@@ -12,7 +12,7 @@
 namespace absenc::capture {
 namespace {
 
-// Returns samples with long runs, like those of a real line, and a part that cannot be compressed.
+// Returns samples of which a third cannot be compressed.
 FileBytes wave(std::size_t size) {
   std::mt19937 random(11);
   FileBytes bytes(size);
@@ -79,7 +79,7 @@ TEST(Sigrok, OnePieceThatIsLargeComesInParts) {
 }
 
 TEST(Sigrok, SamplesOfThreeBytesAreSpread) {
-  // The piece of the first session is a single block, that of the second session is read in parts.
+  // The piece of the first session is one block, that of the second is read in parts.
   for (const std::size_t count : {std::size_t{1000}, std::size_t{6'000'000}}) {
     const FileBytes samples = wave(3 * count);
     const auto reader = open_bytes(session(sigrok_metadata("1 MHz", 24, 3), {{"logic-1-1", samples}}));
@@ -134,8 +134,7 @@ TEST(Sigrok, ADamagedPieceIsCutShortAndTheOthersCount) {
   const FileBytes samples = wave(300'000);
   const FileBytes good =
       session(sigrok_metadata("1 MHz", 8, 1), {{"logic-1-1", samples}, {"logic-1-2", samples}, {"logic-1-3", samples}});
-  // Changes one byte in the second of three pieces, each time another one; the deflated data of a piece follows its
-  // name in the local header.
+  // Changes one byte in the second of three pieces, each time another one.
   const std::string_view name = "logic-1-2";
   const auto local = std::search(good.begin(), good.end(), name.begin(), name.end());
   const auto begin = static_cast<std::size_t>(local - good.begin());
@@ -247,7 +246,7 @@ TEST(Sigrok, ReadsEverythingBeforeACut) {
       const FileBytes file = cut_at(good, size);
       if (size < first + 39) {  // the first piece is completely missing
         const std::string why = problem(file);
-        // The last byte of these deflated entries only marks their end: without it, the data is complete all the same.
+        // Without the last byte of these deflated entries, the data is complete all the same.
         const std::size_t seen = size + (deflate ? 1 : 0);
         EXPECT_NE(why.find("cut off at byte "), std::string::npos) << why;
         EXPECT_NE(why.find(seen < metadata - 30 ? "version:"
@@ -347,8 +346,6 @@ TEST(Sigrok, SamplesOfThreeBytesMayBeCut) {
   EXPECT_EQ(count(second + 5), 335u);
 }
 
-// Checks that a cut archive is read if its sizes are in a zip64 field, as libzip writes them for files that may exceed
-// 4 GiB.
 TEST(Sigrok, ACutArchiveMayHaveSizesOf64Bits) {
   const FileBytes samples = wave(1000);
   FileBytes file =

@@ -15,7 +15,6 @@ namespace {
 
 using Handle = std::unique_ptr<std::filebuf>;
 
-// Opens a file without a buffer in the stream: reads go directly to the caller's memory. Returns null on failure.
 Handle open_handle(const std::filesystem::path& path) {
   auto handle = std::make_unique<std::filebuf>();
   handle->pubsetbuf(nullptr, 0);
@@ -23,7 +22,7 @@ Handle open_handle(const std::filesystem::path& path) {
   return handle;
 }
 
-// A capture file on a disk. A handle has only one position, so each reading thread takes a handle of its own.
+// A capture file on a disk. A handle has one position, so each reading thread takes its own.
 class FileSource final : public Source {
  public:
   FileSource(std::filesystem::path path, std::uint64_t size, Handle first) : path_(std::move(path)), size_(size) {

@@ -12,7 +12,7 @@
 
 namespace absenc::capture {
 
-/// Exception for a capture that cannot be opened. Its text states the reason and, where that helps, what to try.
+/// Exception for a capture that cannot be opened; its text states the reason.
 struct OpenError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -21,12 +21,11 @@ struct OpenError : std::runtime_error {
 struct Source {
   virtual ~Source() = default;
   [[nodiscard]] virtual std::uint64_t size() const = 0;
-  /// Copies bytes from `offset` on into `into` and returns their number: fewer than requested only at the end of the
-  /// file or if the file cannot be read further.
+  /// Copies bytes from `offset` on; returns their number, fewer at the end or on failure.
   [[nodiscard]] virtual std::size_t read(std::uint64_t offset, std::span<std::uint8_t> into) = 0;
 };
 
-/// Opens a file as a source of bytes. Throws OpenError if the file cannot be opened or is no regular file.
+/// Opens a regular file as a source of bytes. Throws OpenError.
 [[nodiscard]] std::unique_ptr<Source> file_source(const std::filesystem::path& path);
 
 [[nodiscard]] std::unique_ptr<Source> memory_source(std::vector<std::uint8_t> bytes);

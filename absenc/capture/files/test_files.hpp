@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Helpers shared by the tests and fuzzers of the readers: files in memory, and reading of all blocks.
+// Helpers shared by the tests and fuzzers of the readers.
 #pragma once
 
 #include <zip.h>
@@ -47,8 +47,7 @@ inline void require_that(bool condition) {
   if (!condition) std::abort();
 }
 
-/// Reads a capture to its end, into one reused block, and returns its contents; aborts if it finds a violation of the
-/// rules in signal.hpp.
+/// Reads a capture to its end and returns its contents; aborts if the reader breaks its rules.
 inline CaptureContents read_all(Reader& reader) {
   CaptureContents all;
   Block block;
@@ -114,7 +113,7 @@ inline FileBytes read_in_threads(Reader& reader) {
   return all;
 }
 
-/// Returns a zip archive with these entries, written by libzip with the given compression method.
+/// Returns a zip archive with these entries, compressed by `method` of libzip.
 inline FileBytes make_zip(const std::vector<std::pair<std::string, FileBytes>>& entries, zip_int32_t method) {
   zip_source_t* target = zip_source_buffer_create(nullptr, 0, 0, nullptr);
   zip_source_keep(target);
@@ -148,7 +147,7 @@ inline std::string sigrok_metadata(std::string_view rate, unsigned channels, uns
   return text + "unitsize=" + std::to_string(unit_size) + "\n";
 }
 
-/// Writes numbers, in the computer's own byte order (little endian), and text for tests of binary files.
+/// Writes text and numbers, in the computer's own byte order, for tests of binary files.
 struct BinaryWriter {
   FileBytes bytes;
 
@@ -178,8 +177,7 @@ inline FileBytes saleae_file(bool level, double begin, double end, const std::ve
   return writer.bytes;
 }
 
-/// Calls `read` with the fuzzer's input as a file, and with a good file changed by the input: each three bytes give a
-/// position and a new value; one or two remaining bytes cut the file off.
+/// Calls `read` with the fuzzer's input, and with a good file that the input changes.
 template <class Read>
 void fuzz_file(const std::uint8_t* data, std::size_t size, const FileBytes& good, Read read) {
   read(FileBytes(data, data + size));
@@ -192,7 +190,7 @@ void fuzz_file(const std::uint8_t* data, std::size_t size, const FileBytes& good
   read(std::move(changed));
 }
 
-/// Requires, for any bytes, that opening reports why it is impossible, or that the reader reads the capture to its end.
+/// Requires that opening states why it fails, or that the capture is read to its end.
 inline void read_or_refuse(FileBytes bytes, const OpenChoices& choices = {}) {
   std::unique_ptr<Reader> reader;
   try {

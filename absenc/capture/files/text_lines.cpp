@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t read_at_once = 1 << 18;
 
-// Parses all of `text` as a whole number of at most `most` digits; returns nothing for another text.
+// Parses all of `text` as a whole number of at most `most` digits, or returns nothing.
 template <class Number>
 std::optional<Number> whole(std::string_view text, std::size_t most) {
   Number value = 0;
@@ -26,7 +26,7 @@ std::optional<Number> whole(std::string_view text, std::size_t most) {
   return value;
 }
 
-// The digits of a decimal number; `point` is the number of digits before the point after the exponent is applied.
+// The digits of a decimal number, and the place of its point with the exponent applied.
 struct Decimal {
   std::array<char, 64> digits{};
   std::size_t count = 0;
@@ -62,8 +62,7 @@ std::optional<Decimal> parse_decimal(std::string_view text) {
   return decimal;
 }
 
-// Returns the number made of `count` digits of `decimal` from index `first` on, where index 0 is the first written
-// digit; digits outside are 0.
+// Returns the number of `count` digits from index `first` on; digits outside are 0.
 std::int64_t digits_at(const Decimal& decimal, std::int64_t first, std::int64_t count) {
   std::int64_t value = 0;
   for (std::int64_t i = first; i < first + count; ++i) {
@@ -73,8 +72,7 @@ std::int64_t digits_at(const Decimal& decimal, std::int64_t first, std::int64_t 
   return value;
 }
 
-// Parses seconds in the usual form, "12.000125" without a sign; returns false for other forms. It is fast, because
-// files may have a million rows.
+// Parses seconds like "12.000125" fast: files may have a million rows.
 bool read_plain_seconds(std::string_view text, Instant& instant) {
   constexpr std::ptrdiff_t most_digits = 18;
   constexpr std::array<std::int64_t, 13> picoseconds = {
@@ -94,7 +92,7 @@ bool read_plain_seconds(std::string_view text, Instant& instant) {
   return at == end;
 }
 
-// Parses seconds in any decimal form into `instant`; returns false if `text` is no number or 10^18 or more.
+// Parses seconds in any decimal form; returns false for another text or too many digits.
 bool read_seconds(std::string_view text, Instant& instant) {
   const std::optional<Decimal> decimal = parse_decimal(text);
   if (!decimal || decimal->point > 18) return false;
@@ -115,8 +113,7 @@ std::optional<std::int64_t> parse_day(std::string_view text) {
   return std::chrono::sys_days(date).time_since_epoch().count();
 }
 
-// Returns the seconds east of Greenwich for a time zone: "+01:00", "-0330"; 0 for "Z" or ""; nothing for
-// another text.
+// Returns the seconds east of Greenwich for a time zone like "+01:00", "-0330", "Z" or "".
 std::optional<std::int64_t> parse_zone(std::string_view text) {
   if (text.empty() || text == "Z") return 0;
   const std::string_view minutes =

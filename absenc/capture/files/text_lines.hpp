@@ -23,8 +23,7 @@ class TextLines {
  public:
   explicit TextLines(Source& source) : source_(source) {}
 
-  /// Reads the next line, without its end ("\n" or "\r\n"), into `line`, valid until the next call. Returns false at
-  /// the end of the file, or if a line has `longest_line` bytes or more.
+  /// Reads the next line, without its end, valid until the next call; false: none, or too long.
   [[nodiscard]] bool next(std::string_view& line);
 
   /// Returns the offset in the file of the line that `next` returned last.
@@ -46,22 +45,19 @@ class TextLines {
 inline constexpr std::int64_t nanosecond = 1000;  // number of picoseconds in a nanosecond
 inline constexpr std::int64_t picoseconds_per_second = 1'000'000'000'000;
 
-/// A time of day, with or without a date, or a time on the counter of any program; the resolution is a picosecond.
+/// A time of day, with or without a date, or a time on any counter.
 struct Instant {
   std::int64_t seconds = 0;
   std::int64_t picoseconds = 0;  // picoseconds to add to `seconds`, 0 to 10^12 - 1
 };
 
-/// Parses seconds like "12", "-0.000125", "1.8e-08"; digits below a picosecond are cut off. Returns nothing if `text`
-/// contains anything else, or 10^18 or more.
+/// Parses seconds like "12", "-0.000125", "1.8e-08"; digits below a picosecond are cut off.
 [[nodiscard]] std::optional<Instant> parse_seconds(std::string_view text);
 
-/// Parses a clock time like "2026-11-21T17:55:24.123456789+00:00" (also with a blank instead of T, with Z or without a
-/// zone), or "17:55:24.123" without a date. Returns nothing for another text.
+/// Parses a clock time like "2026-11-21T17:55:24.123456789+00:00" or "17:55:24.123".
 [[nodiscard]] std::optional<Instant> parse_clock(std::string_view text);
 
-/// Returns the time between two instants in ticks of `picoseconds`; nothing if `to` is before `from` or the number is
-/// too large.
+/// Returns the ticks of `picoseconds` between two instants; nothing if negative or too large.
 [[nodiscard]] constexpr std::optional<Tick> ticks_between(const Instant& from, const Instant& to,
                                                           std::int64_t picoseconds) {
   // Seconds of both instants are below 10^18, so their difference fits.
@@ -76,13 +72,12 @@ struct Instant {
   return static_cast<Tick>(seconds * per_second + rest / picoseconds);
 }
 
-/// Parses a rate like "1 MHz", "12.5 kHz", "250000" and returns it in hertz; nothing if it is not a positive whole
-/// number.
+/// Parses a rate like "1 MHz", "12.5 kHz" or "250000"; returns whole hertz above 0, or nothing.
 [[nodiscard]] std::optional<std::uint64_t> parse_rate(std::string_view text);
 
 [[nodiscard]] std::string_view trim(std::string_view text);
 
-/// Removes the next word, which ends at a blank, from the beginning of `text` and returns it; "" at the end of `text`.
+/// Removes the next word, which ends at a blank, from `text` and returns it.
 [[nodiscard]] std::string_view take_word(std::string_view& text);
 
 /// Returns the value of a hexadecimal digit, 0 to 15, or -1 for another character.

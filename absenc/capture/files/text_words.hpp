@@ -20,7 +20,7 @@ class TextWords {
   explicit TextWords(Source& source)
       : source_(source), buffer_(static_cast<std::size_t>(std::min<std::uint64_t>(source.size(), capacity))) {}
 
-  /// Returns the next word, valid until the next call; "" at the end of the file, or if a word is longer than 64 KiB.
+  /// Returns the next word, valid until the next call; "" at the end or if a word is too long.
   [[nodiscard]] std::string_view next() {
     while (begin_ != end_ && is_blank(buffer_[begin_])) ++begin_;
     std::size_t end = begin_;
@@ -52,7 +52,7 @@ class TextWords {
 
   static bool is_blank(std::uint8_t c) { return c <= ' ' && (c == ' ' || (c >= '\t' && c <= '\r')); }
 
-  // Returns the index of the first blank from `at` on, or `end_`; tests eight bytes at once where it can.
+  // Returns the index of the first blank from `at` on, or `end_`.
   [[nodiscard]] std::size_t skip_word(std::size_t at) const {
     constexpr std::uint64_t each = 0x0101010101010101;
     while (std::endian::native == std::endian::little && end_ - at >= 8) {

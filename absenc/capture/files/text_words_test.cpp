@@ -13,7 +13,7 @@ namespace {
 
 using Places = std::vector<std::pair<std::uint64_t, std::string>>;
 
-// Returns the words of `text` and their offsets, found one character after the other: the reference for TextWords.
+// Returns the words of `text` with their offsets: the reference for TextWords.
 Places plain_words(const std::string& text) {
   Places words;
   bool inside = false;

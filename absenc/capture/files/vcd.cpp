@@ -20,8 +20,7 @@ namespace absenc::capture {
 namespace {
 
 constexpr std::uint64_t block_text = 1 << 20;
-// Number of changes after which a block ends at the next time, besides the limit of its bytes, because one identifier
-// may drive many channels.
+// changes after which a block ends at the next time: one identifier may drive many channels
 constexpr std::size_t block_changes = 1 << 20;
 
 enum class Value : std::uint8_t { low, high, unknown, none };
@@ -98,8 +97,7 @@ class VcdReader final : public ParsedReader {
       }
     }
     done_ = true;
-    // The end of the capture is the last time in the file, or one tick behind it if values follow it, so that the last
-    // changes are within the capture.
+    // The end is one tick behind the last time if values follow it: they are within the capture.
     block.end = std::max(block.first, now_ + (last_changed_ ? 1 : 0));
     unknown_.report(damages_, "values are x or z: taken as the level before");
     return true;
@@ -123,7 +121,7 @@ class VcdReader final : public ParsedReader {
     return true;
   }
 
-  // Handles a word that begins a value change or a section. Returns false if the file is damaged from here on.
+  // Handles a word that begins a value change or a section; returns false if it is damaged.
   bool take(std::string_view word) {
     if (word[0] == '$') return take_section(word);
     started_ = true;
@@ -173,8 +171,7 @@ class VcdReader final : public ParsedReader {
     return true;
   }
 
-  // Changes the channels of a vector. Missing upper bits are unknown if the first written bit is unknown (as x or z),
-  // otherwise 0.
+  // Missing upper bits are unknown if the first written bit is unknown, otherwise 0.
   bool change_vector(const VcdVariable& variable, std::string_view bits, std::uint64_t offset) {
     const Value extension = to_value(bits[0]) == Value::unknown ? Value::unknown : Value::low;
     for (std::size_t i = 0; i < std::max(variable.width, bits.size()); ++i) {

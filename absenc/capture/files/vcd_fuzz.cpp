@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Opens any bytes as a capture, and a valid value change dump with some bytes changed or its end cut off.
+// Fuzzes opening: any bytes, and a value change dump that is changed or cut off.
 #include "absenc/capture/files/vcd.hpp"
 
 #include "absenc/capture/files/test_files.hpp"

@@ -38,8 +38,7 @@ bool parse_range(std::string_view text, long& left, long& right) {
   return colon == std::string_view::npos || parse(text.substr(colon + 1), right);
 }
 
-// Parses a time scale of 1, 10 or 100 units of 1 s to 1 fs. Returns ticks per second; 0 if the text is invalid or
-// the unit is longer than 1 s.
+// Returns the ticks per second of a time scale like "10ns"; 0 if it is invalid.
 std::uint64_t parse_timescale(std::string_view text) {
   std::uint64_t number = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);

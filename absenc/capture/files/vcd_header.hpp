@@ -25,8 +25,7 @@ class VcdHeader {
   /// Reads the declarations up to $enddefinitions. Throws OpenError if they are invalid.
   VcdHeader(TextWords& words, std::string_view name);
 
-  /// Returns all variables of an identifier, without those that are left out; nullptr if the identifier was not
-  /// declared.
+  /// Returns the variables of an identifier, possibly none; nullptr if it was not declared.
   [[nodiscard]] const std::vector<VcdVariable>* find(std::string_view identifier) const {
     const std::size_t code = short_code(identifier);
     if (code < short_.size()) return short_[code] < 0 ? nullptr : &variables_[static_cast<std::size_t>(short_[code])];

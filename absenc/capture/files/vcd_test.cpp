@@ -46,7 +46,7 @@ TEST(Vcd, LevelsAndTimes) {
   EXPECT_TRUE(reader->damages().empty());
 }
 
-// A source for a large file that is not kept in memory: one text repeated many times, then another text.
+// A source of a large file that is not in memory: a text repeated many times, then another.
 class Repeated final : public Source {
  public:
   Repeated(std::string part, std::uint64_t count, std::string last)
@@ -73,8 +73,7 @@ std::unique_ptr<Reader> open_repeated(const std::string& part) {
       "long.vcd");
 }
 
-// Checks that 70 MiB of comments, more than the limit of a header, are skipped: `absenc wave` writes a comment for each
-// character, transfer or frame.
+// Checks that 70 MiB of comments are skipped, more than a header may have otherwise.
 TEST(Vcd, AnyNumberOfCommentsBeforeTheChanges) {
   const auto reader = open_repeated("$comment #123456789012 device 1A and 0 more words like these in between $end\n");
   const CaptureContents contents = read_all(*reader);
@@ -162,8 +161,7 @@ TEST(Vcd, RefusesInvalidHeaders) {
   EXPECT_NE(problem("$timescale 1 us $end $var wire 999999999 ! a $end").find("impossible width"), std::string::npos);
 }
 
-// Checks the changes of a file with many blocks, with words across the borders of the read buffer, and with identifiers
-// of two or three characters.
+// Checks a file with many blocks, words across the read buffer's borders, and long identifiers.
 TEST(Vcd, LargeFiles) {
   std::string text = "$timescale 1 ns $end\n";
   constexpr std::size_t channels = 300;

@@ -15,8 +15,7 @@ namespace absenc::capture {
 
 namespace {
 
-// A window into the source through which libzip reads: libzip requests 8 KiB at a time, and a larger buffer reduces the
-// number of system calls.
+// The source as libzip reads it, through a buffer that saves system calls.
 struct Window {
   Source* source = nullptr;
   std::uint64_t position = 0;
@@ -97,8 +96,7 @@ struct Close {
   void operator()(libdeflate_decompressor* inflater) const { libdeflate_free_decompressor(inflater); }
 };
 
-// Returns the limit for the packed size of an entry of `size` bytes: deflate adds 5 bytes to 64 KiB of incompressible
-// data; a much larger entry would waste memory.
+// Returns the limit for the packed size: deflate adds only few bytes to incompressible data.
 constexpr std::size_t most_packed(std::size_t size) { return size + size / 64 + 1024; }
 
 }  // namespace

@@ -15,7 +15,7 @@ namespace absenc::capture {
 
 class ZipArchive {
  public:
-  /// Opens the archive in `source`, which must outlive the archive. Throws OpenError with libzip's message.
+  /// Opens the archive in `source`, which must outlive this object. Throws OpenError.
   explicit ZipArchive(Source& source);
   ~ZipArchive();
   ZipArchive(const ZipArchive&) = delete;
@@ -23,29 +23,25 @@ class ZipArchive {
 
   struct Entry {
     std::uint64_t index = 0;
-    // Size of the expanded entry according to the directory; reliable only after the entry was read.
+    // size of the expanded entry that the directory states; it may be wrong
     std::uint64_t size = 0;
   };
-  /// Finds an entry by its name and describes it in `entry`. Returns false if the archive has no such entry.
+  /// Finds an entry by its name; returns false if there is none.
   [[nodiscard]] bool find(const std::string& name, Entry& entry) const;
 
   /// Returns the names of all entries, in the order of the archive.
   [[nodiscard]] std::vector<std::string> names() const;
 
-  /// Expands a whole deflated entry into `into`, which must have the entry's size, faster than `open` and `read`.
-  /// Returns true only if the entry is deflated, complete and its checksum is right; otherwise `open` and `read` return
-  /// as much as possible and report the error, if there is one.
+  /// Returns whether it expanded the entry into `into`; works only for intact deflated entries.
   [[nodiscard]] bool expand(const Entry& entry, std::span<std::uint8_t> into);
 
-  /// Begins to read an entry and closes the previous entry. Returns false on error; `problem` then returns the reason.
+  /// Begins to read an entry instead of the previous one; returns false on error, see `problem`.
   [[nodiscard]] bool open(const Entry& entry);
-  /// Expands the next bytes of the open entry into `into` and returns their number; fewer on error or at the end of the
-  /// entry, see `problem`.
+  /// Expands the next bytes of the open entry; returns their number, fewer at its end or on error.
   [[nodiscard]] std::size_t read(std::span<std::uint8_t> into);
-  /// Returns whether `read` returned fewer bytes because the entry's data ended, even if its checksum or size is wrong;
-  /// false if the data is damaged otherwise.
+  /// Returns whether the last `read` returned fewer bytes because the entry's data ended.
   [[nodiscard]] bool ran_out() const;
-  /// Returns, after the whole entry was read, whether the entry ends there and its checksum is right.
+  /// Returns whether the entry that was read ends here with a right checksum.
   [[nodiscard]] bool at_good_end();
 
   /// Returns a message about the last error of this archive, mostly libzip's.

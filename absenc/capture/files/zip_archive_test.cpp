@@ -22,7 +22,7 @@ FileBytes mixed(std::size_t size) {
 
 const FileBytes content = mixed(100'000);
 
-// Returns the byte at offset `at` of the first entry of the archive's directory, counted from the entry's signature.
+// Returns byte `at` of the first entry of the archive's directory.
 std::uint8_t& in_directory(FileBytes& file, std::size_t at) {
   constexpr std::string_view signature = "PK\x01\x02";
   const auto found = std::search(file.begin(), file.end(), signature.begin(), signature.end());
@@ -83,7 +83,6 @@ TEST(ZipArchive, ReadingReportsDamage) {
   }
 }
 
-// Checks that `open` and `read` read what `expand` refuses: stored entries, and those of bzip2 if libzip supports it.
 TEST(ZipArchive, ReadsOtherCompressionMethodsWithoutExpand) {
   for (const zip_int32_t method : {ZIP_CM_STORE, ZIP_CM_BZIP2}) {
     if (zip_compression_method_supported(method, 1) == 0) continue;

@@ -13,13 +13,13 @@ namespace {
 
 constexpr Tick never = std::numeric_limits<Tick>::max();
 constexpr Tick characters_ahead = 12;  // number of characters examined to find the first start bit
-// Number of falling edges tried as the first start bit: more than 16 within a character are noise.
+// number of falling edges tried as the first start bit; more within a character are noise
 constexpr std::size_t candidates = 16;
 constexpr std::size_t step = 64;  // number of changes after which the true state is compared with the guess again
 
 }  // namespace
 
-// A falling edge that may be a start bit, and the levels at the middles of the bits behind it, the start bit in bit 0.
+// A falling edge that may begin a character, with the levels of its bits, start bit in bit 0.
 struct AsyncDecoder::Candidate {
   Tick begin;
   unsigned levels;
@@ -62,9 +62,7 @@ void AsyncDecoder::restart(Start start) {
   unsure_.reset();
 }
 
-// Visits the candidates from the falling edge with index `start` on, as long as `needed` ticks of a candidate lie
-// before `limit`. `visit` returns false to stop before the candidate passed to it. Returns the index of the falling
-// edge at which to continue; that edge may not be known yet. `edges_` ends with `never`.
+// `edges_` must end with `never`. Returns the index of the edge at which to continue.
 template <class Visit>
 std::size_t AsyncDecoder::walk(std::size_t start, Tick limit, Tick needed, Visit&& visit) const {
   const Tick* const edges = edges_.data();
@@ -119,8 +117,7 @@ std::uint64_t AsyncDecoder::faults_from(std::size_t start, Tick limit) const {
   return faults;
 }
 
-// Returns the index of the edge that begins the first start bit, or nothing if more changes are needed. The result does
-// not depend on how many further changes are known already.
+// Returns the index of the edge that begins the first start bit, or nothing if it is not known.
 std::optional<std::size_t> AsyncDecoder::find_start(Tick limit, bool final) const {
   const std::size_t count = edges_.size() - 1;
   const std::size_t first = level_ ? 0 : 1;
@@ -246,8 +243,7 @@ void AsyncDecoder::join(const Changes& part, Tick first, Tick end, AsyncDecoder&
   const auto met = meet(part, first, end, guessed, characters);
   if (!met) return;
   characters.insert(characters.end(), guessed.begin() + static_cast<std::ptrdiff_t>(*met), guessed.end());
-  // `other` counted wrong characters and faults before its characters met those of this decoder: a third decoder counts
-  // these again, and they are subtracted.
+  // `other` counted wrong characters before the two met: they are counted again and subtracted.
   AsyncDecoder wrong(format_, channel_, Start::trust);
   std::vector<Character> ignored;
   wrong.meet(part, first, end, std::span(guessed).subspan(*met, 1), ignored);

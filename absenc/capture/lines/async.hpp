@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decodes asynchronous characters from level changes. It never reads samples: a character is computed from the few
-// changes inside it.
+// Decodes asynchronous characters from level changes.
 #pragma once
 
 #include <array>
@@ -24,18 +23,10 @@ struct AsyncFormat {
 };
 
 /// A decoder of asynchronous characters, which decodes a capture part by part. A bit is the level at its middle,
-/// counted from the falling edge of the start bit; a pulse that is not low at the middle of its start bit is no
-/// character. After a wrong stop bit, the next falling edge begins a character.
-///
-/// Between parts the decoder stores the changes from the first incomplete character on, and no state within a
-/// character.
-///
-/// A capture may begin inside a character: if the line was not high for a whole character first, then of the first 16
-/// falling edges within one character the one with the fewest errors in the next twelve characters is the start bit.
+/// counted from the falling edge of the start bit.
 class AsyncDecoder {
  public:
-  /// Counts of characters and faults. `ticks` and `bits` are sums over all characters without a fault, from the start
-  /// bit to the character's last change: their quotient is the bit time, in which rounding errors do not add up.
+  /// Counts of characters and faults; `ticks` / `bits` of all good characters is the bit time.
   struct Statistics {
     std::uint64_t ticks = 0;
     std::uint64_t bits = 0;
@@ -45,23 +36,20 @@ class AsyncDecoder {
     Statistics& operator+=(const Statistics& other);
     Statistics& operator-=(const Statistics& other);
   };
-  /// How decoding begins: the first start bit must be searched, or the first falling edge is a start bit.
+  /// How decoding begins: with a search for the first start bit, or with the first falling edge.
   enum class Start : std::uint8_t { search, trust };
 
   /// `channel` is stored as the channel of each character.
   explicit AsyncDecoder(const AsyncFormat& format, std::uint8_t channel = 0, Start start = Start::search);
 
-  /// Clears everything except the statistics, because the next part does not follow the previous one.
+  /// Begins anew with a part that does not follow the previous one; keeps the statistics.
   void restart(Start start = Start::search);
-  /// Decodes the next part, from the tick `first` to `end`, and appends its complete characters. If `part.before`
-  /// differs from the last level, the line changed at `first`.
+  /// Decodes the next part, from tick `first` to `end`, and appends complete characters.
   void decode(const Changes& part, Tick first, Tick end, std::vector<Character>& characters);
-  /// Works like `decode` with the result of `other`, which has decoded the same part into `guessed` after a restart
-  /// with `Start::trust`. The correct part of the guess is taken over with its state. The result equals that of
-  /// `decode` exactly.
+  /// Works like `decode`; `other` decoded the part into `guessed` after a restart with `trust`.
   void join(const Changes& part, Tick first, Tick end, AsyncDecoder& other, std::vector<Character>& guessed,
             std::vector<Character>& characters);
-  /// Ends the capture; appends the character in progress if the capture has the middle of its stop bit.
+  /// Ends the capture; appends the remaining characters.
   void finish(std::vector<Character>& characters);
 
   /// Returns a time before which no further character begins.
@@ -78,8 +66,7 @@ class AsyncDecoder {
   [[nodiscard]] std::optional<std::size_t> find_start(Tick limit, bool final) const;
   [[nodiscard]] std::uint64_t faults_from(std::size_t start, Tick limit) const;
 
-  // Decodes until a character begins at the same time as one of `targets`; returns the index of that target and stops
-  // before it. Returns nothing if the part ends first.
+  // Decodes until a character begins at the same time as one of `targets`; returns its index.
   std::optional<std::size_t> meet(const Changes& part, Tick first, Tick end, std::span<const Character> targets,
                                   std::vector<Character>& characters);
   void begin_part(const Changes& part, Tick first);
@@ -98,7 +85,7 @@ class AsyncDecoder {
   bool begun_ = false;
   Tick origin_ = 0;  // first tick of the first part
   Tick end_ = 0;     // end of the last part, in ticks
-  // Level of the line behind all changes fed so far; idle is high, as an inverted line is inverted before.
+  // level behind all changes fed so far; idle is high, also for an inverted line
   bool line_ = true;
   bool level_ = true;           // level before the first of `edges_`
   std::vector<Tick> edges_;     // changes from the first incomplete character on

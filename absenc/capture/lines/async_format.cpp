@@ -28,8 +28,7 @@ std::vector<Tick> pulses(const Changes& changes, Tick glitch) {
   return lengths;
 }
 
-// Returns the bit time in ticks as the mean over pulses that have up to `most` bits and are nearly a multiple of `bit`;
-// `bit` if there are none.
+// Returns the mean bit time of pulses of up to `most` bits that nearly fit `bit`, or `bit`.
 double fitted(const std::vector<Tick>& lengths, double bit, double most) {
   double ticks = 0;
   double bits = 0;
@@ -44,8 +43,7 @@ double fitted(const std::vector<Tick>& lengths, double bit, double most) {
   return bits == 0 ? bit : ticks / bits;
 }
 
-// Returns the mean lengths of up to 8 groups of similar pulses, the shortest first. Pulses of rare lengths are noise
-// and are left out.
+// Returns the mean lengths of groups of similar pulses, the shortest first, without rare ones.
 std::vector<double> clusters(const std::vector<Tick>& lengths) {
   const std::size_t rare = lengths.size() < 50 ? 1 : std::max<std::size_t>(2, lengths.size() / 200);
   std::vector<double> means;
@@ -89,8 +87,7 @@ AsyncDecoder::Statistics decoded(const Stretch& part, const AsyncFormat& format)
   return decoder.statistics();
 }
 
-// Returns the number of errors per character, 1 without characters. Pulses that are clearly shorter than a bit count as
-// errors too: in a short capture, a bit time that is too long may cause no others.
+// Counts pulses that are clearly shorter than a bit as errors: the bit time may be too long.
 double faults(const AsyncDecoder::Statistics& statistics, const std::vector<Tick>& lengths, double bit) {
   if (statistics.characters == 0) return 1;
   const auto shorter = std::find_if(lengths.begin(), lengths.end(),

@@ -20,12 +20,9 @@ struct AsyncSettings {
   unsigned data_bits = 8;       // 5 to 16
 };
 
-/// Finds the format from the first changes of a line between `first` and `end`. It tries the given baud rate, or
-/// without one the bit times of which each of the shortest groups of pulses could be 1 to 4 bits, with each idle level
-/// that `settings` allow. It takes the format with the fewest errors, of nearly equal formats that with the longest
-/// bit. Without a given baud rate, it then measures the bit time from the start bit to the last change of the
-/// characters, and returns nothing if there are too few changes, no bit time of 2.5 ticks or more, or more than one
-/// error for two characters. `ticks_per_second` is needed only when the baud rate is given.
+/// Finds bit time and idle level, as far as `settings` leave them open, from the changes between `first` and `end`.
+/// Returns nothing if the baud rate is not given and none fits. `ticks_per_second` is needed only with a given baud
+/// rate.
 std::optional<AsyncFormat> find_format(const Changes& changes, Tick first, Tick end, const AsyncSettings& settings,
                                        std::uint64_t ticks_per_second);
 

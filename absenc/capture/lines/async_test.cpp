@@ -104,7 +104,6 @@ TEST(Async, ReportsWrongParity) {
   }
 }
 
-// Checks value, length and faults of characters of 5 to 16 data bits, without parity and with odd and even parity.
 TEST(Async, DecodesCharactersOfFiveToSixteenDataBits) {
   for (unsigned data_bits = 5; data_bits <= 16; ++data_bits) {
     for (const Parity parity : {Parity::none, Parity::odd, Parity::even}) {
@@ -127,8 +126,6 @@ TEST(Async, DecodesCharactersOfFiveToSixteenDataBits) {
   }
 }
 
-// Checks that the two bytes of a wide character share its time, on one line and on two, whether or not the rate is
-// given.
 TEST(AsyncPipeline, MakesTwoCharactersOfOneWithMoreThanEightDataBits) {
   for (const double baud : {0.0, 125e6}) {
     Pen pen(8, Parity::none, 1, 16);
@@ -251,8 +248,6 @@ TEST(Async, ASilentLineTakesTheBaudRateOfAnother) {
   EXPECT_EQ(all.outcome.measured_baud[0], 0);
 }
 
-// Checks that the detected bit time is the same for blocks of three sizes, with a sender whose clock changes by 1 % and
-// more changes than the detection uses.
 TEST(Async, DetectionDoesNotDependOnBlocks) {
   Wires wires{{{}}};
   for (const double bit : {5.0, 5.05}) {
@@ -331,8 +326,7 @@ TEST(Async, PassesOnExceptionsOfReader) {
   }
 }
 
-// A reader that claims slowly, as for text formats that are parsed in `claim`. A claiming thread must not keep the
-// other threads from decoding earlier blocks.
+// A reader that claims slowly: meanwhile the other threads must decode earlier blocks.
 class Slow final : public Reader {
  public:
   explicit Slow(Reader& reader) : reader_(reader) {}
@@ -340,7 +334,7 @@ class Slow final : public Reader {
   [[nodiscard]] const Layout& layout() const override { return reader_.layout(); }
   [[nodiscard]] const std::vector<Damage>& damages() const override { return reader_.damages(); }
 
-  // Threads other than the thread that joins the blocks wait here until all claimed blocks have been delivered.
+  // Other threads than the joining one wait here until all claimed blocks were delivered.
   [[nodiscard]] bool claim(Block& block) override {
     std::unique_lock lock(mutex_);
     if (!is_joining() && claimed_ != arrived_) {
@@ -352,7 +346,7 @@ class Slow final : public Reader {
     claimed_ += more ? 1 : 0;
     return more;
   }
-  // The thread that joins the blocks waits in `fill` until another thread claims a block at the same time.
+  // The joining thread waits here until another thread claims at the same time.
   void fill(Block& block) override {
     std::unique_lock lock(mutex_);
     if (is_joining()) wait(lock, [this] { return overlaps_; });

@@ -42,7 +42,7 @@ void LevelReader::expand(Block& block, Levels& levels) const {
   }
   const std::size_t count = sample_count(block);
   levels.end = block.first + count;
-  // The caller of `expand`, which joins the parts, compares the levels at the borders of the parts.
+  // The caller, which joins the parts, compares the levels at their borders.
   for (std::size_t i = 0; i < channels_.size(); ++i) {
     levels.changes[i].before = count > 0 && level_at(block, 0, channels_[i]);
   }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Moves the blocks of a reader through several threads: blocks are expanded, and decoded by guess, in any order, and
-// joined in the order of the capture.
+// Decodes the blocks of a reader in several threads, and joins them in the capture's order.
 #pragma once
 
 #include <algorithm>
@@ -34,10 +33,9 @@ class LevelReader {
   [[nodiscard]] std::string name(unsigned channel) const;
   [[nodiscard]] const Layout& layout() const { return reader_.layout(); }
 
-  /// Claims the next block; only one thread at a time may call this. Returns false at the end of the capture, or if the
-  /// rest of the file cannot be read.
+  /// Claims the next block, by one thread at a time; returns false if there is none.
   [[nodiscard]] bool claim(Block& block) { return reader_.claim(block); }
-  /// Converts a claimed block to level changes. Several threads may call it, each with its own block.
+  /// Converts a claimed block to level changes; threads may do so at once with different blocks.
   void expand(Block& block, Levels& levels) const;
 
  private:
@@ -45,8 +43,7 @@ class LevelReader {
   std::vector<unsigned> channels_;
 };
 
-/// Reads parts into `parts` until `enough(levels)`, which is called for each part in order, returns true, or the
-/// capture ends. Consecutive silent parts are merged, so silence of any length takes no memory.
+/// Reads parts into `parts` until `enough(levels)` is true or the capture ends. Consecutive silent parts are merged.
 template <class Enough>
 void look_ahead(LevelReader& reader, std::vector<Levels>& parts, Enough&& enough) {
   Block block;
@@ -70,18 +67,13 @@ void look_ahead(LevelReader& reader, std::vector<Levels>& parts, Enough&& enough
   }
 }
 
-/// An object that decodes the rest of a reader's capture with several threads. `Decoding` must have
+/// Decodes the rest of a reader's capture with several threads. `Decoding` must have
 /// - `bool decode(const Levels&)`: decodes the next part, in order; returns false to end the run
 /// - `Guess`, and `void guess(const Levels&, Guess&) const`: decodes in any thread a part at whose beginning the state
 ///   of the line is unknown
 /// - `bool join(const Levels&, Guess&)`: works like `decode`, with the result of `guess`
 ///
-/// A guess does not know what was before its block. The true state is continued into the block until it begins a
-/// character or word at the same time as the guess. From there on both depend only on later changes, so the guess is
-/// correct. If true state and guess never meet, the block is decoded twice, and the result is still correct.
-///
-/// The calling thread calls `decode` and `join`. Up to two blocks per thread are in progress. `run` throws exceptions
-/// of the reader and the decoding.
+/// The calling thread calls `decode` and `join`. `run` throws exceptions of the reader and the decoding.
 template <class Decoding>
 class BlockRun {
  public:
@@ -135,8 +127,7 @@ class BlockRun {
 
   [[nodiscard]] bool can_claim() const { return !exhausted_ && !stopped_ && !claiming_ && !free_jobs_.empty(); }
 
-  // Claims a block and prepares it; the lock is held before and after the call. Only one thread claims at a time, while
-  // the others decode earlier blocks: for text, claiming is most of the work.
+  // Claims a block and prepares it; the lock is held before and after the call.
   void prepare(std::unique_lock<std::mutex>& lock, unsigned thread) {
     // The block that this thread used last is still in its cache.
     const auto last =

@@ -67,8 +67,7 @@ void CanDecoder::finish(std::vector<CanRecord>& frames) {
   if (state_ == State::stuffed || state_ == State::tail) state_ = State::waiting;
 }
 
-// Handles a level that lasted from `from` to `to`, as the number of bits that fits the time best; of a long level only
-// as many bits as matter.
+// Handles a level that lasted from `from` to `to`; of a long one, only as many bits as matter.
 void CanDecoder::level_for(bool level, Tick from, Tick to, std::vector<CanRecord>& frames) {
   constexpr double enough = 32;
   const double bits = std::min(static_cast<double>(to - from) / bit_, enough);
@@ -116,8 +115,7 @@ void CanDecoder::take_stuffed(bool bit, std::vector<CanRecord>& frames) {
   tail_ = 0;
 }
 
-// Handles a bit behind the CRC: CRC delimiter, acknowledge slot, acknowledge delimiter, or a bit of the frame's
-// end. The frame is complete after six of the seven bits of the end, because a receiver ignores the level of the last.
+// Handles a bit behind the CRC. A receiver ignores the last bit of a frame's end.
 void CanDecoder::take_tail(bool bit, std::vector<CanRecord>& frames) {
   constexpr unsigned acknowledge = 1, last = 8;
   if (tail_ == acknowledge) {
@@ -140,8 +138,7 @@ std::uint32_t CanDecoder::field(std::size_t first, std::size_t count) const {
   return value;
 }
 
-// Decodes header and data of the frame from the stored bits: start, 11 identifier bits, RTR or SRR, IDE; then r0 and
-// DLC, or 18 identifier bits, RTR, r1, r0 and DLC; then the data.
+// Bits: start, 11 of the id, RTR or SRR, IDE; r0, DLC or 18 of the id, RTR, r1, r0, DLC.
 void CanDecoder::interpret() {
   if (length_ != 0 || bits_.size() < 19) return;
   const bool extended = bits_[13];

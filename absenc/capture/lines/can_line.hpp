@@ -10,21 +10,17 @@
 
 namespace absenc::capture {
 
-/// Returns the meaning of an error frame, of this decoder or of a CAN controller, as words without a full stop.
+/// Returns the meaning of an error frame, as words without a full stop.
 [[nodiscard]] std::string_view text_of_error(const CanFrame& error);
 
-/// A decoder of CAN frames, which decodes a capture part by part. Each level change synchronises the bit
-/// clock. A violation of the protocol is reported as an error frame like that of the kernel (linux/can/error.h): the
-/// identifier gives the class (0x08 protocol error, 0x20 not acknowledged); for a protocol error data[2] gives the kind
-/// (0x04 bit stuffing, 0x02 form) and data[3] the place (0x08 CRC, 0x1A end of frame). After an error the decoder waits
-/// for eleven recessive bits.
+/// A decoder of CAN frames, which decodes a capture part by part. A violation of the protocol is reported as an error
+/// frame like those of the kernel (linux/can/error.h).
 class CanDecoder {
  public:
   /// `bit` is the bit time in ticks, at least 3; it need not be a whole number.
   explicit CanDecoder(double bit) : bit_(bit) {}
 
-  /// Decodes the next part, from the tick `first` to `end`, and appends its frames. If the part does not follow the
-  /// previous part, the decoder waits for an idle bus.
+  /// Decodes the next part, from tick `first` to `end`, and appends its frames.
   void decode(const Changes& part, Tick first, Tick end, std::vector<CanRecord>& frames);
   /// Ends the capture; a frame that is cut off by the end is no error.
   void finish(std::vector<CanRecord>& frames);

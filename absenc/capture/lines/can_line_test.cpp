@@ -100,7 +100,6 @@ RC_GTEST_PROP(CanDecoderProperty, PartsMakeNoDifference, (std::uint32_t seed)) {
   for (std::size_t i = 0; i < whole.size(); ++i) RC_ASSERT(frames[i].frame == whole[i].frame);
 }
 
-// Checks that a frame with a flipped bit gives nothing but error frames, and that the frame behind it is decoded.
 RC_GTEST_PROP(CanDecoderProperty, AFlippedBitIsNoFrame, (std::uint32_t seed)) {
   std::mt19937 random(seed);
   CanBusDrawing bus(10);

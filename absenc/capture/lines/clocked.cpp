@@ -36,8 +36,7 @@ std::optional<ClockRests> find_rests(const Changes& clock) {
   for (std::size_t i = 1; i < rests.size() && found.pauses.size() <= most_lengths; ++i) {
     const Tick shorter = rests[i - 1];
     const Tick longer = rests[i];
-    // Two lengths of rests are clearly different if they differ by a seventh, and by more than the sampling error of
-    // two changes.
+    // Rests differ clearly by more than a seventh and more than the sampling error of two changes.
     if (longer <= found.half_period || longer - shorter <= std::max<Tick>(2, shorter / 7)) continue;
     found.pauses.push_back(std::min(shorter + (longer - shorter) / 2, 2 * shorter));
   }
@@ -89,8 +88,7 @@ void ClockedDecoder::begin_part(const ClockedPart& part) {
   if (format_.has_select && select_.level == format_.select_high) open(part.first, true, nullptr);
 }
 
-// Begins a burst at the time `at`. Returns true, without a burst, if one of the targets begins at the same time and in
-// the same state.
+// Begins a burst at `at`; returns true instead if a target begins there in the same state.
 bool ClockedDecoder::open(Tick at, bool cut, Targets* targets) {
   if (targets != nullptr && !cut) {
     while (targets->next < targets->bursts.size() && targets->bursts[targets->next].begin < at) ++targets->next;
@@ -130,16 +128,14 @@ void ClockedDecoder::take(Tick at, std::vector<Burst>& bursts) {
   ++burst_.bits;
 }
 
-// Stores the level of the data line at `settle` behind the last clock change, if it is not stored yet: a previous part
-// may have ended too early.
+// Samples the last bit behind the last clock change, if `settle` asks for it and it is missing.
 void ClockedDecoder::sample_last_bit() {
   if (format_.settle == 0 || burst_.has_last || !has_in_) return;
   burst_.last = in_.before(last_ + format_.settle);
   burst_.has_last = true;
 }
 
-// Detects whether the data line changed during a rest of the clock, from `settle` on, up to and including the time
-// `until`: if both change in one sample, it cannot be known which changed first.
+// A data change at `until` itself counts: the order of two changes in one sample is unknown.
 void ClockedDecoder::detect_data_change(Tick until) {
   if (format_.change_pause == 0 || !has_in_ || until - last_ <= format_.settle) return;
   if (open_) sample_last_bit();
@@ -179,8 +175,7 @@ bool ClockedDecoder::select_changes(Tick at, Targets* targets, std::vector<Burst
   return false;
 }
 
-// Decodes a part; returns true if it stopped because a burst begins together with one of the targets. A clock change at
-// the same time as a chip select change belongs to the earlier burst.
+// Decodes a part; returns true if it stopped because a burst begins together with a target.
 bool ClockedDecoder::run(const ClockedPart& part, Targets* targets, std::vector<Burst>& bursts) {
   begin_part(part);
   for (;;) {

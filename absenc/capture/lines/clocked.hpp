@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decodes bursts of clocked bits from level changes: SSI, BiSS, SPI with or without chip select.
+// Decodes bursts of clocked bits from level changes: SSI, BiSS, SPI.
 #pragma once
 
 #include <optional>
@@ -10,18 +10,16 @@
 
 namespace absenc::capture {
 
-/// Settings of a clocked line. The idle level of the clock does not matter: a word is a sequence of its changes.
+/// Settings of a clocked line; the idle level of the clock does not matter.
 struct ClockedFormat {
-  // True: the rising edge of the clock samples a bit, false: the falling edge; the bit is the level just before the
-  // edge.
+  // true: a bit is the level just before a rising edge of the clock; false: before a falling one
   bool rising = false;
   bool has_select = false;   // true: chip select begins and ends words; the clock may pause within a word
   bool select_high = false;  // true: chip select is active high
   Tick pause = 0;            // without chip select: a clock that rests longer than this ends a word, in ticks
-  // Without chip select: the last bit is sampled this long behind the last clock change, in ticks; 0: not sampled.
+  // without chip select: ticks from the last clock change to the last bit's sample; 0: none
   Tick settle = 0;
-  // Without chip select: a clock that rests longer than this also ends a word if the data line changes during the rest,
-  // from `settle` on (end of a timeout or a monoflop); 0: it does not.
+  // without chip select: like `pause`, for rests in which the data line changes; 0: unused
   Tick change_pause = 0;
 };
 
@@ -29,8 +27,7 @@ struct ClockedFormat {
 struct ClockRests {
   Tick half_period = 0;
   Tick longest = 0;
-  // Possible limits, in ticks, above which a rest ends a word: three periods, then up to 12 values, the shortest first,
-  // each between two clearly different lengths of rests.
+  // possible limits, in ticks, above which a rest ends a word; the first is three clock periods
   std::vector<Tick> pauses;
 };
 
@@ -47,9 +44,7 @@ struct ClockedPart {
   Tick end = 0;
 };
 
-/// A decoder of clocked bursts, which decodes a capture part by part. A burst whose beginning or end is not in the
-/// capture, and each piece of a burst of more than `most_bits` bits, is marked as cut. A single clock change between
-/// two pauses is no burst: the host holds the clock low, or lets it rise again.
+/// A decoder of clocked bursts, which decodes a capture part by part. An incomplete burst is marked as cut.
 class ClockedDecoder {
  public:
   static constexpr std::size_t most_bits = 65536;  // longest burst, in bits; a longer burst is cut into pieces
@@ -59,8 +54,7 @@ class ClockedDecoder {
   /// Clears the state, because the next part does not follow the previous one.
   void restart() { *this = ClockedDecoder(format_); }
   void decode(const ClockedPart& part, std::vector<Burst>& bursts);
-  /// Works like `decode` with the result of `other`, which has decoded the same part into `guessed` after a restart.
-  /// The correct part of the guess is taken over with its state. The result equals that of `decode` exactly.
+  /// Works like `decode`, with `guessed` from `other`, which decoded the part after a restart.
   void join(const ClockedPart& part, ClockedDecoder& other, std::vector<Burst>& guessed, std::vector<Burst>& bursts);
   /// Ends the capture; a burst in progress is appended as cut.
   void finish(std::vector<Burst>& bursts);

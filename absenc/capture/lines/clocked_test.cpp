@@ -20,7 +20,7 @@ struct ClockedDrawing {
     for (std::size_t i = 0; i < 4; ++i) wires.levels[i].insert(wires.levels[i].end(), ticks, levels[i]);
   }
   void idle(std::size_t ticks, bool clock = true, bool select = true) { hold(clock, true, true, select, ticks); }
-  // Draws an SSI word: a falling edge of the clock latches the position, each rising edge brings the next bit.
+  // Draws an SSI word: the first falling edge latches it, each rising edge brings the next bit.
   void ssi(std::uint32_t word, unsigned bits) {
     hold(false, true, true, true, 2);
     for (unsigned i = bits; i-- > 0;) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One thread, many threads and simple sample-by-sample decoders must give the same result for any capture, in blocks of
-// any size, as samples and as changes.
+// Checks that one thread, many threads and simple decoders give the same result.
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
 #include <rapidcheck/gtest.h>
@@ -35,8 +34,7 @@ struct Line {
   Drawn levels;
 };
 
-// Returns a random line of characters with pauses, breaks, wrong bits and noise; the capture may begin within a
-// character.
+// Returns a random line of characters, perhaps with pauses, breaks, wrong bits and noise.
 Line any_line(Random& random, std::uint64_t ticks_per_second) {
   Line line;
   const double bit = below(random, 2) == 0 ? 3.0 + static_cast<double>(below(random, 1000)) / 100
@@ -148,7 +146,6 @@ RC_GTEST_PROP(LinesProperty, AsyncResultDoesNotDependOnThreadsAndBlocks, (std::u
   }
 }
 
-// Checks that baud rate and idle level are detected independently of the blocks, and that the sent bytes are decoded.
 RC_GTEST_PROP(LinesProperty, BaudAndIdleLevelAreFound, (std::uint64_t seed)) {
   Random random(seed);
   const double bit = 3.0 + static_cast<double>(below(random, below(random, 2) == 0 ? 3000 : 200'000)) / 1000;
@@ -177,7 +174,7 @@ RC_GTEST_PROP(LinesProperty, BaudAndIdleLevelAreFound, (std::uint64_t seed)) {
       std::vector<std::uint8_t> bytes;
       for (const Character& c : decoded(reader, lines, threads, outcome)) bytes.push_back(c.value);
       RC_ASSERT(outcome.formats[0].idle_high == idle_high);
-      // If characters follow each other at whole samples, all have the same rounding error: up to a sample in 8 bits.
+      // The rounding error may be the same in all characters: up to a sample in 8 bits.
       RC_ASSERT(std::abs(outcome.formats[0].bit - bit) < 0.01 * bit + 1.0 / 8);
       RC_ASSERT(bytes == sent);
       if (first.formats.empty()) first = outcome;
@@ -251,7 +248,7 @@ RC_GTEST_PROP(LinesProperty, ClockedResultDoesNotDependOnThreadsAndBlocks, (std:
 
 // ---- Conversion of samples to changes
 
-// Returns the Highway targets of all instruction sets that this processor has, and 0 for no restriction.
+// Returns the Highway targets of this processor, and 0 for no restriction.
 std::vector<std::int64_t> instruction_sets() {
   hwy::GetChosenTarget().DeInit();
   std::vector<std::int64_t> sets = hwy::SupportedAndGeneratedTargets();

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decodes the capture of a reader to characters or bursts with any number of threads; the result equals that of one
-// thread exactly.
+// Decodes a capture to characters or bursts; the number of threads does not change the result.
 #pragma once
 
 #include <functional>
@@ -23,7 +22,7 @@ struct DecodedPart {
   std::span<const AsyncFormat> formats;  // formats of the asynchronous lines, complete from the first part on
 };
 
-/// A function that receives parts in the order of time, in the calling thread. It returns false to end the decoding.
+/// A function that receives parts in the order of time; it returns false to end the decoding.
 using PartSink = std::function<bool(const DecodedPart& part)>;
 
 struct AsyncLine {
@@ -34,15 +33,13 @@ struct AsyncLine {
 struct AsyncOutcome {
   std::string problem;  // reason why nothing could be decoded, as a sentence; "": none
   std::vector<AsyncFormat> formats;
-  // Baud rate of each line, measured over all characters without a fault; 0: there are none, or the file has no times.
+  // measured baud rate of each line; 0: no good characters, or the file has no times
   std::vector<double> measured_baud;
   std::vector<AsyncDecoder::Statistics> statistics;
 };
 
 /// Decodes the characters of several lines, ordered by their start bits; `Character::channel` is the index in `lines`.
-/// A baud rate and an idle level that are not given are detected from at most the first 16384 changes of a line; a line
-/// whose baud rate cannot be detected uses that of another line, if one has a rate. Memory does not grow with the file.
-/// Throws exceptions of the reader and the sink.
+/// Memory does not grow with the file. Throws exceptions of the reader and the sink.
 AsyncOutcome decode_async(Reader& reader, std::span<const AsyncLine> lines, unsigned threads, const PartSink& sink);
 
 /// The beginning of a capture, split into words at rests longer than `pause`.
@@ -64,8 +61,7 @@ struct ClockedLine {
   // `settle` and `change_pause` of ClockedFormat; `settle` is measured instead if `pause` is 0.
   Tick settle = 0;
   Tick change_pause = 0;
-  /// Returns the index of the reading to use, of several ways to split the beginning of the capture. Null: rests longer
-  /// than three periods of the clock end a word.
+  /// Returns the index of the reading to use if `pause` is 0. Null: that with three clock periods.
   std::function<std::size_t(std::span<const PauseReading>)> choose{};
 };
 

@@ -101,8 +101,7 @@ class AsyncDecoding {
     characters.swap(bytes);
   }
 
-  // Delivers the characters of all lines that begin before `until`: no earlier character can follow on any line.
-  // Returns false if the sink ends the decoding.
+  // Delivers the characters that are settled; returns false if the sink ends the decoding.
   bool deliver(Tick until) {
     const Tick end = std::min(until, end_);
     if (characters_.size() == 1) {
@@ -170,7 +169,7 @@ class FirstChanges {
     return all || any;
   }
 
-  // Cuts the stored changes at their limit, so that the detected settings do not depend on the sizes of the parts.
+  // Cuts the changes at a limit, so that found settings do not depend on the sizes of parts.
   void cut() {
     for (const Changes& line : changes_) {
       if (line.at.size() > most_changes) end_ = std::min(end_, line.at[most_changes]);

@@ -109,7 +109,7 @@ std::string no_clock(const std::string& name) {
   return name + " never changes its level, so there is no clock: is it the right channel, and was it connected?";
 }
 
-// Returns the bursts in the first parts of the capture, up to the clock change at the time `last`.
+// Returns the bursts at the beginning of the capture, up to the clock change at `last`.
 std::vector<Burst> bursts_until(Tick last, const std::vector<Levels>& parts, const WireIndices& wires,
                                 const ClockedFormat& format) {
   std::vector<Burst> bursts;
@@ -130,8 +130,7 @@ std::vector<Burst> bursts_until(Tick last, const std::vector<Levels>& parts, con
   return bursts;
 }
 
-// Returns whether the data line changed in each rest between two consecutive bursts, later than `settle` behind the end
-// of the earlier burst; false without a data line, or with fewer than two bursts.
+// Returns whether the data line changed, behind `settle`, in each of one or more rests.
 bool changes_in_rests(const std::vector<Burst>& bursts, const std::vector<Levels>& parts, const WireIndices& wires,
                       Tick settle) {
   if (!wires.in || bursts.size() < 2) return false;
@@ -147,8 +146,7 @@ bool changes_in_rests(const std::vector<Burst>& bursts, const std::vector<Levels
   return true;
 }
 
-// Measures the clock at the beginning of the capture, and sets `settle` and the limits in `format` above which rests of
-// the clock end words. Returns the problem as a sentence, or "" without a problem.
+// Measures the clock and sets the limits of rests in `format`; returns the problem, or "".
 std::string find_pause(LevelReader& reader, const WireIndices& wires, const ClockedLine& line,
                        std::vector<Levels>& parts, ClockedFormat& format) {
   Changes clock;
@@ -177,11 +175,10 @@ std::string find_pause(LevelReader& reader, const WireIndices& wires, const Cloc
     word_formats.push_back(format);
     word_formats.back().pause = pause;
   }
-  // Rests within words and between words may have any length, but a timeout or a monoflop ends only between words.
+  // A timeout or a monoflop ends only between words.
   if (wires.in) {
     word_formats.push_back(word_formats.back());
-    // An encoder that does not drive the line changes nothing: rests longer than half the longest one, and than all of
-    // `rests->pauses`, end the words of such a line.
+    // An encoder that does not drive the line changes nothing: there, only long rests end words.
     word_formats.back().pause =
         std::max(rests->longest / 2, *std::max_element(rests->pauses.begin(), rests->pauses.end()));
     word_formats.back().change_pause = 2 * rests->half_period;

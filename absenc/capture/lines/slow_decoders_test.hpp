@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Simple decoders that process one sample after the other: the reference for the fast decoders in tests.
+// Simple decoders, one sample after the other: the reference for the fast ones in tests.
 #pragma once
 
 #include <algorithm>
@@ -152,7 +152,7 @@ struct SlowClocked {
     add(burst.out, levels[2][i - 1] != 0);
     ++burst.bits;
   }
-  // Returns whether the data line changes from `settle` behind the clock change at the tick `last` to the tick `until`.
+  // Returns whether the data line changes between `settle` behind `last` and `until`.
   bool changes(Tick last, Tick until) const {
     for (Tick i = std::max<Tick>(last + format.settle, 1); i <= until && i < levels[1].size(); ++i) {
       if (levels[1][i] != levels[1][i - 1]) return true;

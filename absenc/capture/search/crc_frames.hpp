@@ -15,8 +15,7 @@
 
 namespace absenc::capture {
 
-/// Layout of a checksum in a frame: its width, bit and byte order and place, and whether it covers a byte 00 that is
-/// not sent.
+/// Layout of a checksum in a frame; `padded`: it also covers a byte 00 that is not sent.
 struct Shape {
   unsigned width = 0;  // width of the checksum in bits
   bool refin = false;
@@ -55,8 +54,7 @@ class Frames {
 
 inline bool bit_of(const CheckedFrame& frame, std::size_t i) { return (frame.bytes[i / 8] >> (7 - i % 8) & 1) != 0; }
 
-/// Returns the checksum in `frame` as a number, read in the byte order of `shape`; nothing if bits above its width are
-/// not 0.
+/// Returns the checksum in `frame` as a number; nothing if bits above its width are not 0.
 inline std::optional<std::uint32_t> check_of(const CheckedFrame& frame, const Shape& shape) {
   const std::size_t at = Frames::size(frame) - shape.trailing - shape.check_size;
   std::uint32_t value = 0;
@@ -71,8 +69,7 @@ inline std::optional<std::uint32_t> check_of(const CheckedFrame& frame, const Sh
   return value;
 }
 
-/// Calls `take` for each covered bit from the byte (in frames of bits: the bit) `first` on, in the order in which they
-/// enter the register. Returns the number of bits.
+/// Calls `take` for each covered bit from `first` on; returns their number.
 template <class Take>
 std::size_t covered_bits(const CheckedFrame& frame, const Shape& shape, std::size_t first, const Take& take) {
   const std::size_t end = Frames::size(frame) - shape.trailing - shape.check_size;
@@ -91,8 +88,7 @@ inline std::uint32_t reflected_if(bool reflected, std::uint32_t value, unsigned 
   return reflected ? reflect(value, width) : value;
 }
 
-/// Returns `frame` as a polynomial, which is a multiple of the CRC polynomial if the frame is good and init and xorout
-/// are right.
+/// Returns the frame, with `init` and `xorout`, as one polynomial.
 inline Polynomial codeword(const CheckedFrame& frame, const Shape& shape, std::size_t first, std::uint32_t check,
                            std::uint32_t init, std::uint32_t xorout) {
   Polynomial word;
@@ -107,7 +103,7 @@ inline Polynomial codeword(const CheckedFrame& frame, const Shape& shape, std::s
   return word;
 }
 
-/// Returns the CRC register behind the covered bits of `frame`, as it would be written without xorout.
+/// Returns the CRC of the covered bits of `frame`, without xorout.
 inline std::uint32_t crc_of(const CheckedFrame& frame, const Shape& shape, std::size_t first, std::uint32_t poly,
                             std::uint32_t init) {
   const auto mask = static_cast<std::uint32_t>(low_mask(shape.width));

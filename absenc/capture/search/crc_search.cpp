@@ -86,8 +86,7 @@ class CrcSearch {
     });
   }
 
-  // Returns how many independent checksums the frames contain: one for each length of frames, and one for each linearly
-  // independent difference of frames of equal length.
+  // Returns how many linearly independent checksums the frames contain.
   [[nodiscard]] double known_checks(const Shape& shape, std::size_t first) {
     Shape plain;
     plain.trailing = shape.trailing;
@@ -111,14 +110,14 @@ class CrcSearch {
     return known->second = static_cast<double>(basis.size() + frames_.lengths.size());
   }
 
-  // Returns the covered bits and the checksum of `frame`, in the order in which they are in the frame.
+  // Returns the covered bits and the checksum of `frame` as one polynomial.
   static Polynomial content(const CheckedFrame& frame, const Shape& plain, std::size_t first) {
     Polynomial word;
     covered_bits(frame, plain, first, [&word](bool bit) { word.append(bit); });
     return word;
   }
 
-  // Reads the checksums of all frames. Returns false if bits above the width of a checksum are not 0.
+  // Reads the checksums of all frames; returns false if bits above the width are not 0.
   bool take_checks(const Shape& shape) {
     checks_.clear();
     for (const auto& [length, frames] : frames_.lengths) {
@@ -149,8 +148,7 @@ class CrcSearch {
     return {{{0, 0}, {ones, 0}, {0, ones}, {ones, ones}}};
   }
 
-  // Returns the possible polynomials without their highest power. With `start` (init and xorout) whole frames are used,
-  // otherwise only differences of frames.
+  // Returns possible polynomials without their highest power. `start`: init and xorout, if known.
   std::vector<std::uint32_t> polynomials(const Shape& shape, std::size_t first,
                                          std::optional<std::pair<std::uint32_t, std::uint32_t>> start) {
     Polynomial common;
@@ -181,8 +179,7 @@ class CrcSearch {
     return found;
   }
 
-  // Finds init and xorout for the polynomial `poly`: all usual values that explain the frames, or else the first that
-  // fit.
+  // Finds init and xorout for `poly`: all usual ones that fit, or else the first that fit.
   void fit(const Shape& shape, std::size_t first, std::uint32_t poly, Firsts& solutions) {
     bool is_usual = false;
     for (const auto& [init, xorout] : usual(shape)) {
@@ -200,7 +197,7 @@ class CrcSearch {
     }
   }
 
-  // Returns the xorout that explains the first frame of every length, and so all frames; nothing if none does.
+  // Returns the xorout that explains the first frame of every length; nothing if none does.
   std::optional<std::uint32_t> xorout_for(const Shape& shape, std::size_t first, std::uint32_t poly,
                                           std::uint32_t init) {
     std::optional<std::uint32_t> xorout;
@@ -213,8 +210,7 @@ class CrcSearch {
     return xorout;
   }
 
-  // Stores the solutions of the polynomial `poly`. Unusual values of init and xorout are stored only if no usual values
-  // explain the frames, and only with the longest covered part.
+  // Stores the solutions of `poly`: all usual ones, or else the one that covers most.
   void keep(const Shape& shape, std::uint32_t poly, const std::map<Key, std::vector<std::size_t>>& keys) {
     const auto is_usual = [&](const Key& key) {
       const auto all = usual(shape);
@@ -231,8 +227,7 @@ class CrcSearch {
     add(shape, poly, widest_cover->first, {widest_cover->second.front()}, free_bits);
   }
 
-  // Adds a solution and its chance, to which `run` later adds the number of tried layouts: each independent checksum
-  // gives `width` bits; the polynomial and `free_bits` bits of init and xorout were chosen to fit.
+  // Adds a solution, whose chance `run` completes; `free_bits` of init and xorout fit by choice.
   void add(const Shape& shape, std::uint32_t poly, const Key& key, std::vector<std::size_t> firsts, double free_bits) {
     CheckSolution solution;
     solution.parameters = {
@@ -245,8 +240,7 @@ class CrcSearch {
     solution.check_size = shape.check_size;
     solution.trailing = shape.trailing;
     solution.chance_log2 = shape.width - 1 + free_bits - known_checks(shape, solution.first.front()) * shape.width;
-    // Over bytes, the CRC with polynomial x^8 + 1 equals an exclusive or, unless only one of input and output is
-    // reversed, and is reported as such.
+    // Over bytes, this CRC is an exclusive or, which `sums` finds.
     if (!frames_.of_bits && shape.width == 8 && poly == 1 && shape.refin == shape.refout) return;
     found_.solutions.push_back(std::move(solution));
   }
@@ -266,8 +260,7 @@ class CrcSearch {
               is_check ? sum_constant(kind, shape, first) : std::optional<std::uint8_t>();
           if (constant) firsts[*constant].push_back(first);
         }
-        // The constants 00 and FF (the complement) are usual; another constant is used only if neither explains the
-        // frames.
+        // Other constants than 00 and FF count only if neither of these explains the frames.
         const bool any_usual = firsts.contains(0) || firsts.contains(0xFF);
         for (auto& [constant, first] : firsts) {
           const bool is_usual = constant == 0 || constant == 0xFF;
@@ -306,8 +299,7 @@ class CrcSearch {
 
   Frames frames_;
   std::map<const CheckedFrame*, std::uint32_t> checks_;
-  // Results of `known_checks`, by the number of bytes (or bits) behind the checksum and the position of the first
-  // covered one.
+  // results of `known_checks`, by `trailing` and the position of the first covered byte or bit
   std::map<std::pair<std::size_t, std::size_t>, double> known_;
   std::size_t shapes_ = 0;
   CheckSearch found_;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds the CRC or sum of an unknown encoder from a few of its frames. The difference of two frames of equal length
-// with good CRCs does not depend on init and xorout and is a multiple of the polynomial, so the polynomial divides the
-// greatest common divisor of all differences.
+// Finds the CRC or sum of an unknown encoder from a few of its frames. The difference of two good frames of equal
+// length is a multiple of the CRC's polynomial.
 #pragma once
 
 #include <cstddef>
@@ -30,14 +29,13 @@ enum class CheckKind : std::uint8_t {
   exclusive_or,  // checksum of 8 bits: constant ^ all bytes
 };
 
-/// A checksum that explains all frames. Positions count bytes, or bits in frames of bits. The end of the covered part
-/// and the position of the checksum are counted from the end of the frame, so that they apply to frames of all lengths.
+/// A checksum that explains all frames. Positions and sizes are in bytes, or in bits in frames of bits.
 struct CheckSolution {
   CheckKind kind = CheckKind::crc;
   CrcParameters parameters{};  // for kinds other than crc: width is 8 and init is the constant
   bool low_first = false;      // width above 8 in frames of bytes: the checksum's low byte comes first in the frame
   bool padded = false;         // the checksum is computed as if a byte 00 followed the covered part
-  // All frames have one length and no usual init and xorout fit: every value of init fits with an xorout of its own.
+  // every init fits, with an xorout of its own: all frames have one length
   bool init_open = false;
   std::vector<std::size_t> first;  // possible positions of the first covered byte or bit
   std::size_t check_size = 0;      // number of bytes, or bits in frames of bits, of the checksum
@@ -50,13 +48,11 @@ struct CheckSearch {
   std::size_t open = 0;  // number of attempts at a layout for which the frames determine too little to list solutions
 };
 
-/// Returns checksums of 3 to 16 bits that explain every frame; none if fewer than two frames differ. Unusual values of
-/// init, xorout or constants are returned only where no usual ones fit. The frames must be all of bytes or all of bits.
-/// Duplicates and bits that never change add no evidence. A checksum that never changes is not accepted.
+/// Returns checksums of 3 to 16 bits that explain every frame. The frames must be all of bytes or all of bits. A
+/// checksum that never changes is not accepted.
 [[nodiscard]] CheckSearch find_checks(std::span<const CheckedFrame> frames);
 
-/// Returns how many more frames with other data would settle whether `solution` is right: its chance would fall below
-/// one in a million.
+/// Returns how many more different frames would bring the chance to one in a million.
 [[nodiscard]] unsigned frames_to_settle(const CheckSolution& solution);
 
 }  // namespace absenc::capture

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the search for checksums with frames whose CRC is computed by `crc_bitwise` of core, which the search does not
-// use.
+// Tests the search for checksums, with frames whose CRC `crc_bitwise` of core computes.
 #include "absenc/capture/search/crc_search.hpp"
 
 #include <gtest/gtest.h>
@@ -44,7 +43,7 @@ std::vector<CheckedFrame> frames_of(const GeneratedCheck& made, std::size_t coun
   return frames;
 }
 
-// Returns whether a CRC is an exclusive or, which is reported as such: its polynomial is x^8 + 1, and refin is refout.
+// Returns whether a CRC equals an exclusive or, which the search reports as such.
 bool is_exclusive_or(const CrcParameters& crc) { return crc.width == 8 && crc.poly == 1 && crc.refin == crc.refout; }
 
 bool describes(const CheckSolution& solution, const GeneratedCheck& made) {
@@ -147,8 +146,7 @@ TEST(CrcSearch, FindsASum) {
   EXPECT_EQ(search.solutions.front().first.front(), 0u);
 }
 
-// Returns frames like those of HIPERFACE, read while the shaft turns slowly: most bytes hardly change, the last is the
-// exclusive or of `check_from` and all others.
+// Returns frames of a slow shaft, whose last byte is the exclusive or with `check_from`.
 std::vector<CheckedFrame> slow_positions(std::uint8_t check_from) {
   std::vector<CheckedFrame> frames;
   for (std::uint32_t i = 0; i < 8; ++i) {
@@ -195,7 +193,6 @@ TEST(CrcSearch, FindsExclusiveOrCrcInBothBitOrders) {
   }
 }
 
-// Checks that four frames, of which two equal the other two, are as much evidence as two frames.
 TEST(CrcSearch, FramesThatDifferInOneWayOnlyCountOnce) {
   std::mt19937 random(9);
   const GeneratedCheck made{.parameters = esl_8};
@@ -241,8 +238,7 @@ RC_GTEST_PROP(CrcSearchProperty, FindsEveryCheckOf3To16Bits, (std::uint32_t seed
   RC_ASSERT(found(find_checks(frames_of(made, 3 + 16 / width, random)), made));
 }
 
-// Compares the list of divisors of a polynomial with the constant term 1 with a trial of every polynomial of the degree
-// that has this term, too: others do not divide it.
+// Compares the list of divisors with a trial of every polynomial with the constant term 1.
 RC_GTEST_PROP(PolynomialProperty, ListsAllDivisorsOnce, (std::uint64_t value)) {
   const unsigned degree = *rc::gen::inRange<unsigned>(1, 11);
   value |= 1;

@@ -13,7 +13,7 @@ namespace absenc::capture {
 namespace {
 
 constexpr unsigned many_attempts = 1u << 20;  // number of random replies tried if there are only one or two frames
-// Number of accepted random replies after which no more are tried: the rate then has an error of some percent.
+// accepted replies after which no more are tried: the rate is then known to some percent
 constexpr unsigned enough_accepted = 256;
 
 /// Stores the position that a good reply reports.
@@ -37,17 +37,14 @@ std::size_t repeated(const ObservedExchange& exchange) {
 
 double position_of(const Reading& reading) { return static_cast<double>(reading.singleturn); }
 
-// Returns the shortest distance between two positions as a fraction of the whole range: 0 to 1/2, for linear encoders 0
-// to 1.
+// Returns the shortest distance between two positions as a fraction of the whole range.
 double relative_distance(const Reading& from, const Reading& to) {
   const double all = std::ldexp(1.0, static_cast<int>(from.singleturn_bits));
   const double difference = std::abs(position_of(to) - position_of(from));
   return (from.unit_um > 0 ? difference : std::min(difference, all - difference)) / all;
 }
 
-// Returns log10 of the chance that random positions move as little as `positions`; nothing if they do not move. A
-// random step is no longer than the longest of the steps with a probability of twice its length; one step is not
-// counted, because it determined that length.
+// Returns log10 of the chance that random positions move so little; nothing without motion.
 std::optional<double> weigh_motion(std::span<const Reading> positions) {
   double longest = 0;
   std::size_t steps = 0;
@@ -62,7 +59,7 @@ std::optional<double> weigh_motion(std::span<const Reading> positions) {
   return static_cast<double>(steps - 1) * std::log10(std::min(1.0, 2 * longest + least));
 }
 
-/// The distinct good exchanges, and the probability that the unit would accept random replies to their requests.
+/// The different good exchanges, and the chance that the unit accepts random replies.
 class Distinct {
  public:
   Distinct(const Unit& unit, const Options& options) : unit_(unit), options_(options) {}

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Weighs exchanges as evidence for a protocol: how many exchanges the protocol explains, and how likely chance would
-// explain as many.
+// Weighs exchanges as evidence for a protocol.
 #pragma once
 
 #include <cstddef>
@@ -24,7 +23,7 @@ struct ObservedFrame {
   friend bool operator==(const ObservedFrame&, const ObservedFrame&) = default;
 };
 
-/// A request and its reply. Without a request, the reply was unsolicited or its request is unknown.
+/// A request and its reply; one of them may be empty.
 struct ObservedExchange {
   ObservedFrame request{};
   ObservedFrame reply{};
@@ -32,32 +31,29 @@ struct ObservedExchange {
   friend bool operator==(const ObservedExchange&, const ObservedExchange&) = default;
 };
 
-/// The evidence that exchanges give for a protocol. Bytes at the beginning of a reply that repeat the request are no
-/// evidence, nor is a repeated exchange.
+/// The evidence that exchanges give for a protocol.
 struct Evidence {
   std::size_t tried = 0;      // number of exchanges examined
   std::size_t explained = 0;  // number of exchanges with a good reply
   std::size_t distinct = 0;   // number of different good exchanges, because a repeated one proves no more
   /// log10 of the probability that the unit would accept as many random frames.
   double frames = 0;
-  /// log10 of the probability that random positions would move as little; empty: no position changed.
+  /// log10 of the chance that random positions move as little; empty: no position changed
   std::optional<double> motion{};
 
-  /// Returns log10 of the total chance: that of the frames, and that of the motion if all exchanges are explained.
+  /// Returns log10 of the chance of frames and motion; the motion counts only if all is explained.
   [[nodiscard]] double chance() const;
   [[nodiscard]] bool explains_all() const { return tried != 0 && explained == tried; }
 };
 
-/// log10 of the chance up to which frames suffice as evidence for options, without the motion of the position.
+/// log10 of the chance up to which frames suffice as evidence for options, without the motion.
 inline constexpr double frames_suffice = -2;
 
-/// Greatest number of random replies tried for a frame if there are more than two different good exchanges, whose
-/// chances multiply.
+/// Usual limit for the number of random replies tried for a frame.
 inline constexpr unsigned usual_attempts = 1u << 14;
 
-/// Returns the probability that the unit accepts a random reply of the length of `good.reply` to `good.request`: at
-/// most 1, at least one divided by `attempts`. Bytes at the beginning that the reply repeats of the request stay
-/// unchanged.
+/// Returns the probability that the unit accepts a random reply like `good.reply`, at least 1 / `attempts`. Bytes at
+/// its beginning that repeat the request are not random.
 [[nodiscard]] double acceptance(const Unit& unit, const Options& options, const ObservedExchange& good,
                                 unsigned attempts = usual_attempts);
 
@@ -67,7 +63,7 @@ inline constexpr unsigned usual_attempts = 1u << 14;
 /// Returns the evidence of exchanges, which must be in the order of time.
 [[nodiscard]] Evidence weigh(const Unit& unit, const Options& options, std::span<const ObservedExchange> exchanges);
 
-/// Returns log10 of the probability that at least `good` of `all` events occur when each has the probability `each`.
+/// Returns log10 of the chance of at least `good` of `all` events of probability `each`.
 [[nodiscard]] double tail(std::size_t good, std::size_t all, double each);
 
 }  // namespace absenc::capture

@@ -14,8 +14,7 @@
 namespace absenc::capture {
 namespace {
 
-/// A toy unit whose reply has two bytes: the first byte of the request, and a number whose bits and direction are
-/// options.
+/// A toy unit, whose reply is the request's first byte and a number.
 struct Toy {
   static constexpr std::array<std::string_view, 2> order_choices{"up", "down"};
   static constexpr std::array<Option, 2> options{{
@@ -150,7 +149,6 @@ TEST(Hypotheses, ListsEqualMeaningsOnce) {
   for (const Hypothesis& one : found) EXPECT_EQ(one.options[2], 0);
 }
 
-// Checks the order of a hypothesis whose frames have a check and one with plausible motion only.
 TEST(Hypotheses, FramesThatProveThemselvesGoFirst) {
   Hypothesis checked{.evidence = {.tried = 20, .explained = 20, .distinct = 20, .frames = -36}};
   Hypothesis moving{.evidence = {.tried = 20, .explained = 20, .distinct = 20, .frames = 0, .motion = -114}};

@@ -56,8 +56,7 @@ class HypothesisSearch {
   HypothesisSearch(const Unit& unit, std::span<const ObservedExchange> exchanges)
       : unit_(unit), exchanges_(exchanges) {}
 
-  /// Adds a hypothesis if `options` are new and explain at least one exchange, and as many as the best hypotheses so
-  /// far; it replaces them if it explains more. Options that decode the same content as others are left out.
+  /// Adds a hypothesis unless it explains nothing, less than others, or the same as one of them.
   void add(const Options& options, bool at_least = false) {
     if (contains(best_, options)) return;
     ++tried_;
@@ -85,8 +84,7 @@ class HypothesisSearch {
     add(options);
   }
 
-  /// Adds `base` with the numbers of bits that fit best, and `base` with every change of a single option that has
-  /// choices, alone and with the numbers of bits that fit best.
+  /// Adds variants of `base`: other numbers of bits, and other values of one option with choices.
   void vary(const Options& base) {
     vary_bits(base);
     for (std::size_t i = 0; i < unit_.options.size(); ++i) {
@@ -102,8 +100,7 @@ class HypothesisSearch {
     }
   }
 
-  /// Adds `base` with every change of a single option that has choices, so that the motion of the position can rank
-  /// them.
+  /// Adds variants of `base` with another value of one option with choices.
   void vary_motion(const Options& base) {
     for (std::size_t i = 0; i < unit_.options.size(); ++i) {
       const auto count = static_cast<std::int64_t>(unit_.options[i].choices.size());
@@ -144,8 +141,7 @@ class HypothesisSearch {
     return count;
   }
 
-  // Adds `base` with the numbers of bits that explain the most exchanges, and of these with the fewest bits, because
-  // frames cannot show more bits.
+  // Adds `base` with the fewest bits that explain the most exchanges: frames cannot show more.
   void vary_bits(const Options& base) {
     const std::vector<std::size_t> bits = resolution_options(unit_);
     std::optional<Options> fewest;

@@ -7,12 +7,10 @@ namespace {
 
 constexpr unsigned highest_degree = 16;
 
-// Returns the degree of a polynomial plus 1; 0 for the polynomial 0. (The type that std::bit_width returns differs
-// between libraries.)
+// Returns the degree plus 1; std::bit_width returns different types in different libraries.
 unsigned width_of(std::uint64_t value) { return static_cast<unsigned>(std::bit_width(value)); }
 
-/// Returns the irreducible polynomials of degree 1 to 16, without the polynomial x, in rising order of their
-/// coefficients.
+/// Returns the irreducible polynomials of degree 1 to 16 in rising order, without x.
 const std::vector<std::uint32_t>& irreducible_polynomials() {
   static const std::vector<std::uint32_t> all = [] {
     constexpr std::uint32_t limit = 1u << (highest_degree + 1);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Polynomials over GF(2) that are long enough for a frame: a frame with a good CRC is a multiple of the CRC's
-// polynomial.
+// Polynomials over GF(2) that are long enough for a frame.
 #pragma once
 
 #include <array>
@@ -47,7 +46,7 @@ class Polynomial {
     return *this;
   }
 
-  /// Divides this polynomial by `divisor`, which must not be 0; leaves the remainder and returns the quotient.
+  /// Leaves the remainder of a division by `divisor`, which must not be 0; returns the quotient.
   constexpr Polynomial divide(const Polynomial& divisor) {
     Polynomial quotient;
     const int step = divisor.degree();
@@ -82,8 +81,7 @@ class Polynomial {
   return a;
 }
 
-/// Returns each divisor of `value` of the given degree, 1 to 16, whose constant term is 1. `value` holds the
-/// coefficients of a polynomial and must not be 0.
+/// Returns the divisors of `value`, not 0, of `degree`, 1 to 16, with the constant term 1.
 [[nodiscard]] std::vector<std::uint32_t> divisors_of_degree(std::uint64_t value, unsigned degree);
 
 }  // namespace absenc::capture

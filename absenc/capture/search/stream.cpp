@@ -38,8 +38,7 @@ double acceptance_of_noise(const Unit& unit, const Options& options) {
   return static_cast<double>(std::max<std::size_t>(good, 1)) / static_cast<double>(examined);
 }
 
-// Returns whether each option in `of_bits` is the number of single-turn or multi-turn bits itself, so that a model's
-// options state the number of bits of a position.
+// Returns whether each option in `of_bits` is itself a number of bits of the resolution.
 bool states_bits(const Unit& unit, const Options& options, std::span<const std::size_t> of_bits) {
   const Resolution resolution = unit.resolution(options);
   return std::all_of(of_bits.begin(), of_bits.end(), [&](std::size_t option) {
@@ -47,8 +46,6 @@ bool states_bits(const Unit& unit, const Options& options, std::span<const std::
   });
 }
 
-// Returns the likely options of the unit. If the unit has streams, and one or two options determine the number of bits,
-// only options that state the number of bits are returned, for every number of bits.
 std::vector<Options> stream_options(const Unit& unit) {
   std::vector<Options> all = likely_options(unit, {});
   const std::vector<std::size_t> of_bits = resolution_options(unit);
@@ -70,15 +67,13 @@ std::vector<Options> stream_options(const Unit& unit) {
   return all;
 }
 
-// Returns a key to sort hypotheses, smaller is better: the fewest single-turn bits, because more bits would explain the
-// frames equally well, and the most multi-turn bits, because they do not change while the shaft is not turned that far.
+// Returns a key, smaller is better: the fewest single-turn bits, then the most multi-turn bits.
 std::pair<unsigned, int> bits_of(const Unit& unit, const Hypothesis& hypothesis) {
   const Resolution resolution = unit.resolution(hypothesis.options);
   return {resolution.singleturn_bits, -static_cast<int>(resolution.multiturn_bits)};
 }
 
-// Sets the first option that makes the encoder send unsolicited frames, unless `options` do so already. The value is
-// the number of frames per second, but from 1 to the option's largest value.
+// Makes `options` say that the encoder sends unsolicited frames, if the unit has such options.
 void set_streaming(const Unit& unit, Options& options, double frames_per_second) {
   if (unit.streams == nullptr || unit.streams(options)) return;
   for (std::size_t i = 0; i < unit.options.size(); ++i) {
@@ -126,7 +121,7 @@ std::vector<Hypothesis> find_stream_hypotheses(const Unit& unit, Bytes bytes, Ti
     const std::vector<ObservedExchange> replies = split_stream(unit, options, bytes);
     Hypothesis one{.options = options, .evidence = weigh(unit, options, replies)};
     if (one.evidence.explained < least_frames) continue;
-    // The first frame was searched at every byte of a frame's length, so each byte of the longest frame is an attempt.
+    // The first frame was searched at every byte of a frame's length: each byte is an attempt.
     for (const ObservedExchange& reply : replies) one.tried = std::max(one.tried, reply.reply.bytes.size());
     one.tried *= all.size();
     found.push_back(std::move(one));

@@ -10,14 +10,10 @@
 
 namespace absenc::capture {
 
-/// Splits a stream into replies that the unit accepts, and returns them in order. Each byte outside a reply is an
-/// exchange of its own, because a reply might have begun there. Only bytes that may belong to a reply cut by the
-/// beginning or the end of the stream are left out.
+/// Splits a stream into good replies and single other bytes; may leave out bytes at its ends.
 [[nodiscard]] std::vector<ObservedExchange> split_stream(const Unit& unit, const Options& options, Bytes bytes);
 
-/// Returns the best hypothesis for a stream; none if no options explain at least three frames. If the unit has an
-/// option for it, its options state that the encoder sends unsolicited frames, and if possible how often, computed from
-/// `duration`, the time of the recording.
+/// Returns the best hypothesis for a stream, or none. `duration` is the time of the recording.
 [[nodiscard]] std::vector<Hypothesis> find_stream_hypotheses(const Unit& unit, Bytes bytes, Time duration);
 
 }  // namespace absenc::capture

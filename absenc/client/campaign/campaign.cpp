@@ -71,7 +71,7 @@ struct PlacedShaft final : Shaft {
   std::int64_t position = 0;
 };
 
-/// Reads the encoder repeatedly, each time with the shaft at another position, and counts the results.
+/// Repeated readings, each with the shaft at another position, and their results.
 template <class Item>
 class Campaign {
  public:
@@ -88,7 +88,7 @@ class Campaign {
     result.wrong.of = result.older.of = result.changed.of = result.exchanges;
   }
 
-  /// Reads `count` times and returns the good replies with a position; none on CAN. The line must have no faults.
+  /// Reads `count` times and returns the replies with a position; none on CAN.
   std::vector<GoodReply> good_replies(unsigned count) {
     std::vector<GoodReply> replies;
     if constexpr (!std::is_same_v<Item, CanFrame>) {
@@ -112,15 +112,13 @@ class Campaign {
     std::int64_t position;
   };
 
-  // Moves the shaft to a random position of 64 bits, which it hardly had before, so that an older position is
-  // recognised.
+  // Moves the shaft to a random position of 64 bits, so that an older position is recognised.
   void move() {
     shaft_.position = static_cast<std::int64_t>(bench_.random.next());
     constexpr Time longest = 30s;  // longer than any fault delays a reply
     if (places_.size() > 1 && places_[1].since + longest < line_.now()) places_.pop_front();
     places_.push_back({line_.now(), shaft_.position});
-    // If the encoder sends unsolicited frames, waits until those with the old position have passed; on SPI waits as
-    // long as chip select must be released.
+    // Frames with the old position must pass first; on SPI chip select must be released for a time.
     if (bench_.unsolicited) {
       line_.rest(line_.now() + 5ms);
       line_.drop();
@@ -174,8 +172,7 @@ class Campaign {
 
 std::optional<CheckWorth> worth_of(const Unit& unit, const Options& options, double bit_errors) {
   if (unit.link == LinkKind::can) return {};
-  // Number of sample replies. A reply whose frame is shifted passes the check only at some positions of the shaft,
-  // so many replies are needed.
+  // A shifted frame passes the check only at some positions, so many replies are needed.
   constexpr unsigned frames = 20'000;
   constexpr unsigned samples = 500'000;
   const std::vector<GoodReply> replies = Campaign<std::uint8_t>(unit, options, {}, 7).good_replies(frames);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks campaigns: wrong positions are as frequent as computed, each fault makes exchanges fail, a good line does not,
-// and wrong arguments are refused.
+// Checks the results of campaigns, and that wrong arguments are refused.
 #include "absenc/client/campaign.hpp"
 
 #include <gtest/gtest.h>
@@ -31,7 +30,7 @@ void PrintTo(const Named& named, std::ostream* out) { *out << named.protocol << 
 
 class Computed : public ::testing::TestWithParam<Named> {};
 
-// Checks that the rate of wrong positions is the computed one within five standard deviations: both vary by chance.
+// Checks that the rate of wrong positions is the computed one within five standard deviations.
 TEST_P(Computed, IsWhatIsCounted) {
   const Named& named = GetParam();
   const CampaignResult result = run(named.protocol, {named.fault}, 200'000);
@@ -54,8 +53,7 @@ INSTANTIATE_TEST_SUITE_P(Units, Computed,
                                            Named{"amt21", "bit=0.1", 2, 2}, Named{"ssi", "bit=0.01", 0, 1},
                                            Named{"biss", "bit=0.005", 6, 3}, Named{"biss", "bit=0.02", 6, 3}));
 
-// The exclusive OR of eleven bytes misses every error of two bits in the same column (the same bit of two bytes), and
-// detects every error of three bits.
+// The exclusive OR misses two wrong bits in a column and detects every error of three bits.
 TEST(CheckCodeTest, ExclusiveOrHasTheWeightsOfItsColumns) {
   const Unit& unit = *find_unit("tformat");
   Options options;
@@ -66,14 +64,11 @@ TEST(CheckCodeTest, ExclusiveOrHasTheWeightsOfItsColumns) {
   EXPECT_EQ(code->bits(), 88u);
   const std::vector<double> words = code->weights(4);
   EXPECT_EQ(words, (std::vector<double>{1, 0, 8 * 55, 0, 8 * 330 + 28 * 55 * 55}));
-  // An error is missed if each of the 8 bit columns contains an even number of wrong bits. The probability of that,
-  // less the probability of no error, must be `unseen`.
+  // An error is missed if each column contains an even number of wrong bits.
   const double even = (1 + std::pow(1 - 2 * 0.02, 11)) / 2;
   EXPECT_NEAR(code->unseen(0.02), std::pow(even, 8) - std::pow(0.98, 88), 1e-12);
 }
 
-// The CRC of Modbus has 16 bits and detects every error of up to 3 bits in a reply; that of BiSS has 6 bits and detects
-// every error of up to 2 bits. A CAN protocol has no computed check.
 TEST(CampaignTest, KnowsOtherChecks) {
   const CampaignResult modbus = run("raa38-modbus", {"bit=0.01"}, 1000);
   ASSERT_TRUE(modbus.worth);
@@ -95,8 +90,6 @@ TEST(CampaignTest, AGoodLineFailsNowhere) {
   }
 }
 
-// Injects each fault alone into the exchanges of T-Format: some exchanges fail (many, except with `delay`), some
-// succeed, and none returns an older position.
 TEST(CampaignTest, EveryFaultIsThere) {
   for (const LineFault& fault : line_faults()) {
     const CampaignResult result = run("tformat", {std::string(fault.name) + "=0.1"}, 20'000);
@@ -108,16 +101,13 @@ TEST(CampaignTest, EveryFaultIsThere) {
   }
 }
 
-// Checks that older positions occur and are counted among the wrong ones: the host accepts delayed unsolicited frames,
-// because they do not show when they were sent.
+// A host accepts delayed unsolicited frames: they do not show when they were sent.
 TEST(CampaignTest, OldFramesAreCounted) {
   const CampaignResult result = run("raa38", {"late=0.1"}, 20'000);
   EXPECT_GT(result.older.count, 0u);
   EXPECT_LE(result.older.count, result.wrong.count);
 }
 
-// Checks that few readings fail or are wrong although damaged requests change encoders: a changed zero would make every
-// later reading wrong.
 TEST(CampaignTest, EncodersThatWereChangedAreReplaced) {
   const CampaignResult result = run("raa38-can", {"request_corrupt=0.05"}, 100'000);
   EXPECT_GT(result.changed.count, 0u);

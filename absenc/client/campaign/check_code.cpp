@@ -31,7 +31,7 @@ bool has_position(const Unit& unit, const Options& options, const GoodReply& rep
   return unit.decode(options, {.bytes = reply.request}, frame, seen) == Error::none && seen.reading.has_value();
 }
 
-/// A copy of a good reply in which bits can be flipped. `decode` and `error` return the decoder's judgement of it.
+/// A copy of a good reply in which bits can be flipped.
 class CheckCode::AlteredReply {
  public:
   AlteredReply(const Unit& unit, const Options& options, const GoodReply& good)
@@ -75,9 +75,7 @@ std::optional<CheckCode> CheckCode::learn(const Unit& unit, const Options& optio
   return code;
 }
 
-// Searches the check bits from the last bit of the reply backwards, because most checks are at the end; if the check is
-// elsewhere, other independent bits take the role of check bits. Bits before the first covered bit count as fixed: they
-// belong to another frame or mark the beginning of this frame.
+// Searches check bits from the end, where most checks are; other independent bits would do too.
 bool CheckCode::find_check(AlteredReply& asked) {
   bool complete = false;
   bool before = false;
@@ -101,13 +99,13 @@ bool CheckCode::find_check(AlteredReply& asked) {
   return true;
 }
 
-// Returns the check bits that compensate an error of the bit `bit`; nothing if no combination does.
+// Returns the check bits that compensate an error of `bit`; nothing if none do.
 std::optional<std::uint32_t> CheckCode::syndrome_of(AlteredReply& asked, std::size_t bit) const {
   asked.restore();
   asked.flip(bit);
   std::uint32_t pattern = 0;
   if (asked.passes()) return pattern;
-  // Tries all combinations of check bits in the order of the Gray code, in which one bit changes at a time.
+  // In the order of the Gray code one bit changes at a time.
   for (std::uint32_t i = 1; i < std::uint32_t{1} << check_.size(); ++i) {
     const auto changed = static_cast<unsigned>(std::countr_zero(i));
     asked.flip(check_[changed]);
@@ -117,8 +115,7 @@ std::optional<std::uint32_t> CheckCode::syndrome_of(AlteredReply& asked, std::si
   return {};
 }
 
-// Returns whether 1000 random errors, each of a random reply, agree with the syndromes: code words pass the checksum,
-// other errors do not, and no reply fails the checksum once the check bits of the syndrome are flipped.
+// Returns whether 1000 random errors of random replies agree with the syndromes.
 bool CheckCode::is_linear(const Unit& unit, const Options& options, std::span<const GoodReply> replies) const {
   sim::Random random(1);
   for (unsigned i = 0; i < 1000; ++i) {
@@ -129,8 +126,7 @@ bool CheckCode::is_linear(const Unit& unit, const Options& options, std::span<co
       asked.flip(bit);
       syndrome ^= syndromes_[bit];
     }
-    // Only `bad_checksum` for a code word, or no error for an error that is no code word, contradicts the syndromes.
-    // Any other error code is accepted, because another check of the decoder may reject the reply before the checksum.
+    // Another check of the decoder may reject the reply before the checksum.
     const Error error = asked.error();
     if (error == (syndrome == 0 ? Error::bad_checksum : Error::none)) return false;
     for (unsigned one = 0; one < check_.size(); ++one) {
@@ -190,10 +186,7 @@ bool CheckCode::is_check(std::size_t bit) const {
   return std::has_single_bit(syndrome) && check_[static_cast<unsigned>(std::countr_zero(syndrome))] == bit;
 }
 
-// Draws errors of all bits but the check bits at random, then sets the check bits so that the checksum is right. The
-// weight of a drawn error is the probability of its errors of check bits. An error of fixed bits may shift the frame;
-// then the check bits are drawn at random too, and the weight is 1. A shifted frame passes the check in some replies
-// only, so the difference between replies is part of the deviation.
+// Importance sampling: an error that the checksum detects is not worth drawing.
 Estimated CheckCode::taken(const Unit& unit, const Options& options, std::span<const GoodReply> replies,
                            double bit_errors, unsigned samples) const {
   sim::Random random(2);

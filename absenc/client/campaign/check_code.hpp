@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds the errors that a unit's checksum misses, as a linear code that is derived from its decoder.
+// Finds the errors that a unit's checksum misses, as a linear code.
 #pragma once
 
 #include <cstdint>
@@ -29,30 +29,23 @@ struct Estimated {
   double deviation = 0;
 };
 
-/// The linear code of all errors that the checksum misses. An error is a code word if the exclusive OR of the syndromes
-/// of its bits is 0. Bits of a frame are numbered in the order of the bytes, from the most significant bit.
+/// The linear code of the errors that a checksum misses. Bits of a frame are numbered in the order of the bytes, from
+/// the most significant bit.
 class CheckCode {
  public:
-  /// Derives the code from the decoder. The last independent bits of the frame are the check bits; for every other
-  /// covered bit, the check bits that compensate its error are its syndrome. Returns nothing if the check has more than
-  /// 16 bits, covers at most half of the frame (each channel has a check of its own), or is not linear (a sum, digits
-  /// as text), or if the replies differ in length. `replies` must not be empty.
+  /// Derives the code from the decoder; returns nothing if the checksum is no such code. `replies` must not be empty.
   [[nodiscard]] static std::optional<CheckCode> learn(const Unit& unit, const Options& options,
                                                       std::span<const GoodReply> replies);
 
   [[nodiscard]] std::size_t bits() const { return syndromes_.size(); }
   [[nodiscard]] unsigned check_bits() const { return static_cast<unsigned>(check_.size()); }
-  /// Returns the number of bits of a reply that are left out of the code: bits before the frame, and bits whose error
-  /// the decoder rejects by another check than the checksum.
+  /// Returns the number of bits of a reply that are left out of the code.
   [[nodiscard]] std::size_t fixed_bits() const { return fixed_; }
-  /// Returns the numbers of code words of each weight from 0 to `most`, by MacWilliams' identity from the 2^check_bits
-  /// words of the dual code.
+  /// Returns the numbers of code words of each weight from 0 to `most`.
   [[nodiscard]] std::vector<double> weights(unsigned most) const;
-  /// Returns the probability that independent bit errors damage a reply, leave its fixed bits intact, and leave the
-  /// checksum right.
+  /// Returns the chance that bit errors damage only covered bits, but leave the checksum right.
   [[nodiscard]] double unseen(double bit_errors) const;
-  /// Returns the probability that the decoder, with all its checks, accepts a damaged reply with another position. The
-  /// probability is estimated from random code words, weighted by their probability, and from errors of fixed bits.
+  /// Estimates the probability that the decoder accepts a damaged reply with another position.
   [[nodiscard]] Estimated taken(const Unit& unit, const Options& options, std::span<const GoodReply> replies,
                                 double bit_errors, unsigned samples) const;
 

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compares each confirmed position on a bad line with the true position of the shaft, for every model, at rest and
-// turning. The number of wrong confirmed positions must not exceed, within chance, the number computed from frame
-// checks and speed limit; unless every reply is damaged, it must agree with that number.
+// Compares confirmed positions on a bad line with the true ones, for every model.
 #include <gtest/gtest.h>
 
 #include <cctype>
@@ -48,8 +46,7 @@ class Confirmed : public ::testing::TestWithParam<Encoder> {
     return campaign(GetParam().unit, choices);
   }
 
-  // The number of wrong positions varies by chance: allows four standard deviations, and two more positions for very
-  // small counts.
+  // Allows four standard deviations, and two more positions for very small counts.
   static double chance(const Guarded& guarded) { return 4 * std::sqrt(guarded.let_through) + 2; }
 };
 
@@ -69,8 +66,6 @@ TEST_P(Confirmed, IsNotWrongMoreOftenThanChecksAndLimitLetThrough) {
   }
 }
 
-// Lowers the host's speed limit to 100 rpm, near the 60 rpm of the shaft: at most as many wrong positions may pass, and
-// nearly all right ones must still be confirmed.
 TEST_P(Confirmed, IsWrongLessOftenWithALowerLimit) {
   const Guarded usual = *read(0.1, 60).guarded;
   const Guarded lower = *read(0.1, 60, 100).guarded;
@@ -81,8 +76,7 @@ TEST_P(Confirmed, IsWrongLessOftenWithALowerLimit) {
 
 INSTANTIATE_TEST_SUITE_P(Models, Confirmed, ::testing::ValuesIn(encoders()), name_of);
 
-// Checks that confirmation at least halves the rate of wrong words, and that as many are confirmed as computed. The
-// words have no check: only the distance to the word before shows damage.
+// The words have no check: only the distance to the word before shows damage.
 TEST(ConfirmedWords, WithoutACheckOnlyTheLimitTells) {
   CampaignChoices choices{.faults = {"corrupt=0.1"}, .exchanges = 20'000};
   choices.rpm = 0;

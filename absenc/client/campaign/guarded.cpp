@@ -24,8 +24,7 @@ std::int64_t wrapped(std::uint64_t difference, unsigned bits) {
   return static_cast<std::int64_t>(difference << unused) >> unused;
 }
 
-/// A shaft that starts one millisecond after power-on and then turns steadily. It stores the time and position of the
-/// encoder's last 16 measurements.
+/// A shaft that stores the times and positions of its last 16 measurements.
 class MeasuredShaft final : public Shaft {
  public:
   MeasuredShaft(std::int64_t start, double turns_a_second) : start_(start), speed_(turns_a_second) {}
@@ -37,11 +36,9 @@ class MeasuredShaft final : public Shaft {
     return {.position = position, .speed_millirpm = seconds > 0 ? static_cast<std::int32_t>(60'000 * speed_) : 0};
   }
 
-  /// Returns whether the shaft had the reading's position at a stored measurement within 2 ms of the reading's latch
-  /// time.
+  /// Returns whether the shaft had the position near the reading's latch time, as far as stored.
   [[nodiscard]] bool was_at(const Reading& reading) const { return find(reading) != nullptr; }
-  /// Returns the position of the shaft that belongs to the reading; for a wrong reading, the last position measured
-  /// until the reading was received, or the oldest stored one.
+  /// Returns the position of the shaft that belongs to the reading, also to a wrong one.
   [[nodiscard]] std::int64_t place_of(const Reading& reading) const {
     const ShaftSample* found = find(reading);
     for (std::size_t i = 0; found == nullptr && i < count(); ++i) {
@@ -77,7 +74,7 @@ class MeasuredShaft final : public Shaft {
   mutable std::size_t count_ = 0;
 };
 
-/// Computes how many wrong positions pass both the frame checks and the comparison with the position before.
+/// Computes how many wrong positions are confirmed.
 class LetThrough {
  public:
   LetThrough(const Resolution& resolution, const host::SpeedLimit& limit, unsigned bits)
@@ -86,16 +83,14 @@ class LetThrough {
   void add_position() { ++positions_; }
   /// Adds a wrong position, by its distance in counts from the true position.
   void add_wrong(std::int64_t away) { away_.push_back(away); }
-  /// Adds a comparison of a position with the one before. `moved` is the movement of the true shaft between these two,
-  /// `before` its movement in the comparison before; both in counts.
+  /// Adds a comparison: the shaft moved `moved` counts, in the comparison before `before` counts.
   void add_comparison(Time between, std::int64_t moved, std::int64_t before) {
     comparisons_.push_back({between, moved, before});
   }
 
   [[nodiscard]] Share wrong() const { return {away_.size(), positions_}; }
 
-  /// Returns the expected number of wrong positions that are confirmed. Assumes that positions are wrong independently,
-  /// with the rate and the distances of all added wrong positions.
+  /// Returns the expected number of confirmed wrong positions, if these are wrong independently.
   [[nodiscard]] double expected() const {
     if (away_.empty()) return 0;
     constexpr unsigned draws = 16;
@@ -124,8 +119,7 @@ class LetThrough {
     std::int64_t before;
   };
 
-  // Returns whether the host's comparison of positions would accept `step`, by the host's rule but computed in floating
-  // point. `before` is the step of the comparison before.
+  // Returns whether the host would accept `step` after the step `before`.
   [[nodiscard]] bool agrees(Time between, std::uint64_t step, std::uint64_t before) const {
     const double most = std::ldexp(15.0 / 32, static_cast<int>(bits_));
     const double reached = 4 + counts_per_second_ * std::chrono::duration<double>(between).count();
@@ -147,7 +141,7 @@ class LetThrough {
 
 double turns_a_second(const Resolution& resolution, double rpm) {
   if (resolution.unit_um == 0) return rpm / 60;
-  // A simulated linear encoder moves over its whole scale, 2^singleturn_bits counts, in one revolution of the shaft.
+  // A simulated linear encoder moves over its whole scale in one revolution of the shaft.
   return rpm * 1000 / resolution.unit_um / std::ldexp(1.0, static_cast<int>(resolution.singleturn_bits));
 }
 
@@ -184,8 +178,7 @@ class GuardedCampaign {
     return limit;
   }
 
-  // Returns the width of the position in bits, including the turns if the reading has valid turns, as in the host's
-  // comparison of positions.
+  // Returns the width of the position with its valid turns, as the host compares it.
   static unsigned bits_of(const Reading& reading) {
     return reading.singleturn_bits + (reading.multiturn_valid ? reading.multiturn_bits : 0);
   }

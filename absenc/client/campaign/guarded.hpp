@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a campaign with confirmed positions and computes how many wrong positions pass both the frame checks and the
-// speed limit.
+// Runs a campaign with confirmed positions.
 #pragma once
 
 #include "absenc/client/campaign.hpp"
@@ -8,8 +7,7 @@
 
 namespace absenc::client {
 
-/// Reads a shaft that turns steadily, or rests if `choices.rpm` is 0, until at least `choices.exchanges` exchanges are
-/// done. Counts readings, exchanges, failures and changed encoders in `result`, and returns the shares of confirmed and
+/// Reads a shaft at `choices.rpm`, which must have a value. Counts in `result`, and returns the shares of confirmed and
 /// wrong positions.
 [[nodiscard]] Guarded read_guarded(const Unit& unit, const Options& options, const Rates& rates,
                                    const CampaignChoices& choices, CampaignResult& result);

@@ -81,8 +81,7 @@ struct RoughBench {
     faulty.set_rates(on ? rates.device : sim::FaultRates{});
   }
 
-  /// Returns the number of requests since `before`; if there were none, the number of unsolicited frames since then, at
-  /// least 1.
+  /// Returns the number of requests since `before`, or else of unsolicited frames, at least 1.
   [[nodiscard]] std::uint64_t exchanges_since(const sim::RoughCounts& before) const {
     const std::uint64_t asked = line.counts().requests - before.requests;
     return asked != 0 ? asked : std::max<std::uint64_t>(1, line.counts().replies - before.replies);
@@ -96,8 +95,7 @@ struct RoughBench {
     }
   }
 
-  // Returns whether a damaged request has changed the encoder permanently; false if the fault `request_corrupt` is off.
-  // Reads over a line without faults to find out, and replaces a changed encoder by a new one.
+  // Returns whether a damaged request has changed the encoder, and then replaces the encoder.
   template <class IsRight>
   bool was_changed(const Command& read, const IsRight& is_right) {
     using namespace std::chrono_literals;
@@ -112,8 +110,7 @@ struct RoughBench {
     return changed;
   }
 
-  // Lets 10 us to 10 s pass after a failure (at most 100 ms if the encoder sends unsolicited frames), each decade with
-  // the same probability: a line that delays a reply also delays later ones.
+  // Lets a random time of at most 10 s pass: a line that delays a reply also delays later ones.
   void pause() {
     const double decades = (unsolicited ? 4 : 6) * static_cast<double>(random.next() >> 11) * 0x1p-53;
     line.rest(line.now() + Time(static_cast<std::int64_t>(1e4 * std::pow(10.0, decades))));

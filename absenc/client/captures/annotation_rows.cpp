@@ -11,7 +11,7 @@ namespace {
 
 using capture::Annotation;
 
-/// Indexes of the columns that precede the columns of the unit's fields, and of the first of these.
+/// Indexes of the columns before those of the unit's fields, and of the first of these.
 enum At : std::size_t { at_begin, at_end, at_kind, at_request, at_reply, at_turnaround, at_position, first_field };
 
 std::vector<Column> columns_of(const Unit& unit, const Options& options, bool has_time) {
@@ -70,8 +70,7 @@ void AnnotationRows::fill(const Annotation& annotation, const Options& options, 
                                                 : degrees(reading.singleturn, reading.singleturn_bits);
 }
 
-// Returns the index of the field's description in the unit's list; otherwise that of a field with the same name;
-// otherwise the length of the list.
+// Returns the field's index in the unit's list, by identity or name; the list's length if none.
 std::size_t AnnotationRows::place_of(const FieldInfo& info) const {
   const std::span<const FieldInfo> fields = unit_.fields;
   std::size_t place = 0;
@@ -95,7 +94,7 @@ void AnnotationRows::fill_fields(const capture::Contents& contents, std::vector<
   if (contents.reading != nullptr) fill_alarms(*contents.reading, values);
 }
 
-// Shows the alarms known for the encoder: alarms that this reply does not carry come from an earlier reply.
+// Alarms that this reply does not carry come from an earlier reply of the encoder.
 void AnnotationRows::fill_alarms(const Reading& reading, std::vector<Value>& values) const {
   for (const Flags& flags : alarms_of(unit_, reading)) {
     const std::size_t place = place_of(*flags.field);

@@ -57,7 +57,7 @@ std::vector<std::string_view> split(std::span<const std::string> wanted) {
 bool is_clocked(LinkKind link) { return link == LinkKind::clocked || link == LinkKind::spi; }
 
 bool is_needed(LinkKind link, std::string_view wire) {
-  // On a full-duplex line one channel suffices: a capture may contain the host's or the encoder's wire alone.
+  // A capture of a full-duplex line may contain the host's or the encoder's wire alone.
   if (link == LinkKind::full_duplex) return false;
   return wire != "cs" && wire != "mosi";
 }
@@ -129,8 +129,7 @@ WireChannels find_wires(LinkKind link, std::span<const std::string> channels, st
         if (!found.wires[wire] && is_called(wires[wire], channels[i])) found.wires[wire] = i;
       }
     }
-    // If no channel has the name of a wire, the channels are assigned to the wires in order, provided that there are
-    // not more channels than wires. Not for clocked lines and SPI.
+    // Channels without names of wires may be in the order of the wires.
     const bool any =
         std::any_of(found.wires.begin(), found.wires.end(), [](const auto& one) { return one.has_value(); });
     if (!any && !is_clocked(link) && channels.size() <= wires.size()) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decodes clocked lines with the timing of real masters. The test draws the lines edge by edge from the documents,
-// without the virtual encoder, and decodes them as `absenc decode` does.
+// Decodes clocked lines that are drawn edge by edge, without the virtual encoder.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -29,8 +28,7 @@ class Wires {
   // Draws a change of the data line, `behind` nanoseconds after the clock edge that causes it.
   void data(bool level, std::int64_t behind = 5) { changes_[{now_ + behind, 'd'}] = level; }
 
-  /// Draws `count` clock periods. Just after the rising edge of clock i, counted from 1, the data line changes to
-  /// `bit(i)`.
+  /// Draws `count` clock periods; the data line becomes `bit(i)` behind rising edge i, from 1 on.
   template <class Bit>
   void burst(std::int64_t period, std::size_t count, Bit&& bit) {
     for (std::size_t i = 0; i < count; ++i) {
@@ -73,7 +71,7 @@ struct Master {
 
 constexpr int biss_bits = 32;  // number of bits that `biss_frame` returns
 
-// Computes the frame bit by bit: two idle bits, one ACK bit, start, CDS, 19 bits, nError, nWarning and the CRC.
+// Computes a frame: two idle bits, ACK, start, CDS, 19 bits, nError, nWarning, CRC.
 std::string biss_frame(std::uint32_t position, bool cds) {
   std::string word;
   for (int bit = 18; bit >= 0; --bit) word += (position >> bit & 1) != 0 ? '1' : '0';
@@ -185,8 +183,7 @@ TEST_F(ClockedLines, BissOfAnyClockTimeoutAndMaster) {
   EXPECT_GT(cells, 300u);
 }
 
-// The master may set the control bit by a falling edge of MA at any time before the timeout elapses, because the
-// encoder samples MA only then. Checks edges at 50 % and 60 % of the timeout.
+// A control bit may come late: the encoder samples MA only when the timeout elapses.
 TEST_F(ClockedLines, AControlBitMayComeLateInTheTimeout) {
   for (const std::int64_t khz : {100, 250, 1000, 10'000}) {
     const std::int64_t period = 1'000'000 / khz;
@@ -210,9 +207,7 @@ TEST_F(ClockedLines, AControlBitMayComeLateInTheTimeout) {
   }
 }
 
-// Checks the words of an interrupted host: its clock pauses inside a word for up to nearly the timeout; the pause after
-// each of the first 50 words is at most 1 us longer than the timeout. Only the data line SLO shows where the timeout
-// has elapsed.
+// The clock rests nearly as long in words as between them; only the data line shows the ends.
 TEST_F(ClockedLines, ATimeoutThatIsOverEndsAWordWhoseClockRestsAsLong) {
   constexpr std::int64_t timeout = 12'500;
   const std::string frame = biss_frame(17, false);
@@ -253,8 +248,7 @@ TEST_F(ClockedLines, AControlFrameThatTheFileCutsIsCut) {
 
 constexpr unsigned ssi_bits = 13;
 
-// Draws `words` words with different positions. With more than 14 clocks the same word follows again after a zero bit.
-// The monoflop time starts at the last clock edge.
+// Draws words with different positions; with more than 14 clocks the same word follows again.
 void draw_ssi(Wires& wires, std::int64_t period, std::int64_t monoflop, std::int64_t pause, std::size_t clocks,
               unsigned words) {
   for (unsigned word = 0; word < words; ++word) {
@@ -296,7 +290,7 @@ TEST_F(ClockedLines, SsiOfAnyClockMonoflopAndNumberOfClocks) {
   EXPECT_GT(cells, 300u);
 }
 
-// The monoflop time elapses only after the second copy, so the pause after the first copy does not end the word.
+// Both copies belong to one word: the monoflop time elapses only after the second.
 TEST_F(ClockedLines, AMonoflopThatIsOverEndsAWord) {
   Wires wires;
   for (unsigned word = 0; word < 12; ++word) {
@@ -313,8 +307,6 @@ TEST_F(ClockedLines, AMonoflopThatIsOverEndsAWord) {
   EXPECT_EQ(rows.words, 12u);
 }
 
-// If the data line never shows the end of the monoflop time, two drawn words may be two readings, or one reading that
-// was repeated; a note must say so.
 TEST_F(ClockedLines, TwoWaysToCutAreSaid) {
   Wires wires;
   for (unsigned word = 0; word < 12; ++word) {

@@ -42,8 +42,7 @@ class Comparison {
  public:
   Comparison(const Unit& unit, const LineSettings& line, bool faulty, const std::vector<Said>& rows)
       : rows_(rows), faulty_(faulty) {
-    // On CAN the row of a frame ends with the frame in the waveform, but the live receiver waits until the bus is idle,
-    // so the times may differ by that wait.
+    // A live CAN receiver waits until the bus is idle, so its times may be later by that wait.
     tolerance_ = unit.link == LinkKind::can ? line.bits(160) : 2 * line.character();
   }
 
@@ -71,14 +70,13 @@ class Comparison {
     if (told) return {};
     const bool any =
         std::any_of(within_.begin(), within_.end(), [](const Said* row) { return row->error != Error::none; });
-    // A live host that repeats a request may reject the reply, because the reply may belong to the request before; the
-    // capture then has another error or, with faults, none.
+    // A host that repeats a request may reject a reply, which may belong to the request before.
     return (any || faulty_) && live.exchanges != 1 ? "" : "no row has the error";
   }
 
   std::string compare_good(const Said& live) const {
     for (const Said* row : within_) {
-      // A search or wake-up command may send requests to a missing encoder, or to one that does not reply at first.
+      // A search or wake-up command may send requests to an encoder that does not reply.
       const bool silent = row->error == Error::timeout || row->error == Error::line_stuck;
       const bool is_silence = silent && live.exchanges > 1;
       if (row->error != Error::none && !is_silence && !faulty_ && !live.is_special) return "a row has an error";
@@ -108,16 +106,14 @@ class Comparison {
     return row.end > reading.received - tolerance_ && row.end < reading.received + tolerance_;
   }
 
-  // Compares the live position with the last good row that has a position; its turns may be in another row. Returns a
-  // sentence about the difference; "" if they match.
+  // Compares the live position with the last good row that has one; returns "" if they match.
   std::string compare_position(const Said& live) const {
     const Said* row = nullptr;
     for (const Said* one : within_) {
       const bool fits = live.exchanges != 0 || is_of(*one, *live.reading);
       if (one->reading && one->error == Error::none && fits) row = one;
     }
-    // The first good frame of a stream determines the length of its frames, so there may be no row with a position
-    // before it.
+    // Before the first good frame of a stream, rows may have no position.
     const bool knows_size = std::any_of(
         rows_.begin(), rows_.end(), [&](const Said& one) { return one.reading && one.end < live.reading->received; });
     if (row == nullptr) return live.exchanges != 0 || knows_size ? "no row has a position" : "";

@@ -97,8 +97,7 @@ struct Decoded::Parts {
 
   // ---- Functions of the caller's thread
 
-  /// Returns the next row; null at the end. Throws an exception of the decoding thread after all batches that were
-  /// handed over before it, and Cancelled after `stop` once the current batch is used up.
+  /// Returns the next row; null at the end. Throws exceptions of the decoding, and Cancelled.
   const Row* take() {
     if (++at < taken.size()) return &taken[at];
     std::unique_lock lock(mutex);

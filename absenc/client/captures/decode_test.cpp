@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that captures are decoded to rows, and that the protocol of a line and of a capture is identified.
+// Tests `decode`, `identify` and `identify_capture`.
 #include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 
@@ -55,8 +55,7 @@ TEST(ClientDecode, RowsHaveTypedColumns) {
 TEST(ClientIdentify, SaysHowToOpenWhatItFound) {
   const Emulation emulation = emulate("tformat?motion=rpm=60");
   Identified all;
-  // Tries a longer latency only if the shorter one fails, as on a slow machine: each request without a reply takes
-  // several latencies.
+  // A request without a reply takes several latencies, so the shortest is tried first.
   for (const char* const latency : {"20", "200", "1000"}) {
     all = identify(emulation.path() + "?latency=" + latency, {.limit = std::chrono::minutes(5)});
     if (!all.found.empty() && all.found[0].sure) break;

@@ -16,8 +16,7 @@ namespace {
 
 using capture::Tick;
 
-// Counts good frames (not requests alone), unanswered requests, and frames with characters that have framing or parity
-// errors.
+// Counts good frames, unanswered requests and frames with damaged characters.
 struct FrameCounts final : capture::AnnotationSink {
   void put(const capture::Annotation& annotation) override {
     if (annotation.remark == capture::Remark::damaged) ++damaged;
@@ -31,9 +30,7 @@ struct FrameCounts final : capture::AnnotationSink {
   std::uint64_t damaged = 0;
 };
 
-// Returns whether the line carries requests without replies at the unit's own baud rate: that rate gives no damaged
-// frame and more unanswered requests than the other rate, whose good frames exceed neither its damaged frames nor these
-// requests. The few level changes of such requests fit many rates.
+// Returns whether the line seems to carry requests without replies at the unit's own baud rate.
 bool reads_silence(const FrameCounts& at_own, const FrameCounts& at_other) {
   return at_own.damaged == 0 && at_own.unanswered > at_other.unanswered &&
          at_other.good <= std::min(at_other.damaged, at_own.unanswered);
@@ -71,11 +68,7 @@ struct Possible final : EvidenceSink {
 
 }  // namespace
 
-// Selects baud rate and parity where the user left them open, except for standard input. Takes the unit's own baud rate
-// if it gives a good frame and, at the beginning of the capture, no fewer good frames than the rate that the level
-// changes suggest, or if `reads_silence`: few level changes fit many rates, but only one rate gives right checksums.
-// Tries other parities if characters are damaged, or if neither a good frame nor an unanswered request is found, and
-// takes one that gives more good frames.
+// Selects baud rate and parity where the user left them open.
 CaptureRun::Speed CaptureRun::likely_speed(const Lines& lines) const {
   constexpr std::size_t enough_characters = 20'000;
   Speed best{choices_.how.baud, choices_.how.parity.value_or(line_.parity)};
@@ -107,9 +100,7 @@ CaptureRun::Speed CaptureRun::likely_speed(const Lines& lines) const {
   return best;
 }
 
-// A clock has pauses of several lengths: between words, and between the bytes of a host that sends eight clocks at a
-// time. Takes the reading with the most good words, the first of several. If no checksum confirms it and the pauses are
-// in doubt, a reading without bad words that shows the encoder's timeouts is preferred.
+// A clock may also pause within words: between the bytes of a host that sends eight bits each.
 std::size_t CaptureRun::likely_pause(std::span<const capture::PauseReading> readings,
                                      std::vector<std::string>& notes) const {
   struct Words final : capture::AnnotationSink {
@@ -142,8 +133,7 @@ std::size_t CaptureRun::likely_pause(std::span<const capture::PauseReading> read
     annotator.finish();
     is_proved = is_proved || words.is_proved;
     if (words.bad == 0 && words.good > 1) faultless.push_back(i);
-    // The number of bad frames does not decide between pause lengths: a longer pause merges a silent word into the
-    // next.
+    // The number of bad frames does not decide: a longer pause merges a silent word into the next.
     if (i > 0 && words.good <= most) continue;
     best = i;
     most = words.good;
@@ -151,8 +141,7 @@ std::size_t CaptureRun::likely_pause(std::span<const capture::PauseReading> read
   const auto differs = [&](std::size_t i) { return readings[i].bursts.size() != readings[best].bursts.size(); };
   const auto other = std::find_if(faultless.begin(), faultless.end(), differs);
   if (other == faultless.end() || is_proved) return best;
-  // Takes the first reading without bad words in which the data line shows the end of the timeout in every pause: after
-  // a shorter pause the encoder would continue the old word.
+  // After a pause without the end of a timeout the encoder would continue the old word.
   const auto shown =
       std::find_if(faultless.begin(), faultless.end(), [&](std::size_t i) { return readings[i].timed_out; });
   if (shown != faultless.end()) return *shown;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs the commands of each unit, except `scan`, against its virtual encoder in virtual time, draws the conversation as
-// `absenc wave` does, decodes it as `absenc decode` does, and compares both results.
+// Compares results of commands, in virtual time, with those decoded from a capture of them.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -71,7 +70,7 @@ std::vector<Said> decode(const Stage& stage, const std::string& path) {
   return std::move(captured.rows);
 }
 
-/// The address of a virtual encoder, and whether it differs from another encoder of the list only in a detail.
+/// The address of a virtual encoder, and whether it differs only in a detail from another one.
 struct Encoder {
   std::string address;
   bool is_detail = false;
@@ -119,11 +118,10 @@ std::vector<Encoder> encoders_of(const Unit& unit) {
 
 constexpr std::uintmax_t long_file = 300'000;  // size in bytes above which a capture is long
 
-/// The commands of one capture: all commands that change nothing, or one that changes the encoder.
+/// The commands of one capture: all that change nothing, or one that changes the encoder.
 struct Together {
   std::vector<const Command*> commands;
-  // whether the capture of a changing command is long, so that it is not repeated for encoders that differ only in a
-  // detail
+  // whether the capture of a changing command is long, so that it is not repeated for details
   bool is_long = false;
 };
 

@@ -17,8 +17,7 @@ class PositionTrace {
  public:
   static constexpr std::size_t columns = 64;
 
-  /// Adds a position; a `tick` before that of the first position counts as the first. A position that is invalid or not
-  /// ready is not added, nor one without turns after a first position with turns; it leaves a gap in the plot.
+  /// Adds a position; one that is invalid, not ready or lacks its turns leaves a gap in the plot.
   void add(std::uint64_t tick, const Reading& reading) {
     if (!reading.singleturn_valid() || !reading.ready) return;
     if (count_ == 0) {
@@ -55,7 +54,7 @@ class PositionTrace {
   };
 
   void halve();
-  // Returns the offset that makes negative turns sort before positive ones; 0 if turns are not plotted or not signed.
+  // Returns the offset by which negative turns sort before positive ones, or 0.
   [[nodiscard]] std::uint64_t offset() const { return turns_ && signed_ ? std::uint64_t{1} << 63 : 0; }
   [[nodiscard]] double value(std::uint64_t counts) const;
   [[nodiscard]] std::string_view unit() const;

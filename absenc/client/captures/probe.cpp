@@ -50,8 +50,7 @@ class Captures {
   std::vector<WireFrame> frames_;
 };
 
-// Returns the values of the probed options that later commands need, as settings: values that the frames determine, and
-// values other than the default where the frames allow several.
+// Returns the values of probed options that later commands need, as settings.
 std::vector<std::string> settled(const Unit& unit, const Options& options, std::span<const OptionEvidence> evidence) {
   std::vector<std::string> settings;
   for (std::size_t i = 0; i < unit.options.size(); ++i) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From captured frames, finds the values of options that the document of a protocol leaves open.
+// Finds values of options that a protocol's document leaves open, from captured frames.
 #pragma once
 
 #include <span>
@@ -19,14 +19,12 @@ struct Probed {
   std::vector<std::string> settled{};      // options that later commands need, as "name=value"; may be empty
 };
 
-/// Judges captured frames. `replies` have the text form that `absenc decode` reads, "" for a missing reply. `requests`
-/// are as many, in the same order, "" for an unknown request; or the list is empty. Throws UsageError, also for a
-/// protocol without open options.
+/// Judges captured frames in the text form that `absenc decode` reads, "" for a missing one. `requests` are as many as
+/// `replies`, or none. Throws UsageError.
 [[nodiscard]] Probed probe(std::string_view protocol, std::string_view model, std::span<const std::string> settings,
                            std::span<const std::string> replies, std::span<const std::string> requests);
 
-/// Converts the result to {"protocol","ok","evidence":[{"option","value","possible","why","frame"}],"settled"}; "frame"
-/// is the number, from 1, of the frame that excludes the value.
+/// Converts the result to a JSON object, in which frames are counted from 1.
 [[nodiscard]] Json to_json(const Probed& probed);
 
 }  // namespace absenc::client

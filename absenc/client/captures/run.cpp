@@ -32,8 +32,7 @@ using capture::Content;
 using capture::DecodedPart;
 using capture::Tick;
 
-// Stores an exception of the annotation sink or of `progress` until decoding has ended, because the exception must not
-// pass through a decoder that uses threads.
+// Stores an exception until decoding has ended: it must not pass through decoder threads.
 class Guard {
  public:
   template <class Work>
@@ -72,7 +71,7 @@ void require_link(const Unit& unit, Content content) {
   if (content == Content::bytes && !uart) refuse(unit, "bytes", "record the levels of its wires, or CAN frames");
 }
 
-// A damaged file is reported as the problem, even if something else is missing before the damage.
+// A damage is reported as the problem, whatever else is missing.
 std::string why_nothing(const CaptureOutcome& outcome, const TickClock& clock) {
   for (const capture::Damage& damage : outcome.damages) {
     if (!damage.note) return to_text(damage, clock);
@@ -80,8 +79,7 @@ std::string why_nothing(const CaptureOutcome& outcome, const TickClock& clock) {
   return outcome.problem;
 }
 
-// Decodes the levels of a bus for capture::BlockRun. A frame depends on the frames before it, so only reading and
-// expanding run ahead in threads.
+// Decodes a bus for capture::BlockRun. Frames depend on those before, so `guess` does nothing.
 struct BusDecoding {
   struct Guess {};
 
@@ -125,8 +123,7 @@ std::unique_ptr<capture::Reader> open_capture(const CaptureChoices& choices) {
   try {
     if (choices.path != "-") return capture::open_capture(choices.path, how);
     auto source = std::make_unique<StdinSource>();
-    // Refuses raw samples from standard input, and data with a zero byte among the first 64 bytes, which is binary:
-    // some binary formats are read from the end of the file, which is not known there.
+    // Some binary formats are read from the end of the file, which is not known here.
     std::array<std::uint8_t, 64> head{};
     const std::size_t size = source->read(0, head);
     if (how.channels != 0 || std::count(head.begin(), head.begin() + static_cast<std::ptrdiff_t>(size), 0) != 0) {
@@ -264,15 +261,14 @@ CaptureOutcome CaptureRun::run_bytes(capture::AnnotationSink& sink, const std::f
   if (settings.channel_count == 2) settings.channels = {Carries::requests, Carries::replies};
   settings.gap = reader_->layout().arrival_gap;
   settings.by_arrival = settings.gap != 0;
-  // A log by arrival times may begin inside a frame, because its program may have begun to listen during a frame. Other
-  // captures of bytes are assumed to begin with a complete frame.
+  // A log by arrival times may begin inside a frame; other captures of bytes hardly do.
   settings.begins_silent = !settings.by_arrival;
   CaptureOutcome outcome;
   std::unique_ptr<capture::Annotator> annotator;
   read_all(*reader_, [&](const capture::Block& block) {
     for (const capture::Character& character : block.bytes) {
       if (annotator == nullptr) {
-        // In the export of a logic analyser's UART decoder a character lasts from its first data bit to its last.
+        // In the export of a UART decoder a character lasts from its first data bit to its last.
         const double data_bits = static_cast<double>(character.end - character.begin);
         if (data_bits > 1) settings.ticks = capture::line_ticks(unit_, data_bits / 8, ticks_per_second());
         if (data_bits > 1) settings.ticks.pause += static_cast<Tick>(data_bits / 4);
@@ -283,7 +279,7 @@ CaptureOutcome CaptureRun::run_bytes(capture::AnnotationSink& sink, const std::f
     outcome.end = std::max(outcome.end, block.end);
     progress(block.end);
   });
-  // A log ends at the time of its last line, so the length of a pause is added to end the last frame.
+  // A log ends at the time of its last line; a pause behind it ends the last frame.
   if (annotator != nullptr) annotator->finish(outcome.end + settings.ticks.pause);
   return outcome;
 }

@@ -24,7 +24,7 @@ namespace absenc::client {
 /// A capture and its description by the user.
 struct CaptureChoices {
   std::string path;  // path of the file; "-": standard input
-  // the user's description of the capture; its model and options are ignored, because they are passed as Options
+  // the user's description of the capture; its model and options are ignored
   DecodeChoices how{};
   // characters to decode instead of a file; null: decode the file `path`
   std::shared_ptr<const ReceivedCharacters> received{};
@@ -39,26 +39,22 @@ struct CaptureOutcome {
   std::vector<capture::Damage> damages;
 };
 
-/// Opens the capture and returns its reader. Throws UsageError for raw samples or binary data from standard input,
-/// Failure if the capture cannot be opened.
+/// Opens the capture and returns its reader. Throws UsageError or Failure.
 [[nodiscard]] std::unique_ptr<capture::Reader> open_capture(const CaptureChoices& choices);
 
 class CaptureRun {
  public:
-  /// Opens the capture. Throws UsageError if the capture holds bytes or CAN frames that do not fit the link of `unit`,
-  /// and the exceptions of `open_capture`.
+  /// Opens the capture. Throws UsageError or Failure.
   CaptureRun(const Unit& unit, const Options& options, const CaptureChoices& choices);
   ~CaptureRun();
 
   [[nodiscard]] const Options& options() const { return options_; }
   /// Returns the number of ticks per second of the capture; 0: the capture has no times.
   [[nodiscard]] std::uint64_t ticks_per_second() const;
-  /// Returns the options, completed by values that a live host would read from the encoder, if the frames of the
-  /// capture report them. Call it before `run`. For standard input, which can be read only once, returns the options
-  /// unchanged.
+  /// Returns the options, completed by the capture's frames where possible. Call before `run`.
   const Options& settle_options();
-  /// Decodes the whole capture into `all` and returns the outcome. Calls `progress` from time to time with the tick
-  /// that is reached. Throws UsageError, Failure and the exceptions of `all` and `progress`.
+  /// Decodes the whole capture into `all`. Calls `progress` with the tick that is reached. Throws UsageError, Failure
+  /// and the exceptions of `all` and `progress`.
   CaptureOutcome run(capture::AnnotationSink& all, const std::function<void(capture::Tick)>& progress);
 
  private:

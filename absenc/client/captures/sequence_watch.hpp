@@ -10,10 +10,7 @@
 
 namespace absenc::client {
 
-/// Forwards annotations to a sink. A reply becomes `sequence_mismatch` if its first field with the role sequence equals
-/// that of the encoder's last reply, or if a field with the role life_counter is not one more, modulo 64, than in the
-/// frame before. After damaged frames a life counter may also have advanced by more. After many frames an equal counter
-/// is accepted, because it may have wrapped.
+/// Forwards annotations to a sink; a reply out of sequence becomes `sequence_mismatch`.
 class SequenceWatch final : public capture::AnnotationSink {
  public:
   /// Forwards to `sink`, which must outlive the object.
@@ -32,7 +29,7 @@ class SequenceWatch final : public capture::AnnotationSink {
   }
 
  private:
-  // Distance in frames from which an equal counter may be right: a counter of 7 bits may have wrapped.
+  // frames after which an equal counter may be right: a counter of 7 bits may have wrapped
   static constexpr std::uint64_t most_between = 100;
   static constexpr std::int64_t life_counter_end = 64;
 

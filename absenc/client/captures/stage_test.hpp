@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs commands of a unit against its virtual encoder in virtual time, stores their results, and draws the conversation
-// as `absenc wave` does.
+// Runs commands of a unit against its virtual encoder in virtual time, and draws the traffic.
 #pragma once
 
 #include <algorithm>
@@ -35,7 +34,7 @@ struct Said {
   bool reads = false;       // whether its verb is `read` or `read_part`: all values come from replies of the encoder
   bool is_special = false;  // whether its verb is `run`; such a command may try requests that fail
   unsigned exchanges = 0;   // number of requests, pulses or transfers of the conversation
-  // whether the error is a verdict of the procedure over several replies, not an error of the last reply
+  // whether the error is a verdict over several replies, not an error of the last one
   bool is_verdict = false;
 };
 
@@ -77,8 +76,7 @@ class Stage {
 
   [[nodiscard]] LineSettings line() const { return address.line.with_some_rate(); }
 
-  /// Runs the commands one after the other, with pauses long enough for every reply. Stores in `live` the results that
-  /// a capture can show.
+  /// Runs the commands one after the other; `live` receives the results that a capture can show.
   void run(const std::vector<const Command*>& commands) {
     if (device_.bytes() != nullptr) {
       run_on(*device_.bytes(), commands);
@@ -93,7 +91,7 @@ class Stage {
     capture::write_vcd(out, drawing_);
   }
 
-  /// Returns the length of silence that decoders need before the first and after the last character.
+  /// Returns the silence that decoders need before the first and after the last character.
   [[nodiscard]] Time idle() const { return std::max<Time>(std::chrono::milliseconds(1), 5 * line().character()); }
   EncoderAddress address;
   std::vector<Said> live;
@@ -123,8 +121,7 @@ class Stage {
     }
   }
 
-  // Returns two sets of arguments to try: required ones have their smallest or their greatest value, because the
-  // encoder may not accept numbers in between, and others their defaults.
+  // Returns two sets of arguments: with the smallest and with the greatest values, or defaults.
   static std::vector<std::vector<std::int64_t>> arguments_of(const Command& command) {
     std::vector<std::vector<std::int64_t>> all(2);
     for (const Argument& argument : command.arguments) {
@@ -157,7 +154,7 @@ class Stage {
     if constexpr (std::is_same_v<Item, CanFrame>) {
       said.is_verdict = said.error == Error::cross_check_failed;
     } else {
-      // If the last reply is good, the failure is a verdict of the procedure, which the capture cannot show.
+      // If the last reply is good, the failure is a verdict of the procedure.
       const Exchange<Item> last = conversation->exchange();
       const bool has_bytes = address.unit->link != LinkKind::clocked && !last.received.empty();
       said.is_verdict = has_bytes && address.unit->check(address.options, {.bytes = last.sent},
@@ -165,7 +162,7 @@ class Stage {
     }
     // `not_still` is always a verdict: it compares two good replies.
     said.is_verdict = said.is_verdict || said.error == Error::not_still;
-    // A capture cannot be decoded after a change of the rate, except on clocked lines, which carry their own clock.
+    // After a change of the rate a capture cannot be decoded, except on clocked lines.
     const bool can_follow = !port.moved || address.unit->link == LinkKind::clocked;
     if (can_follow && said.error != Error::unsupported) live.push_back(std::move(said));
     return true;

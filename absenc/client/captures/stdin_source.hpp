@@ -10,16 +10,14 @@
 
 namespace absenc::client {
 
-/// Standard input as a source of bytes. Buffers the last 2 MiB, so that the beginning can be read several times.
-/// Earlier bytes are no longer available.
+/// Standard input as a source of bytes, of which only the last 2 MiB remain available.
 class StdinSource final : public capture::Source {
  public:
   StdinSource() : window_(capacity) {}
 
   /// Returns the greatest number as the size, because the size of standard input is unknown.
   [[nodiscard]] std::uint64_t size() const override { return UINT64_MAX; }
-  /// Copies bytes of the input and returns their number: fewer if the input ends, or if the bytes are no longer
-  /// buffered. Waits until the requested bytes have arrived or the input has ended. Throws Failure.
+  /// Waits for the bytes, copies them and returns their number, fewer if some are not available. Throws Failure.
   [[nodiscard]] std::size_t read(std::uint64_t offset, std::span<std::uint8_t> into) override;
 
  private:

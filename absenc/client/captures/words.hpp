@@ -14,17 +14,15 @@ namespace absenc::client {
 /// Converts ticks of a capture to seconds and to text.
 class TickClock {
  public:
-  /// Takes the tick rate. `ticks_per_second` is 0 for a capture without times; then `text` prints the number of the
-  /// tick.
+  /// Takes the number of ticks per second; 0 for a capture without times.
   explicit TickClock(std::uint64_t ticks_per_second);
 
   [[nodiscard]] bool has_time() const { return ticks_per_second_ != 0; }
   [[nodiscard]] double seconds(capture::Tick tick) const;
   [[nodiscard]] Time time(capture::Tick ticks) const;
-  /// Returns the time of a tick in seconds, with the digits that a tick needs; without times, the number of the tick.
+  /// Returns the time of a tick in seconds; without times, the number of the tick.
   [[nodiscard]] std::string text(capture::Tick tick) const;
-  /// Returns the format of a time in seconds for `Column::Presentation`, as "{:.6f}", with the digits that a tick
-  /// needs.
+  /// Returns the format of a time in seconds for `Column::Presentation`, like "{:.6f}".
   [[nodiscard]] std::string format() const;
 
  private:
@@ -32,19 +30,15 @@ class TickClock {
   int digits_ = 0;
 };
 
-/// Returns a sentence about damage: "the capture is damaged at byte 600, second 0.005: the file is cut off", or "note:
-/// byte 600, ...".
+/// Returns a sentence about a damage or a note, with its place in the file.
 [[nodiscard]] std::string to_text(const capture::Damage& damage, const TickClock& clock);
 
 /// Returns the kind of an annotation as rows name it: "exchange", "request", "reply" or "noise".
 [[nodiscard]] std::string_view name_of(capture::Annotation::Kind kind);
 
-/// Returns whether the fields of an annotation may be shown: not if it has an error, is noise, is cut off, or is not
-/// documented.
 [[nodiscard]] bool has_fields(const capture::Annotation& annotation);
 
-/// Returns the remark of an annotation in words (of a CAN error frame, its meaning) or, without a remark, its error,
-/// with advice if there is a reply; "" if it has neither. A good composed frame has a text of its own.
+/// Returns a message about the annotation; "" if there is none.
 [[nodiscard]] std::string message_of(const Unit& unit, const Options& options, const capture::Annotation& annotation);
 
 }  // namespace absenc::client

@@ -15,8 +15,7 @@
 
 namespace absenc::client {
 
-/// Parses the address. If its encoder sends unsolicited frames, selects the first value of an option with which the
-/// encoder is polled; if there is none, returns the address as it is.
+/// Parses the address; selects an option with which the encoder is polled, if there is one.
 inline EncoderAddress polled_address(const std::string& text) {
   const EncoderAddress usual = parse_address(text);
   const Unit& unit = *usual.unit;
@@ -31,8 +30,7 @@ inline EncoderAddress polled_address(const std::string& text) {
   return usual;
 }
 
-/// Returns addresses of the unit's virtual encoder: with default options, and with each option at several values (each
-/// choice, both ends of a range, both neighbours of the default). Leaves out values that no virtual encoder has.
+/// Returns addresses of the unit's virtual encoder, with default options and with other ones.
 inline std::vector<EncoderAddress> variations_of(const Unit& unit) {
   std::vector<EncoderAddress> all{parse_address(fmt::format("sim:{}", unit.id))};
   const auto add = [&](const Option& option, std::int64_t value) {
@@ -54,8 +52,7 @@ inline std::vector<EncoderAddress> variations_of(const Unit& unit) {
   }
   return all;
 }
-/// Returns the unit's identifier, followed by the first option that differs from its default, if any: "UNIT
-/// crc_width=0".
+/// Returns the unit's identifier and its first option that is not the default, if any.
 inline std::string variation_name(const EncoderAddress& address) {
   const EncoderAddress usual = parse_address(fmt::format("sim:{}", address.unit->id));
   for (std::size_t i = 0; i < address.unit->options.size(); ++i) {

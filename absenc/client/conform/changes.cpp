@@ -21,15 +21,14 @@ namespace absenc::client {
 
 namespace {
 
-// Wait that is longer than the longest busy time of an encoder after a byte write, including its reply.
+// longer than an encoder is busy after a byte write, including its reply
 constexpr Time settling = std::chrono::milliseconds(50);
 constexpr unsigned tries = 3;        // attempts to restore one value
 constexpr std::uint32_t beside = 4;  // number of bytes before the written byte that must stay unchanged
 // positions are equal if at most this fraction of a turn, 1/512, is between them
 constexpr unsigned position_tolerance = 512;
 
-/// Thrown when a command fails, or when a value or position of the encoder is missing or not as expected, so that the
-/// clause is broken.
+/// Thrown when a command fails or a value is missing or wrong, so that the clause is broken.
 struct ClauseBroken {
   std::string evidence;
 };
@@ -166,7 +165,7 @@ void ChangeTester::test_busy(const Clause& clause, ClauseResult& result) {
   conclude(result, reply && reply->busy, std::move(seen));
 }
 
-// Saves byte 0 of page 0, the page that is selected after power-on: `put_back` reads it, which selects that page again.
+// Saves byte 0 of page 0: reading it in `put_back` selects page 0, as after power-on.
 void ChangeTester::test_closed(const Clause& clause, ClauseResult& result) {
   save({.look = [this] { return read_byte(0, 0); }, .write = [](std::int64_t) {}});
   static_cast<void>(read_byte(clause.page, clause.address));
@@ -200,7 +199,7 @@ void ChangeTester::test_offset(const Clause& clause, ClauseResult& result) {
   if (!is_near(before, 0)) conclude(result, true, seen);
 }
 
-// The direction setting cannot be read, so the test looks at the position, which is unchanged or mirrored.
+// The direction cannot be read, so the test looks at the position, unchanged or mirrored.
 void ChangeTester::test_direction(const Clause& clause, ClauseResult& result) {
   const Reading before = read();
   const std::uint64_t turn = std::uint64_t{1} << before.singleturn_bits;
@@ -218,7 +217,7 @@ void ChangeTester::test_direction(const Clause& clause, ClauseResult& result) {
   const auto set = [this, &setter](std::int64_t value) {
     static_cast<void>(run(setter, complete_arguments(setter, std::array{value})));
   };
-  // To restore the direction, sets one direction and then the other until the position is mirrored, or not, as wanted.
+  // It is not known which value gave which direction, so both may be tried.
   save({.look = is_mirrored,
         .write =
             [is_mirrored, set, values = std::array{clause.other, clause.value}](std::int64_t wanted) {
@@ -264,9 +263,7 @@ void ChangeTester::test_pace(const Clause& clause, ClauseResult& result) {
 
 // ---- Clauses that erase values which cannot be restored
 
-// Returns whether the test may erase `what`, the value in words: with `resets`, or if `what` is "", so that no value
-// can be lost (the test then sends the command too, because the encoder may refuse it or do harm). If not, stores the
-// reason in `result`.
+// Returns whether the test may erase `what`; if not, stores the reason in `result`.
 bool ChangeTester::may_erase(std::string_view what, ClauseResult& result) const {
   if (what.empty() || resets_) return true;
   result.evidence = fmt::format("there is {}, which nothing could bring back: --resets gives it up", what);
@@ -375,8 +372,7 @@ void ChangeTester::put_back() {
   }
 }
 
-// Restores one value; returns false if that fails. Delays an interrupt until all values are restored, because otherwise
-// the encoder would stay changed.
+// Restores one value or returns false. An interrupt must wait until all values are restored.
 bool ChangeTester::put_back(const Saved& one) {
   for (unsigned i = 0; i < tries; ++i) {
     try {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the clauses that change an encoder, and tries to restore the changed values however the test ends, except
-// values that `resets` allows it to erase.
+// Tests the clauses that change an encoder, and tries to restore the changed values.
 #pragma once
 
 #include <algorithm>
@@ -30,8 +29,7 @@ struct CommandResult {
   std::optional<Reading> reading{};
 };
 
-/// A single request and its reply. Both are empty if readings send no request with these options; the reply is empty if
-/// none was received.
+/// A single request and its reply; each of them may be empty.
 struct SingleExchange {
   capture::ObservedFrame request{};
   capture::ObservedFrame reply{};
@@ -49,8 +47,7 @@ struct UnsolicitedFrames {
   Time first{};
   Time last{};
 
-  /// Returns the rate in frames per second, rounded, from the times of the first and the last frame; for fewer than two
-  /// frames their number.
+  /// Returns the rate in frames per second, rounded; for fewer than two frames their number.
   [[nodiscard]] std::int64_t per_second() const {
     if (frames < 2) return static_cast<std::int64_t>(frames);
     const std::int64_t between = (last - first).count();
@@ -58,9 +55,7 @@ struct UnsolicitedFrames {
   }
 };
 
-/// Access to the line, independent of its link. Functions that send or wait throw the exceptions of the port. When the
-/// caller wants the test to end, the next of these functions throws os::Interrupted, but only once, so that values can
-/// still be restored.
+/// Access to the line. An end of the test throws os::Interrupted only once, so that values can still be restored.
 struct ChangesLine {
   std::function<CommandResult(const Command&, Arguments)> run;
   // sends a request, encoded by Unit::encode, and returns the exchange
@@ -72,27 +67,23 @@ struct ChangesLine {
   std::function<const Options&()> options;  // returns the options with which the encoder is reached now
 };
 
-/// Returns whether the reading's position is at most 1/512 turn away from `wanted`, in counts: the noise of a shaft at
-/// rest is assumed to be less.
+/// Returns whether the reading's position is at most 1/512 turn away from `wanted`, in counts.
 [[nodiscard]] bool is_near(const Reading& reading, std::uint64_t wanted);
 
 class ChangeTester {
  public:
-  /// Takes the encoder's name in commands for the user, the access to its line, and whether tests may erase values that
-  /// cannot be restored (`resets`).
+  /// Takes the encoder's name in commands for the user, its line, and whether it may be reset.
   ChangeTester(const Unit& unit, std::string_view name, ChangesLine line, bool resets)
       : unit_(unit), name_(name), line_(std::move(line)), resets_(resets) {}
 
-  /// Tests one clause and stores verdict and evidence in `result`. Afterwards, also before it passes on an exception,
-  /// tries to restore the changed values; the commands for those that stay changed are added to `left`.
+  /// Tests one clause into `result`, and tries to restore changed values also after an exception.
   void test(const Clause& clause, ClauseResult& result);
 
   /// Returns the commands with which the user restores values that the test could not restore.
   [[nodiscard]] const std::vector<std::string>& left() const { return restore_commands_; }
 
  private:
-  /// A value of the encoder before the test changed it, with functions to read and write it and the user's command to
-  /// restore it.
+  /// A value before the test changed it, and how to read, write and restore it.
   struct Saved {
     std::function<std::int64_t()> look{};
     std::function<void(std::int64_t)> write{};

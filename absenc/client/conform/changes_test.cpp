@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the clauses that change an encoder: at least two mutants break each clause, at least one of them no other
-// clause. A test that is ended at some step leaves the encoder's settings as they were, and its memory unless that
-// counts its writes.
+// Tests the clauses that change an encoder, with mutants and with tests that end at any step.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -94,7 +92,7 @@ class Disobedient final : public Machine<Item> {
   std::vector<Item> reply_;
 };
 
-/// A port that calls `end` at its wait number `at`, from 1, and with `lost` loses the line from that wait on.
+/// A port that calls `end` at its wait `at`, from 1, and with `lost` then loses the line.
 template <class Item>
 class EndingPort final : public Port<Item> {
  public:
@@ -127,11 +125,9 @@ struct Bench {
     port = std::make_unique<EndingPort<Item>>(*line);
   }
   [[nodiscard]] ByteList memory() const { return {device->memory().begin(), device->memory().end()}; }
-  /// Returns, as text, the position and the settings that clauses change, as the encoder reports them. The memory of
-  /// the encoder is no measure: it may count how often it was written.
+  /// Returns position and settings as text. The memory is no measure: it may count its writes.
   [[nodiscard]] std::string settings() const {
-    // Sets the rate first, as a program that opens the port: the test may have ended at another rate, or just after a
-    // restart of the encoder.
+    // The test may have ended at another rate, or just after a restart of the encoder.
     line->begin({.kind = Step<Item>::Kind::configure, .rate = address.line.with_some_rate().rate});
     const Step<Item> rest{.at = line->now() + std::chrono::seconds(2)};
     while (line->now() < rest.at && line->wait(rest).kind != Event<Item>::Kind::timer) {
@@ -154,7 +150,7 @@ struct Bench {
     if (position != address.unit->fields.end()) add_value(*find_command(*address.unit, Verb::read), position->name);
     return text;
   }
-  // Runs the test on a link that does not own the device, so that the device can be inspected afterwards.
+  // Runs the test on a link that does not own the device, which is inspected afterwards.
   [[nodiscard]] Conformance run(bool resets = false, const std::function<bool()>& over = {}) const {
     Link port_link;
     if constexpr (std::is_same_v<Item, CanFrame>) {
@@ -182,16 +178,13 @@ std::vector<const Clause*> changing(const Unit& unit) {
   return clauses;
 }
 
-/// Returns the address of an encoder whose shaft is at a third of a turn, a position that is neither zero nor its own
-/// mirror image.
+/// Returns the address of an encoder whose position is neither zero nor its own mirror image.
 EncoderAddress address_of_unit(const Unit& unit, std::string_view more = {}) {
   const std::string text = fmt::format("sim:{}?{}", unit.id, more);
   const Resolution resolution = unit.resolution(parse_address(text).options);
   return parse_address(fmt::format("{}{}singleturn={}", text, more.empty() ? "" : "&",
                                    (std::uint64_t{1} << resolution.singleturn_bits) / 3));
 }
-/// Returns the address of an encoder that shows the behaviour which the clause demands. For a clause about a reset the
-/// encoder has turns or an alarm that the reset must clear.
 EncoderAddress address_showing_change(const Unit& unit, const Clause& clause) {
   std::string more(clause.shown_with);
   const auto add = [&](const std::string& setting) { more += (more.empty() ? "" : "&") + setting; };
@@ -274,8 +267,7 @@ std::vector<Spoil<Item>> spoils_of(const EncoderAddress& address, const Clause& 
       });
     }
   }
-  // For clauses from Demand::set on, adds encoders that ignore a window of consecutive requests: spoiling a byte of the
-  // memory breaks no clause about a setting that the memory does not contain.
+  // Spoiling a byte of the memory breaks no clause about a setting that is not in the memory.
   const unsigned step = address.unit->link == LinkKind::clocked ? 20 : 5;
   for (const unsigned window : {30u, 1000u}) {
     for (unsigned from = 1; clause.demand >= Demand::set && from <= requests; from += step) {
@@ -325,8 +317,7 @@ void check_ends(const EncoderAddress& address) {
   ASSERT_EQ(original.verdict(), Verdict::kept) << original.report();
   const unsigned steps = whole.port->steps;
   const std::string settings = whole.settings();
-  // If the memory differs even after a complete test, it counts its writes, which cannot be restored; then only the
-  // settings are compared.
+  // A memory that differs even after a complete test counts its writes.
   const bool counts = whole.memory() != before;
   // In tests with many steps, each tested step has only one of the three kinds of end.
   const unsigned kinds = steps < 1000 ? 3 : 1;
@@ -352,8 +343,7 @@ void check_ends(const EncoderAddress& address) {
     } catch (const Cancelled&) {
       ended = kind == 2;
     }
-    // Only an interrupt must end the test at every step. A short loss of the line is harmless while values are being
-    // restored.
+    // A short loss of the line is harmless while values are being restored.
     EXPECT_TRUE(ended || kind != 0) << at;
     if (!counts) {
       ASSERT_EQ(bench.memory(), before) << "end " << kind << " at " << at << " of " << steps;
@@ -391,7 +381,6 @@ INSTANTIATE_TEST_SUITE_P(Units, ChangingClauses, ::testing::ValuesIn([] {
                          }()),
                          [](const auto& one) { return test_name(*one.param); });
 
-// If a value cannot be restored, the text of the error must contain the command that restores it.
 TEST(Conformance, NamesCommandThatRestoresAfterLostLine) {
   const EncoderAddress address = parse_address("sim:tformat");
   const Bench<std::uint8_t> whole(address);
@@ -417,7 +406,6 @@ TEST(Conformance, NamesCommandThatRestoresAfterLostLine) {
   EXPECT_GT(changed, 4U);
 }
 
-// Without `resets`, a test must not erase values that it cannot restore. A counter that is already 0 proves nothing.
 TEST(Conformance, ErasesZeroTurnsAndAlarmsOnlyWithResets) {
   const auto found = [](std::string_view text, bool resets) {
     const Bench<std::uint8_t> bench(parse_address(text));

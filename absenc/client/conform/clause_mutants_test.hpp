@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Makes the mutants with which the tests of conform break a clause: encoders whose requests, replies or state are
-// wrong.
+// Makes encoders whose requests, replies or state are wrong, with which tests break clauses.
 #pragma once
 
 #include <cstdint>
@@ -31,8 +30,7 @@ inline void flip_bit(FrameList& items, std::size_t bit) {
   byte = static_cast<std::uint8_t>(byte ^ 1U << bit % 8);
 }
 
-/// Lets the mutant flip a bit of its reply and search for the last two bytes with which the checksum is right again;
-/// does nothing on CAN.
+/// Lets the mutant flip a bit of its replies and try to repair their checksum; not on CAN.
 template <class Item>
 void flip_and_repair(Mutant<Item>& mutant, const EncoderAddress& address, std::size_t bit) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
@@ -52,8 +50,7 @@ void flip_and_repair(Mutant<Item>& mutant, const EncoderAddress& address, std::s
   }
 }
 
-/// Adds mutants that change the reply to a single request, to all requests from the third on (a host may repeat its
-/// request), and to all from the eighth on (some hosts use the first requests to detect the echo).
+/// Adds mutants that change one reply, all from the third on, or all from the eighth on.
 template <class Item>
 void add_reply_mutants(ReplyChanges<Item>& all, const std::function<void(Mutant<Item>&)>& change) {
   all.push_back({.change = change});
@@ -70,8 +67,7 @@ void add_reply_mutants(ReplyChanges<Item>& all, void (*change_reply)(std::vector
   add_reply_mutants<Item>(all, [change_reply](Mutant<Item>& m) { m.change_reply = change_reply; });
 }
 
-/// Adds mutants that send an earlier reply again: the whole reply, or its first bits with the rest of a later reply.
-/// Adds none on CAN or without a clause error that they could cause.
+/// Adds mutants that send an earlier reply again, whole or in part; none on CAN.
 template <class Item>
 void add_stale_mutants(ReplyChanges<Item>& all, const Clause& clause) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
@@ -139,8 +135,7 @@ ReplyChanges<Item> frame_mutants(const EncoderAddress& address, const Clause& cl
   return all;
 }
 
-/// Returns mutants with a condition of the encoder at an end of its range or 5 above normal, where its range has such a
-/// value, mutants that always flip the same bit of their replies, and mutants that flip the same bit of each request.
+/// Returns mutants with other conditions, and with a flipped bit in each reply or request.
 template <class Item>
 ReplyChanges<Item> command_mutants(const EncoderAddress& address) {
   ReplyChanges<Item> all;
@@ -163,8 +158,6 @@ ReplyChanges<Item> command_mutants(const EncoderAddress& address) {
   return all;
 }
 
-/// Returns mutants that treat special requests (Mutant::is_special) wrongly: they send the reply to the first request,
-/// no reply, or another reply.
 template <class Item>
 ReplyChanges<Item> special_request_mutants(const Clause& clause) {
   using M = Mutant<Item>;
@@ -258,8 +251,7 @@ ReplyChanges<Item> mutants_of(const EncoderAddress& address, const Clause& claus
     default:
       break;
   }
-  // Applies each change only to valid requests that are addressed to other encoders or have no address; on CAN to all
-  // special requests.
+  // Changes apply to valid requests to other encoders or without an address; on CAN to all.
   if (clause.demand == Demand::foreign_silent) {
     for (const ReplyChange<Item>& change : special_request_mutants<Item>(clause)) {
       all.push_back({.change = [change = change.change, &address](Mutant<Item>& m) {

@@ -7,7 +7,7 @@
 
 namespace absenc::client {
 
-/// Tests the clauses over `link` and returns the results. `name` is the encoder's name in commands for the user.
+/// Tests the clauses over `link`; `name` is the encoder's name in commands for the user.
 [[nodiscard]] Conformance conform(const EncoderAddress& address, Link link, const ConformChoices& choices,
                                   std::string_view name = {});
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that the virtual encoder satisfies every clause that does not change it, and that at least two mutants break
-// each such clause, one of them no other clause; clauses about commands may break together.
+// Checks clauses that change no encoder: the virtual encoder keeps them, mutants break them.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -18,8 +17,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Returns whether the mutant breaks only this clause. Clauses about commands may break together: the registers depend
-// on channel 2, and both depend on the identity.
+// Returns whether the mutant breaks only this clause; those about commands may break together.
 bool breaks_only(const Unit& unit, const Clause& clause, const std::vector<std::string>& broken) {
   return std::all_of(broken.begin(), broken.end(), [&](const std::string& id) {
     const auto other = std::ranges::find(clauses_of(unit), id, &Clause::id);
@@ -69,14 +67,12 @@ TEST_P(Clauses, EachClauseIsBrokenByTwoMutantsOneAlone) {
   }
 }
 
-// Checks that a mutant can break each clause whose verdict is `kept`: a clause that does not apply with these options
-// must not be `kept`.
 template <class Item>
 void check_kept(const EncoderAddress& address, std::set<std::string>& seen) {
   const Unit& unit = *address.unit;
   try {
     const Conformance good = conform_mutant<Item>(address, {}, {.readings = 3});
-    // A report that equals an earlier one, including the number of detectable changes, needs no second check.
+    // A report that equals an earlier one needs no second check.
     if (!seen.insert(good.report()).second) return;
     for (const Clause& clause : clauses_of(unit)) {
       if (verdict_of(good, clause.id) != Verdict::kept) continue;
@@ -106,8 +102,6 @@ TEST_P(Clauses, EachKeptClauseCanBeBroken) {
 INSTANTIATE_TEST_SUITE_P(Units, Clauses, ::testing::ValuesIn(all_units().begin(), all_units().end()),
                          [](const auto& one) { return test_name(*one.param); });
 
-// The echo must not be taken for a reply: with echo the encoder breaks no clause, and missing replies break the clause
-// "answer".
 TEST(Conformance, EchoOfAdapterIsNoReply) {
   for (const char* const text : {"sim:tformat?echo=auto", "sim:tformat?echo=on", "sim:amt21?echo=auto"}) {
     const EncoderAddress address = parse_address(text);
@@ -188,7 +182,7 @@ TEST(Conformance, PrintsTapJunitAndReport) {
   EXPECT_EQ(one.verdict(), Verdict::broken);
 }
 
-// Without "Bail out!", programs that count tests would regard a run with only skipped tests as passed.
+// Programs that count tests may regard a run with only skipped tests as passed.
 TEST(Conformance, TapBailsOutIfNoClauseWasJudged) {
   const Conformance nothing{.protocol = "toy", .clauses = {{"a", "doc", "1", "x", Verdict::untested, "nothing came"}}};
   EXPECT_EQ(nothing.verdict(), Verdict::untested);
@@ -212,8 +206,7 @@ TEST(Conformance, TapBailsOutIfNoClauseWasJudged) {
       std::string::npos);
 }
 
-// The text for people names the document and then the paragraph, so the document's name must not contain the paragraph
-// too.
+// The document's name stands before the paragraph, so it must not contain the paragraph too.
 TEST(Clauses, DocumentNameContainsNoParagraph) {
   for (const Unit* unit : all_units()) {
     const auto look = [&](std::string_view id, std::string_view paragraph) {

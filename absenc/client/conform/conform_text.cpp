@@ -12,8 +12,7 @@ namespace {
 
 constexpr std::string_view nothing_judged = "nothing was seen that could be judged";
 
-// Returns why the result is not good apart from broken clauses: the encoder is left changed, or no clause was judged;
-// "" if neither.
+// Returns why the result is not good apart from broken clauses; "" if there is no such reason.
 std::string_view failure_of_all(const Conformance& one) {
   if (!one.left.empty()) return "the encoder is left changed";
   return one.verdict() == Verdict::untested ? nothing_judged : std::string_view();

@@ -6,9 +6,6 @@
 
 namespace absenc::client {
 
-/// Converts the results to
-/// {"ok","protocol","verdict","kept","broken","untested","clauses":[{"id","document","paragraph",
-/// "words","verdict","evidence"}],"left"}.
 [[nodiscard]] Json to_json(const Conformance& conformance);
 
 }  // namespace absenc::client

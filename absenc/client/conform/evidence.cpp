@@ -21,8 +21,7 @@ std::size_t bits_of(const ObservedFrame& frame) {
   return frame.bits != 0 ? frame.bits : frame.bytes.size() * 8;
 }
 
-// Flips the bit `bit` of the frame. In each byte bits are numbered from the most significant on clocked links,
-// otherwise from the least significant.
+// Flips the bit `bit` of the frame; on clocked links bit 0 is the most significant of its byte.
 void flip(ObservedFrame& frame, std::size_t bit) {
   std::uint8_t& byte = frame.can ? frame.can->data[bit / 8] : frame.bytes[bit / 8];
   byte = static_cast<std::uint8_t>(byte ^ (frame.bits != 0 ? 0x80U >> bit % 8 : 1U << bit % 8));
@@ -36,8 +35,7 @@ void resize(ObservedFrame& frame, int by) {
   }
 }
 
-// Returns the request of a command with valid arguments; empty on a clocked link, or if the request does not exist with
-// these options.
+// Returns the request of a command with valid arguments, or empty, as always on clocked links.
 ObservedFrame request_of(const Unit& unit, const Options& options, const Command& command) {
   std::array<std::uint8_t, longest_request> bytes{};
   std::vector<std::int64_t> arguments;
@@ -53,7 +51,7 @@ ObservedFrame request_of(const Unit& unit, const Options& options, const Command
   return {.can = parse_wire_text(unit.link, "a request", text).can};
 }
 
-// Returns the requests of all commands, addressed to this encoder and, if the unit has addresses, to another one.
+// Returns the requests of all commands to this encoder and, with addresses, to another one.
 std::vector<ObservedFrame> other_requests(const Unit& unit, const Options& options) {
   std::vector<ObservedFrame> requests;
   const auto add = [&](const Options& with, const Command& command) {
@@ -138,8 +136,7 @@ std::size_t detected_changes(const Unit& unit, const Options& options, const Obs
   }
   for (const ObservedFrame& request : other_requests(unit, options)) try_one(request, good.reply);
   if (unit.link == LinkKind::clocked) return noticed;  // on a clocked link the checksum is no byte at the end
-  // If no change was reported, flips each bit before the last byte: the checksum would hide the change, so every value
-  // of the last byte is tried. One of them makes a checksum of one byte right.
+  // A wrong checksum would hide the change, so every value of the last byte is tried.
   ObservedFrame changed = good.reply;
   for (std::size_t bit = 0; noticed == 0 && changed.bytes.size() > 2 && bit < bits_of(good.reply) - 8; ++bit) {
     flip(changed, bit);

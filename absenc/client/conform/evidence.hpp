@@ -19,8 +19,7 @@ namespace absenc::client {
 // greatest number of bytes of a request; on CAN, of characters of its text
 inline constexpr std::size_t longest_request = 64;
 
-/// Returns the request that a clause asks for, as bytes, or as text for a CAN bus; empty if it does not exist with
-/// these options.
+/// Returns the request that a clause asks for, as bytes, on CAN as text; empty if there is none.
 [[nodiscard]] std::vector<std::uint8_t> request_of_ask(const Unit& unit, const Options& options, const Ask& ask);
 
 inline void conclude(ClauseResult& result, bool kept, std::string evidence) {
@@ -31,20 +30,15 @@ inline void conclude(ClauseResult& result, bool kept, std::string evidence) {
 /// Returns the reason why the clause does not apply with these options; "" if it applies.
 [[nodiscard]] std::string reason_against(const Unit& unit, const Options& options, const Clause& clause);
 
-/// Returns how many changes of a good exchange the decoder reports as one of `errors`; 0 for example if the unit has no
-/// such check with these options. Changes are a wrong bit, a missing or additional byte, and the same reply to another
-/// request. If the decoder reports none of them, a wrong bit together with another last byte is tried on links of
-/// bytes, and counts once.
+/// Returns how many changes of a good exchange the decoder reports as one of `errors`.
 [[nodiscard]] std::size_t detected_changes(const Unit& unit, const Options& options,
                                            const capture::ObservedExchange& good, Errors errors);
 
-/// Returns the error of the exchange's reply, checked as the reply to a request of `command` or, if `command` is "", to
-/// the exchange's own request. Returns `timeout` if there is no reply.
+/// Returns the reply's error, as a reply to `command` or, if that is "", to its own request.
 [[nodiscard]] Error reply_error(const Unit& unit, const Options& options, std::string_view command,
                                 const capture::ObservedExchange& exchange);
 
-/// Returns the address of the encoder to which the request is sent; nothing if the frame is no request or has no
-/// address.
+/// Returns the address to which the request is sent; nothing if there is none.
 [[nodiscard]] std::optional<std::int64_t> encoder_of(const Unit& unit, const Options& options, const Frame& request);
 
 /// Returns request and reply as text, "to 9a came 1a 40 ...".

@@ -22,15 +22,13 @@ class HostStage {
   ~HostStage() = default;
 };
 
-/// Checks that a host of the unit can be judged. Throws UsageError if the unit has no clauses for hosts, or if its
-/// encoder is not polled with these options.
+/// Checks that a host of the unit can be judged. Throws UsageError.
 void require_host(const Unit& unit, const Options& options);
 
-/// Serves the host until the limits or the function `over` of `choices` end the test, and returns the verdicts on the
-/// host.
+/// Serves the host until `choices` end the test, and returns the verdicts on the host.
 [[nodiscard]] Conformance judge_host(const Unit& unit, HostStage& stage, const ConformHostChoices& choices);
 
-/// Returns `counts` with the counts of the rule about the SPI mode, which only the SPI device can check.
+/// Returns `counts` with those of the rule about the SPI mode, which only the device can check.
 [[nodiscard]] inline std::vector<RuleCount> with_mode(std::vector<RuleCount> counts, const os::SpiDevice& device) {
   counts.push_back({.rule = spi_mode_rule, .looked = device.messages(), .broken = device.wrong_modes()});
   return counts;

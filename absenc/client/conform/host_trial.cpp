@@ -18,16 +18,14 @@ std::uint64_t HostTrial::length() const {
   return is_polled ? requests_to_continue : 0;
 }
 
-// Returns the count, since the test began, that ends the present phase: of faults of its kind, in the phase `refusal`
-// of received requests, or, in a phase without a fault, of answered requests.
+// Returns the count, since the test began, that ends the present phase.
 std::uint64_t HostTrial::counted() const {
   if (phase_ == Phase::silence) return seen_.missing;
   if (phase_ == Phase::refusal) return seen_.requests.good + seen_.requests.bad;
   return phase_ == Phase::damage ? seen_.damaged : seen_.answered;
 }
 
-// Returns whether no fault affects the host's requests. After a fault that made the host abort a sequence, its first
-// requests may still differ.
+// Returns whether neither a fault nor an earlier one affects the host's requests.
 bool HostTrial::is_calm() const {
   return phase_ == Phase::good || phase_ == Phase::over ||
          (phase_ == Phase::last && counted() - phase_begin_ >= requests_to_continue);
@@ -97,7 +95,7 @@ void HostTrial::judge_requests(ClauseResult& result) const {
   conclude(result, true, std::move(evidence));
 }
 
-// Concludes `kept` only if the host sends nothing but requests: among random bytes a request may occur by chance.
+// Concludes `kept` only if the host sends only requests: random bytes may contain some.
 void HostTrial::conclude_if_all_are_requests(ClauseResult& result, bool kept, std::string evidence) const {
   if (!kept || seen_.requests.bad == 0) return conclude(result, kept, std::move(evidence));
   result.evidence = fmt::format("{}, but the host also sent what is no request", evidence);

@@ -29,7 +29,7 @@ class HostTrial {
     RequestCounts requests{};
     std::vector<RuleCount> rules{};
   };
-  /// Takes the latest counts and returns the fault that the virtual encoder must inject from now on.
+  /// Takes the latest counts and returns the fault that the encoder must inject from now on.
   Fault look(TrialCounts seen);
   [[nodiscard]] bool over() const { return phase_ == Phase::over; }
 
@@ -46,7 +46,6 @@ class HostTrial {
   [[nodiscard]] bool is_calm() const;
   void judge_one(const HostClause& clause, ClauseResult& result) const;
   void judge_requests(ClauseResult& result) const;
-  /// Stores in `result` whether the host continued after the fault of `phase`, which occurred `count` times.
   void judge_continuation(Phase phase, std::string_view what, std::uint64_t count, ClauseResult& result) const;
   void judge_rule(const HostClause& clause, ClauseResult& result) const;
   void conclude_if_all_are_requests(ClauseResult& result, bool kept, std::string evidence) const;
@@ -57,11 +56,11 @@ class HostTrial {
   std::uint64_t phase_begin_ = 0;  // result of `counted` when the present phase began
   std::uint64_t refused_ = 0;  // number of requests received while the fault `damaged_request` damages every request
   TrialCounts seen_{};
-  // rule counts from the times in which all replies were good and no earlier fault can affect the host
+  // rule counts of the times in which no fault affects the host
   std::vector<RuleCount> calm_{};
 };
 
-/// Returns how often the virtual encoder injected `fault`, `silence` or `damage`, into a reply; 0 if it has no faults.
+/// Returns how often the virtual encoder injected `fault`, which is `silence` or `damage`.
 [[nodiscard]] inline std::uint64_t count_of(const VirtualDevice& encoder, HostTrial::Fault fault) {
   const sim::FaultKind kind = fault == HostTrial::Fault::silence ? sim::FaultKind::silence : sim::FaultKind::corrupt;
   return encoder.faults() != nullptr ? (*encoder.faults())[static_cast<std::size_t>(kind)] : 0;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that our own host satisfies every clause for hosts, that two mutants break each clause and no other except
-// "asks", and that no clause is kept by a sender that is no host of the protocol.
+// Checks clauses for hosts: our own host keeps them, flaws break them, strangers keep none.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -101,7 +100,7 @@ EncoderAddress address_of_unit(const Unit& unit, std::string_view motion) {
 }
 
 bool is_mistake_of(std::span<const std::string> broken, std::string_view clause) {
-  // A host that sends other bytes also violates the clause "asks", which demands the documented requests.
+  // A host that sends other bytes may also violate the clause "asks".
   return std::find(broken.begin(), broken.end(), clause) != broken.end() &&
          std::all_of(broken.begin(), broken.end(), [&](const std::string& id) { return id == clause || id == "asks"; });
 }
@@ -136,8 +135,7 @@ Error error_of(const EncoderAddress& address, const std::vector<CanFrame>& reque
   return address.unit->check(address.options, {.can = request.data()}, {});
 }
 
-/// Returns all variants of the request for a position in which one wrong bit makes the request invalid; on CAN, leaves
-/// out frames of other devices.
+/// Returns requests for a position with one wrong bit that makes them invalid.
 template <class Item>
 std::vector<std::vector<Item>> damaged_requests(const EncoderAddress& address) {
   std::vector<std::vector<Item>> all;
@@ -152,8 +150,7 @@ std::vector<std::vector<Item>> damaged_requests(const EncoderAddress& address) {
   return all;
 }
 
-/// Returns the verdicts on hosts that always repeat the same damaged request, and on hosts that alternate it with a
-/// good request, for at most four damaged requests.
+/// Returns verdicts on hosts that send a damaged request, always or in turn with a good one.
 template <class Item>
 std::vector<Conformance> judged_with_damaged_requests(const EncoderAddress& address) {
   std::vector<Conformance> all;
@@ -243,8 +240,6 @@ void expect_none_kept(const Conformance& found, std::string_view who) {
   EXPECT_EQ(with_verdict(found, Verdict::kept), std::vector<std::string>{}) << who << "\n" << found.report();
 }
 
-/// Judges senders that ignore replies: of random bytes or CAN frames, of damaged requests (also in turn with good ones)
-/// and of requests of other units. They must keep no clause.
 template <class Item>
 void check_stranger_hosts(const EncoderAddress& address) {
   const auto judged_sending = [&](const auto& next) { return Host<Item>(address, {}).judged_sending(next); };
@@ -284,7 +279,6 @@ TEST_P(HostClauses, StrangerKeepsNoClause) {
   }
 }
 
-// Checks that two requests in one write break a clause: the second does not wait for the reply to the first.
 TEST_P(HostClauses, TwoRequestsInOneWriteBreakAClause) {
   const Unit& unit = *GetParam();
   if (unit.link != LinkKind::half_duplex) GTEST_SKIP() << "its host need not wait";

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Devices that are no encoder of the protocol must keep no clause without evidence: for each kept clause the test
-// searches the line for good replies and, if the clause has a request of its own, for that request.
+// Checks that devices which are no encoder of the protocol keep no clause without evidence.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,8 +24,7 @@ namespace {
 using capture::ObservedExchange;
 using capture::ObservedFrame;
 
-/// A port that stores all exchanges: each request with everything received until the next request, after a first entry
-/// with what was received before.
+/// A port that stores all exchanges, each with everything received until the next request.
 template <class Item>
 class TapPort final : public Port<Item> {
  public:
@@ -59,8 +57,7 @@ class TapPort final : public Port<Item> {
   Port<Item>& port_;
 };
 
-/// A device that replies to a request with the items that `next` returns, if any, and sends unsolicited frames where an
-/// encoder of the unit would.
+/// A device that replies with the items of `next`, and streams them where an encoder would.
 template <class Item>
 class Stranger final : public Machine<Item> {
  public:
@@ -128,8 +125,7 @@ std::vector<Item> reply_of(const EncoderAddress& address) {
   return {reply_items.begin(), reply_items.end()};
 }
 
-/// Returns a good reply of an encoder with another address; empty if the unit has no addresses or the encoder cannot be
-/// read.
+/// Returns a good reply of an encoder with another address; empty if there is none.
 template <class Item>
 std::vector<Item> reply_of_neighbour(const EncoderAddress& address) {
   EncoderAddress other = address;
@@ -171,8 +167,7 @@ ObservedFrame frame_of(const std::vector<Item>& items, std::size_t bits = 0) {
   return frame;
 }
 
-/// Counts the good frames in the replies and streams that the port `tap` stored, without flat replies (`is_flat`); a
-/// frame may count twice. Checks them with the options of the clause.
+/// Counts the good frames that `tap` stored, except flat ones (`is_flat`); some may count twice.
 template <class Item>
 std::size_t good_replies(EncoderAddress address, const Clause& clause, const TapPort<Item>& tap) {
   const Unit& unit = *address.unit;
@@ -199,8 +194,7 @@ std::size_t good_replies(EncoderAddress address, const Clause& clause, const Tap
   return good;
 }
 
-/// Returns whether the port `tap` stored the request of the clause; if that is not known as bytes, whether it stored
-/// requests of more than one kind.
+/// Returns whether `tap` stored the request of the clause or, if that is unknown, several kinds.
 template <class Item>
 bool was_sent(const EncoderAddress& address, const Clause& clause, const TapPort<Item>& tap) {
   const Unit& unit = *address.unit;
@@ -217,7 +211,7 @@ bool was_sent(const EncoderAddress& address, const Clause& clause, const TapPort
       return std::ranges::any_of(tap.exchanges, [&](const auto& one) { return one.request == wanted; });
     }
   }
-  // The clause has no request in bytes, as on CAN: returns whether requests of more than one kind were sent.
+  // The clause has no request in bytes, as on CAN: several kinds of requests must do.
   std::set<std::string> different;
   for (const auto& one : tap.exchanges) {
     if (!one.request.empty()) different.insert(to_wire_text(unit.link, frame_of(one.request).frame()));
@@ -326,7 +320,7 @@ TEST_P(HostileEncoders, KeepNoClauseWithoutEvidence) {
   }
 }
 
-// Checks that the encoder at the address breaks no clause; does nothing if it cannot be read with its options.
+// Checks that the encoder breaks no clause; does nothing if it cannot be read.
 template <class Item>
 void check_good_one(const EncoderAddress& address) {
   if (reply_of<Item>(address).empty()) return;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Encoders that break a clause: a mutant between virtual encoder and line changes requests and replies, in virtual
-// time.
+// A virtual encoder whose requests and replies a test can change.
 #pragma once
 
 #include <fmt/format.h>
@@ -21,7 +20,6 @@
 
 namespace absenc::client {
 
-/// A virtual encoder behind a filter that changes the requests it receives, and its replies to some of them.
 template <class Item>
 class Mutant final : public Machine<Item> {
  public:
@@ -76,24 +74,23 @@ class Mutant final : public Machine<Item> {
   std::function<void(std::vector<Item>&)> change_request{};
   std::function<void(std::vector<Item>&, Step<Item>&)> change_reply{};
   bool on_damage = false;  // whether a damaged special request reaches the encoder as the first request, `good`
-  // whether replies to special requests are changed, instead of the replies to the request number `mutated`
+  // whether `is_special` selects the replies that are changed, instead of `mutated`
   bool changes_special = false;
   bool always = false;  // whether the replies to all requests from number `mutated` on are changed
-  // number of the first request whose reply is changed, from 1; a host may use request 1 only to detect the echo
+  // number of the first request, from 1, whose reply is changed
   unsigned mutated = 3;
   bool driven = false;
   unsigned requests = 0;
   std::vector<Item> reply_items;
   std::vector<Item> good;  // the first request that was received, a good one
-  // index of the only special request among those that differ from `good`, in order of arrival; -1: all are special
+  // index in `specials_` of the only special request; -1: any
   int special = -1;
   // further condition that a special request must fulfil; empty: none
   std::function<bool(const std::vector<Item>&)> is_meant{};
   bool is_special = false;  // whether the last request is special
 
  private:
-  // Decides whether the request is special: it differs from the first one and fits `special` and `is_meant`. A damaged
-  // request has no items.
+  // A damaged request has no items.
   void note_special(const std::vector<Item>& request) {
     is_special = false;
     if (!request.empty() && request == good) return;
@@ -154,7 +151,6 @@ inline Verdict verdict_of(const Conformance& conformance, std::string_view id) {
   return Verdict::untested;
 }
 
-/// Returns an address, as "sim:raa38?mode=bus", whose encoder shows the behaviour that the clause demands.
 inline std::string address_showing(const Unit& unit, const Clause& clause) {
   return fmt::format("sim:{}{}{}", unit.id, clause.shown_with.empty() ? "" : "?", clause.shown_with);
 }

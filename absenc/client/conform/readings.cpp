@@ -27,9 +27,7 @@ std::size_t distinct_counters(const Readings& readings) {
   return values.size();
 }
 
-// Returns how many mixtures of two replies the decoder reports as one of `errors`. A mixture has the first bits of the
-// first good reply and the rest of another, so that each part alone is right. Counts the mixtures with a single other
-// reply: the first one with which a mixture is reported.
+// Counts mixtures of two good replies that have one of `errors`.
 std::size_t detected_mixtures(const Unit& unit, const Options& options, const Readings& readings, Errors errors) {
   const Attempted* const one = readings.first_good();
   std::size_t noticed = 0;

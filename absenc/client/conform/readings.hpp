@@ -11,10 +11,10 @@
 
 namespace absenc::client {
 
-/// Returns whether all bits of a clocked word are equal, as on a line that nothing drives; false for a frame of bytes.
+/// Returns whether all bits of a clocked word are equal; false for a frame of bytes.
 [[nodiscard]] bool is_flat(const capture::ObservedFrame& reply);
 
-/// Returns whether the last request of the reading got a reply other than the constant level of an undriven line.
+/// Returns whether the reading got a reply; the constant level of an undriven line is none.
 [[nodiscard]] inline bool was_answered(const Attempted& one) { return one.answered && one.error != Error::line_stuck; }
 
 /// Readings that were taken with one set of options, and their counts.
@@ -35,13 +35,9 @@ void judge_answered(const Readings& readings, ClauseResult& result);
 /// Stores the verdict on whether unsolicited frames were received until the last reading.
 void judge_streamed(const Readings& readings, ClauseResult& result);
 
-/// Stores the verdict on whether each good reply began within the time that a host waits for it. `latency` is the
-/// precision of the port's times.
+/// Stores the verdict; `latency` is the precision of the port's times.
 void judge_time(const Unit& unit, const Options& options, const Readings& readings, Time latency, ClauseResult& result);
 
-/// Stores the verdict on whether no reply has one of `errors`. Concludes `kept` only with evidence that such an error
-/// would be noticed: a change of a good reply or a mixture of two causes it, or, for errors of a counter, the counter
-/// has moved.
 void judge_frames(const Unit& unit, const Options& options, const Readings& readings, Errors errors,
                   ClauseResult& result);
 

@@ -11,7 +11,7 @@
 
 namespace absenc::client {
 
-/// Returns 1 to `most` random items: bytes, or CAN frames with a random identifier and 8 random bytes.
+/// Returns 1 to `most` random bytes or CAN frames.
 template <class Item>
 std::vector<Item> noise(sim::Random& random, std::size_t most) {
   std::vector<Item> items(1 + random.below(most));

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the clauses about readings, about commands and about requests that no host sends, and gives ChangeTester access
-// to the line.
+// Tests clauses of a protocol's document, and gives ChangeTester access to the line.
 #pragma once
 
 #include <fmt/format.h>
@@ -92,8 +91,7 @@ class Tester {
   }
 
  private:
-  // Time after a failed reading in which a late reply is still received, and the number of characters whose duration is
-  // added to it.
+  // Terms of `listening_`.
   static constexpr Time least_listening = std::chrono::milliseconds(20);
   static constexpr int reply_characters = 16;
   static constexpr unsigned times = 3;  // number of times that a test sends its command or request
@@ -101,8 +99,6 @@ class Tester {
 
   // ---- Access to the line
 
-  // Runs a command and returns its result. Throws os::Interrupted; a conversation that has changed the encoder for its
-  // own use restores that first.
   CommandResult run(const Command& command, Arguments arguments, unsigned attempts) {
     runner_.set_options(options_);
     runner_.start_again(attempts);
@@ -132,8 +128,6 @@ class Tester {
     AnswerSink sink;
   };
 
-  // Takes one reading with these options; if it fails with an encoder that replies to requests, listens for a late
-  // reply.
   Attempted once(const Options& options, std::optional<Time> listen_for = {}) {
     runner_.set_options(options);
     if (!is_streamed(options)) runner_.start_again();
@@ -157,8 +151,7 @@ class Tester {
       const std::uint64_t requests = runner_.port().requests - before;
       const std::uint64_t unanswered = std::min(requests, one.unanswered + (was_answered(one) ? 0 : 1));
       readings.requests += requests;
-      // If the last reply is late, counts earlier requests without a reply as answered too: their replies were late,
-      // not missing.
+      // Before a late reply, earlier replies are taken to be late too.
       readings.answered += was_answered(one) && one.is_late() ? requests : requests - unanswered;
       readings.good += one.error == Error::none ? std::max<std::uint64_t>(requests, 1) : 0;
       readings.discarded += one.discarded;
@@ -170,10 +163,9 @@ class Tester {
   [[nodiscard]] bool is_streamed(const Options& options) const {
     return unit_.streams != nullptr && unit_.streams(options);
   }
-  // Returns false on clocked and SPI links: the host clocks the bits there, so no reply can be late.
+  // On the other links the host clocks the bits, so no reply can be late.
   [[nodiscard]] bool is_polled() const { return unit_.link != LinkKind::clocked && unit_.link != LinkKind::spi; }
-  // Returns whether one of up to three readings gets a good reply: otherwise a missing reply to another request is no
-  // evidence.
+  // Returns whether a reading succeeds, without which a missing reply proves nothing.
   [[nodiscard]] bool answers() {
     for (unsigned i = 0; i < times; ++i) {
       if (once(options_).error == Error::none) return true;
@@ -181,8 +173,7 @@ class Tester {
     return false;
   }
 
-  /// Sends an edited request in place of the first request of a reading and returns the exchange; nothing if readings
-  /// send no request.
+  /// Sends an edited request in place of the first one of a reading.
   std::optional<Attempted> send_instead(const std::function<void(std::vector<Item>&)>& edit, std::uint32_t permille = 0,
                                         std::optional<Time> listen_for = {}) {
     const std::uint64_t before = runner_.port().requests;
@@ -223,8 +214,7 @@ class Tester {
       return request;
     }
   }
-  /// Listens for `time` and counts valid frames with the identifier of the readings' replies. CAN only; 0 on other
-  /// links.
+  /// Counts frames like the readings' replies for `time`; 0 on other links than CAN.
   UnsolicitedFrames count_unsolicited(Time time) {
     UnsolicitedFrames heard;
     const Attempted* const good = readings_.first_good();
@@ -274,8 +264,7 @@ class Tester {
 
   // ---- Requests that no host sends
 
-  // Sends requests to several other addresses; a single one might belong to a neighbour on the line. A reply that is
-  // valid only for our own address, or at every address an invalid reply or our position, is from our encoder.
+  // A single other address may be a neighbour's.
   void test_foreign(ClauseResult& result) {
     constexpr std::size_t most_addresses = 8;
     const auto role = std::find_if(unit_.options.begin(), unit_.options.end(),
@@ -327,8 +316,7 @@ class Tester {
     return unit_.check(options_, frame, {}) == Error::none &&
            encoder_of(unit_, options_, frame).value_or(value) == value;
   }
-  // Returns whether the encoder did not reply. On CAN other frames than the reply are ignored, because a node may send
-  // them at any time.
+  // On CAN a node may send other frames at any time.
   [[nodiscard]] static bool is_silent(const Attempted& one) {
     if constexpr (is_can) return one.error == Error::timeout;
     return !one.answered;
@@ -362,7 +350,7 @@ class Tester {
       if (!one) return;
       last = exchange_text(unit_.link, one->exchange.request.frame(), one->exchange.reply.frame());
       const Compliance seen = reaction_of(clause, *one);
-      // A port that changes its rate for the request may return to the usual rate too late for the reply.
+      // The port may return to its usual rate too late for the reply.
       const bool missed = slow && (is_silent(*one) || seen == Compliance::unclear);
       result.evidence = last + ": a port that changes its rate may be too late to hear the reply";
       if (missed) return;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Hosts in virtual time for conformance tests: our own host, with or without a defect, and senders that are no host of
-// the protocol.
+// Hosts in virtual time, for conformance tests of hosts.
 #pragma once
 
 #include <fmt/format.h>
@@ -45,7 +44,7 @@ struct Flaws {
 
 struct Stopped {};
 
-/// A port that skips the waits of its host up to `skipped_wait`, and stops the host after `requests_left` requests.
+/// A port that can stop its host.
 template <class Item>
 class HastyPort final : public Port<Item> {
  public:
@@ -162,8 +161,7 @@ class Host {
     return trial.judge();
   }
 
-  /// Returns the verdict on our own host with its defects. With `all`, the host finally runs once every command that
-  /// changes no option.
+  /// Returns the verdict; `all` adds every command that changes no option.
   Conformance judged(bool all = false) {
     constexpr unsigned most_rounds = 40;
     HostTrial trial(unit_, 20);
@@ -173,7 +171,7 @@ class Host {
     device_.set_faults({});
     if (!flaws_.sends.empty()) send_all();
     for (const Command& command : unit_.commands) {
-      // Skips commands that change an option, because the host would have to change its own options after them.
+      // Skips commands after which the host would have to change its options.
       const bool moves = !command.changes_option.empty();
       if (all && !moves) run(command, complete_arguments(command, required_arguments(command)));
     }

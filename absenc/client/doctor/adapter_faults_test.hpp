@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Faults for tests of doctor, each with its expected finding: those of adapters and those of other encoders.
+// Faults of adapters and of other encoders, for tests of doctor.
 #pragma once
 
 #include <functional>
@@ -10,14 +10,11 @@
 
 namespace absenc::client {
 
-/// An expected finding, and a function that returns an examination with the fault that causes it.
 struct Fault {
   std::string id;
   std::function<Examination()> examine;
 };
 
-/// Returns each fault of `faults_of_bytes`, and the faults "another protocol" and "another address", each produced with
-/// the first unit that can have it.
 inline std::vector<Fault> adapter_faults() {
   std::vector<Fault> faults;
   std::vector<path_faults::PathFault> all = path_faults::faults_of_bytes();

@@ -17,7 +17,7 @@ bool has_characters(const Case& one) {
 bool is_mended(const Case& one, const Frame& request, std::vector<std::uint8_t> bytes, std::size_t bits) {
   const std::size_t count = bits != 0 ? bits : bytes.size() * 8;
   for (std::size_t bit = 0; bit < count; ++bit) {
-    // Numbers the bits of each byte from the most significant one, which is the first of a frame of bits.
+    // A frame of bits begins with the most significant bit of its first byte.
     bytes[bit / 8] ^= static_cast<std::uint8_t>(0x80u >> (bit % 8));
     const bool is_good = decodes(one, request, {.bytes = bytes, .bits = bits});
     bytes[bit / 8] ^= static_cast<std::uint8_t>(0x80u >> (bit % 8));
@@ -54,8 +54,7 @@ bool has_good_part(const Case& one, const Attempted& attempt) {
       is_frame(raw.subspan(sent.size()))) {
     return true;
   }
-  // Looks for two good frames, or for one good frame at the beginning or the end that has at least two thirds of all
-  // bytes. More bytes beside a single good frame are a damaged reply and not noise.
+  // Needs two good frames, or one with at least two thirds of all bytes.
   for (std::size_t size = 2; size < raw.size(); ++size) {
     const bool is_long = size * 3 >= raw.size() * 2;
     if (is_long ? is_frame(raw.first(size)) || is_frame(raw.last(size))

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that doctor names each fault, and that healthy encoders give no finding with random pauses between readings.
+// Checks that doctor names each fault.
 #include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 
@@ -112,7 +112,6 @@ Examination examine_rate(std::string_view text, std::uint32_t rate) {
   });
 }
 
-/// Examines an encoder on SPI whose replies are good only with settings for which `understands` returns true.
 Examination examine_spi(const std::function<bool(const EncoderAddress&)>& understands) {
   return examine_with("encolink-spi:spi:/dev/spidev0.0", [understands](const EncoderAddress& address) {
     if (understands(address)) return virtual_link(address);
@@ -165,7 +164,6 @@ std::vector<Fault> line_faults() {
   return faults;
 }
 
-/// Returns the reply number `number` of a moving encoder that has a CRC instead of the unit's checksum.
 ByteList with_other_checksum(unsigned number) {
   ByteList reply = good_reply();
   for (std::size_t i = 2; i < 5; ++i) reply[i] = static_cast<std::uint8_t>(number * (37 + 11 * i) + number * number);
@@ -252,8 +250,6 @@ std::vector<Fault> other_faults() {
   return faults;
 }
 
-/// Returns faults of replies that are cut, have bytes before them, contradict themselves or refuse their request, and
-/// faults that good or late replies show.
 std::vector<Fault> partial_faults() {
   std::vector<Fault> faults;
   faults.push_back({"extra_bytes", [] {
@@ -359,8 +355,6 @@ TEST(Doctor, FindingsSayWhatHelps) {
 
 // ---- Healthy encoders
 
-/// Checks that encoders of all units with a command `read` give no finding with random pauses between readings; about
-/// every second encoder turns.
 TEST(Doctor, AThousandHealthyEncodersGiveNoFinding) {
   std::mt19937_64 random(16);
   std::size_t runs = 0;
@@ -382,16 +376,13 @@ TEST(Doctor, AThousandHealthyEncodersGiveNoFinding) {
   }
 }
 
-/// A position that moves to and fro by one count, with the shaft at rest, is not noise; neither is an even or
-/// accelerated motion.
+/// A flicker by one count is no noise; neither is an even or an accelerated motion.
 TEST(Doctor, AFlickeringLastBitIsNoNoise) {
   EXPECT_THAT(ids(judged(positions([](std::size_t i) { return i % 2; }))), IsEmpty());
   EXPECT_THAT(ids(judged(positions([](std::size_t i) { return i * 13; }))), IsEmpty());
   EXPECT_THAT(ids(judged(positions([](std::size_t i) { return i * i / 3 + i; }))), IsEmpty());
 }
 
-/// Checks that an examination ends soon after `over` returns true, at its poll 1, 2, 4, 11 or 61, with an encoder that
-/// replies and on a silent line.
 TEST(Doctor, EndsAsSoonAsItIsToldTo) {
   for (const bool answers : {true, false}) {
     const auto open = [&](const EncoderAddress&) {

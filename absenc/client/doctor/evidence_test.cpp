@@ -17,7 +17,6 @@ using testing::IsEmpty;
 using testing::Not;
 using testing::StartsWith;
 
-/// Checks the evidence of a contact that opens again and again: its bursts of failures, and their period if it is even.
 TEST(Doctor, FailuresThatComeAndGoAreToldWithTheirPeriod) {
   const Examination even = examine_contact(5s, [](Time at) { return at % 1s < 300ms; });
   EXPECT_THAT(even.findings.at(0).evidence, AllOf(HasSubstr("bursts of about 3"), HasSubstr("one every 1 s")));
@@ -31,8 +30,6 @@ TEST(Doctor, FailuresThatComeAndGoAreToldWithTheirPeriod) {
   EXPECT_THAT(ids(any), Not(Contains("comes_and_goes")));
 }
 
-/// Checks a shaft that the user turns by hand: by several turns, which change where the position passes zero, and by
-/// less than one.
 TEST(Doctor, AShaftThatFollowsTheHandGivesNoFinding) {
   const auto place = [](std::size_t i) { return i * hand_counts; };
   EXPECT_THAT(ids(judged(turned_by_hand(
@@ -44,7 +41,6 @@ TEST(Doctor, AShaftThatFollowsTheHandGivesNoFinding) {
   EXPECT_THAT(ids(judged(turned_by_hand(less_than_a_turn, [](std::size_t) { return 3; }))), IsEmpty());
 }
 
-/// A few replies that are late by no more than this computer's own delay are no evidence against the encoder.
 TEST(Doctor, ALatenessOfThisComputerIsNotTheEncoders) {
   Observations seen = positions([](std::size_t) { return 5; });
   for (Attempted& one : seen.readings) one.limit = 3ms;
@@ -55,8 +51,7 @@ TEST(Doctor, ALatenessOfThisComputerIsNotTheEncoders) {
   EXPECT_THAT(ids(judged(seen)), Contains("sometimes_late"));
   seen.computer_late = 13ms;
   EXPECT_THAT(ids(judged(seen)), IsEmpty());
-  // Four late replies of nine are a finding. One of nine is more than a tenth too, but a single one, which this
-  // computer may have caused.
+  // A single late reply may be due to this computer.
   seen.readings.resize(9);
   EXPECT_THAT(ids(judged(seen)), Contains("reply_late"));
   seen.late = 1;
@@ -65,8 +60,6 @@ TEST(Doctor, ALatenessOfThisComputerIsNotTheEncoders) {
   EXPECT_THAT(ids(judged(seen)), Contains("reply_late"));
 }
 
-/// On a busy computer, late or missing replies in less than 0.1 % of the readings are no finding; on an idle one they
-/// are.
 TEST(Doctor, FewOfThousandsMayBeABusyComputer) {
   Observations seen = positions([](std::size_t) { return 5; });
   const std::vector<Attempted> some = seen.readings;
@@ -91,8 +84,6 @@ TEST(Doctor, FewOfThousandsMayBeABusyComputer) {
   }
 }
 
-/// On a busy computer one missing reply, or one late reply before the next, among 200 readings is no finding. On an
-/// idle one, or among three readings, it is a finding.
 TEST(Doctor, OneOfManyMayBeABusyComputer) {
   const auto with_one = [](std::size_t count, const Attempted& failed) {
     Observations seen = positions([](std::size_t) { return 5; });
@@ -126,8 +117,6 @@ TEST(Doctor, OneOfManyMayBeABusyComputer) {
   EXPECT_THAT(ids(judged(busy)), Contains("extra_bytes"));
 }
 
-/// Judges two failures among 300 readings with a timeout of 300 ms: a computer that was 75 ms late explains them, a
-/// third failure it does not. With a timeout of 40 ms it must have been 40 ms late.
 TEST(Doctor, AComputerThatStoodStillExplainsSilence) {
   Observations seen = positions([](std::size_t) { return 5; });
   const std::vector<Attempted> some = seen.readings;
@@ -151,8 +140,7 @@ TEST(Doctor, AComputerThatStoodStillExplainsSilence) {
   EXPECT_THAT(ids(judged(seen)), Contains("sometimes_silent"));
 }
 
-/// Judges a cut reply, and one with a changed byte, on a computer that was late: it may read the rest of a reply too
-/// late, but it does not change bytes.
+/// A late computer may cut a reply, but it does not change bytes.
 TEST(Doctor, AComputerThatStoodStillExplainsACutReply) {
   Observations seen = positions([](std::size_t) { return 5; });
   for (Attempted& one : seen.readings) one.exchange.reply.bytes = good_reply();
@@ -171,8 +159,7 @@ TEST(Doctor, AComputerThatStoodStillExplainsACutReply) {
   EXPECT_THAT(ids(judged(seen)), Not(IsEmpty()));
 }
 
-/// Checks that frames of a stream that waited in this computer are no jump: they are read at once, so the speed of the
-/// shaft between them is unknown.
+/// Frames that waited in this computer are read at once, so the speed between them is unknown.
 TEST(Doctor, APositionThatThisComputerTookLateIsNoJump) {
   Observations seen = positions([](std::size_t i) { return i * 20; });
   for (std::size_t i = 100; i < 150; ++i)
@@ -213,7 +200,6 @@ TEST(Doctor, NothingIsCalledGoodOfWhichNothingWas) {
   }
 }
 
-/// All readings are good, because those with a damaged reply repeat their request: the damage shows the adapter.
 TEST(Doctor, RepeatedRequestsShowAdapter) {
   Observations seen = positions([](std::size_t) { return 5; });
   for (std::uint8_t i = 0; i < 20; ++i) {

@@ -18,7 +18,7 @@ namespace absenc::client {
 
 namespace {
 
-// delay beyond the allowed time above which a reply is slow: half of the default latency timer of a USB adapter
+// delay beyond the allowed time above which a reply is slow
 constexpr Time slow = std::chrono::milliseconds(8);
 
 FindingKind kind_of(const Refusal& refusal) {
@@ -97,7 +97,6 @@ std::string inversion(const Case& one) {
   return {};
 }
 
-// Adds the finding about missing replies if no reading received anything, unless another observation explains that.
 void judge_silence(const Case& one, std::vector<Finding>& findings) {
   const Observations& seen = one.seen;
   if (seen.readings.empty() || count(seen.readings, was_heard) != 0 || seen.never_silent) return;
@@ -118,10 +117,9 @@ void judge_silence(const Case& one, std::vector<Finding>& findings) {
 void judge_lateness(const Case& one, std::vector<Finding>& findings) {
   const Observations& seen = one.seen;
   const std::size_t tried = seen.readings.size();
-  // Skips CAN: encoders there send unsolicited frames, so a frame after an unanswered request is no late reply to it.
+  // On CAN, a frame after an unanswered request may be unsolicited.
   if (seen.late == 0 || one.unit.link == LinkKind::can) return;
-  // If late replies are rare, a single one is no finding, and a few are none if this computer was busy. The verdict of
-  // the examination counts the failed readings nevertheless.
+  // A few late replies may be due to this computer.
   const bool nothing_else = one.good == 0 && count(seen.readings, was_heard) * 10 < tried;
   const bool often = seen.late * 10 >= tried || nothing_else;
   if (!often && (seen.late < 2 || may_be_the_computer(seen, seen.late))) return;
@@ -209,7 +207,6 @@ void judge_line(const Case& one, std::vector<Finding>& findings) {
 
 namespace {
 
-// Finds a counter that has the same value in all good replies that contain it, if these are at least 8.
 void judge_counter(const Case& one, std::vector<Finding>& findings) {
   constexpr std::size_t enough = 8;
   std::set<std::int64_t> values;
@@ -291,12 +288,11 @@ Examination judge(const Unit& unit, const Options& options, const Observations& 
   const Case one{unit, options, seen, result.good};
   judge_port(one, result.findings);
   judge_line(one, result.findings);
-  // A fault of the port or the line, except destroyed CAN frames, explains bad frames, so these give no finding of
-  // their own.
+  // A fault of the port or of the line explains bad frames.
   const bool explained = std::any_of(result.findings.begin(), result.findings.end(), [](const Finding& found) {
     return found.severity == Severity::fault && found.finding_kind != FindingKind::can_errors;
   });
-  // A few good frames do not make a good line: one of 256 damaged frames passes a checksum of 8 bits.
+  // A damaged frame passes a checksum of 8 bits once in 256 times.
   if (result.good * 20 < result.tried || result.good == 0) {
     if (!explained) judge_bad_frames(one, result.findings);
   } else {

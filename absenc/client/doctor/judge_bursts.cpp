@@ -44,8 +44,7 @@ std::vector<Burst> bursts_of(const std::vector<Attempted>& readings, std::size_t
   return bursts;  // without the last series of failures, which may continue
 }
 
-// Returns the median length of the bursts, and their period or that they are not periodic: " of about 300 ms, one every
-// 1 s".
+// Returns for example " of about 300 ms, one every 1 s".
 std::string rhythm(const std::vector<Burst>& bursts) {
   std::vector<Time> lengths;
   std::vector<Time> periods;

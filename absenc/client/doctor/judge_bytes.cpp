@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds changes that adapters, drivers and device servers make to the bytes of replies: by undoing them in damaged
-// replies, or by their traces in good replies.
+// Finds changes that adapters and drivers make to the bytes of replies.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -29,14 +28,13 @@ constexpr std::uint8_t xoff = 0x13;
 constexpr std::uint8_t lf = 0x0A;
 constexpr std::uint8_t cr = 0x0D;
 
-/// A received reply, with functions that return whether it would be good if a change of its bytes were undone.
+/// A received reply, and ways to undo changes of its bytes.
 class Mender {
  public:
   // longest reply for which all combinations of 8th bits are tried, in bytes
   static constexpr std::size_t most_bytes = 12;
 
-  /// Takes a damaged reply. With `random` the functions make random changes, to measure how often chance makes the
-  /// reply good; null: they undo the suspected change.
+  /// Takes a damaged reply; with `random` the changes are random, to measure chance.
   Mender(const Case& one, const Attempted& attempt, sim::Random* random)
       : one_(one), request_(attempt.exchange.request.frame()), raw_(attempt.raw), random_(random) {}
 
@@ -50,8 +48,7 @@ class Mender {
     return sent.size() == size && raw_.size() >= size && std::equal(sent.begin(), sent.end(), raw_.begin());
   }
 
-  /// Returns whether the reply is good without the bytes at these indexes; false for no index or all. With `random`,
-  /// leaves out as many other bytes; returns false if there are not so many.
+  /// Returns whether leaving out these bytes, or as many random ones, mends the reply.
   [[nodiscard]] bool without(const std::vector<std::size_t>& places) const {
     if (places.empty() || places.size() >= raw_.size()) return false;
     std::vector<bool> removed(raw_.size(), false);
@@ -74,8 +71,7 @@ class Mender {
     return is_good(rest);
   }
 
-  /// Returns whether inserting up to `most` of these values makes the reply good; `put` is then their number. Gives up
-  /// after 5000 decodings. With `random`, inserts random values instead.
+  /// Gives up after 5000 decodings.
   [[nodiscard]] bool with(Bytes values, std::size_t most, std::size_t& put) const {
     ByteList used(values.begin(), values.end());
     if (random_ != nullptr) {
@@ -92,9 +88,7 @@ class Mender {
     return false;
   }
 
-  /// Returns whether setting the 8th bit of some bytes makes the reply good, and stores their number in `set`. A reply
-  /// of more than 12 bytes is only checked for completeness, and `set` is its length. With `random`, first flips up to
-  /// two of the other bits.
+  /// Returns whether lost 8th bits may be the damage of the reply.
   [[nodiscard]] bool with_eighth_bits(std::size_t& set) const {
     ByteList bytes = raw_;
     if (random_ != nullptr && bytes.size() > 2) {
@@ -122,8 +116,7 @@ class Mender {
  private:
   static constexpr std::size_t most_tries = 5000;  // limit of the decodings of one reply
 
-  // Returns whether inserting `count` of the values at indexes from `from` on makes the bytes good. Each decoding
-  // decrements `tries`; at 0 it gives up.
+  // Each decoding decrements `tries`; at 0 the search ends.
   [[nodiscard]] bool insert(ByteList& bytes, const ByteList& values, std::size_t from, std::size_t count,
                             std::size_t& tries) const {
     if (count == 0) {
@@ -159,8 +152,6 @@ bool contains(const ByteList& bytes, std::uint8_t value) {
 struct Suspicion {
   FindingKind finding_kind;
   bool (*fits)(const ByteList& raw);  // returns false if this reply, good or not, proves that the change is not made
-  /// Returns whether undoing the change makes the reply good, and stores in `count` the number of bytes that it
-  /// concerns.
   bool (*undo)(const Mender& mender, std::size_t& count);
   std::size_t most_tried;      // greatest number of replies for which undoing the change is tried
   bool of_each_reply = false;  // whether the change affects each reply, independent of its bytes
@@ -170,7 +161,7 @@ struct Suspicion {
 
 bool fits_any(const ByteList&) { return true; }
 
-// Undoes `size` bytes before the reply. Returns false if they are the whole request, because that is an echo.
+// The whole request before a reply is its echo.
 template <std::size_t size>
 bool undo_bytes_before(const Mender& mender, std::size_t& count) {
   count = size;
@@ -240,7 +231,7 @@ bool undo_seven_bits(const Mender& mender, std::size_t& count) { return mender.w
 constexpr std::size_t cheap = 24;  // number of replies to try
 constexpr std::size_t dear = 10;   // number of replies to try if each is decoded thousands of times
 
-// The first change that is found is reported: more specific ones come first, and those that need many decodings last.
+// The first change that is found is reported; costly searches come last.
 constexpr auto suspicions = std::to_array<Suspicion>({
     {FindingKind::telnet_doubled, fits_telnet, undo_telnet, cheap},
     {FindingKind::newline_translated, fits_newline, undo_newline, cheap},
@@ -255,8 +246,6 @@ constexpr auto suspicions = std::to_array<Suspicion>({
 
 std::string bytes_of(std::size_t count) { return count == 1 ? "a byte" : fmt::format("{} bytes", count); }
 
-// Returns the sum, over all byte indexes, of the number of different values minus one. The more values there are, the
-// less likely chance is the reason that a bit is never set.
 std::size_t variety(const All& all) {
   std::vector<std::set<std::uint8_t>> values;
   for (const Attempted* attempt : all) {
@@ -268,15 +257,12 @@ std::size_t variety(const All& all) {
   return sum;
 }
 
-// Returns the finding of this change, or nothing. Undoing it must make at least 8 of 10 tried damaged replies good, and
-// at least half of them more than random changes do; lost 8th bits need no comparison with random changes if the
-// replies vary enough.
+// Compares with random changes, because chance mends some replies, too.
 std::optional<Finding> suspected(const Case& one, const All& all, const Suspicion& suspicion) {
   constexpr std::size_t enough = 4;
   const bool of_nearly_all = all.size() * 10 >= one.seen.readings.size() * 8;
   if (suspicion.of_each_reply && !of_nearly_all) return {};
-  // A longer reply is hardly ever good without its 8th bits: if more than one reading in five is undamaged, the damage
-  // has another cause.
+  // A long reply is hardly ever good without its 8th bits.
   const auto is_long = [](const Attempted* attempt) { return attempt->raw.size() > Mender::most_bytes; };
   if (suspicion.finding_kind == FindingKind::seven_bits && !of_nearly_all && std::ranges::any_of(all, is_long))
     return {};
@@ -313,8 +299,7 @@ std::optional<Finding> suspected(const Case& one, const All& all, const Suspicio
                   to_hex(Bytes(example->raw).first(std::min<std::size_t>(example->raw.size(), 24)))});
 }
 
-// Finds lost 8th bits in good replies, because an XOR checksum can be right without them: no byte has its 8th bit set,
-// and at one index the byte jumps at least twice between 0x60 or more and less than 0x20.
+// With an XOR checksum, a reply without its 8th bits can be good.
 std::optional<Finding> seven_bits_of_good(const Case& one) {
   constexpr std::size_t enough = 40;
   constexpr std::size_t least_wraps = 2;
@@ -342,8 +327,6 @@ std::optional<Finding> seven_bits_of_good(const Case& one) {
                   to_hex(Bytes(before->raw).first(std::min<std::size_t>(before->raw.size(), 24)))});
 }
 
-// Finds bytes before at least 8 of 10 good replies, as many as the request has but with other values, which the port
-// took for the echo of the request.
 std::optional<Finding> false_echo(const Case& one) {
   std::size_t good = 0;
   std::size_t wrong = 0;

@@ -74,8 +74,6 @@ std::optional<Finding> own_echo(const Case& one, const All& all) {
   return finding(FindingKind::only_echo, {fmt::format("{}", all.size()), to_hex(all.front()->exchange.request.bytes)});
 }
 
-// Returns whether the attempt received a good reply to the request `first`, followed by a good reply to its own
-// request. With an empty `first`, a good reply to any request counts.
 bool holds_two(const Case& one, const Attempted& attempt, const Frame& first) {
   const Frame request = attempt.exchange.request.frame();
   const Bytes bytes = attempt.exchange.reply.bytes;
@@ -133,7 +131,7 @@ bool is_contradiction(const Attempted& attempt) {
          attempt.error == Error::unexpected_reply;
 }
 
-// Returns the finding for those attempts of `all`, at least one, whose error is detected after a good checksum.
+// `all` has at least one contradiction.
 Finding contradiction(const Case& one, const All& all) {
   std::size_t count = 0;
   const Attempted* last = nullptr;
@@ -166,8 +164,6 @@ std::optional<Finding> refusal(const Case&, const All& all) {
                                         last.advice.empty() ? std::string(text.advice) : last.advice});
 }
 
-// Finds a sender at another rate: by characters without a stop bit that the UART counted, or by received bytes that
-// have at most one level change each, because the sender is several times slower than the receiver.
 std::optional<Finding> stretched(const Case& one, const All& all) {
   if (one.unit.link != LinkKind::half_duplex && one.unit.link != LinkKind::full_duplex) return {};
   if (const auto& damage = one.seen.damage; damage && damage->framing > 0) {
@@ -211,8 +207,7 @@ std::optional<Damage> compare(const ByteList& reply, const ByteList& good) {
   return damage;
 }
 
-// Returns the reply that at least 9 of 10 good replies equal; empty if there is none, or if fewer than 8 replies are
-// good.
+// Returns the reply that nearly all good ones equal; may be empty.
 ByteList usual_reply(const std::vector<Attempted>& readings) {
   std::map<ByteList, std::size_t> counts;
   std::size_t good = 0;
@@ -227,7 +222,7 @@ ByteList usual_reply(const std::vector<Attempted>& readings) {
   return is_usual ? usual->first : ByteList{};
 }
 
-// Returns the number of damaged frames of a stream that no reading reports: a reading goes on to the next good frame.
+// Counts damaged frames of a stream that no reading reports.
 std::size_t unreported(const std::vector<Attempted>& readings) {
   std::size_t count = 0;
   for (const Attempted& one : readings) {
@@ -246,16 +241,14 @@ All heard(const std::vector<Attempted>& attempts) {
 
 bool is_silent(const Attempted& one) { return one.error != Error::none && !one.heard; }
 
-// Returns whether the reply is shorter than each good one: this computer may have read its rest too late.
+// This computer may have read the rest of such a reply too late.
 bool is_cut(const Observations& seen, const Attempted& attempt) {
   return std::ranges::none_of(seen.readings, [&](const Attempted& one) {
     return one.error == Error::none && one.exchange.reply.bytes.size() <= attempt.exchange.reply.bytes.size();
   });
 }
 
-// Returns the damaged replies to requests that were repeated, without refusals and without good replies beside other
-// bytes. Returns none if as many or more of the repeated requests were not answered: a late reply may collide with the
-// reply to the next request.
+// Where requests stay unanswered, a late reply may collide with the next one.
 All damaged_requests(const Case& one) {
   All all = damaged(one.seen.repeated);
   std::erase_if(all, [&](const Attempted* attempt) { return is_refusal(*attempt) || has_good_part(one, *attempt); });
@@ -342,7 +335,6 @@ Finding finding_of(const Unit& unit, const Options& options, PortKind place, con
 void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
   All all = damaged(one.seen.readings);
   const All repeated = damaged_requests(one);
-  // A reading of a stream goes on to the next good frame, so its damaged frames are stored separately.
   const All of_stream = damaged(one.seen.damaged_frames);
   // A reading that repeats its requests is good, although an adapter damages some replies.
   All by_adapter = one.seen.is_stream ? of_stream : all;
@@ -377,7 +369,7 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
     });
     return taken;
   };
-  // A data line that never changes counts as silence, because a clocked line always delivers bits.
+  // A clocked line always delivers bits, so a constant level counts as silence.
   const All stuck = take([](const Attempted& attempt) { return attempt.error == Error::line_stuck; });
   const auto is_misheard = [&](const Attempted& attempt) {
     return is_refusal(attempt) || (!has_good_part(one, attempt) && answers_another(one, attempt));
@@ -388,8 +380,7 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
                                 refused.back()->detail.empty() ? std::string(text_of(refused.back()->error).description)
                                                                : refused.back()->detail}));
   }
-  // Contradictions are reported only if all remaining damaged replies are such: otherwise they may be damage that the
-  // checksum missed.
+  // Among other damage, a contradiction may be damage that the checksum missed.
   if (!all.empty() && std::ranges::all_of(all, [](const Attempted* attempt) { return is_contradiction(*attempt); })) {
     findings.push_back(contradiction(one, all));
     all.clear();
@@ -406,8 +397,7 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
                                {fmt::format("{}", one.seen.overfull), fmt::format("{}", one.seen.readings.size()),
                                 to_hex(example.first(std::min(example.size(), most_shown)))}));
   } else if (std::optional<Finding> extra = extra_bytes(one, all)) {
-    // A late reply stands before the reply to the next request, and the request of the late reply seems not to be
-    // answered.
+    // A late reply stands before the reply to the next request.
     const bool are_late =
         std::ranges::all_of(all, [&](const Attempted* one_of) { return holds_two(one, *one_of, {}); });
     const bool is_explained = are_late && (silent >= all.size() || may_be_the_computer(one.seen, all.size()));
@@ -419,7 +409,7 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
     if (!are_cut || !may_be_the_computer(one.seen, both.size())) findings.push_back(some_damage(one, both));
   }
   const std::size_t late = one.unit.link == LinkKind::can ? 0 : one.seen.late;
-  // A late reply may make the next reading fail as well, so silent readings are compared with twice the late replies.
+  // A late reply may make the next reading fail as well.
   if (silent > 2 * late && !may_be_the_computer(one.seen, silent)) {
     findings.push_back(some_silence(one.seen, silent, one.seen.readings.size() + one.seen.repeated.size()));
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Judges replies that do not come from the encoder of the user's settings: another model, another checksum, text.
+// Judges replies of another model or another kind of device.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -24,7 +24,7 @@ namespace absenc::client {
 
 namespace {
 
-// Returns the setting of the polled encoder's address, "address=3"; empty if the unit has no addresses.
+// Returns for example "address=3"; empty if the unit has no addresses.
 std::vector<std::string> address_settings(const Unit& unit, const Options& options) {
   const Option* option = find_role(unit.options, Role::encoder);
   if (option == nullptr) return {};
@@ -50,8 +50,7 @@ bool speaks_text(const Unit& unit) {
   return all != 0 && text * 10 >= all * 9;
 }
 
-// Returns at most 32 bytes from `at` to the end of the line as quoted text, "$GPGGA,120000". Quotation marks and bytes
-// that cannot be printed become dots.
+// Returns up to 32 bytes of a line.
 std::string quoted(Bytes bytes, std::size_t at) {
   constexpr std::size_t most = 32;
   std::string text = "\"";
@@ -76,7 +75,6 @@ bool is_same_kind(const FoundCheck& one, const FoundCheck& other) {
                                                           one.parameters.poly == other.parameters.poly));
 }
 
-// Returns whether this kind of checksum, for a CRC with this width and polynomial, explains the unit's example replies.
 bool is_of_unit(const FoundCheck& check, const Unit& unit) {
   std::vector<CheckedFrame> frames;
   for (const Vector& vector : unit.vectors) {
@@ -132,14 +130,13 @@ std::optional<Finding> text_of_others(const Case& one, Bytes bytes) {
   return finding(FindingKind::modem_answers, {quoted(bytes, static_cast<std::size_t>(begin - bytes.begin()))});
 }
 
-// Searches for other options like `identify`, limited to this unit and to the encoder's address.
+// Searches like `identify`, but only this unit at the encoder's address.
 std::optional<Finding> other_settings(const Case& one, const All& all) {
   constexpr std::size_t enough = 4;  // least number of frames; fewer are weak evidence
   if (all.size() < enough) return {};
   std::vector<capture::ObservedExchange> exchanges;
   for (const Attempted* attempt : all) exchanges.push_back(attempt->exchange);
-  // Each frame is decoded with many sets of options, so at most this number is. They are spread over all frames: the
-  // first ones of a shaft that turns slowly may fit fewer bits than the position has.
+  // Spread over all frames, because the first ones of a slow shaft may fit fewer bits.
   constexpr std::size_t most_tried = 32;
   const std::size_t count = std::min(exchanges.size(), most_tried);
   for (std::size_t i = 0; i < count; ++i) exchanges[i] = exchanges[i * exchanges.size() / count];

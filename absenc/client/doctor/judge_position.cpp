@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Judges whether positions are those of a shaft: steady at rest, moving when turned by hand, not too fast, without
-// missing codes.
+// Judges whether positions are those of a shaft.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -69,8 +68,7 @@ std::int64_t quiet(const Walk& walk) {
   return std::max(quiet_counts, static_cast<std::int64_t>(std::ldexp(quiet_share, static_cast<int>(walk.bits))));
 }
 
-// Finds a position that is noisy at rest. A turning shaft moves in one direction or swings; the noise of a shaft at
-// rest changes direction all the time.
+// Noise changes direction all the time, unlike a shaft that turns or swings.
 void judge_noise(const Walk& walk, std::vector<Finding>& findings) {
   constexpr std::size_t enough = 40;
   std::size_t turns = 0;
@@ -83,7 +81,7 @@ void judge_noise(const Walk& walk, std::vector<Finding>& findings) {
     ++moved;
   }
   if (walk.steps.size() < enough || walk.span() <= quiet(walk) || moved * 4 < walk.steps.size()) return;
-  // A wide movement is no noise, and neither is a swing that changes direction at fewer than every third step.
+  // A wide movement is no noise, and neither is a slow swing.
   const bool wide = walk.unit_um > 0 ? walk.span() > 1000 : walk.span() > (std::int64_t{1} << walk.bits) / 32;
   if (turns * 3 < moved || wide) return;
   const std::string size = walk.unit_um > 0
@@ -93,8 +91,7 @@ void judge_noise(const Walk& walk, std::vector<Finding>& findings) {
   findings.push_back(finding(FindingKind::position_noise, {fmt::format("{}", walk.span()), size}));
 }
 
-// Returns how many counts the position can change in the time `pause`, with a margin of a quarter and the variation at
-// rest.
+// Returns how many counts the position can move in the time `pause`.
 double reach(const Walk& walk, Time pause, const host::SpeedLimit& limit) {
   const double seconds = std::chrono::duration<double>(pause).count();
   const double counts =
@@ -102,9 +99,7 @@ double reach(const Walk& walk, Time pause, const host::SpeedLimit& limit) {
   return 1.25 * counts * seconds + static_cast<double>(quiet(walk));
 }
 
-// Finds positions that the shaft cannot have reached. Up to `damaged` jumps, the number of readings that failed by
-// damage, are no finding: a checksum misses some damage. `computer_late`: a pause may have been this much longer,
-// because this computer read the first of two positions late.
+// Finds positions that the shaft cannot have reached.
 void judge_jumps(const Walk& walk, const host::SpeedLimit& limit, Time computer_late, std::size_t damaged,
                  std::vector<Finding>& findings) {
   std::size_t jumps = 0;
@@ -120,8 +115,6 @@ void judge_jumps(const Walk& walk, const host::SpeedLimit& limit, Time computer_
   findings.push_back(finding(FindingKind::position_jumps, {fmt::format("{}", jumps), fmt::format("{}", furthest)}));
 }
 
-// Judges a shaft that is turned by hand: its position must move, and valid numbers of turns must change if the position
-// covers a whole turn.
 void judge_turning(const Walk& walk, std::vector<Finding>& findings) {
   constexpr std::size_t enough = 20;
   if (walk.steps.size() < enough) return;
@@ -137,8 +130,7 @@ void judge_turning(const Walk& walk, std::vector<Finding>& findings) {
   }
 }
 
-// Finds bits, below the highest three, that never change although the position moved in uneven steps by at least eight
-// times their value. With even steps a bit may always have the same value.
+// With even steps a sound bit may never change.
 void judge_bits(const Walk& walk, std::vector<Finding>& findings) {
   constexpr std::size_t enough = 64;
   constexpr std::size_t uneven = 8;

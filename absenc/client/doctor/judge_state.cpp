@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Judges the state that the encoder reports: starting, alarms, status, and the validity of its position.
+// Judges the state that the encoder reports.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -26,7 +26,7 @@ struct RaisedFlag {
   std::set<std::string_view> channels{};  // names of the fields, one for each channel, that report the flag
   const Reading* last = nullptr;          // the last reading that has the flag raised
   std::size_t readings = 0;
-  // number of readings with this flag raised in which the position or the turns are invalid; 0 if they may be damage
+  // number of these readings whose position or turns are invalid; 0 if that may be damage
   std::size_t invalid = 0;
 };
 
@@ -65,8 +65,6 @@ std::string share(std::size_t some, std::size_t all) {
   return some == all ? fmt::format("all {}", all) : fmt::format("{} of {}", some, all);
 }
 
-// Reports that positions, or else numbers of turns, are invalid; called if no flag explains that. `is_damage` returns
-// whether so few invalid readings may be damage that the checksum missed.
 template <class IsDamage>
 void judge_validity(const std::vector<const Reading*>& readings, const IsDamage& is_damage,
                     std::vector<Finding>& findings) {
@@ -114,8 +112,7 @@ void judge_state(const Case& one, std::vector<Finding>& findings) {
   std::stable_sort(flags.begin(), flags.end(), [](const RaisedFlag& before, const RaisedFlag& after) {
     return (before.invalid > 0) > (after.invalid > 0);  // flags with an invalid position or turns come first
   });
-  // Removes flags of so few readings that they may be damage: a checksum of 6 bits misses one of 64 damaged replies, by
-  // chance a few more.
+  // Flags of so few readings may be damage that the checksum missed.
   const std::size_t failed = one.seen.readings.size() - one.good;
   const auto is_damage = [failed](std::size_t count) { return count * 10 < failed; };
   std::erase_if(flags, [&](const RaisedFlag& rare) { return is_damage(rare.readings); });
@@ -157,7 +154,7 @@ std::optional<Finding> judge_start(const Case& one) {
   const auto failed = static_cast<std::size_t>(first - readings.begin());
   if (failed < 2 || failed + one.good != readings.size()) return {};
   const auto silent = std::count_if(readings.begin(), first, [](const Attempted& attempt) { return !attempt.heard; });
-  // The last failures may be damaged replies, because the encoder may begin to reply in the middle of a request.
+  // The encoder may begin to reply in the middle of a request.
   if (static_cast<std::size_t>(silent) * 2 < failed) return {};
   // A computer that stood still for as long may have delayed the first replies.
   if (first->began - readings.front().began <= one.seen.computer_late) return {};

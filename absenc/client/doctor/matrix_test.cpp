@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks doctor in virtual time with every unit: healthy, with alarms and extreme conditions, and with faults of the
-// line. Doctor must report every defect that a reply shows and every fault that has an effect, and must name no other
-// cause. docs/doctor.md has the tables of first findings; `./dev tables` updates them.
+// Checks doctor with every unit. `./dev tables` updates the tables in docs/doctor.md.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <gmock/gmock-more-matchers.h>
@@ -30,10 +28,9 @@ using Ids = std::set<std::string_view>;
 
 constexpr std::size_t readings = 200;
 
-/// Setting of a position other than 0: with zeros only, the rest of a truncated frame could be a good frame.
+/// With zeros only, the rest of a truncated frame could be a good frame.
 constexpr std::string_view at_no_zero = "singleturn=1383&";
 
-/// The result of an examination, and the virtual encoder that was examined, which counts its injected faults.
 struct Watched {
   std::shared_ptr<VirtualDevice> device;
   Examination examination{};
@@ -129,7 +126,7 @@ Read reading_of(const EncoderAddress& address) {
   return link.bytes != nullptr ? reading_on(address, *link.bytes) : reading_on(address, *link.frames);
 }
 
-/// Returns the raised flags that are defects, as bits: all alarms, and status flags with an advice.
+/// Returns all alarms, and status flags with an advice.
 std::uint64_t defects_of(const Unit& unit, const Reading& reading) {
   std::uint64_t bits = reading.alarms;
   unsigned at = 0;
@@ -161,14 +158,12 @@ const Ids& causes_of(const Unit& unit, sim::FaultKind kind) {
         "always_damaged", "position_jumps", "position_noise", "stuck_bits"}},
       {silence, {"no_answer", "sometimes_silent", "miso_stuck"}},
       {repeat, {"two_answer", "extra_bytes"}},
-      // If the encoder takes a damaged request for another request, its reply does not fit; doctor cannot know which
-      // direction was damaged.
+      // A damaged request may look like another one, whose reply does not fit.
       {request_corrupt,
        {"requests_damaged", "sometimes_silent", "no_answer", "refused", "damaged_bits", "damaged_bursts",
         "sometimes_damaged", "always_damaged", "bytes_missing", "contradictory", "position_jumps"}},
   };
-  // On a clocked or SPI line the host always receives bits, so a missing reply appears as damage, or as a level that
-  // never changes.
+  // On a clocked or SPI line the host receives bits even without a reply.
   static const Ids clocked = [] {
     Ids all = damage;
     all.insert({"miso_stuck", "sometimes_silent", "contradictory", "requests_damaged", "other_checksum"});
@@ -198,8 +193,6 @@ class Matrix : public ::testing::TestWithParam<const Unit*> {
   const Unit& unit() const { return *GetParam(); }
 };
 
-/// Returns the settings of `modes_of` with which a virtual encoder can be read; of settings whose reading has the same
-/// bytes on the wire only the first.
 std::vector<std::string> readable_modes(const Unit& unit) {
   std::vector<std::string> modes;
   std::set<std::string> known;
@@ -231,8 +224,6 @@ TEST_P(Matrix, AHealthyEncoderIsGoodAndItsVerdictSaysWhatWasLookedAt) {
   }
 }
 
-/// Returns each alarm that replies can report with the default options, and each condition at each end of its range
-/// that is not its normal value, as settings of a virtual encoder.
 std::vector<std::string> states_of(const Unit& unit) {
   std::vector<std::string> states;
   const Options options = parse_address("sim:" + std::string(unit.id)).options;
@@ -286,8 +277,6 @@ TEST_P(Matrix, WhatTheEncoderReportsIsNeverGood) {
   std::printf("%s: %zu states reported, %zu not\n", std::string(unit().id).c_str(), reported, unreported);
 }
 
-/// Returns the first readable mode in which the encoder is polled, and the first in which it sends unsolicited, as far
-/// as the unit has them.
 std::vector<std::string> damaged_modes(const Unit& unit) {
   std::vector<std::string> modes;
   std::set<bool> known;
@@ -308,7 +297,7 @@ TEST_P(Matrix, DamageIsNeverGoodAndNamedAsWhatItIs) {
         const Watched one = examined(address);
         const Examination& examination = one.examination;
         const bool all_good = examination.good == examination.tried;
-        // Skips faults that did not occur, or without an effect on the host, such as a delay within the timeout.
+        // Skips faults without an effect, such as a delay within the timeout.
         if (one.injected() == 0 || (all_good && examination.findings.empty())) continue;
         EXPECT_FALSE(examination.healthy()) << sentences(examination);
         EXPECT_EQ(differences(ids_of(examination), causes_of(unit(), static_cast<sim::FaultKind>(kind))), "")
@@ -325,8 +314,6 @@ std::string first_of(const Examination& examination) {
   return first == nullptr ? "good" : std::string(first->id);
 }
 
-/// Returns the table with a row for each unit and a column for each fault. A cell has the first finding at each of 1,
-/// 10 and 100 %, without one that equals the finding before it.
 std::string fault_table() {
   std::string table = "| protocol |";
   for (const std::string_view name : sim::fault_names) table += fmt::format(" {} |", name);
@@ -349,8 +336,6 @@ std::string fault_table() {
   return table;
 }
 
-/// Returns the table with a row for each state of `states_of` that the default options allow, with the first finding
-/// and its evidence, or the verdict if there is no finding.
 std::string state_table() {
   std::string table = "| protocol | state of the encoder | first finding | evidence |\n|---|---|---|---|\n";
   for (const Unit* unit : all_units()) {
@@ -379,8 +364,7 @@ std::vector<std::string> lines_of(const std::string& text) {
 /// Returns the first cell of a row, which names the protocol, with the bar before it.
 std::string protocol_of(const std::string& row) { return row.substr(0, row.find('|', 1)); }
 
-/// Replaces the table of the document between the marks `<!-- name -->` and `<!-- end -->`. The test fails if the
-/// former table has other rows for a protocol that it contains.
+/// Replaces the table between the marks `<!-- name -->` and `<!-- end -->`.
 void replace_table(std::string& text, const std::string& name, const std::string& table) {
   const std::string begin = fmt::format("<!-- {} -->\n", name);
   const std::size_t from = text.find(begin);

@@ -12,8 +12,7 @@
 
 namespace absenc::client {
 
-/// Returns settings that may change how the unit is read: "" for the default options, each model, and each value of
-/// each option with named values except the rate.
+/// Returns settings as "model=23-bit"; "" is the default mode.
 [[nodiscard]] inline std::vector<std::string> modes_of(const Unit& unit) {
   std::vector<std::string> modes{""};
   for (const Model& model : unit.models) modes.push_back(fmt::format("model={}", model.name));

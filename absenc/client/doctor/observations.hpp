@@ -18,7 +18,7 @@
 
 namespace absenc::client {
 
-/// A setting that was tried instead of the user's setting, and how well the encoder could be read with both.
+/// A setting that was tried instead of the user's.
 struct Trial {
   FindingKind finding_kind{};  // the finding if the other setting helps
   std::string said{};          // the user's setting, "baud=115200"
@@ -50,8 +50,7 @@ struct Observations {
   Time listened{};
   bool never_silent = false;  // whether bytes came in 4 or all of 5 periods of listening
   std::vector<Attempted> readings{};
-  // Failed requests that readings repeated, in the order of time: a reading may be good although its first request was
-  // not answered. The last request of a reading is not here, but in `readings`.
+  // Failed requests that readings repeated.
   std::vector<Attempted> repeated{};
   std::vector<Attempted> damaged_frames{};  // damaged frames of a stream, cut at the pauses between frames
   std::size_t doubled = 0;                  // number of frames of a stream that arrived twice
@@ -79,16 +78,15 @@ struct Observations {
       std::ranges::count_if(attempts, [](const Attempted& one) { return one.error == Error::none; }));
 }
 
-/// Returns whether at most one in 20 attempts is good: a short checksum accepts some damaged replies.
+/// Returns whether at most one in 20 attempts is good, perhaps by chance.
 [[nodiscard]] inline bool hardly_any_good(const std::vector<Attempted>& attempts) {
   return count_good(attempts) * 20 < attempts.size() + 1;
 }
 
-/// Derives the findings from the observations, in the order of their kinds, and returns the result of the examination.
+/// Returns the findings in the order of their kinds.
 [[nodiscard]] Examination judge(const Unit& unit, const Options& options, const Observations& seen);
 
-/// Returns the most likely finding for a single failed reading; the evidence of the finding may be incomplete.
-/// `usually_good`: other readings mostly succeed; `late`: replies arrived after their timeout.
+/// Returns the most likely finding for a single failed reading.
 [[nodiscard]] Finding finding_of(const Unit& unit, const Options& options, PortKind place, const Attempted& last,
                                  bool usually_good, bool late);
 

@@ -23,13 +23,13 @@ inline std::vector<std::string> ids(const Examination& examination) {
   return all;
 }
 
-/// Returns the T-format reply to the request 1A: position of 17 bits and turns of 16 bits, both 0, no alarm.
+/// Returns a T-format reply without alarms.
 inline const ByteList& good_reply() {
   static const ByteList reply{0x1A, 0, 0, 0, 0, 0x11, 0, 0, 0, 0, 0x0B};
   return reply;
 }
 
-/// Returns observations with 200 good readings, one every millisecond, with the positions `place(i)`.
+/// Returns 200 good readings, one every millisecond.
 inline Observations positions(const std::function<std::uint64_t(std::size_t)>& place, unsigned bits = 17) {
   Observations seen;
   for (std::size_t i = 0; i < 200; ++i) {
@@ -48,7 +48,6 @@ inline Examination judged(const Observations& seen) {
   return judge(*address.unit, address.options, seen);
 }
 
-/// Returns observations in which the shaft is turned by hand, with a reading of position and turns every millisecond.
 inline Observations turned_by_hand(const std::function<std::uint64_t(std::size_t)>& place,
                                    const std::function<std::int64_t(std::size_t)>& turns) {
   Observations seen = positions([](std::size_t) { return 5; });
@@ -64,7 +63,7 @@ inline Observations turned_by_hand(const std::function<std::uint64_t(std::size_t
 
 constexpr std::uint64_t hand_counts = 1201;  // counts per millisecond of a shaft at 550 rpm (17 bits)
 
-/// Examines, for at most `time`, a line on which requests get no reply while `dead(now)` returns true.
+/// Examines a line on which requests get no reply while `dead(now)` is true.
 inline Examination examine_contact(Time time, const std::function<bool(Time)>& dead) {
   const Surroundings surroundings{[&](const EncoderAddress&) {
                                     auto port = std::make_shared<ScriptedPort<std::uint8_t>>();

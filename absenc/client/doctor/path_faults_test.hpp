@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Faults of an adapter, of the line or of another device at the other end, and states of an encoder, with the expected
-// findings, for tests of doctor.
+// Faults with their expected findings, for tests of doctor.
 #pragma once
 
 #include <set>
@@ -43,8 +42,6 @@ inline ByteList with_before(const ByteList& bytes, std::uint8_t value, std::uint
   return all;
 }
 
-/// Returns settings "singleturn=N" of positions whose counts contain one of these byte values, each value at different
-/// bits.
 inline std::vector<std::string> positions_with(const Unit& unit, const Options& options,
                                                const std::vector<std::uint64_t>& values) {
   std::vector<std::string> all;
@@ -57,7 +54,7 @@ inline std::vector<std::string> positions_with(const Unit& unit, const Options& 
   return all;
 }
 
-/// Returns whether the unit accepts more than 5 % of random replies, so that a change of bytes cannot be recognised.
+/// Returns whether the unit accepts more than 5 % of random replies.
 inline bool has_weak_check(const Pair& pair) {
   Opener opener(pair.far);
   const EncoderAddress asked = parse_address(pair.asked);
@@ -65,10 +62,6 @@ inline bool has_weak_check(const Pair& pair) {
   return capture::acceptance(*asked.unit, asked.options, one.exchange, 1u << 10) > 0.05;
 }
 
-/// Returns a fault in which an adapter applies `change` to each reply. The shaft swings a little about a position that
-/// contains one of these byte values, and with which at least half of the replies change. Units without such a
-/// position, with a weak checksum, or with characters of more than 8 bits, which no serial adapter transfers, cannot
-/// have the fault.
 inline PathFault of_bytes(const std::string& name, const std::vector<std::uint64_t>& values, const Change& change,
                           Ids causes = {}) {
   causes.insert(name);
@@ -121,7 +114,7 @@ inline std::vector<PathFault> faults_of_bytes() {
                       if (one.seen.changed != 0) outcome = one;
                       return outcome;
                     }});
-  // A frame of mostly 00 bytes loses nearly all of its bytes, so doctor may take it for a cut frame.
+  // Without its 00 bytes, a frame may look like a cut one.
   faults.push_back(of_bytes("nul_lost", {0x00},
                             [](const ByteList&, const ByteList& reply) { return without(reply, {0x00}); },
                             {"bytes_missing"}));
@@ -144,7 +137,7 @@ inline PathFault of_encoder_fault(const std::string& name, const std::string& fa
               pair.far.encoder.device.delay = limit * 5 / 4;
             }
             Outcome one{examined(pair.asked, pair.far, {.readings = 400, .limit = 60s}), causes};
-            // The fault has no effect on a unit whose conversation repeats failed requests: every reading is good.
+            // A unit whose conversation repeats failed requests may be spared.
             const bool is_spared =
                 one.seen.first() == "good" && one.seen.examination.good == one.seen.examination.tried;
             if (!is_spared) outcome = one;
@@ -155,7 +148,7 @@ inline PathFault of_encoder_fault(const std::string& name, const std::string& fa
 inline PathFault of_talker(const std::string& name, const std::string& text, Time period, bool answers, Ids causes) {
   return {name, [=](const Unit& unit, const std::string& mode, const std::string& rate) {
             Pair pair = pair_of(unit, mode, rate);
-            // A unit with a weak checksum may take the first bytes of the text for its reply, so it is skipped.
+            // With a weak checksum the text may look like a reply.
             if (has_weak_check(pair)) return std::optional<Outcome>();
 
             pair.far.other = [=] {
@@ -250,8 +243,6 @@ inline std::vector<PathFault> faults_of_state() {
                       Pair pair = pair_of(unit, mode, rate, {"singleturn=1383"});
                       Opener opener(pair.far);
                       const Attempted usual = read_once(parse_address(pair.asked), opener);
-                      // The period and the interruption are long enough for many good readings and for many timeouts,
-                      // also of readings that repeat each request.
                       const Time period = std::max({300 * usual.after, 200 * usual.limit, Time(50ms)});
                       pair.far.is_cut = [period](Time now) { return now % period > period * 7 / 10; };
                       const Choices choices{.readings = 100'000, .limit = 5 * period};
@@ -289,8 +280,6 @@ inline std::vector<PathFault> all_path_faults() {
   return all;
 }
 
-/// Returns the table with a row for each unit of a line of characters and a column for each fault. A cell has the first
-/// finding, or "good"; "-" if the unit cannot have the fault, or if the fault has no effect.
 inline std::string path_fault_table() {
   const std::vector<PathFault> faults = all_path_faults();
   std::string table = "| protocol |";

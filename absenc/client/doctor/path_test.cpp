@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks, for every unit of a line of characters at each of its rates, that the first finding of doctor is an expected
-// one for each fault of `all_path_faults` that the unit can have; and how doctor compares other settings.
+// Checks that doctor's first finding for a fault is an expected one.
 #include <gtest/gtest.h>
 
 #include "absenc/client/doctor/path_faults_test.hpp"
@@ -38,8 +37,6 @@ TEST_P(DoctorWays, FaultOfLineIsNamed) { examine_each(faults_of_line()); }
 TEST_P(DoctorWays, OtherEncoderIsNamed) { examine_each(faults_of_others()); }
 TEST_P(DoctorWays, StateIsNamed) { examine_each(faults_of_state()); }
 
-/// Checks that doctor names wrong settings if another model is connected than the user set and a reading fails. Skips
-/// units with a weak checksum.
 TEST_P(DoctorWays, OtherModelIsNamedInBothDirections) {
   const Unit& unit = *GetParam();
   const std::string mode = asked_mode(unit);

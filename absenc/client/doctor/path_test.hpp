@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Adapters and other devices between host and virtual encoder in virtual time, for tests of doctor.
+// Adapters and other devices on a line in virtual time, for tests of doctor.
 #pragma once
 
 #include <fmt/format.h>
@@ -27,8 +27,7 @@ using ByteList = std::vector<std::uint8_t>;
 /// A function that returns the changed bytes of the reply to a request.
 using Change = std::function<ByteList(const ByteList& request, ByteList reply)>;
 
-/// A machine between a device and the line that changes or delays the device's replies, like the receiving side of an
-/// adapter, or drops them while a contact is open.
+/// A machine that changes, delays or drops replies of a device.
 class Adapter final : public Machine<std::uint8_t> {
  public:
   Adapter(Machine<std::uint8_t>& device, Change change, std::function<bool(Time)> is_cut, Time delay)
@@ -113,8 +112,7 @@ struct Far {
   std::function<std::unique_ptr<Talker>()> other{};
 };
 
-/// Opens links to the devices that `Far` describes. Each call of `open` makes new devices; with `goes_on` only the
-/// first one does.
+/// Opens links to the devices that `Far` describes; with `goes_on`, always to the same ones.
 class Opener {
  public:
   explicit Opener(Far far) : far_(std::move(far)) {}
@@ -239,8 +237,7 @@ inline std::vector<const Unit*> character_units() {
   return units;
 }
 
-/// Returns the setting with which the unit replies to requests: "" if the default options do, otherwise the first
-/// choice of an option that does, or "" if there is none.
+/// Returns a setting that makes the unit reply to requests; may be "".
 inline std::string asked_mode(const Unit& unit) {
   const auto streams = [&](const std::string& mode) {
     const auto address = parse_address(fmt::format("sim:{}{}{}", unit.id, mode.empty() ? "" : "?", mode));
@@ -256,8 +253,6 @@ inline std::string asked_mode(const Unit& unit) {
   return "";
 }
 
-/// Returns each rate of the unit as a setting: "rate=9600", or "baud=9600" if the rate belongs to the line. A unit
-/// without a rate of its own gets two usual ones.
 inline std::vector<std::string> rates_of(const Unit& unit) {
   std::vector<std::string> rates;
   if (const Option* option = find_role(unit.options, Role::rate)) {
@@ -290,8 +285,7 @@ struct Pair {
   Far far;
 };
 
-/// Returns the user's address and an encoder with the same settings. `state` holds further settings of the encoder
-/// only, such as "motion=rpm=60".
+/// Adds the settings `state` to the encoder only.
 inline Pair pair_of(const Unit& unit, const std::string& mode, const std::string& rate,
                     const std::vector<std::string>& state = {}) {
   std::vector<std::string> settings{mode, of_encoder(unit, rate)};

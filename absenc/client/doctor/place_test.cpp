@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that advice fits the kind of port: none about USB for a network, none about ModemManager for a port that
-// absenc itself uses.
+// Checks that doctor's advice fits the kind of port.
 #include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 
@@ -15,7 +14,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-/// Ids of findings that only a serial port can have: they need facts that the system reports about such a port.
+/// Ids of findings that only a serial port can have.
 const std::set<std::string_view> of_serial_ports{"port_is_modem", "latency_timer", "direction_unswitched"};
 
 std::string advice_of(FindingKind finding_kind, PortKind place) {
@@ -40,8 +39,6 @@ TEST(DoctorAdvice, NamesNothingThatThePlaceHasNot) {
   }
 }
 
-/// Advice about late or missing replies names the setting `latency` for serial ports and TCP, but not for virtual
-/// encoders and SPI.
 TEST(DoctorAdvice, ProposesALatencyOnlyWhereItCanBeSet) {
   for (const FindingKind finding_kind :
        {FindingKind::reply_late, FindingKind::sometimes_late, FindingKind::sometimes_silent}) {

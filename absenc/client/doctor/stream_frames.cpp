@@ -23,8 +23,7 @@ struct PausedBytes {
   ByteList bytes{};
 };
 
-// Returns the bytes between pauses of at least `pause`, without the first and the last piece: reading may have begun
-// and ended in the middle of a frame.
+// Leaves out the first and the last piece, which may be cut.
 std::vector<PausedBytes> pieces_of(const StreamBytes& stream, Time pause) {
   std::vector<PausedBytes> pieces;
   std::size_t begin = 0;
@@ -43,8 +42,6 @@ std::vector<PausedBytes> pieces_of(const StreamBytes& stream, Time pause) {
   return pieces;
 }
 
-// Returns the share of the pieces that have the most frequent length; 0 if there are too few pieces, or if that length
-// is one byte.
 double evenness(const std::vector<PausedBytes>& pieces) {
   if (pieces.size() < enough) return 0;
   std::map<std::size_t, std::size_t> lengths;
@@ -54,8 +51,7 @@ double evenness(const std::vector<PausedBytes>& pieces) {
   return static_cast<double>(usual->second) / static_cast<double>(pieces.size());
 }
 
-// Tries pauses from 0.1 ms to 200 ms, each half as long again as the one before. Of those that make about the most even
-// pieces the middle one is taken, because it is far from the pauses within a frame and from those between two frames.
+// Of several good pauses, the middle one is safest.
 std::vector<PausedBytes> most_even_pieces(const StreamBytes& stream) {
   constexpr Time shortest = 100us;
   constexpr Time longest = 200ms;
@@ -78,8 +74,7 @@ std::vector<Time> distances_of(const std::vector<Time>& arrivals) {
   return distances;
 }
 
-// Returns the time between two frames; 0 if there are fewer than 8 distances, or if they are irregular, as those of
-// frames that an adapter collects.
+// Returns 0 if there are too few frames, or they are irregular.
 Time period_of(std::vector<Time> distances) {
   if (distances.size() < enough) return {};
   std::ranges::sort(distances);
@@ -123,7 +118,7 @@ void insert_missing_frames(std::vector<Attempted>& readings, const std::vector<T
     const double periods = static_cast<double>(distances[i - 1].count()) / static_cast<double>(period.count());
     const auto due = static_cast<std::size_t>(std::lround(periods));
     const std::size_t come = 1 + readings[i].discarded;
-    // Between damaged frames nothing shows how many there were: two of them may have been discarded as one.
+    // Two damaged frames may have been discarded as one.
     if (due > come && readings[i].discarded == 0) missing[i] = due - come;
     // A late frame was counted as missing, and those after it come early.
     std::size_t early = come > due ? come - due : 0;
@@ -133,11 +128,10 @@ void insert_missing_frames(std::vector<Attempted>& readings, const std::vector<T
       early -= late;
     }
   }
-  // A gap just before the end may be a late frame: those that would come early after it were not received any more.
+  // A gap just before the end may be a late frame.
   for (std::size_t i = readings.size() - std::min<std::size_t>(readings.size(), 2); i < readings.size(); ++i)
     missing[i] = 0;
-  // One missing frame may be a change of delay: a frame that contains the bytes of a header is accepted with the next
-  // frame.
+  // One missing frame may be a change of delay.
   if (std::accumulate(missing.begin(), missing.end(), std::size_t{0}) < 2) return;
   std::vector<Attempted> all;
   for (std::size_t i = 0; i < readings.size(); ++i) {
@@ -172,8 +166,7 @@ void conclude_stream(const Unit& unit, const Options& options, const StreamBytes
     seen.doubled = count_doubled(seen.readings, stream.arrivals);
     insert_missing_frames(seen.readings, stream.arrivals);
   } else if (!frames.empty()) {
-    // The reading of a stream goes on to the next good frame, so hardly any good frame means hardly any reading: the
-    // frames themselves are examined instead.
+    // The frames themselves are examined, because there is hardly any reading.
     seen.readings = std::move(frames);
   } else if (!stream.bytes.empty()) {
     constexpr std::size_t most_shown = 256;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks doctor with encoders that send frames without requests, in virtual time: faults of the adapter, and frames
-// that do not come.
+// Checks doctor with encoders that send frames without requests.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -12,8 +11,6 @@
 namespace absenc::client::path_faults {
 namespace {
 
-// Returns the units of lines of characters whose encoders can send without requests, each with the first setting that
-// makes its encoder do so; "" if the default does.
 std::vector<std::pair<const Unit*, std::string>> streaming_units() {
   std::vector<std::pair<const Unit*, std::string>> all;
   for (const Unit* unit : character_units()) {

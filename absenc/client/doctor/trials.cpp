@@ -102,7 +102,7 @@ void add_spi(const EncoderAddress& address, std::vector<Other>& others) {
 
 // ---- Trials of other models and addresses
 
-/// Decides which requests must not be sent because they could change an encoder of another protocol on the line.
+/// Decides which requests could change an encoder of another protocol on the line.
 class Safety {
  public:
   explicit Safety(const EncoderAddress& address)
@@ -111,8 +111,7 @@ class Safety {
     harmful_ = harmful_to_others(unit_, address.line.rate, search_of(address));
     said_ = is_harmful(address.options);
   }
-  /// Returns whether the request may be sent: it could change no other encoder, or the user's own request could as
-  /// well.
+  /// Allows every request if the user's own one is harmful.
   [[nodiscard]] bool allows(const Options& options) const { return said_ || !is_harmful(options); }
 
  private:
@@ -129,7 +128,6 @@ class Safety {
   bool said_ = false;
 };
 
-// Returns the address with other options on the same port, at the user's rate unless the options have another one.
 EncoderAddress with_options(const EncoderAddress& address, const Options& options) {
   EncoderAddress other = address;
   other.options = options;

@@ -27,7 +27,7 @@ using enum Severity;
 
 // In these texts {0}, {1} ... are replaced by the values that the judge passes to `finding`.
 constexpr auto table = std::to_array<Words>({
-    // If the evidence of a port or a CAN bus is "{0}" alone, that is the error of the system with its advice.
+    // Here "{0}" alone is the error of the system with its advice.
     {FindingKind::port_missing, "port_missing", fault, "{0}",
      "the adapter is not plugged in, or the name is another one",
      "plug it in, or correct the name; `ls /dev/serial/by-id` shows adapters by their own names"},
@@ -220,7 +220,7 @@ constexpr auto table = std::to_array<Words>({
      "the resolution is another one, or codes are missing", "check the resolution of the model; replace the encoder"},
 });
 
-/// Texts that replace those of a finding at a kind of port other than `serial`; "": the text is not replaced.
+/// Texts for one kind of port; "" replaces nothing.
 struct Elsewhere {
   FindingKind finding_kind;
   PortKind place;

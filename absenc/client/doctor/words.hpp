@@ -13,7 +13,7 @@ namespace absenc::client {
 /// Returns a finding of this kind; `values` replace {0}, {1} ... in its texts.
 [[nodiscard]] Finding finding(FindingKind finding_kind, const std::vector<std::string>& values = {});
 
-/// Replaces the finding's cause or action if it does not fit the kind of port: no advice about USB for a network.
+/// Replaces texts of the finding that do not fit this kind of port.
 void suit(Finding& finding, PortKind place);
 
 }  // namespace absenc::client

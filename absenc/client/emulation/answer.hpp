@@ -6,8 +6,7 @@
 
 namespace absenc::client {
 
-/// Runs a command once with the virtual encoder of this address, and returns its last request with the reply. Throws
-/// UsageError for settings that the encoder cannot have.
+/// Throws UsageError.
 [[nodiscard]] Attempted answer_of(const EncoderAddress& address, const Command& command, Arguments arguments);
 
 }  // namespace absenc::client

@@ -10,11 +10,10 @@
 
 namespace absenc::client {
 
-/// Time by which the encoder may send early: a host on a pseudo-terminal waits milliseconds anyway.
+/// Time by which the encoder may send early.
 inline constexpr Time send_slack = std::chrono::microseconds(500);
 
-/// A machine that passes events to an encoder and calls `look` between the encoder's steps, in the same thread, so that
-/// no second thread touches the encoder.
+/// A machine that calls `look` in the thread of the encoder.
 template <class Item>
 class Attended final : public Machine<Item> {
  public:
@@ -34,7 +33,7 @@ class Attended final : public Machine<Item> {
     if (now >= look_at_) look_at_ = look_(now) ? now + between_looks : never;
     Step<Item> step = machine_.next(now);
     if (step.kind != Step<Item>::Kind::wait) return step;
-    // As on real ports, a time that has passed starts no timer, but a timer that is due at another event remains due.
+    // A time that has passed starts no timer, unless it is that of the present timer.
     timer_ = step.at > now || step.at == timer_ ? step.at : never;
     step.at = std::min(look_at_, timer_);
     return step;

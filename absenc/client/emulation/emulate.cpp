@@ -122,8 +122,7 @@ struct Emulation::Service {
     serve_forever(attended, open, wait, [](PortEvent, std::string_view) {});
   }
 
-  // Runs the function that another thread has passed to `carry_out`, between two steps of the encoder. Throws Cancelled
-  // once the emulation is stopped.
+  // Throws Cancelled once `stopped` is set.
   bool look(Time now) {
     const std::lock_guard lock(mutex);
     if (stopped) throw Cancelled{};
@@ -134,8 +133,7 @@ struct Emulation::Service {
     return true;
   }
 
-  /// Runs `work` in the encoder's thread and returns when it has ended. Throws the exception that has ended the
-  /// encoder's thread, or Cancelled.
+  /// Runs `work` in the encoder's thread and waits for its end. Throws what ended that thread.
   void carry_out(const std::function<void(Time)>& work) {
     const std::lock_guard turn(wishes);
     std::unique_lock lock(mutex);

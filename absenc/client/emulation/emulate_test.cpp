@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests a virtual encoder on a port. Two tests set the port's latency to half a second, because the computer may be
-// busy.
+// Tests a virtual encoder on a port. A latency of half a second allows for a busy computer.
 #include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 

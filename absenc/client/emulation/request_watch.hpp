@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counts the requests of a host to a virtual encoder, and bytes and frames from the host that are no request.
+// Counts the requests that a virtual encoder receives.
 #pragma once
 
 #include <algorithm>
@@ -18,8 +18,6 @@
 
 namespace absenc::client {
 
-/// A machine between the line and the virtual encoder, which counts requests. On a clocked line each start of the clock
-/// is a request.
 template <class Item>
 class RequestWatch final : public Machine<Item> {
  public:
@@ -65,8 +63,7 @@ class RequestWatch final : public Machine<Item> {
     }
   }
 
-  // Counts good and bad requests. Ignores frames that no host sends to such an encoder: they belong to other devices on
-  // the bus.
+  // Frames that decoding reports as unexpected_reply belong to other devices on the bus.
   void look_at_frames(std::span<const CanFrame> frames) {
     for (const CanFrame& frame : frames) {
       const Error error = error_of({.can = &frame});
@@ -83,12 +80,11 @@ class RequestWatch final : public Machine<Item> {
     note_bad(to_hex(bytes));
   }
 
-  // Counts requests in received bytes. After a collision with a reply on a half-duplex line, and after bytes that begin
-  // no request, ignores bytes up to a pause.
+  // Ignores bytes after a collision, and after bytes that begin no request.
   void look_at_bytes(Bytes bytes, Time at, Time late) {
     const Time pause = at - character_ * static_cast<std::int64_t>(bytes.size()) - heard_at_;
     heard_at_ = at;
-    // A request that this program noticed so late is no violation: in time, the reply might have been sent before it.
+    // In time, such a late request might have found the reply already sent.
     const bool may_have_waited = late > unit_.timing.turnaround + most_in_reply * character_;
     if (pause > 2 * character_ || may_have_waited) skipping_ = waits_ = false;
     if (sending_ && unit_.link == LinkKind::half_duplex) skipping_ = true;
@@ -130,7 +126,7 @@ class RequestWatch final : public Machine<Item> {
 
   [[nodiscard]] Error error_of(const Frame& request) const { return unit_.check(options_, request, {}); }
 
-  // Moves the count of bad requests to `before` at the first good one: opening a port may produce a few.
+  // Opening a port may produce a few bad requests before the first good one.
   void note_good() {
     if (++counts_.good > 1) return;
     counts_.before += counts_.bad;
@@ -148,7 +144,7 @@ class RequestWatch final : public Machine<Item> {
   bool sending_ = false;
   Time heard_at_{};
   bool waits_ = false;  // whether the reply is outstanding, so that the host must wait
-  // whether bytes are ignored until the line is silent, after a collision or after bytes that begin no request
+  // whether bytes are ignored
   bool skipping_ = false;
   std::vector<std::uint8_t> pending_{};
   RequestCounts counts_{};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counts how often a virtual encoder checked each rule of its host, and how often the host broke it.
+// Counts how often each rule was checked, and how often it was broken.
 #pragma once
 
 #include <algorithm>

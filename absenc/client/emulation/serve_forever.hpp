@@ -15,8 +15,6 @@ namespace absenc::client {
 /// A change of the port that is reported to the caller.
 enum class PortEvent : std::uint8_t { opened, away, back };
 
-/// An encoder that moves from one port to the next. If the last port was lost after a transfer began and before it was
-/// sent, `left` reports the transfer as sent.
 template <class Item>
 class Movable final : public Machine<Item> {
  public:
@@ -47,10 +45,7 @@ class Movable final : public Machine<Item> {
   std::uint32_t rate_ = 0;
 };
 
-/// Serves the encoder and returns only by an exception: an os::Failure if the port cannot be opened for the first time,
-/// or if it is open and does not support a rate that the encoder sets, and every exception of `wait`. `open()` opens
-/// the port. When the port is lost (another os::Failure), calls `wait(time)` and `open()` again. Calls
-/// `told(what, why)` for each change of the port.
+/// Serves the encoder, and opens a lost port again. Returns only by an exception.
 template <class Item, class Open, class Wait, class Told>
 [[noreturn]] void serve_forever(Machine<Item>& machine, const Open& open, const Wait& wait, const Told& told) {
   constexpr Time time_between_tries = std::chrono::milliseconds(250);
@@ -70,7 +65,7 @@ template <class Item, class Open, class Wait, class Told>
       is_open = was_open = true;
       host::drive(movable, *port, [] { return true; });
     } catch (const os::Failure& failure) {
-      // Ends if the open port does not support a rate that the encoder set, because it will not support it later.
+      // An open port will not support that rate later either.
       const bool unable = is_open && failure.kind() == os::Failure::Kind::unsupported;
       if (!was_open || unable) throw;
       if (is_open) told(PortEvent::away, failure.what());

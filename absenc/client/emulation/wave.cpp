@@ -32,8 +32,7 @@ using namespace std::chrono_literals;
 constexpr Time first_request = 20us;              // time from power-on to the first request
 constexpr std::uint64_t fastest = 1'000'000'000;  // highest sample rate: the drawing has a resolution of 1 ns
 
-// Idle time that decoders need at the beginning and at the end: 11 bits for CAN, 3.5 characters for Modbus, and more to
-// detect the rate.
+// Idle time that decoders need at the beginning and at the end.
 Time idle_around(const LineSettings& line) { return std::max(first_request, 5 * line.character()); }
 
 enum class FileFormat : std::uint8_t { vcd, sigrok, saleae };
@@ -103,8 +102,7 @@ struct Conversations {
     while (port.now() < until) static_cast<void>(port.wait({.at = until}));
   }
 
-  // Runs one command until it ends or the last result is drawn. A stream never ends by itself, so it is stopped after
-  // the last result; a streaming command that sends a request for each result is stopped after one result.
+  // A stream never ends by itself, so it is stopped after the last result.
   template <class Item>
   void hold(sim::SimPort<Item>& port, const Spoken& one) {
     std::vector<std::byte> storage(uri.unit->host_storage);

@@ -34,7 +34,6 @@ std::optional<Answer> ask(Connection& connection, const Command& reader, Argumen
   return std::move(sink.answer);
 }
 
-// Returns the address with the setting `name` set to `value`; an older value of the setting is removed.
 std::string with_setting(const std::string& address, std::string_view name, std::int64_t value) {
   const std::size_t question = std::min(address.find('?'), address.size());
   std::string result = address.substr(0, question);
@@ -78,8 +77,7 @@ void ChangeRecord::look_at_memory() {
   }
 }
 
-// Finds the old value of the integer field that the command's only required argument sets: after a confirmed write a
-// field that now equals the argument, otherwise any integer field. Stores nothing unless exactly one field is possible.
+// Stores no old value if it is uncertain which field the command sets.
 void ChangeRecord::find_old_value(bool good) {
   if (!old_ || arguments_.empty()) return;
   if (std::ranges::count_if(command_.arguments, &Argument::required) != 1) return;

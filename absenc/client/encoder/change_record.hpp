@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes a change of an encoder into the journal, with the old value if it is known or was read before the change.
+// Writes a change of an encoder into the journal.
 #pragma once
 
 #include <cstdint>
@@ -17,12 +17,10 @@ class Connection;
 
 class ChangeRecord {
  public:
-  /// If there is a journal, reads the value that the command will overwrite, which must be a setting that can be read,
-  /// or a byte of the memory; not if it is `known`. Throws the exceptions of the port.
+  /// Reads, if necessary, the value that the command will overwrite.
   ChangeRecord(Connection& connection, const Command& command, Arguments arguments, std::optional<std::int64_t> known);
 
-  /// Appends the change to the journal if there is one and the request of the change was sent. `way` is the encoder's
-  /// address before the change. Returns "", or the reason why the change could not be written.
+  /// Returns "" or why the change could not be written.
   [[nodiscard]] std::string keep(const EncoderAddress& way, const Change& change);
 
  private:

@@ -25,8 +25,7 @@ Frame to_frame(std::span<const CanFrame> frames, std::size_t = 0) {
   return {.can = frames.empty() ? nullptr : &frames.front()};
 }
 
-// Returns the new address of a changed encoder in words, "it is reached with baud=57600 now"; "" if the address has not
-// changed.
+// Returns "" if the address has not changed.
 std::string new_way(const EncoderAddress& before, const Command& command, Arguments arguments) {
   if (command.changes_option.empty()) return {};
   const Options behind = options_behind(*before.unit, before.options, command, arguments.front());
@@ -67,8 +66,7 @@ class LifeCounters final : public FieldSink {
     stand_ = stand_ || (!is_first && known->second == field.number);
     known->second = field.number;
   }
-  /// Returns whether a life counter equals that of the reading before. A counter may have advanced by any number,
-  /// because of errors and other hosts.
+  /// Returns whether a life counter equals that of the reading before.
   [[nodiscard]] bool stand() const { return stand_; }
 
  private:
@@ -113,8 +111,7 @@ class ConnectionOn final : public Connection {
     const Command* command = uri().reads != nullptr ? uri().reads : find_command(unit(), Verb::read);
     if (command == nullptr) throw UsageError(fmt::format("{} has no command that reads the position", unit().id));
     Outcome ended = read_once(*command, take);
-    // Reads again before an unchanged counter is an error: another host may have read so many frames that the counter
-    // wrapped to the same value.
+    // Another host may have read so many frames that the counter wrapped to the same value.
     if (life_counters_.stand()) ended = read_once(*command, take);
     if (!life_counters_.stand()) return ended;
     session_.refuse_last(Error::sequence_mismatch);
@@ -217,7 +214,7 @@ class ConnectionOn final : public Connection {
     return trouble;
   }
 
-  // A requested reading of a virtual encoder has an exact latch time: requests are not delayed on its simulated line.
+  // On a simulated line the latch time of a requested reading is exact.
   void keep_latch_time(const Reading& reading, bool was_asked) {
     if (!was_asked) {
       arrivals_.add(reading.received, port_.nothing_until);
@@ -267,7 +264,7 @@ class ConnectionOn final : public Connection {
     return {ChangeState::unknown, advice_to_look(before, command, arguments)};
   }
 
-  // Tells the conversations that other encoders share the line, so that they do not change its settings.
+  // Conversations must not change settings of a line that other encoders share.
   void tell_of_company() {
     Options options = uri().options;
     tell_shared(unit(), options);
@@ -283,7 +280,7 @@ class ConnectionOn final : public Connection {
             port_.take_aborted(),  conversation->reading(), {}};
   }
 
-  // Adds to a timeout that replies came late, because a late reply has other causes than a missing one.
+  // A late reply has other causes than a missing one.
   void tell_lateness(Trouble& trouble) const {
     const Time lateness = session_.lateness();
     if (trouble.error != Error::timeout || lateness == Time{}) return;
@@ -395,7 +392,7 @@ std::string Trouble::text() const {
   return with_change(lines, change);
 }
 
-// Sets options; the user's line settings remain, except for the rate if the encoder now has another.
+// The user's line settings remain, except for the rate if the options change it.
 void Connection::set_options(const Options& options) {
   const std::uint32_t rate = line_settings(unit(), options).rate;
   if (rate != line_settings(unit(), uri_.options).rate) uri_.line.rate = rate;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Connects to an encoder on any kind of line, runs the commands of its unit, and explains failures.
+// Connects to an encoder, runs the commands of its unit, and explains failures.
 #pragma once
 
 #include <functional>
@@ -30,45 +30,37 @@ struct Outcome {
 
 class Connection {
  public:
-  /// Returns a connection that is not open yet. Without `open` it opens the port of the address and writes changes to
-  /// the journal (journal.hpp), except those of sim:.
+  /// Returns a connection that is not open yet.
   [[nodiscard]] static std::unique_ptr<Connection> make(const EncoderAddress& uri, OpenLink open = {});
   /// Makes a connection, opens its port and returns it. Throws the exceptions of `connect`.
   [[nodiscard]] static std::unique_ptr<Connection> open(const EncoderAddress& uri);
   virtual ~Connection() = default;
 
-  /// Opens the port, or shares the open port of another connection on the same line; also again after `disconnect`:
-  /// counters and statistics continue. Throws os::Failure, UsageError.
+  /// Opens the port, or shares that of another connection. Throws os::Failure, UsageError.
   virtual void connect() = 0;
   virtual void disconnect() = 0;
   [[nodiscard]] virtual bool connected() const = 0;
-  /// Returns hints on how to improve the port's settings, one sentence each; none while the connection is not open.
   [[nodiscard]] virtual const std::vector<std::string>& notes() const = 0;
 
-  // `read`, `run`, `trouble`, `lend` and `now` require an open connection. `read` and `run` throw the
-  // exceptions of the port, and UsageError if the unit cannot run the command with these options.
+  // `read`, `run`, `trouble`, `lend` and `now` require an open connection.
 
-  /// Reads the position, or runs the command that the address names instead. `take` selects which frame is used if the
-  /// encoder sends positions unsolicited. Throws UsageError if there is no such command.
+  /// Reads the position. Throws UsageError and the exceptions of the port.
   virtual Outcome read(host::Take take = host::Take::newest) = 0;
-  /// Runs a command and returns its outcome. Calls `on_emit` for each result but the last; during the call, `report`
-  /// passes on the fields of that result. If the command succeeds in setting an option of the unit, the connection uses
-  /// the new value from then on.
+  /// Calls `on_emit` at intermediate results, which `report` then passes on.
   virtual Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit = {}) = 0;
-  /// Stores the value that the next changing command overwrites, so that the journal need not read it from the encoder.
+  /// Stores the value that the next changing command overwrites, for the journal.
   void know_before(std::int64_t value) { known_before_ = value; }
   /// Returns the state of the last changing command, also if the command threw an exception.
   [[nodiscard]] virtual const Change& change() const = 0;
   /// Passes the fields of the last outcome, and its reading, to `sink`.
   virtual void report(FieldSink& sink) const = 0;
-  /// After an exception of `run`, passes the settings that the command left changed in the encoder to `sink`.
+  /// Passes settings that a failed command left changed to `sink`.
   virtual void report_left(FieldSink& sink) const = 0;
   /// Returns a description of the failure `outcome`, which must be the last outcome.
   [[nodiscard]] virtual Trouble trouble(const Outcome& outcome) const = 0;
-  /// Returns the computed bounds, by the port's clock, of the time at which the encoder latched the position that
-  /// `read` returned last.
+  /// Returns times of the port's clock.
   [[nodiscard]] virtual host::LatchTime latch_time() const = 0;
-  /// Returns whether the position that `read` returned last agrees with the one before it (host::FirstReading).
+  /// Returns whether the last position agrees with the one before.
   [[nodiscard]] virtual bool confirmed() const = 0;
   [[nodiscard]] virtual const host::Counters& counters() const = 0;
   [[nodiscard]] virtual const host::Latencies& latencies() const = 0;
@@ -81,8 +73,7 @@ class Connection {
   /// Returns the present time of the clock of the readings.
   [[nodiscard]] virtual Time now() = 0;
 
-  /// Sets a function that is polled during each wait. Once it returns true, the wait throws os::Ended, even if the line
-  /// is never silent. Empty: none.
+  /// Sets a function that is polled during waits; true ends them with os::Ended. Empty: none.
   virtual void end_when(std::function<bool()> over) = 0;
 
   /// Uses these options from the next command on, without opening the port again.
@@ -100,12 +91,10 @@ class Connection {
   EncoderAddress uri_;
 };
 
-/// Returns a reading with the alarms: by the command for alarms if the unit has one that these options allow, otherwise
-/// by `read`. Throws EncoderFailure, Failure, and the exceptions of Connection::run.
+/// Throws EncoderFailure, Failure, and as Connection::run.
 [[nodiscard]] Reading read_alarms(Connection& connection);
 
-/// Runs a command and passes the fields of its result to `sink`. Throws EncoderFailure, and the exceptions of
-/// Connection::run.
+/// Throws EncoderFailure, and as Connection::run.
 void run_into(Connection& connection, const Command& command, Arguments arguments, FieldSink& sink);
 
 }  // namespace absenc::client

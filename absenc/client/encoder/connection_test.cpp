@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that a life counter that stands still from one reading to the next is an error, for each clocked unit that has
-// one, with an encoder that repeats frames.
+// Checks that a life counter that stands still is an error.
 #include "absenc/client/encoder/connection.hpp"
 
 #include <gtest/gtest.h>
@@ -23,7 +22,7 @@ class Seen final : public FieldSink {
   bool any = false;
 };
 
-/// A machine that forwards and records the frames of an encoder, and repeats chosen frames after a call of `play`.
+/// A machine that can repeat frames of an encoder.
 class Recorder final : public Machine<std::uint8_t> {
  public:
   explicit Recorder(Machine<std::uint8_t>& encoder) : encoder_(&encoder) {}
@@ -103,7 +102,7 @@ TEST_P(LifeCounters, OneThatStandsStillIsAnError) {
 TEST_P(LifeCounters, OneThatHasComeRoundIsReadAgain) {
   Counting line(*GetParam());
   for (int i = 0; i < 2; ++i) EXPECT_EQ(line.connection->read().error, Error::none);
-  // the second reading gets the same frames as the first, as if the counter had wrapped, and is repeated with others
+  // the second reading looks as if the counter had wrapped, and is repeated
   line.recorder.play({0, 1, 0, 1, 2, 3, 0, 1});
   for (int i = 0; i < 3; ++i) EXPECT_EQ(line.connection->read().error, Error::none);
   EXPECT_EQ(line.recorder.left(), 0u);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Uses the library as a program does: with virtual encoders in this process and on pseudo-terminals.
+// Uses the library as a program does, with virtual encoders.
 #include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 
@@ -115,7 +115,6 @@ TEST(ClientEncoder, GoesOnWithTheAddressThatItWasSetTo) {
   EXPECT_TRUE(encoder.read().singleturn_valid());
 }
 
-// After a change of its rate the encoder is read at the new rate, and the address of its connection has the new rate.
 TEST(ClientEncoder, GoesOnAtTheRateThatItWasSetTo) {
   for (const bool by_name : {true, false}) {
     Encoder encoder = open("sim:raa38-modbus");
@@ -130,8 +129,7 @@ TEST(ClientEncoder, GoesOnAtTheRateThatItWasSetTo) {
   }
 }
 
-// Aborts a change of the rate at different points. Afterwards the encoder must be readable if, and only if, it has the
-// rate of its connection's address.
+// The encoder is readable if, and only if, it has the rate of its connection.
 TEST(ClientEncoder, IsReadAtItsRateWhenAChangeOfItsRateWasBrokenOff) {
   unsigned whole = 0;
   unsigned there = 0;
@@ -254,8 +252,7 @@ TEST(ClientSamples, AreRowsOfNamedValues) {
   EXPECT_EQ(rows.of_gap(Time{}, 12).get<std::uint64_t>("missed"), 12u);
 }
 
-// Two wrong bits at the same place of two bytes pass the checksum of T-Format, an exclusive OR of the bytes. Checks
-// that the host refuses positions with such errors: the continued position neither restarts nor is a turn away.
+// Two wrong bits at the same place of two bytes pass the checksum of T-Format.
 TEST(ClientEncoder, APositionThatNoShaftReachesIsReadAgain) {
   Encoder encoder = open("sim:tformat?singleturn=1000&fault=corrupt=0.6");
   const std::uint64_t& refused = encoder.counters().errors[static_cast<std::size_t>(Error::cross_check_failed)];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Computes lower and upper bounds of the times at which readings were latched, from the times of their exchanges.
+// Computes bounds of the times at which readings were latched.
 #pragma once
 
 #include <algorithm>
@@ -11,24 +11,18 @@
 
 namespace absenc::client {
 
-/// Returns the bounds for a requested reading. Assumes that the encoder latches between the end of the request, or
-/// `latched` if that is earlier, and the beginning of its reply. `character` is the duration of a character; 0 if it is
-/// unknown, or if bytes take no time. Ignores a constant delay between request and latching that the document states.
+/// Returns the bounds; `character` is the duration of a character, or 0.
 template <class Item>
 [[nodiscard]] host::LatchTime asked_latch_time(const LineExchange<Item>& exchange, Time latched, Time character) {
-  // If the host clocks the encoder, or an earlier request triggered it, the encoder latches before the end of the
-  // request.
+  // The encoder latches before the end of the request if the host clocks or triggered it.
   const Time earliest = std::min(exchange.sent_at, latched) - exchange.sent_late;
-  // The reply may have begun later than computed: the last character may be reported before its stop bit ends, and the
-  // encoder's clock may be slightly fast.
+  // The last character may be reported before its stop bit ends, and clocks differ.
   const auto characters = static_cast<std::int64_t>(std::max<std::size_t>(exchange.reply().size(), 1)) - 1;
   const Time reply = characters * character * 15 / 16;
   return {earliest, std::max(earliest, exchange.received_at - reply)};
 }
 
-/// Estimates bounds for readings that an encoder sends unsolicited, from the spread of their arrivals. Assumes that a
-/// reading is not latched before the previous reading arrived, unless the previous reading was delayed itself, and that
-/// the delay is at most the sum by which pauses of this second and the one before exceeded 5/4 of the usual pause.
+/// Estimates bounds for unsolicited readings from the spread of their arrivals.
 class ArrivalSpread {
  public:
   /// Adds the arrival of the next reading. No byte had arrived until `nothing_until`.

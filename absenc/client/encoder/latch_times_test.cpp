@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks latch times for every model, and for some modes, in virtual time. The true instant of a requested reading must
-// be within the measured bounds, whether or not its request leaves late, or its end or the reply is noticed late; and
-// no speed may differ from the true one by more than its uncertainty.
+// Checks the bounds of latch times in virtual time.
 #include "absenc/client/encoder/latch_times.hpp"
 
 #include <gtest/gtest.h>
@@ -31,7 +29,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// A shaft that moves by a function from seconds to revolutions, and stores when the encoder sampled its position.
+/// A shaft that stores when it was sampled.
 struct WatchedShaft final : Shaft {
   explicit WatchedShaft(std::function<double(double)> motion) : turns(std::move(motion)) {}
   [[nodiscard]] double place(Time at) const { return turns(std::chrono::duration<double>(at).count()); }
@@ -43,7 +41,7 @@ struct WatchedShaft final : Shaft {
   mutable std::vector<Time> looked_at;
 };
 
-/// A port on a busy computer: requests leave late, their end is noticed late, and received bytes are read late.
+/// A port on a busy computer, which is often late.
 template <class Item>
 class BusyPort final : public Port<Item> {
  public:
@@ -108,7 +106,7 @@ std::vector<Case> cases() {
   return all;
 }
 
-// Returns a speed in revolutions per second. One revolution of a linear encoder is its whole range, several metres.
+// A revolution of a linear encoder is its whole range.
 double revolutions_a_second(const Case& one) {
   const EncoderAddress address = parse_address(one.address);
   return address.unit->resolution(address.options).unit_um > 0 ? 0.05 : 0.5;
@@ -132,8 +130,6 @@ class Busy {
 
   [[nodiscard]] bool is_unsolicited() const { return host::sends_unsolicited(*address_.unit, address_.options); }
 
-  /// Reads `count` times with a pause before each reading, calls `use(reading, bounds)` for each valid position, and
-  /// returns their number.
   template <class Use>
   std::size_t read(std::size_t count, Time pause, const Use& use) {
     std::size_t good = 0;
@@ -149,7 +145,6 @@ class Busy {
     return good;
   }
 
-  /// Adds the reading and returns the speed after it, in counts per second; the speed may be invalid.
   [[nodiscard]] const host::Velocity& measured(const Reading& reading, const host::LatchTime& at) {
     if (unwrapper_.add(reading, at) != host::Unwrapper::Joined::continued) velocity_.restart();
     velocity_.add(unwrapper_.position(), at);
@@ -192,8 +187,6 @@ constexpr std::array most_late{0us, 400us, 8'000us};
 
 class LatchTimes : public ::testing::TestWithParam<Case> {};
 
-// Returns the last instant within the bounds at which the encoder sampled the position of the reading; nothing if there
-// is none.
 std::optional<Time> true_instant(const WatchedShaft& shaft, const Reading& reading, const host::LatchTime& at) {
   const std::vector<Time> all = shaft.looked_at;
   const auto shows = [&](Time time) {
@@ -244,7 +237,7 @@ TEST_P(LatchTimes, MakeNoSpeedThatIsFartherOffThanItSays) {
   }
 }
 
-// The measured speed must be, within its uncertainty, the mean between the two instants, even if the shaft accelerates.
+// The measured speed is the mean between both instants, even if the shaft accelerates.
 TEST_P(LatchTimes, MakeTheMeanSpeedOfAShaftThatSwings) {
   const double swing = revolutions_a_second(GetParam()) / 5;
   for (const Time most : most_late) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Equally spaced times that do not drift; times that are overdue by a period or more are skipped.
+// Equally spaced times that do not drift.
 #pragma once
 
 #include <algorithm>
@@ -13,13 +13,11 @@ namespace absenc::client {
 
 class Pace {
  public:
-  /// Takes the number of times per second (0: as fast as possible) and the offset of the first time from now. The first
-  /// call of `next` returns the second time, one period later.
+  /// Takes the rate in Hz (0: as fast as possible) and the offset of the first time from now.
   explicit Pace(double rate, Time offset = {})
       : period_(rate > 0 ? static_cast<std::int64_t>(1e9 / rate) : 0), next_(os::now() + offset) {}
 
-  /// Returns the next time; if the caller is late, the last time that has passed, and skips those before it. With rate
-  /// 0 returns a time in the past.
+  /// Returns the next time, from the second one on; without a rate, a time in the past.
   Time next() {
     if (period_ == Time{}) return {};
     next_ += period_;
@@ -28,8 +26,7 @@ class Pace {
     return next_;
   }
 
-  /// Sleeps until the next time, or until `end` if that is earlier; with rate 0 does not sleep. Throws the exceptions
-  /// of `sleep_until`.
+  /// Does not sleep without a rate.
   template <class SleepUntil>
   void wait(Time end, SleepUntil sleep_until) {
     if (period_ == Time{}) return;
@@ -46,8 +43,7 @@ class Pace {
 
   void wait() { wait(never, os::sleep_until); }
 
-  /// Skips times that have passed before the next time is used. A time that passed less than a period ago is only late;
-  /// it is skipped only if `end` is reached.
+  /// Skips times that have passed; one less than a period late is kept, unless `end` is reached.
   void leave_out(Time end) {
     const Time now = os::now();
     if (period_ == Time{} || now < next_) return;
@@ -62,11 +58,9 @@ class Pace {
     if (first < end) missed_ += static_cast<std::uint64_t>((end - first - Time{1}) / period_ + 1);
   }
 
-  /// Returns the number of times before the end that `wait` and `leave_out` skipped since the last call, because the
-  /// caller took longer than a period or was stopped.
   [[nodiscard]] std::uint64_t take_missed() { return std::exchange(missed_, 0); }
 
-  /// Begins a new series of times, the first of which is `start`; the next call of `next` or `wait` is for the second.
+  /// Begins a new series; the next call of `next` or `wait` is for the time after `start`.
   void start_at(Time start) { next_ = start; }
 
   [[nodiscard]] Time period() const { return period_; }

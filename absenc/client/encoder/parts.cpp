@@ -39,8 +39,7 @@ double speed_of(const Reading& reading, double counts_per_second) {
   return std::ldexp(60 * counts_per_second, -static_cast<int>(reading.singleturn_bits));
 }
 
-// Returns the offset from the port's clock, which may be simulated, to os::now. The thread may be interrupted between
-// the readings of both clocks, so the quickest of five attempts is used.
+// The quickest of five attempts is the most exact.
 Time ahead_of(Connection& connection) {
   Time quickest = never;
   Time ahead{};
@@ -164,7 +163,7 @@ Sample Encoder::Parts::sample_of(Reading reading) {
   return sample;
 }
 
-// Returns the angles of joint and motor that the sample's position yields; the position must be valid.
+// The sample's position must be valid.
 JointAngles Encoder::Parts::angles_of(const Sample& sample) const {
   const Joint& one = connection->uri().joint;
   const Reading& reading = sample.reading;

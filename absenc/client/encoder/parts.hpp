@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The parts of an Encoder that only this library uses: its connection, and the state that turns readings into samples.
+// The parts of an Encoder that only this library uses.
 #pragma once
 
 #include <atomic>
@@ -29,7 +29,6 @@ struct Encoder::Parts {
 
   void connect();
   void disconnect();
-  /// Takes one sample; while the port is not open, waits for the time of the next try and tries to open it.
   Sample next();
   /// Waits until `time`. Throws Cancelled, os::Interrupted, os::Failure.
   void wait_until(Time time) const;
@@ -60,11 +59,10 @@ struct Encoder::Parts {
   Time unwrapped_at_{};  // lower bound of the time at which the last valid position was latched
 };
 
-/// Makes an encoder that is not connected yet. `period` is the intended time between readings; 0: as short as the line
-/// allows. Without `open` the connection opens the port of the address.
+/// Makes an encoder; `period` is the intended time between readings, 0: none.
 [[nodiscard]] Encoder make_encoder(const EncoderAddress& address, Time period, OpenLink open = {});
 
-/// Returns the connection of the encoder. The connection lives as long as the encoder, even if the encoder is moved.
+/// Returns a connection that stays the same if the encoder is moved.
 [[nodiscard]] inline Connection& connection_of(Encoder& encoder) { return *Encoder::Parts::of(encoder).connection; }
 [[nodiscard]] inline const Connection& connection_of(const Encoder& encoder) {
   return *Encoder::Parts::of(encoder).connection;

@@ -39,8 +39,7 @@ std::size_t place_of(const Answer& answer, std::string_view name) {
                                   answer.columns.begin());
 }
 
-// Runs a command that writes a setting. If the port is lost after the setting may have been written, throws a Failure
-// that lists the values with which the encoder may be left, if the command knows them.
+// After the loss of the port, says which values the encoder may have.
 void write(Connection& encoder, const Command& setter, Arguments arguments, SettingSink& told) {
   try {
     run_into(encoder, setter, arguments, told);
@@ -60,8 +59,7 @@ void write(Connection& encoder, const Command& setter, Arguments arguments, Sett
   }
 }
 
-// Compares the setting, read again by its own command, with the value that the setter has verified. Throws Failure if
-// they differ.
+// Throws Failure if the setting reads differently from the verified value.
 void require_same(const Answer& now, const Answer& written, std::string_view name) {
   for (std::size_t i = 0; i < written.columns.size(); ++i) {
     const std::size_t place = place_of(now, written.columns[i].name);
@@ -73,8 +71,7 @@ void require_same(const Answer& now, const Answer& written, std::string_view nam
   }
 }
 
-// Returns a sentence about the encoder's new address if the written setting, such as a rate, is part of the address;
-// otherwise "".
+// Returns "" if the address has not changed.
 std::string note_of(const Unit& unit, const Options& before, const Command& setter, std::int64_t value) {
   if (options_behind(unit, before, setter, value).values == before.values) return {};
   return fmt::format("from now on it is reached with {}={}", setter.changes_option, value);

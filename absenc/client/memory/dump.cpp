@@ -19,7 +19,7 @@ namespace {
 constexpr std::string_view checksum_name = "checksum: ";
 constexpr std::string_view edited = "edited";
 
-/// The checksum of a dump: the CRC-16/IBM-3740 of the lines before it that are not ignored, each with one line feed.
+/// CRC-16/IBM-3740 of the significant lines, each with one line feed.
 class Checksum {
  public:
   void add(std::string_view line) {
@@ -36,8 +36,7 @@ class Checksum {
 
 std::string_view model_name(const Options& options) { return options.model != nullptr ? options.model->name : "none"; }
 
-// Returns the header lines of a dump, which must match the encoder: protocol and model; without a model also all
-// options.
+// These lines must match the encoder.
 std::vector<std::string> header(const Unit& unit, const Options& options) {
   std::vector<std::string> lines{fmt::format("protocol: {}", unit.id), fmt::format("model: {}", model_name(options))};
   if (options.model != nullptr) return lines;
@@ -103,8 +102,6 @@ class DumpParser {
     sum_.add(lines_.line);
   }
 
-  // Removes `name`, a number and the character `behind` from the front of `text`, and returns the number; nothing if
-  // `text` does not begin so.
   static std::optional<std::uint32_t> take(std::string_view& text, std::string_view name, char behind) {
     if (!text.starts_with(name) || text.substr(name.size()).find(behind) == std::string_view::npos) return std::nullopt;
     const std::string_view number = text.substr(name.size(), text.find(behind, name.size()) - name.size());

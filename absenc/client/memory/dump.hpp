@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads and writes dumps: text files with a copy of an encoder's memory, described in docs/dump-format.md.
+// Reads and writes dumps of an encoder's memory, which docs/dump-format.md describes.
 #pragma once
 
 #include <string>
@@ -11,14 +11,13 @@ namespace absenc::client {
 
 struct Dump {
   MemoryImage image;
-  // Whether the dump is known to be complete: it has a checksum line, which is right or states "edited".
+  // whether the dump has a right checksum, or states "edited"
   bool checked = false;
 };
 
 [[nodiscard]] std::string to_dump(const Unit& unit, const Options& options, const MemoryImage& image);
 
-/// Parses a dump and returns it. `name` is the file's name in messages. Throws Failure if the text is damaged, is from
-/// another kind of encoder, or has addresses that do not permit `access`.
+/// Parses a dump; `name` is the file's name in messages. Throws Failure.
 [[nodiscard]] Dump parse_dump(const std::string& name, std::string_view text, const Unit& unit, const Options& options,
                               MemoryAccess access);
 

@@ -21,7 +21,7 @@ struct ReadBytes final : FieldSink {
     if (field.info->role == Role::data) data.assign(field.bytes.begin(), field.bytes.end());
     if (field.info->role == Role::value) value = static_cast<std::uint32_t>(field.number);
   }
-  // Returns the words of `size` bytes each, with the low byte first, or the reported value if no bytes were reported.
+  // Returns words of `size` bytes, with the low byte first.
   [[nodiscard]] std::vector<std::uint32_t> words(std::size_t size) const {
     if (data.empty() && value) return {*value};
     std::vector<std::uint32_t> all;

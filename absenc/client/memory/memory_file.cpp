@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Format of the file: a first line with the kind of file; lines "protocol: tformat", "model: NAME", "size: BYTES"; then
-// lines with an address and bytes in hexadecimal: "0010: 00 5A ...". Empty lines and lines that begin with # are
-// ignored.
+// Format: the kind of file; lines "protocol: tformat", "model: NAME", "size: BYTES"; then lines "0010: 00 5A ...".
 #include "absenc/client/memory/memory_file.hpp"
 
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Stores the memory of a virtual encoder in a text file that people can edit. memory_file.cpp describes the format.
+// Stores the memory of a virtual encoder in a text file.
 #pragma once
 
 #include <optional>
@@ -16,9 +16,7 @@ class MemoryFile {
   /// Takes the path, which may be a symbolic link; opens nothing.
   MemoryFile(const std::string& path, std::string_view protocol, std::string_view model);
 
-  /// Fills `memory` from the file, or creates the file from `memory` if there is none, and locks the file. Throws
-  /// Failure, and changes neither memory nor file, if the file is of another kind, damaged, of another protocol, model
-  /// or size, locked by another emulator, or not writable.
+  /// Fills `memory` from the file, or creates the file. Throws Failure.
   void load(MutableBytes memory);
 
   /// Replaces the content of the loaded file atomically. Throws Failure.

@@ -7,13 +7,11 @@
 
 namespace absenc::client {
 
-/// A machine in front of a virtual encoder. Every change that a reply confirms is in the file, even if this process is
-/// killed. If saving fails, `next` throws Failure and the encoder sends no reply.
+/// A machine that saves a changed memory before the encoder's reply. `next` throws Failure.
 template <class Item>
 class MemorySaver final : public Machine<Item> {
  public:
-  /// Takes the machine on the line, which is `device` itself or a machine in front of it, and the file for the device's
-  /// memory.
+  /// Takes `device`, and the machine on its line, which may be `device` itself.
   MemorySaver(Machine<Item>& line, Device<Item>& device, MemoryFile& file)
       : line_(&line), device_(&device), file_(&file), saved_(device.memory_version()), finished_(saved_) {}
 
@@ -25,8 +23,7 @@ class MemorySaver final : public Machine<Item> {
     return step;
   }
 
-  /// Saves the memory if it changed since this function last saved it, and waits until it is on the disk. Throws
-  /// Failure.
+  /// Waits until the memory is on the disk. Throws Failure.
   void finish() {
     if (finished_ != device_->memory_version()) save(os::Durable::yes);
     finished_ = saved_;

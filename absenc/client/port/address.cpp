@@ -20,8 +20,7 @@ namespace absenc::client {
 
 namespace {
 
-// Applies a setting of a pulse wire. `what` is the end of the setting's name: "" for the wire, "_us" for the width of
-// the pulse, "_active" for its level.
+// `what` is the end of the setting's name: "" for the wire, "_us" or "_active".
 void set_pulse_wire(os::PulseWire& wire, std::string_view what, const OptionText& setting) {
   using Kind = os::PulseWire::Kind;
   constexpr std::string_view gpio = "gpio:";
@@ -40,8 +39,6 @@ void set_pulse_wire(os::PulseWire& wire, std::string_view what, const OptionText
   }
 }
 
-// Returns the command of this name. Throws UsageError if there is none, or if it changes the encoder or takes
-// arguments.
 const Command& reading_command(const Unit& unit, std::string_view name) {
   const Command& command = require_command(unit, name);
   if (command.changes_encoder || !command.arguments.empty()) {
@@ -134,8 +131,7 @@ void check_speed_limit(const EncoderAddress& uri) {
   }
 }
 
-// Applies all settings: the unit's options, among them the rate if the unit has an option for it, and then the link
-// parameters.
+// Options come first, because line settings follow from them.
 void take_settings(EncoderAddress& uri, std::span<const OptionText> settings) {
   std::vector<OptionText> options;
   std::vector<OptionText> of_link;
@@ -264,14 +260,12 @@ EncoderAddress parse_place(std::string_view address) {
   return uri;
 }
 
-// Returns whether the text may be a name of absenc.toml: it is not empty, has no ':' or '/', and is neither a protocol
-// nor "sim".
 bool is_name(std::string_view address) {
   return !address.empty() && address.find_first_of(":/") == std::string_view::npos && address != "sim" &&
          find_unit(address) == nullptr;
 }
 
-// Returns whether absenc.toml has an encoder of this name, which then has priority over a port of the same name.
+// A name in absenc.toml has priority over a port of the same name.
 bool is_in_settings_file(std::string_view name) {
   const std::optional<SettingsFile> file = load_settings_file();
   return file && std::any_of(file->encoders.begin(), file->encoders.end(),
@@ -298,9 +292,7 @@ void require_once(std::span<const OptionText> settings) {
   }
 }
 
-// Checks the last of `settings` after all others, which were checked before, so that the last one causes the error. For
-// sim:, also makes the virtual encoder, but only if the last one is no option, because the encoder needs all options
-// first.
+// The settings before the last one were checked before.
 void try_settings(EncoderAddress uri, std::span<const OptionText> settings) {
   take_settings(uri, settings);
   const bool options_are_set = find_link_parameter(settings.back().name) != nullptr;

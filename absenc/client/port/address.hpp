@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Parses the address of an encoder: tformat:/dev/ttyUSB0?model=23-bit&echo=on, tformat:tcp:host:4001,
-// ssi:spi:/dev/spidev0.0, raa38-can:can0, raa38-can:slcan:/dev/ttyACM0, sim:tformat, or a name of absenc.toml.
+// Parses the address of an encoder, as tformat:/dev/ttyUSB0?model=23-bit.
 #pragma once
 
 #include <array>
@@ -81,8 +80,7 @@ inline constexpr std::array<LinkParameter, 30> link_parameters{{
     {"seed", "N", "another series of faults", "sim"},
 }};
 
-/// Returns the option that a setting of this name sets; null if there is none. If a unit on a serial line has an option
-/// for the rate, `rate_setting` sets that option, whatever the option's name is.
+/// Returns the option that a setting of this name sets; null: none.
 [[nodiscard]] const Option* find_option(const Unit& unit, std::string_view name);
 
 /// Returns the link parameter of this name; null if there is none.
@@ -112,19 +110,17 @@ struct EncoderAddress {
   std::string written;  // address as the user wrote it, with all settings: "elbow?baud=57600"
 };
 
-/// Returns the speed limit of the encoder: the limit that the user set, otherwise that of host::speed_limit.
+/// Returns the user's speed limit, or else that of host::speed_limit.
 [[nodiscard]] host::SpeedLimit speed_limit(const EncoderAddress& uri);
 
-/// Returns the port with its settings, as `absenc identify` takes it, if the text names a port of this computer or of
-/// the network without a protocol; otherwise nothing.
+/// Returns a port that was written without a protocol; nothing: it is none.
 [[nodiscard]] std::optional<std::string> bare_port(std::string_view text);
 
-/// Parses an address and returns it. `settings` ("name=value") are appended to the text; both override the settings of
-/// absenc.toml. Throws UsageError, which names the error and, for an unknown name, a similar one if there is one.
+/// Appends `settings` ("name=value") to the address. Throws UsageError.
 [[nodiscard]] EncoderAddress parse_address(std::string_view text, std::span<const std::string> settings = {});
 
 class NamedEncoders;
-/// Parses the name of an encoder in `names`, the absenc.toml that was read before, and returns its address.
+/// Returns the address of a name; `names` is the content of absenc.toml.
 [[nodiscard]] EncoderAddress parse_address(std::string_view name, const NamedEncoders& names);
 
 /// Returns protocol and port of the address, without settings: "tformat:/dev/ttyUSB0".

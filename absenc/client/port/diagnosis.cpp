@@ -17,8 +17,6 @@ bool is_good(const Unit& unit, const Options& options, const Frame& request, con
 
 std::string bytes_text(std::size_t count) { return fmt::format("{} byte{}", count, count == 1 ? "" : "s"); }
 
-// Finds a good reply with the echo of the request before it, or with other bytes before or after it, or an echo without
-// a reply. All texts are empty if there is none of these.
 Diagnosis surrounded(const Unit& unit, const Options& options, const Frame& request, Bytes reply) {
   const Bytes sent = request.bytes;
   const bool echoed =
@@ -67,8 +65,6 @@ Diagnosis other_settings(const Unit& unit, const Options& options, const Frame& 
   return {};
 }
 
-// Returns the meaning of an error for this frame, in words. On clocked lines and CAN the text counts bits or data
-// bytes.
 std::string meaning(LinkKind link, Subject subject, Error error) {
   const std::string_view frame = link == LinkKind::clocked || link == LinkKind::can ? "frame"
                                  : subject == Subject::request                      ? "request"

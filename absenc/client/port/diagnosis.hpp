@@ -17,7 +17,7 @@ struct Diagnosis {
   std::string setting{};  // setting "NAME=VALUE" with which the reply would be good; "": there is none
 };
 
-/// Explains a bad reply: an echo, a good reply after or before other bytes, or a good reply of another model or option.
+/// Explains a bad reply, as by an echo, further bytes, or another model.
 [[nodiscard]] Diagnosis diagnose(const Unit& unit, const Options& options, const Frame& request, const Frame& reply);
 
 /// The frame of an exchange that an error is about.
@@ -26,13 +26,10 @@ enum class Subject : std::uint8_t { request, reply };
 /// Returns which frame an error of `decode` is about: the reply, or a bad or unanswered request.
 [[nodiscard]] Subject subject_of(const Unit& unit, const Options& options, const Frame& request, const Frame& reply);
 
-/// Returns the message about an error: "MEANING: DETAIL; FINDING", without empty parts. MEANING is that of the error
-/// for this frame and line. FINDING is left out if the detail already names its setting.
+/// Returns "MEANING: DETAIL; FINDING" or a part of it.
 [[nodiscard]] std::string describe(LinkKind link, Subject subject, Error error, std::string_view detail = {},
                                    const Diagnosis& diagnosis = {});
 
-/// Returns a sentence that explains a bad or missing reply, with the unit's explanation of the error and with advice if
-/// there are any.
 [[nodiscard]] std::string sentence_for(const Unit& unit, const Options& options, Error error, const Frame& request,
                                        const Frame& reply);
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that messages about failed exchanges state each fact only once, and ascribe a wrong length to the frame that
-// has it.
+// Checks the messages about failed exchanges.
 #include "absenc/client/port/diagnosis.hpp"
 
 #include <gtest/gtest.h>
@@ -62,8 +61,6 @@ std::vector<const Unit*> units_of_bytes() {
   return units;
 }
 
-// Checks the messages about encoders that are set up differently from their host, with each choice of each option: a
-// setting that the diagnosis finds is named once, and no clause is repeated.
 TEST(Diagnosis, ASettingThatWouldHelpIsNamedOnce) {
   std::set<std::string> named;
   for (const Unit* unit : units_of_bytes()) {
@@ -90,7 +87,6 @@ TEST(Diagnosis, ASettingThatWouldHelpIsNamedOnce) {
   EXPECT_GE(named.size(), 2u);
 }
 
-// Checks the messages about exchanges on a line with each kind of fault: no message repeats a clause.
 TEST(Diagnosis, AMessageSaysNothingTwice) {
   unsigned messages = 0;
   for (const Unit* unit : units_of_bytes()) {
@@ -135,15 +131,13 @@ std::vector<std::string> words_of(std::string_view text) {
   return {std::istream_iterator<std::string>(in), {}};
 }
 
-// Returns the message about an exchange whose error is a wrong length; "" if it has another error or none.
+// Returns "" if the error is not a wrong length.
 std::string said_of(const Unit& unit, const Options& options, const WireFrame& request, const WireFrame& reply) {
   NoFields ignored;
   const Error error = unit.decode(options, request.frame(), reply.frame(), ignored);
   return error == Error::wrong_length ? sentence_for(unit, options, error, request.frame(), reply.frame()) : "";
 }
 
-// Shortens the reply of each good vector by a byte or a bit, or the request of a vector without a reply. A message
-// about a wrong length must ascribe it to this frame.
 TEST(FrameWords, WrongLengthIsSaidOfTheFrameThatHasIt) {
   std::set<LinkKind> links;
   for (const Unit* const unit : all_units()) {

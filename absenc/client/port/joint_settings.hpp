@@ -9,8 +9,7 @@
 
 namespace absenc::client {
 
-/// Applies the setting to `joint` if it is a joint setting; otherwise returns false. Throws UsageError for a wrong
-/// value.
+/// Returns false if it is no joint setting. Throws UsageError.
 bool set_joint(Joint& joint, const OptionText& setting);
 
 /// Throws UsageError if a setting of linear encoders is given to a rotary one, or the reverse.

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The journal of changes: one line for each changing command that was sent to an encoder other than sim:, except by
-// conformance tests. Fields are separated by tabs: time (UTC), encoder, what, old value, new value, result, command
-// that restores the old value. An unknown value is empty.
+// The journal of changes of encoders. Tabs separate the fields of a line: time (UTC), encoder, what, old value, new
+// value, result, command that restores the old value.
 #pragma once
 
 #include <cstddef>
@@ -21,12 +20,10 @@ struct JournalEntry {
   std::string put_back{};  // command that restores the old value; "": there is none
 };
 
-/// Returns the path of the journal: $ABSENC_CHANGES, or else changes.tsv in $STATE_DIRECTORY, $XDG_STATE_HOME/absenc or
-/// ~/.local/state/absenc. Returns "" if ABSENC_CHANGES is "none", or if none of these is known.
+/// Returns the path of the journal; "" if there is none.
 [[nodiscard]] std::string journal_path();
 
-/// Appends an entry to the journal as one line, with a single write. Returns "", or a sentence with the reason of a
-/// failure. Throws nothing, because the change has already been made.
+/// Returns "" or the reason of a failure.
 [[nodiscard]] std::string append_to_journal(const std::string& path, JournalEntry entry);
 
 struct Journal {

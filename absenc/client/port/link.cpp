@@ -37,8 +37,7 @@ ExtraWires extra_wires(const EncoderAddress& uri) {
   return uri.unit->extra_wires == nullptr ? ExtraWires{} : uri.unit->extra_wires(uri.options);
 }
 
-// Returns the settings of the serial line. A port that did not exist when its address was parsed may be a
-// pseudo-terminal, which needs no rate.
+// A port that did not exist when its address was parsed may be a pseudo-terminal.
 LineSettings line_of_serial(const EncoderAddress& uri) {
   if (uri.line.rate != 0 || os::is_pseudo_terminal(uri.path)) return uri.line.with_some_rate();
   throw UsageError(
@@ -117,9 +116,7 @@ Link open_slcan(const EncoderAddress& uri) {
   return link;
 }
 
-// Returns the CAN log file of a link. After a loss of the port the log continues in the same file. Throws os::Failure
-// if another link uses the file, because a file that exists is not created again. Takes no
-// lock: connect_link calls this under its own, and other callers of open_link must not run at the same time.
+// After a loss of the port the log continues in the same file. Takes no lock.
 std::shared_ptr<os::LineFile> log_file(const std::string& path) {
   static std::map<std::string, std::shared_ptr<os::LineFile>> files;
   std::shared_ptr<os::LineFile>& file = files[path];
@@ -135,7 +132,7 @@ void keep_log(Link& link, const EncoderAddress& uri) {
   link.owner = std::move(log);
 }
 
-// Opens a virtual encoder. Its virtual time follows the real clock, so that a moving shaft moves.
+// Virtual time follows the real clock, so that a moving shaft moves.
 Link open_sim(const EncoderAddress& uri) {
   Link link;
   link.place = "the virtual encoder";

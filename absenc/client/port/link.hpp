@@ -25,8 +25,7 @@ struct Link {
 
 /// Opens the port of the address and returns it. Throws os::Failure, UsageError.
 [[nodiscard]] Link open_link(const EncoderAddress& uri);
-/// Opens a serial port for receiving only, or a TCP connection, and returns it with `bytes` set. Throws os::Failure,
-/// UsageError.
+/// Opens a port for receiving only. Throws os::Failure, UsageError.
 [[nodiscard]] Link open_receiving(const EncoderAddress& uri);
 /// Type of open_link, and of functions that tests use instead.
 using OpenLink = std::function<Link(const EncoderAddress&)>;

@@ -19,7 +19,7 @@ namespace {
 
 using Names = std::vector<std::string_view>;
 
-// name of the only setting of `serve` that an encoder's section may contain: its readings per second
+// readings per second of `serve`
 constexpr std::string_view rate_name = "rate_hz";
 
 void add_options(Names& names, const Unit& unit) {
@@ -62,7 +62,6 @@ void check_bus(const FileSection& bus) {
   if (bus.find("port") == nullptr) refuse(bus.place, fmt::format("the bus {} has no port", bus.name));
 }
 
-// Refuses a name that is a protocol or "sim", is empty, begins with '-', or has ':', '/' or '?'.
 void check_name(const FileSection& encoder) {
   if (encoder.name == "sim" || find_unit(encoder.name) != nullptr) {
     refuse(encoder.place, fmt::format("\"{}\" is a protocol: give the encoder another name", encoder.name));

@@ -25,9 +25,7 @@ struct NamedEncoder {
 /// The encoders of an absenc.toml that was checked, and is read only once for all encoders.
 class NamedEncoders {
  public:
-  /// Takes the content of a file and checks the names of settings, protocols and buses in all sections but
-  /// [serve.NAME]. Other values are checked when they are used. Throws UsageError, which names the position in the
-  /// file.
+  /// Checks names in the file. Throws UsageError.
   explicit NamedEncoders(SettingsFile file);
   NamedEncoders(NamedEncoders&&) noexcept = default;
   NamedEncoders& operator=(NamedEncoders&&) noexcept = default;
@@ -36,8 +34,7 @@ class NamedEncoders {
   ~NamedEncoders() = default;
 
   [[nodiscard]] const SettingsFile& file() const { return file_; }
-  /// Returns the encoder of this name. Throws UsageError if its rate_hz is wrong, or if there is none; then the text
-  /// suggests a similar name or lists all.
+  /// Throws UsageError.
   [[nodiscard]] NamedEncoder require(std::string_view name) const;
 
  private:
@@ -51,10 +48,10 @@ class NamedEncoders {
   std::unordered_map<std::string_view, std::size_t> on_bus_;  // number of encoders on each bus, by the bus's name
 };
 
-/// Reads and checks absenc.toml. Throws UsageError, also if there is no file; then `purpose` states why one is needed.
+/// Reads absenc.toml; `purpose` says why it is needed. Throws UsageError.
 [[nodiscard]] NamedEncoders require_names(std::string_view purpose);
 
-/// Runs `work` and returns its result. If `work` throws a UsageError, throws one whose text begins with `place`.
+/// Puts `place` before the text of a UsageError.
 template <class Work>
 auto at(const std::string& place, const Work& work) {
   try {

@@ -16,16 +16,14 @@ struct FoundPort {
   std::string_view kind{};  // kind of the port: "serial", "can" or "spi"
   os::ListedPort serial{};  // details of a serial port; empty for other kinds
 
-  /// Returns the command that the user can run next, "absenc identify /dev/ttyUSB0"; "" for a port that may not be
-  /// opened, is in use, or belongs to a mobile modem.
+  /// Returns for example "absenc identify /dev/ttyUSB0"; may be "".
   [[nodiscard]] std::string next_command() const;
 };
 
-/// Returns all ports of this computer without opening any, because opening would reset some boards.
+/// Opens no port, because opening would reset some boards.
 [[nodiscard]] std::vector<FoundPort> ports();
 
-/// Converts the port to {"port","kind"}; for a serial port also "lasting_name","maker","adapter","serial_number",
-/// "chip","driver","latency_timer_ms","highest_rate","may_open","refusal","in_use_by". Unknown values are null.
+/// Returns a JSON object, in which unknown values are null.
 [[nodiscard]] Json to_json(const FoundPort& port);
 
 }  // namespace absenc::client

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs the commands of a unit on a port and keeps the last exchange as it was on the line. All times are those of the
-// port's clock.
+// Runs commands of a unit on a port and keeps the last exchange.
 #pragma once
 
 #include <algorithm>
@@ -32,7 +31,7 @@ struct Attempted {
   bool heard = false;                    // whether anything was received after the last request, even only an echo
   bool answered = false;                 // whether something other than an echo was received
   std::uint64_t unanswered = 0;          // number of earlier requests without reply; the last request is not counted
-  // number of damaged frames of a stream since the previous result; `error` may report one of them
+  // number of damaged frames since the previous result
   std::uint64_t discarded = 0;
   Time answered_after{};  // time from the end of the request to the beginning of the reply
   Time limit{};           // limit of `answered_after` by protocol and connection; 0: there is no limit
@@ -48,8 +47,7 @@ struct Attempted {
   [[nodiscard]] bool is_late() const { return answered && limit > Time{} && answered_after > limit; }
 };
 
-/// Returns a request and its reply as an exchange. `clocks` is the number of clocks of a clocked link. Of several CAN
-/// frames in `reply` the last one counts as the reply.
+/// Returns the exchange; of several CAN frames the last is the reply.
 template <class Item>
 [[nodiscard]] capture::ObservedExchange observed_exchange(std::span<const Item> request, std::span<const Item> reply,
                                                           std::size_t clocks) {
@@ -99,7 +97,7 @@ class Runner {
  public:
   static constexpr bool is_can = std::is_same_v<Item, CanFrame>;
 
-  /// Takes the encoder's address, and how often at most the session runs a command that may be repeated.
+  /// Takes how often a command that may be repeated runs at most.
   explicit Runner(const EncoderAddress& address, unsigned attempts = 1)
       : unit_(*address.unit),
         options_(address.options),
@@ -120,7 +118,7 @@ class Runner {
     latency_ = latency;
   }
 
-  // ---- Hooks of `run` and `once`; empty: not called. An exception of a hook ends the conversation.
+  // ---- Hooks; empty: not called
 
   std::function<void(std::vector<Item>& request)> edit{};  // hook that changes each request before it is sent
   // hook that sees, and may change, each step of the conversation
@@ -132,7 +130,7 @@ class Runner {
 
   // ---- Commands
 
-  /// Starts a new session, which forgets earlier requests: it neither waits for their replies nor discards these.
+  /// Starts a session that does not wait for replies to earlier requests.
   void start_again(unsigned attempts = 1) {
     if (session_) {
       echo_ = session_->echo().mode();
@@ -148,12 +146,10 @@ class Runner {
     session_->set_options(options);
   }
 
-  /// Calls `use(session)`, which runs one command and returns its conversation, and returns that conversation; null if
-  /// the unit cannot run the command.
+  /// Returns null if the unit cannot run the command.
   template <class Use>
   const Conversation<Item>* converse(const Use& use) {
-    // If the command before sent no request, the stored exchange is an older one, whose bytes must not be counted
-    // again.
+    // Without a request, the stored exchange is an older one.
     if (requests_before_ == port_.requests) port_.last.clear();
     requests_before_ = port_.requests;
     received_before_ = port_.last.received.size();
@@ -170,8 +166,7 @@ class Runner {
     answered_ = ended != nullptr && ended->error() == Error::none ? port_.last.received.size() : 0;
     return ended;
   }
-  /// Runs one command to its end and returns its conversation; null if the unit cannot run it. A streaming conversation
-  /// continues to its next result.
+  /// Returns null if the unit cannot run the command.
   const Conversation<Item>* run(const Command& command, Arguments arguments = {}) {
     return converse([&](host::Session<Item>& session) { return session.next(command, arguments); });
   }
@@ -200,8 +195,6 @@ class Runner {
     return one;
   }
 
-  /// Calls `attempt()` again and again and adds the results, of type Attempted, to `into`. Ends at the limits of
-  /// `series`.
   template <class Attempt>
   void repeat(const Series& series, const Attempt& attempt, std::vector<Attempted>& into) {
     const Time begin = port_.now();
@@ -238,8 +231,7 @@ class Runner {
 
   // ---- Listening without a request
 
-  /// Listens for `time` and adds received items to the last exchange. `on_items(items)` returns false to stop
-  /// listening.
+  /// Listens until `on_items(items)` returns false, or for `time`.
   template <class OnItems>
   void listen(Time time, const OnItems& on_items) {
     const Step<Item> step{.at = port_.now() + time};
@@ -252,8 +244,7 @@ class Runner {
   void listen(Time time) {
     listen(time, [](std::span<const Item>) { return true; });
   }
-  /// Waits until nothing has been received for `quiet`; begins no new wait once `longest` has passed. Returns whether
-  /// anything was received.
+  /// Waits for a silence of `quiet`, or for about `longest`. Returns whether anything came.
   bool settle(Time quiet, Time longest) {
     bool heard = false;
     const Time end = port_.now() + longest;
@@ -271,8 +262,6 @@ class Runner {
 
   /// Returns the last exchange, with what was received since its request.
   [[nodiscard]] const LineExchange<Item>& last() const { return port_.last; }
-  /// Returns the number of late replies that arrived before the next request, or the number that sessions dropped,
-  /// whichever is greater.
   [[nodiscard]] std::uint64_t late() const {
     const std::uint64_t seen = late_ + (lateness_of(last()) != Time{} ? 1 : 0);
     return std::max(seen, late_before_ + session_->counters().late);
@@ -280,7 +269,7 @@ class Runner {
   /// Returns the longest time between a request and its late reply; 0 if no reply was late.
   [[nodiscard]] Time lateness() const { return std::max({lateness_, lateness_of(last()), session_->lateness()}); }
 
-  /// Returns how often a command ended well and further bytes arrived before the next request; 0 on a CAN bus.
+  /// Returns how many good replies had further bytes after them.
   [[nodiscard]] std::uint64_t overfull() const { return overfull_; }
   /// Returns the greatest number of further items that followed a good reply.
   [[nodiscard]] std::size_t most_behind() const { return most_behind_; }
@@ -344,7 +333,7 @@ class Runner {
     std::vector<Item> request_;
   };
 
-  // Stores the frame of this result only: the bytes of a stream may hold several frames, each with a result.
+  // The bytes of a stream may hold several frames, each with a result.
   static void keep_frame(Attempted& one, const Conversation<Item>& ended) {
     one.heard = one.answered = one.error != Error::timeout;
     if constexpr (!is_can) {
@@ -368,18 +357,15 @@ class Runner {
     open_ = true;
     opened_at_ = port_.requests;
   }
-  // Passes the open exchange to `on_exchange`. If a hook threw an exception before the request was sent, the last
-  // exchange is an earlier one, which was passed already.
+  // Without a request since, the last exchange was passed already.
   void close_exchange() {
     if (std::exchange(open_, false) && opened_at_ != port_.requests && on_exchange) on_exchange(last());
   }
-  // Stores the length of the echo in the last exchange. A new session has not seen that echo, so the greater length
-  // counts.
+  // A new session has not seen that echo, so the greater length counts.
   void keep_echo() {
     if constexpr (!is_can) port_.last.echo = std::max(port_.last.echo, session_->echo().echoed());
   }
-  // Returns the time between request and reply if the reply was late; otherwise 0. Returns 0 on CAN, where the frame
-  // may be from another node.
+  // Returns 0 if the reply was not late, and on CAN, where it may be from another node.
   [[nodiscard]] Time lateness_of(const LineExchange<Item>& exchange) const {
     if (is_can || exchange.answer == Time{} || exchange.reply().empty()) return {};
     const Time after = exchange.answered_after(character_);
@@ -404,8 +390,7 @@ class Runner {
   std::uint64_t late_ = 0;         // number of late replies before the last exchange
   std::uint64_t late_before_ = 0;  // number of late replies that earlier sessions discarded
   Time lateness_{};
-  std::size_t answered_ = 0;  // number of items received when the last command ended well; 0: it failed, or a new
-                              // request followed
+  std::size_t answered_ = 0;  // number of items when the last command ended well; else 0
   std::uint64_t overfull_ = 0;
   std::size_t most_behind_ = 0;
   std::vector<Item> overfull_example_;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs exchanges in virtual time and checks how the runner classifies echo, late replies and damaged frames of a
-// stream. Readings, doctor, conform and identify depend on this.
+// Checks how the runner classifies echo, late replies and damaged frames of a stream.
 #include "absenc/client/port/runner.hpp"
 
 #include <fmt/format.h>
@@ -55,7 +54,7 @@ TEST(Runner, SilenceIsATimeoutInEveryUnit) {
 
 // ---- Echo
 
-// The replies of T-Format begin with the same bytes as its requests, so an echo resembles the beginning of a reply.
+// An echo of T-Format resembles the beginning of a reply.
 TEST(Runner, TakesTheEchoFromTheFirstExchangeOn) {
   for (const bool echo : {false, true}) {
     for (const char* const mode : {"auto", "on", "off"}) {
@@ -128,7 +127,7 @@ TEST(Runner, AReplyThatBeginsAfterItsLimitIsLate) {
   EXPECT_LT(bench.runner.lateness(), 21ms);
 }
 
-// The host waits for a quiet line before its next request, and receives the late reply in that time.
+// The host waits for a quiet line, and receives the late reply in that time.
 TEST(Runner, CountsALateReplyThatComesBeforeTheNextRequest) {
   Bench bench(delayed(120us));
   for (int i = 0; i < 10; ++i) EXPECT_EQ(bench.once().error, Error::timeout);
@@ -167,8 +166,6 @@ TEST(Runner, EndsByTheClockOfItsPort) {
 
 // ---- Streams
 
-/// Returns an address at which the unit's encoder sends unsolicited frames; nothing if the unit has no such mode, or no
-/// virtual encoder has it.
 std::optional<EncoderAddress> streaming(const Unit& unit) {
   if (unit.streams == nullptr) return {};
   std::vector<std::vector<OptionText>> settings{{}};
@@ -185,8 +182,7 @@ std::optional<EncoderAddress> streaming(const Unit& unit) {
       address.options = options;
       address.line = line_settings(unit, options);
       if (Bench(address).once().error == Error::none) return address;
-      // Some encoders send good frames only with another resolution: tries 16 bits, or the option's maximum if that is
-      // less.
+      // Some encoders send good frames only with another resolution.
       for (const std::size_t index : capture::resolution_options(unit)) {
         address.options.values[index] = std::min<std::int64_t>(unit.options[index].maximum, 16);
       }
@@ -212,16 +208,14 @@ TEST_P(Streams, AGoodOneHasNoDamage) {
   EXPECT_EQ(bench.runner.session().counters().discarded, 0u);
 }
 
-// Synchronisation with the stream needs two adjacent good frames; a single good frame is discarded with the damaged
-// ones. So the runner may count up to four times as many frames as were damaged.
+// A single good frame between damaged ones is discarded, too.
 TEST_P(Streams, EachDamagedFrameIsCounted) {
   for (const char* const fault : {"corrupt=0.02", "corrupt=0.3", "truncate=0.1", "drop=0.1"}) {
     Bench bench(with_faults(address, {fault}));
     std::uint64_t discarded = 0;
     for (int i = 0; i < 500; ++i) discarded += bench.once().discarded;
     const std::uint64_t damaged = bench.link.device->damaged_replies().value();
-    // The counts may differ by the last frames, which are still in transit, and by truncated frames, two of which may
-    // be as long as one.
+    // The last frames may be in transit, and two truncated frames may be as long as one.
     EXPECT_GE((discarded + 2) * 5, damaged * 4) << fault;
     EXPECT_LE(discarded, 4 * damaged) << fault;
     EXPECT_EQ(bench.runner.session().counters().discarded, discarded);

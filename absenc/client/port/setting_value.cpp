@@ -17,8 +17,7 @@ namespace absenc::client {
 
 namespace {
 
-// Parses `text`, the setting's value or a part of it, as a number up to `most`: above 0 with `is_above_zero`, otherwise
-// from -`most`. Throws UsageError.
+// `text` is the setting's value or a part of it.
 double real_in(const OptionText& setting, std::string_view text, double most, bool is_above_zero) {
   const std::optional<double> value = parse_real(text);
   if (value && std::abs(*value) <= most && (!is_above_zero || *value > 0)) return *value;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Parses values of settings behind an encoder's address. Each function throws UsageError, which states what the value
-// must be.
+// Parses values of an encoder's settings. Each function throws UsageError.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +15,7 @@ namespace absenc::client {
 [[nodiscard]] std::int64_t number_of(const OptionText& setting, std::int64_t minimum, std::int64_t maximum);
 /// Returns the value as a number from -`most` to `most`; with `is_above_zero` above 0.
 [[nodiscard]] double real_of(const OptionText& setting, double most, bool is_above_zero);
-/// Returns a ratio, "100", "12.5" or "50/3", as a number; both parts must be above 0 and at most a million.
+/// Parses a ratio, as "12.5" or "50/3".
 [[nodiscard]] double ratio_of(const OptionText& setting);
 /// Returns the index of the word that equals the value.
 [[nodiscard]] std::size_t choice_of(const OptionText& setting, std::initializer_list<std::string_view> words);

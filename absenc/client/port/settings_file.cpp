@@ -18,7 +18,6 @@ namespace absenc::client {
 
 namespace {
 
-// Settings whose value must be a text, such as a name or a path; a value of another type is refused as a mistake.
 constexpr std::array<std::string_view, 4> text_only{"protocol", "model", "bus", "port"};
 
 constexpr const char* variable = "ABSENC_CONFIG";
@@ -42,8 +41,7 @@ std::string_view type_of(const toml::node& node) {
   }
 }
 
-// Returns the entries of a table in the order of the file, so that the first error is reported first. toml++ sorts them
-// by name.
+// The first error of the file is reported first; toml++ sorts by name.
 std::vector<std::pair<const toml::key*, const toml::node*>> in_file_order(const toml::table& table) {
   std::vector<std::pair<const toml::key*, const toml::node*>> entries;
   for (const auto& [key, node] : table) entries.emplace_back(&key, &node);
@@ -132,8 +130,6 @@ class SettingsFileReader {
   std::string path_;
 };
 
-// Returns the index of the last closing quote of the string that begins at `at`, or of the line feed that ends an
-// unclosed string of one line; otherwise the length of the text.
 std::size_t end_of_string(std::string_view text, std::size_t at) {
   const char quote = text[at];
   const bool lines = text.substr(at).starts_with(std::string(3, quote));
@@ -150,8 +146,7 @@ std::size_t end_of_string(std::string_view text, std::size_t at) {
   return text.size();
 }
 
-// Refuses a file that is nested more than 16 deep, because toml++ calls itself once for each level; absenc.toml needs
-// only a list in [encoder.NAME]. Throws UsageError.
+// Refuses deep nesting, because toml++ calls itself once for each level.
 void check_depth(std::string_view text, const SettingsFileReader& reader) {
   constexpr std::size_t deepest = 16;
   std::size_t brackets = 0;

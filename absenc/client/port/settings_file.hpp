@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads absenc.toml into data: the names of encoders and buses, with their settings. Only settings_file.cpp includes
-// toml++.
+// Reads absenc.toml into data. Only settings_file.cpp includes toml++.
 #pragma once
 
 #include <optional>
@@ -35,17 +34,13 @@ struct SettingsFile {
   std::vector<FileSection> services;  // the sections [serve.NAME], in the order of the file
 };
 
-/// Parses the text of a file and returns its sections. Checks syntax, sections and types, but not the settings in the
-/// sections. Throws UsageError, whose text begins with the position in the file.
+/// Throws UsageError.
 [[nodiscard]] SettingsFile parse_settings_file(std::string_view text, const std::string& path);
 
-/// Returns the paths where absenc.toml is searched, in order of priority: only the file of ABSENC_CONFIG if that is set
-/// and not empty; otherwise the working directory and the user's configuration directory, if that is known.
+/// Returns the paths in order of priority.
 [[nodiscard]] std::vector<std::string> settings_file_paths();
 
-/// Reads the first absenc.toml that exists; returns nothing if there is none. Throws UsageError, also if the file of
-/// ABSENC_CONFIG is missing, or if an existing file cannot be read, is a broken link, or is a FIFO or socket: such a
-/// file is never skipped.
+/// Reads the first file that exists; nothing: there is none. Throws UsageError.
 [[nodiscard]] std::optional<SettingsFile> load_settings_file();
 
 }  // namespace absenc::client

@@ -29,7 +29,6 @@ std::string refusal(std::string_view text) {
   return "accepted";
 }
 
-// Returns the error of a file that has a valid encoder and then `line`; "accepted" if there is none.
 std::string refusal_of(std::string_view line) {
   return refusal("[encoder.elbow]\nprotocol = \"tformat\"\nport = \"sim\"\n" + std::string(line));
 }

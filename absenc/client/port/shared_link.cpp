@@ -22,7 +22,7 @@ fs::path device(const std::string& path) {
   return error ? fs::path(path) : canonical;
 }
 
-// Returns a key that is equal for encoders on the same port; "" for a virtual encoder, which has a port of its own.
+// Returns "" for a virtual encoder.
 std::string place_key(const EncoderAddress& one) {
   const std::string_view place = port_kind_names[static_cast<std::size_t>(one.port_kind)];
   switch (one.port_kind) {
@@ -118,7 +118,7 @@ void require_different(std::span<const EncoderAddress> encoders, std::span<const
   }
 }
 
-// Opens the port under the lock, so that encoders that reconnect at the same time open a shared port only once.
+// Holds the lock, so that a shared port is opened only once.
 std::shared_ptr<SharedLink> connect_link(const EncoderAddress& uri, const OpenLink& open) {
   Registry& all = registry();
   const std::lock_guard lock(all.mutex);

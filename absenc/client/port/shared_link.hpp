@@ -18,8 +18,7 @@
 
 namespace absenc::client {
 
-/// A fair lock, granted in the order of requests. With a mutex, the thread that has just released it would often get it
-/// again, and the other threads would starve.
+/// A fair lock, granted in the order of requests.
 class Turns {
  public:
   void lock() {
@@ -42,14 +41,11 @@ class Turns {
   std::uint64_t current_ = 0;
 };
 
-/// An open port, which several encoders can share: only one conversation uses the line at a time.
 class SharedLink {
  public:
   explicit SharedLink(Link link) : link_(std::move(link)) {}
 
-  /// Runs `work`, one conversation, with exclusive use of the line, and returns its result. If `work` throws an
-  /// os::Failure, the port counts as lost: it is closed, and every later call throws an os::Failure of the same kind
-  /// and text.
+  /// Has exclusive use of the line. An os::Failure of `work` closes the port.
   template <class Work>
   auto take_turn(const Work& work) {
     const std::lock_guard turn(turns_);
@@ -67,7 +63,7 @@ class SharedLink {
 
   [[nodiscard]] const Link& link() const { return link_; }
 
-  /// Returns the state of late replies on this line. Only a conversation that has the line may use it.
+  /// Returns state that only a conversation that has the line may use.
   template <class Item>
   [[nodiscard]] host::ReplyGuard<Item>& guard() {
     if constexpr (std::is_same_v<Item, CanFrame>) {
@@ -84,7 +80,7 @@ class SharedLink {
   host::ReplyGuard<std::uint8_t> byte_guard_;
   host::ReplyGuard<CanFrame> frame_guard_;
   Turns turns_;
-  // The data of the exception that reported the loss, because threads must not share an exception object.
+  // Threads must not share an exception object.
   struct Loss {
     os::Failure::Kind kind;
     std::string sentence;
@@ -93,16 +89,13 @@ class SharedLink {
   std::optional<Loss> loss_;
 };
 
-/// Returns whether both encoders are on the same line; false for SPI and sim:, whose ports are not shared. Throws
-/// UsageError if they are on the same line, but need different settings of it.
+/// Throws UsageError for different settings of a shared port.
 [[nodiscard]] bool share_line(const EncoderAddress& one, const EncoderAddress& other);
 
-/// Checks that encoders can be read at the same time. Throws UsageError if two are the same encoder or on the same SPI
-/// device, or cannot share a line.
+/// Throws UsageError if the encoders cannot be read at the same time.
 void require_different(std::span<const EncoderAddress> encoders, std::span<const std::string> names);
 
-/// Returns a link to the encoder: the open link of the same line if there is one, otherwise a new one. Throws
-/// os::Failure, UsageError.
+/// Returns the open link of the same line, if any. Throws os::Failure, UsageError.
 [[nodiscard]] std::shared_ptr<SharedLink> connect_link(const EncoderAddress& uri, const OpenLink& open = open_link);
 
 }  // namespace absenc::client

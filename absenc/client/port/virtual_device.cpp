@@ -19,15 +19,13 @@ std::uint64_t checked(std::string_view name, std::optional<std::int64_t> value, 
   if (!value) return 0;
   if (bits == 0) throw UsageError(fmt::format("{} cannot be set: this encoder has no such position", name));
   const std::uint64_t low = low_mask(bits) & static_cast<std::uint64_t>(*value);
-  // Accepts negative turns as a number with a sign, as the encoder reports them, or as the bits on the line.
+  // Accepts negative turns with a sign, or as the bits on the line.
   if (low == static_cast<std::uint64_t>(*value) || (has_sign && with_sign(low, bits) == *value)) return low;
   const std::int64_t minimum = has_sign ? with_sign(std::uint64_t{1} << (bits - 1), bits) : 0;
   throw UsageError(fmt::format("{} is {}, but must be from {} to {}: it has {} bits{}", name, *value, minimum,
                                low_mask(has_sign ? bits - 1 : bits), bits, has_sign ? ", the highest its sign" : ""));
 }
 
-// Returns the position of the shaft (core/shaft.hpp) at which the encoder reports the singleturn and multiturn values
-// of the settings.
 std::int64_t start_position(const Unit& unit, const Options& options, const DeviceSettings& settings) {
   const Resolution resolution = unit.resolution(options);
   const std::uint64_t counts = checked("singleturn", settings.singleturn, resolution.singleturn_bits, false);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual encoder, made from the user's settings: shaft, starting position, alarms and faults, and the unit's device.
+// A virtual encoder, made from the user's settings.
 #pragma once
 
 #include <cstddef>
@@ -41,25 +41,24 @@ class VirtualDevice {
   VirtualDevice(const VirtualDevice&) = delete;
   VirtualDevice& operator=(const VirtualDevice&) = delete;
 
-  /// Sets the conditions, switches the encoder on, raises the alarms, and starts the motion of the shaft at `now`.
+  /// Starts the motion of the shaft at `now`.
   void power_on(Time now);
 
-  // ---- The following functions may only be called by the thread that runs the encoder's machine.
+  // ---- Only the thread of the encoder's machine may call these functions.
 
   [[nodiscard]] const Options& options() const { return options_; }
   [[nodiscard]] bool is_on() const { return is_on_; }
-  /// Switches the encoder on; does nothing if it is on. With `real` it needs the start-up time of the document.
+  /// Switches on; with `real` the encoder needs the start-up time of the document.
   void switch_on(Time now, bool real);
   void switch_off(Time now);
   /// Raise or lower alarms, given as bits of the unit's alarms.
   void raise_alarms(std::uint32_t bits);
   void lower_alarms(std::uint32_t bits);
-  /// Sets a condition at the time `now`. `index` is its index among the unit's conditions; `value` must be within its
-  /// range.
+  /// Sets a condition to `value`, which must be in its range.
   void set_condition(std::size_t index, std::int64_t value, Time now);
   [[nodiscard]] std::int64_t condition(std::size_t index) const { return conditions_[index]; }
 
-  /// Sets the object that counts how often rules are checked and broken, which must outlive the device; null: none.
+  /// Sets the counter of rules, which must outlive the device; null: none.
   void watch_rules(RuleWatch* watch);
 
   /// Sets the rates of all faults from now on. Requires `faults_may_come`, or faults at the start.
@@ -67,13 +66,12 @@ class VirtualDevice {
   [[nodiscard]] const sim::FaultRates& fault_rates() const { return rates_; }
 
   [[nodiscard]] const Any<Device>& device() const { return device_; }
-  /// Return the machine on the line, the device or the device with its faults, for bytes or frames; null for the other
-  /// kind.
+  /// Return the machine on the line; null for the other kind.
   [[nodiscard]] Machine<std::uint8_t>* bytes() const;
   [[nodiscard]] Machine<CanFrame>* frames() const;
   /// Returns how often each fault was injected; null if faults were never enabled.
   [[nodiscard]] const sim::FaultCounts* faults() const;
-  /// Returns the number of replies with at least one fault; nothing for CAN, or if faults were never enabled.
+  /// Returns nothing for CAN, or without faults.
   [[nodiscard]] std::optional<std::uint64_t> damaged_replies() const;
 
  private:

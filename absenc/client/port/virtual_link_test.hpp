@@ -15,8 +15,6 @@
 
 namespace absenc::client {
 
-/// A virtual clock for ports that are opened one after the other, as in `identify`. It advances only while a port
-/// waits.
 struct VirtualClock {
   [[nodiscard]] sim::RealTime real_time() {
     return {.now = [this] { return time; }, .sleep_until = [this](Time until) { time = std::max(time, until); }};
@@ -28,15 +26,14 @@ struct VirtualClock {
 struct VirtualPort {
   bool echo = false;                      // whether the adapter echoes requests
   std::optional<std::uint64_t> pauses{};  // seed of random delays before each request; nothing: no delays
-  // fault rates of a line that carries whole frames, which is faster than a line of bits, but has no echo; without
-  // a value the line carries bits and has no faults
+  // fault rates of a line of whole frames; without a value it carries bits
   std::optional<sim::RoughRates> rough{};
   std::uint64_t seed = 1;         // seed of the faults of `rough`
   VirtualClock* clock = nullptr;  // clock of the port; null: time begins with the link and jumps from event to event
   std::uint32_t rate = 0;         // rate of the host's end in bits per second; 0: that of the encoder
 };
 
-/// A port that delays a transfer by a random time of up to 0.4 ms, unless its step names a later time.
+/// A port that delays transfers at random.
 template <class Item>
 class UnevenPort final : public Port<Item> {
  public:
@@ -44,7 +41,7 @@ class UnevenPort final : public Port<Item> {
   Time now() override { return port_->now(); }
   void begin(const Step<Item>& step) override {
     Step<Item> later = step;
-    // Keeps a time that the step names, because the pause before it may have a meaning, as inside a procedure.
+    // A time that the step names may have a meaning, as inside a procedure.
     if (step.kind == Step<Item>::Kind::transfer && step.at <= port_->now()) {
       later.at = port_->now() + Time(std::uniform_int_distribution<std::int64_t>(0, 400'000)(random_));
     }
@@ -67,7 +64,7 @@ void take_port(Link& link, std::shared_ptr<AnyPort> port) {
   link.owner = std::move(port);
 }
 
-/// Connects `link` to `device` in place of the encoder of this address. `device` must outlive the link.
+/// Puts `device`, which must outlive the link, in the place of the encoder.
 template <class Item>
 void put_on_line(Link& link, const EncoderAddress& encoder, Machine<Item>& device, const VirtualPort& way = {}) {
   const LinkKind kind = encoder.unit->link;
@@ -88,7 +85,6 @@ void put_on_line(Link& link, const EncoderAddress& encoder, Machine<Item>& devic
   take_port<Item>(link, std::shared_ptr<sim::SimPort<Item>>(std::move(line)));
 }
 
-/// Returns a link to the virtual encoder of an address, with options, motion, conditions, alarms and faults.
 inline Link virtual_link(const EncoderAddress& encoder, const VirtualPort& way = {}) {
   Link link;
   link.device = std::make_unique<VirtualDevice>(*encoder.unit, encoder.options, encoder.device);

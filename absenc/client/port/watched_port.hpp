@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A port that stores the last exchange as it was on the line, and ends waits that take too long.
+// A port that stores the last exchange, and ends waits that take too long.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +16,7 @@
 
 namespace absenc::client {
 
-/// A request and what was received until the next request; items that follow the first 1024 or more are left out.
+/// A request and what was received until the next one; long ones are cut.
 template <class Item>
 struct LineExchange {
   std::vector<Item> request{};
@@ -37,8 +37,7 @@ struct LineExchange {
   [[nodiscard]] std::span<const Item> reply() const {
     return std::span<const Item>(received).subspan(std::min(echo, received.size()));
   }
-  /// Returns the time from the end of the request to the beginning of the reply's first character; 0 without a reply.
-  /// `character` is the duration of a character, 0 for frames.
+  /// Returns 0 without a reply.
   [[nodiscard]] Time answered_after(Time character) const {
     const auto first = std::find_if(marks.begin(), marks.end(), [this](const Mark& one) { return one.items > echo; });
     if (first == marks.end()) return {};
@@ -57,8 +56,6 @@ struct LineExchange {
 /// Thrown when a wait reaches the port's deadline.
 struct OutOfTime {};
 
-/// A port around another port, which stores the last exchange and ends waits. After Ctrl-C, a conversation that must
-/// restore the encoder first may finish.
 template <class Item>
 class WatchedPort final : public Port<Item> {
  public:
@@ -67,7 +64,7 @@ class WatchedPort final : public Port<Item> {
     port_ = &port;
     rate_ = 0;
   }
-  /// Sets the line back to `rate` before a conversation, because an aborted conversation may have left another rate.
+  /// Restores `rate`, which an aborted conversation may have changed.
   void return_to(std::uint32_t rate) {
     if (rate_ != 0 && rate_ != rate) begin({.kind = Step<Item>::Kind::configure, .rate = rate});
   }
@@ -113,8 +110,7 @@ class WatchedPort final : public Port<Item> {
   /// Returns whether a conversation was asked to end early since the last call of this function.
   [[nodiscard]] bool take_aborted() { return std::exchange(aborted_, false); }
 
-  // function that is polled during each wait: if it returns true, the wait ends with os::Ended; if it throws
-  // os::Interrupted, the conversation is asked to end early
+  // function that is polled during waits; true ends them with os::Ended
   std::function<bool()> over;
   // function that asks the conversation to end early; returns false if it cannot end by itself
   std::function<bool()> abort;
@@ -139,8 +135,7 @@ class WatchedPort final : public Port<Item> {
       }
     }
   }
-  // Uses the time read last instead of reading the clock: the time of the step could pass between the step and its
-  // wait.
+  // The time of the step may pass before its wait.
   [[nodiscard]] Step<Item> bounded(const Step<Item>& step) const {
     if (deadline == never) return step;
     if (deadline <= looked_at_) throw OutOfTime{};

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Records rows as HDF5. A thread of its own writes the waiting rows about four times a second, so that neither the HDF5
-// library nor the disk delays a reading.
+// Records rows as HDF5, in a thread of its own.
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
@@ -31,7 +30,7 @@ Hdf5Attributes attributes_of(const RecordHeader& header) {
           {"part", header.part}};
 }
 
-// Makes the file visible with its columns, so that it can already be opened, and returns its size.
+// Makes the file visible, so that it can already be opened.
 std::uint64_t appear(os::BlockFile& file) {
   file.appear();
   return file.size();
@@ -142,8 +141,7 @@ class Hdf5Record final : public RecordFile {
   RecordCounts taken_;   // counts of the rows that are being written now
   RecordCounts committed_;
   std::uint64_t size_;
-  // Numbers of syncs: all calls, those that the running commit serves, and those that are served. A sync waits for a
-  // commit that began after its call.
+  // numbers of syncs
   std::uint64_t asked_ = 0;
   std::uint64_t serving_ = 0;
   std::uint64_t served_ = 0;

@@ -28,7 +28,7 @@ herr_t close_file(H5FD_t* file) {
   return 0;
 }
 
-// Reports no features of the driver: otherwise the HDF5 library combines blocks of several types.
+// With features, the HDF5 library would combine blocks of several types.
 herr_t query(const H5FD_t*, unsigned long* features) {
   *features = 0;
   return 0;
@@ -94,8 +94,7 @@ void Hdf5Store::attach(hid_t access) {
 }
 
 void Hdf5Store::write(H5FD_mem_t type, std::uint64_t at, Bytes bytes) {
-  // Finds a stored block by its offset. The HDF5 library writes whole objects, so two blocks that overlap are equal, or
-  // one is inside the other.
+  // The HDF5 library writes whole objects, so overlapping blocks lie inside each other.
   auto next = blocks_.upper_bound(at);
   if (next != blocks_.begin()) {
     auto& [begin, block] = *std::prev(next);
@@ -123,10 +122,7 @@ void Hdf5Store::read(std::uint64_t at, MutableBytes bytes) {
   }
 }
 
-// Returns the rank of a block that an earlier commit has written; the lowest rank is written first. A block comes after
-// the blocks that it points to. Exceptions are the superblock, which comes first, and the B-tree, whose upper node
-// comes first: after a split it points to both halves, and a reader does not search the old node for the moved half.
-// Object headers, which hold the number of rows, come last.
+// The lowest rank is written first.
 int Hdf5Store::rank(const StoredBlock& block) {
   constexpr int last = 1000;
   switch (block.type) {

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Stores an HDF5 file so that it can be opened if the process crashes at any point after the first commit. The store
-// collects the writes of the HDF5 library; `commit` writes them in an order in which the file is consistent after every
-// single write.
+// Stores an HDF5 file that can be opened after a crash at any point after the first commit.
 #pragma once
 
 #include <hdf5.h>
@@ -24,11 +22,10 @@ class Hdf5Store {
   };
   explicit Hdf5Store(Disk disk) : disk_(std::move(disk)) {}
 
-  /// Sets this store as the driver in `access`, a property list for H5Fcreate. The store must outlive the file.
+  /// Sets this store, which must outlive the file, as the driver.
   void attach(hid_t access);
 
-  /// Writes the collected blocks to the disk. Throws the exceptions of `disk`; then the data committed before remains
-  /// intact.
+  /// Throws the exceptions of `disk`.
   void commit();
 
   // Functions for the HDF5 driver:

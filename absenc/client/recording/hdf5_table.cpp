@@ -13,7 +13,7 @@ namespace absenc::client {
 namespace {
 
 constexpr hsize_t rows_of_a_chunk = 1024;
-// alignment in the file, in bytes: a write inside one page is atomic even if the process is killed
+// alignment in the file, in bytes: a write inside one page is atomic
 constexpr hsize_t page = 4096;
 constexpr std::size_t text_bytes = 48;  // length of text columns in bytes, which is longer than the name of any error
 
@@ -172,7 +172,7 @@ Hdf5Table::Hdf5Table(Hdf5Store::Disk disk, std::span<const Column> columns, cons
   require(H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr));
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   store_.attach(access);
-  // Selects the oldest format of HDF5: it has no checksums over several blocks, and every reader supports it.
+  // The oldest format of HDF5 has no checksums over several blocks.
   require(H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18));
   require(H5Pset_meta_block_size(access, 0));
   require(H5Pset_alignment(access, 1, page));

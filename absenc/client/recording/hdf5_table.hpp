@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes rows as an HDF5 file with one dataset for each column that is no detail, which h5py, MATLAB and h5dump read.
+// Writes rows as an HDF5 file with one dataset for each column that is no detail.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@
 
 namespace absenc::client {
 
-/// Rows that are collected column by column, in the format of the file. Columns with `is_detail` are left out.
+/// Rows in the format of the file.
 class Hdf5Rows {
  public:
   explicit Hdf5Rows(std::span<const Column> columns);
@@ -34,24 +34,20 @@ class Hdf5Rows {
 
 using Hdf5Attributes = std::vector<std::pair<std::string, std::variant<std::string, double, std::uint64_t>>>;
 
-/// Value of the attribute `rows` while the file is being written; it stays if the writer is killed.
+/// Value of the attribute `rows` until `finish`.
 constexpr std::uint64_t hdf5_not_ended = UINT64_MAX;
 
 class Hdf5Table {
  public:
-  /// Creates the file with a dataset for each column that is no detail. The file has `attributes`, `rows`, and
-  /// `columns` with the names of these columns. Each dataset has `unit` and `meaning`, if the column has them, and
-  /// `missing_value`, the element of a missing value (NaN for reals). Throws Failure and the exceptions of `disk`.
+  /// Throws Failure and the exceptions of `disk`.
   Hdf5Table(Hdf5Store::Disk disk, std::span<const Column> columns, const Hdf5Attributes& attributes);
   ~Hdf5Table();
   Hdf5Table(const Hdf5Table&) = delete;
   Hdf5Table& operator=(const Hdf5Table&) = delete;
 
-  /// Writes rows to the file. Throws Failure and the exceptions of `disk`; then the rows written before remain in the
-  /// file.
+  /// Throws Failure and the exceptions of `disk`.
   void commit(const Hdf5Rows& rows);
-  /// Writes the number of rows into the attribute `rows`, which was `hdf5_not_ended`. Throws Failure and the exceptions
-  /// of `disk`.
+  /// Throws Failure and the exceptions of `disk`.
   void finish();
 
  private:

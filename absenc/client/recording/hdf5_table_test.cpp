@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that the file opens and holds the rows committed before if the process is killed between two writes, or if the
-// disk is full.
+// Checks that a file keeps its committed rows in a crash.
 #include "absenc/client/recording/hdf5_table.hpp"
 
 #include <gtest/gtest.h>
@@ -61,8 +60,7 @@ Hdf5Rows rows_from(std::int64_t first, std::int64_t count) {
   return rows;
 }
 
-/// Returns the number of rows of a dataset; -1 if the file or the dataset cannot be opened or read, or if it has other
-/// values than those written.
+/// Returns -1 if the dataset has wrong values.
 template <class T>
 std::int64_t whole_rows(const fs::path& path, const char* name, hid_t type, T (*expected)(std::int64_t)) {
   const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
@@ -84,8 +82,7 @@ std::int64_t whole_rows(const fs::path& path, const char* name, hid_t type, T (*
   return found;
 }
 
-// Applies the writes of each commit one by one; after each of them the file must open and hold the rows committed
-// before. The rows fill 96 chunks, too many for one B-tree node, so nodes are split and the tree gets another level.
+// The rows are too many for one B-tree node, so that nodes are split.
 TEST(Hdf5Table, EveryBeginningOfACommitIsAWholeFile) {
   Bench bench("prefix");
   Hdf5Table table(bench.disk(), columns, {{"encoder", std::string("elbow")}, {"rate_hz", 100.0}});

@@ -26,18 +26,16 @@ struct RecordHeader {
   std::uint64_t part = 1;
 };
 
-/// A file of a recording that is being written. Members that write, and `require_there`, throw os::Failure for errors
-/// of the disk, with kind `lost` if the file was removed, moved, replaced or cut.
+/// Functions that write, and `require_there`, throw os::Failure, Failure.
 class RecordFile {
  public:
   virtual ~RecordFile() = default;
 
-  /// Appends a row, which is in the file within a second, and adds `counts` to the counts of the file.
+  /// Adds `counts` to the counts of the file.
   virtual void append(const Row& row, const RecordCounts& counts) = 0;
   /// Waits until all appended rows are in the file and on the disk.
   virtual void sync() = 0;
-  /// Writes the number of rows into the file, so that a reader knows that none is missing, and waits for the disk.
-  /// Nothing may be appended afterwards.
+  /// Ends the file; nothing may be appended afterwards.
   virtual void finish() = 0;
   virtual void require_there() const = 0;
   [[nodiscard]] virtual std::uint64_t size() const = 0;

@@ -98,7 +98,7 @@ bool Recording::Parts::run(const std::function<void(const Sample&)>& on_written)
   Sample sample;
   const auto note_missed = [&] {
     const std::uint64_t missed = pace.take_missed();
-    // While the port is lost, no rows for missed readings are written: the row of the loss covers them.
+    // While the port is lost, the row of the loss covers missed readings.
     const bool was_there = sample.kind == Sample::Kind::reading || sample.kind == Sample::Kind::failed;
     if (was_there) miss(missed);
   };
@@ -131,7 +131,7 @@ std::string Recording::Parts::part_path(unsigned part) const {
   return path.parent_path() / name;
 }
 
-// Refuses to start if parts of an older recording of this name exist: this recording might reach their names.
+// This recording might reach the names of parts of an older one.
 void Recording::Parts::refuse_parts_of_another_recording() const {
   const fs::path path(settings_.path);
   const std::string begin = path.stem().string() + "-";
@@ -171,8 +171,6 @@ RecordHeader Recording::Parts::header() const {
           .part = part_};
 }
 
-// Returns whether the sample is written: every Nth reading, every reading with other alarms or other reported alarms
-// than the one before, and all failures and events except repeated waiting for the port.
 bool Recording::Parts::wanted(const Sample& sample) {
   if (sample.kind == Sample::Kind::absent) return false;
   if (sample.kind != Sample::Kind::reading) return true;

@@ -22,8 +22,7 @@ Receiver::Receiver() : place_("standard input") {
 
 Receiver::~Receiver() { cancel(); }
 
-// Half a second more than twice the latency: programs and adapters may delay a part of a frame for their latency, a
-// busy computer for much longer.
+// A busy computer may delay a part of a frame for longer than its latency.
 Time Receiver::quiet() const { return 500ms + 2 * link_.latency; }
 
 void Receiver::start(Time end) {

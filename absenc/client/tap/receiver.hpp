@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Receives the bytes of a port or of standard input in a thread of its own, because the caller may be slow. Never sends
-// anything.
+// Receives bytes in a thread of its own; sends nothing.
 #pragma once
 
 #include <condition_variable>
@@ -41,9 +40,7 @@ class Receiver {
 
   /// Starts the receiving thread, which ends at the time `end`. Called once.
   void start(Time end = never);
-  /// Waits for bytes or for the report of silence, and returns them in their order. Returns nothing when `deadline` is
-  /// reached, after `cancel`, or if receiving has ended and everything was returned. Throws os::Ended if the
-  /// os::CancelCheck of this thread ends the wait.
+  /// Returns nothing at `deadline` or at the end.
   [[nodiscard]] std::optional<Received> next(Time deadline = never);
   /// Ends receiving: `next` returns nothing from now on. May be called from any thread.
   void cancel();
@@ -52,7 +49,6 @@ class Receiver {
   [[nodiscard]] ReceiveEnd end() const;
   /// Returns a sentence about the loss of the port; "" if it was not lost.
   [[nodiscard]] std::string problem() const;
-  /// Returns the number of bytes that were dropped because with them more than 64 MiB would have waited for the caller.
   [[nodiscard]] std::uint64_t dropped() const;
 
   /// Returns the port in words, "/dev/ttyUSB0 at 2500000 baud".

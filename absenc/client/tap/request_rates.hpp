@@ -25,7 +25,7 @@ class RequestRates final : public capture::AnnotationSink {
     capture::Tick begin = 0;   // tick of the first request
     capture::Tick last = 0;    // tick of the last request
 
-    /// Returns the number of requests per second; 0 for fewer than two requests, or if all have the same tick.
+    /// Returns 0 if the times do not tell it.
     [[nodiscard]] double per_second() const {
       return count > 1 && last > begin
                  ? static_cast<double>(count - 1) * static_cast<double>(arrival_ticks_per_second) /
@@ -56,8 +56,7 @@ class RequestRates final : public capture::AnnotationSink {
     kind.errors += annotation.error != Error::none ? 1 : 0;
   }
 
-  /// Returns the kinds of requests, at most `most_kinds`, the most frequent first. The requests of a command are one
-  /// kind; requests that no command sends are one kind if their bytes are equal.
+  /// Returns the most frequent kinds first.
   [[nodiscard]] std::vector<RequestKind> kinds() const {
     std::vector<RequestKind> all = kinds_;
     std::stable_sort(all.begin(), all.end(),
@@ -66,7 +65,7 @@ class RequestRates final : public capture::AnnotationSink {
   }
 
  private:
-  // limit of the number of kinds; requests of further kinds are counted with the kind that was added last
+  // limit of the number of kinds; requests of further kinds count as the last kind
   static constexpr std::size_t most_kinds = 64;
 
   struct SampleRequest {
@@ -75,8 +74,7 @@ class RequestRates final : public capture::AnnotationSink {
     bool varies;  // whether the command has arguments, which may change its request
   };
 
-  // Returns the command of a request; "" if there is none. Assumes that all requests of a command with arguments begin
-  // with the same byte and have the same length.
+  // Assumes that requests of a command with arguments have equal lengths and first bytes.
   [[nodiscard]] std::string_view command_of(Bytes request) const {
     for (const SampleRequest& one : samples_) {
       if (std::equal(one.bytes.begin(), one.bytes.end(), request.begin(), request.end())) return one.command;

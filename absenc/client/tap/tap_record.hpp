@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes all received bytes to a file that `decode` reads: one line for each frame, with its arrival time.
+// Writes all received bytes to a file that `decode` reads.
 #pragma once
 
 #include <fmt/format.h>
@@ -14,8 +14,6 @@
 
 namespace absenc::client {
 
-/// Writes annotations to a file. The annotations of the annotator contain each received byte; their times are arrival
-/// ticks.
 class TapRecord final : public capture::AnnotationSink {
  public:
   /// Creates the file. Throws os::Failure, with kind `in_use` if the file already exists.
@@ -39,8 +37,7 @@ class TapRecord final : public capture::AnnotationSink {
   [[nodiscard]] const std::string& path() const { return file_.path(); }
 
  private:
-  // Adds a line for a frame. Each frame gets a time of its own, because `decode` joins lines of the same time to one
-  // frame.
+  // `decode` joins lines of the same time to one frame.
   void add(capture::Tick at, Bytes bytes) {
     if (bytes.empty()) return;
     last_ = std::max(at, last_ + 1);

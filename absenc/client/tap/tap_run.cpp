@@ -39,7 +39,7 @@ bool is_asynchronous(const Unit& unit) {
   return unit.link == LinkKind::half_duplex || unit.link == LinkKind::full_duplex;
 }
 
-// Records each annotation, then passes it on without its response time, because arrival times are too coarse for it.
+// Arrival times are too coarse for response times.
 struct Untimed final : capture::AnnotationSink {
   Untimed(TapRecord* of_run, capture::AnnotationSink& next) : record(of_run), sink(next) {}
   void put(const capture::Annotation& annotation) override {

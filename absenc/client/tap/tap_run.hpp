@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Listens on a line: receives bytes, identifies the protocol if none was given, and passes the exchanges to a sink.
+// Listens on a line, identifies the protocol, and passes the exchanges to a sink.
 #pragma once
 
 #include <cstdint>
@@ -30,23 +30,16 @@ struct TapOutcome {
 
 class TapRun {
  public:
-  /// Opens `place`: a port with settings behind ?, "/dev/ttyUSB0?baud=115200" or "tcp:HOST:PORT"; or "-" for standard
-  /// input. A protocol before the port, "tformat:/dev/ttyUSB0", counts as the given protocol. Throws UsageError,
-  /// os::Failure.
+  /// Opens a port with settings, or "-" for standard input. Throws UsageError, os::Failure.
   TapRun(std::string_view place, TapChoices choices);
   ~TapRun();
 
-  /// Waits for enough bytes to identify the protocol and its options. Returns false if no byte arrived or no protocol
-  /// explains the bytes. If the protocol was given, only determines missing options and returns true. Must be called
-  /// before `begin`.
+  /// Returns whether protocol and options are known.
   bool settle(const std::function<void(const std::string&)>& progress);
   /// Starts decoding: exchanges are passed to `sink`, which must outlive the object. Called once.
   void begin(capture::AnnotationSink& sink);
-  /// Waits until bytes arrive or the time `Receiver::quiet` elapses, and passes the complete exchanges to the sink.
-  /// Returns false when receiving has ended. Throws os::Failure of the record file, and the exceptions of the sink and
-  /// of Receiver::next.
+  /// Returns false at the end.
   bool advance();
-  /// Returns what was received and why receiving ended; call it after `settle` or `advance` returned false.
   [[nodiscard]] TapOutcome outcome() const;
   /// Makes `advance` return false. May be called from any thread after `settle`.
   void cancel();
@@ -56,7 +49,7 @@ class TapRun {
   [[nodiscard]] const Unit& unit() const { return *unit_; }
   [[nodiscard]] const Options& options() const { return options_; }
   [[nodiscard]] const Receiver& receiver() const { return *receiver_; }
-  /// Returns the candidates for the protocol, the likeliest first; empty if the protocol was given.
+  /// Returns the likeliest first; none if the protocol was given.
   [[nodiscard]] const std::vector<Candidate>& candidates() const { return candidates_; }
   [[nodiscard]] std::uint64_t received_bytes() const { return bytes_; }
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }

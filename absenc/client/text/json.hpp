@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A JSON value that is printed on one line. Only json.cpp includes nlohmann-json, which is slow to compile.
+// A JSON value, printed on one line. Only json.cpp includes nlohmann-json.
 #pragma once
 
 #include <concepts>
@@ -43,14 +43,13 @@ class Json {
   Json& operator=(Json other) noexcept;
   ~Json();
 
-  /// Sets a member of a JSON object. Members keep the order in which they were first set; setting a name again replaces
-  /// its value.
+  /// Members keep the order in which they were first set.
   Json& set(std::string_view name, Json value);
   Json& append(Json value);
   [[nodiscard]] bool empty() const;
   [[nodiscard]] bool is_text() const;
 
-  /// Returns the JSON value as text on one line, without a line end. Bytes that are not UTF-8 become U+FFFD.
+  /// Bytes that are not UTF-8 become U+FFFD.
   [[nodiscard]] std::string line() const;
 
  private:

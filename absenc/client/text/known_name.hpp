@@ -17,13 +17,11 @@ struct KnownName {
   bool is_model = false;
   std::vector<const Unit*> units;
 
-  /// Returns a sentence about the name: "AksIM-2 is a model of encolink and encolink-spi", or for a maker or a family
-  /// "NAME: the protocols are A, B and C".
+  /// Returns for example "AksIM-2 is a model of encolink and encolink-spi".
   [[nodiscard]] std::string sentence() const;
 };
 
-/// Returns the known name that has the same letters and digits as `word`, without regard to case and other characters;
-/// nothing if there is none, or if `word` is the name of a protocol.
+/// Compares letters and digits alone, in any case.
 [[nodiscard]] std::optional<KnownName> find_known_name(std::string_view word);
 
 }  // namespace absenc::client

@@ -17,7 +17,7 @@ char folded(char c) {
   return c == '_' ? '-' : c;
 }
 
-// Returns the edit distance of two names: insertions, deletions, replacements and swaps of neighbours.
+// Returns the edit distance; a swap of neighbours counts 1.
 std::size_t distance(std::string_view from, std::string_view to) {
   std::vector<std::size_t> before(to.size() + 1), last(to.size() + 1), row(to.size() + 1);
   for (std::size_t j = 0; j <= to.size(); ++j) last[j] = j;

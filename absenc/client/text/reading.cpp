@@ -14,7 +14,6 @@ std::uint32_t flag_mask(const FieldInfo& field) {
   return static_cast<std::uint32_t>(low_mask(static_cast<unsigned>(field.flags.size())));
 }
 
-// Returns the bits of the flags that a complete field must report: flags that have a name and are not optional.
 std::uint32_t required(const FieldInfo& field) {
   std::uint32_t mask = 0;
   for (std::size_t i = 0; i < field.flags.size(); ++i) {

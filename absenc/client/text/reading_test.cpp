@@ -124,7 +124,7 @@ TEST(ClientReading, AnswersTellInvalidFromUnknown) {
   EXPECT_EQ(sink.answer["turns"], Value(Unknown{}));
 }
 
-// The position is unconfirmed, so its validity is unknown; turns that the encoder reports as invalid stay invalid.
+// Turns that the encoder reports as invalid stay invalid.
 TEST(ClientReading, AnUnconfirmedPositionIsUnknown) {
   const Reading unconfirmed = checked(reading(0, 5), false);
   EXPECT_EQ(unconfirmed.singleturn_validity(), Validity::unknown);

@@ -6,8 +6,7 @@
 
 namespace absenc::client {
 
-/// Parses the whole text as a number such as "12.5" or "1e-3". Returns nothing if the text is no number, or if the
-/// number is not finite or out of a double's range.
+/// Parses the whole text as a finite number; nothing otherwise.
 [[nodiscard]] std::optional<double> parse_real(std::string_view text);
 
 }  // namespace absenc::client

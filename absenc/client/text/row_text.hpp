@@ -14,8 +14,7 @@ namespace absenc::client {
 
 /// Returns the names of the columns as a CSV line, without columns that are details.
 [[nodiscard]] std::string csv_header(std::span<const Column> columns);
-/// Append to `text`, or return, the values of the row as a CSV line, without a line end and without columns that are
-/// details. A missing, invalid or unknown value is empty.
+/// Append or return a CSV line, without columns that are details.
 void append_csv(std::string& text, const Row& row);
 [[nodiscard]] std::string to_csv(const Row& row);
 
@@ -24,8 +23,7 @@ void append_csv(std::string& text, const Row& row);
 /// Returns the names of the flags in `bits` as a JSON array: ["over_heat","battery_alarm"].
 [[nodiscard]] Json flags_to_json(const FieldInfo& field, std::uint64_t bits);
 [[nodiscard]] Json to_json(const Value& value);
-/// Returns the row as a JSON object, with a member for each column. A missing value is left out; an invalid or unknown
-/// value is null.
+/// Leaves out missing values; invalid and unknown ones are null.
 [[nodiscard]] Json to_json(const Row& row);
 
 /// Returns the value of an option as JSON: a number, the name of a choice, or a boolean.

@@ -12,19 +12,16 @@ namespace absenc::client {
 inline constexpr std::string_view memory_file_title = "absenc memory 1";  // memory of a virtual encoder
 inline constexpr std::string_view dump_title = "absenc dump 1";           // dump: copy of the memory of an encoder
 
-/// Returns the content of a file. Throws Failure, whose text begins with `what` and the path, if the file cannot be
-/// read or has more than about 16 MiB.
+/// Returns the content; `what` names the file in errors. Throws Failure.
 [[nodiscard]] std::string read_text_file(std::string_view what, const std::string& path);
 
-/// Returns the path at the end of a chain of up to 40 symbolic links, even if that file does not exist.
+/// Follows up to 40 symbolic links.
 [[nodiscard]] std::string link_target(const std::string& path);
 
-/// Checks, before long work, that the path is that of a regular file that can be replaced, or of no file in an existing
-/// folder. Throws Failure if not.
+/// Throws Failure if the path is known not to be writable.
 void require_replaceable(const std::string& path);
 
-/// Iterates over the lines of a text that are neither empty nor begin with #, and removes blanks at the end of each
-/// line.
+/// Iterates over lines that are neither empty nor begin with #.
 class SignificantLines {
  public:
   explicit SignificantLines(std::string_view text) : rest_(text) {}

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds units, commands, alarms and conditions by the names that users write, parses options and arguments, and returns
-// values of a unit as text.
+// Finds parts of units by their names, and returns values as text.
 #pragma once
 
 #include <cstdint>
@@ -21,22 +20,19 @@ namespace absenc::client {
 /// Splits a setting "name=value" into name and value. Throws UsageError.
 [[nodiscard]] OptionText split_setting(std::string_view text);
 
-/// Returns the options of a model, changed by settings; "model" may be one of the settings. Throws UsageError; for an
-/// unknown name it may suggest one of `extra_names`.
+/// Returns the options of a model, changed by settings. Throws UsageError.
 [[nodiscard]] Options require_options(const Unit& unit, std::string_view model, std::span<const OptionText> settings,
                                       std::span<const std::string_view> extra_names = {});
-/// Returns the options of a model, changed by settings of the form "name=value", as from --option. Throws UsageError.
+/// Returns the options of a model, changed by settings "name=value". Throws UsageError.
 [[nodiscard]] Options require_options(const Unit& unit, std::string_view model, std::span<const std::string> settings);
 
-/// Parses the arguments of the command and returns one number for each; an optional one that is left out gets its
-/// default. Throws UsageError.
+/// Throws UsageError.
 [[nodiscard]] std::vector<std::int64_t> require_arguments(const Command& command, std::span<const std::string> written);
 
-/// Checks numbers as arguments of the command and returns one number for each argument; an optional one that is left
-/// out gets its default. Throws UsageError.
+/// Throws UsageError.
 [[nodiscard]] std::vector<std::int64_t> complete_arguments(const Command& command, std::span<const std::int64_t> given);
 
-/// Returns `options` with the option that the command `setter` changes set to `value`; all others stay as they are.
+/// Returns `options` after a command that changes one of them.
 [[nodiscard]] Options options_behind(const Unit& unit, const Options& options, const Command& setter,
                                      std::int64_t value);
 
@@ -44,7 +40,7 @@ struct RoleArgument {
   Role role;
   std::int64_t value;
 };
-/// Returns arguments in the order of the command, from values by role; arguments without a value get their default.
+/// Returns values by role, or else by default.
 [[nodiscard]] std::vector<std::int64_t> role_arguments(const Command& command,
                                                        std::initializer_list<RoleArgument> values);
 
@@ -55,8 +51,7 @@ struct RoleArgument {
 [[nodiscard]] std::uint32_t require_alarms(const Unit& unit, std::span<const std::string> names);
 /// Returns the names of the alarms that an encoder with these options can report.
 [[nodiscard]] std::vector<std::string> reportable_alarms(const Unit& unit, const Options& options);
-/// Returns the bits of the alarms with these names. Throws UsageError, also if an encoder with these options cannot
-/// report one.
+/// Throws UsageError also for an alarm that cannot be reported.
 [[nodiscard]] std::uint32_t require_alarms(const Unit& unit, const Options& options,
                                            std::span<const std::string> names);
 
@@ -64,7 +59,7 @@ struct RoleArgument {
 [[nodiscard]] const Condition* find_condition(const Unit& unit, std::string_view name);
 /// Returns the unit's condition of this name. Throws UsageError if there is none.
 [[nodiscard]] const Condition& require_condition(const Unit& unit, std::string_view name);
-/// Parses a value of the condition. Throws UsageError if it is not a number within the condition's range.
+/// Throws UsageError.
 [[nodiscard]] std::int64_t require_value(const Condition& condition, std::string_view written);
 /// Returns the range of a condition as text: "-20 to 127 degC".
 [[nodiscard]] std::string range_of(const Condition& condition);
@@ -74,34 +69,32 @@ struct RoleArgument {
 /// Returns a time as text with a suitable unit: "85 us", "2.1 ms" or "1.5 s".
 [[nodiscard]] std::string to_text(Time time);
 
-/// Returns the possible values of an option as text, such as "1 to 24", or its choices as "none or odd or even".
+/// Returns for example "1 to 24" or "none or odd or even".
 [[nodiscard]] std::string range_of(const Option& option);
 [[nodiscard]] std::string to_text(const Option& option, std::int64_t value);
 /// Returns `value`, which an option stores as an integer, divided by 10^decimals.
 [[nodiscard]] double real_value(const Option& option, std::int64_t value);
 
-/// Returns the option `name` with its value as a setting, "baud=57600"; "" if the unit has no such option.
+/// Returns for example "baud=57600"; "" if the unit has no such option.
 [[nodiscard]] std::string option_text(const Unit& unit, const Options& options, std::string_view name);
 
 /// Returns the description of a position word as text: "multiturn:12 position:24 gray".
 [[nodiscard]] std::string to_text(const WordFormat& word);
-/// Returns a setting "name=value" for each option of the unit; a position word replaces the options that it covers.
+/// Returns settings "name=value"; a position word replaces some.
 [[nodiscard]] std::vector<std::string> option_texts(const Unit& unit, const Options& options);
 
 /// Returns the flags of the field that have a name and are set in `bits`.
 [[nodiscard]] std::vector<const FlagInfo*> raised(const FieldInfo& field, std::uint64_t bits);
-/// Returns the advice on a flag; "" if there is none, or if the flag only sums up alarms and `beside_alarms` states
-/// that these are shown with their own advice.
+/// Leaves out, with `beside_alarms`, the advice on a sum of alarms.
 [[nodiscard]] std::string_view action_of(const FlagInfo& flag, bool beside_alarms);
 [[nodiscard]] std::vector<std::string_view> flag_names(const FieldInfo& field, std::uint64_t bits);
 [[nodiscard]] std::string to_text(const FieldValue& value);
 /// Returns the number in hexadecimal, "0x17"; a negative number in decimal.
 [[nodiscard]] std::string hexadecimal(std::int64_t value);
-/// Returns bytes of an encoder as text, with '.' for every character that is not printable ASCII.
+/// Returns bytes as text, with '.' for bytes that are not printable ASCII.
 [[nodiscard]] std::string printable(Bytes bytes);
 
-/// Returns how often the memory can be written: "100000 writes in total", or "1000000 writing cycles" if the document
-/// does not state what it counts; "" if unknown.
+/// Returns for example "100000 writes in total"; "" if unknown.
 [[nodiscard]] std::string life_of(const MemoryArea& area);
 
 /// Returns the name of a kind of line, as "half_duplex".
@@ -115,13 +108,10 @@ struct RoleArgument {
 /// Returns the name of a role, as "identity"; "" for `other`.
 [[nodiscard]] std::string_view name_of(Role role);
 
-/// Returns the validity of a field that depends on position or turns, from the reading of the same frame. Other fields,
-/// and fields whose value the reading does not have, are `valid`.
+/// Returns `valid` for other fields than position and turns.
 [[nodiscard]] Validity validity_of(const FieldInfo& field, const Reading& reading);
 [[nodiscard]] bool holds(const FieldInfo& field, const Reading& reading);
-/// Returns `value`, the text of a field, marked by its validity: "74565 counts", "unknown (74565 counts)" or "INVALID
-/// (74565 counts)", which says in the parentheses if the encoder is starting, or if only the top bits of the position
-/// hold.
+/// Returns for example "unknown (74565 counts)" or "INVALID (74565 counts)".
 [[nodiscard]] std::string marked(const FieldInfo& field, const std::string& value, const Reading& reading);
 
 }  // namespace absenc::client

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Parses and prints frames: bytes in hexadecimal, CAN frames as ID:DATA, words of clocked links as 0 and 1.
+// Parses and prints frames.
 #pragma once
 
 #include <cstddef>
@@ -26,12 +26,10 @@ struct WireFrame {
   [[nodiscard]] Frame frame() const;
 };
 
-/// Parses a frame and returns it. Bytes may be separated by white space and commas, and each run of bytes may begin
-/// with 0x. Throws UsageError, whose text begins with `what` and states the error; for a wrong character also its
-/// position (from 1).
+/// Parses a frame, with or without white space between bytes. Throws UsageError.
 [[nodiscard]] WireFrame parse_wire_text(LinkKind link, std::string_view what, std::string_view text);
 
-/// Returns a frame as people read it: "1A 00 2B", "1FF:022B", a remote frame "1FF:R8", a word "0001 1110".
+/// Returns for example "1A 00 2B", "1FF:022B" or "0001 1110".
 [[nodiscard]] std::string to_wire_text(LinkKind link, const Frame& frame);
 /// Returns a frame as programs read it, as in vectors.json: "1a002b", "1ff:022b", "00011110".
 [[nodiscard]] std::string to_compact_wire_text(LinkKind link, const Frame& frame);

@@ -65,7 +65,7 @@ std::vector<iovec> ranges(const std::vector<UserMemory>& memory) {
 
 }  // namespace
 
-/// Callbacks of libfuse. They throw nothing, because libfuse is C; requests that must wait are answered by `serve`.
+/// Callbacks of libfuse, which throw nothing, because libfuse is C.
 struct SpidevNodeCalls {
   using Operation = SpidevNode::Operation;
 
@@ -146,7 +146,7 @@ SpidevNode::SpidevNode(const std::string& name, Spidev& spidev) : spidev_(&spide
     wait_for({&readable, 1}, never);
     process_one();
   }
-  // The kernel reports no error if it refuses the name of the device, so this checks whether the device exists.
+  // The kernel reports no error if it refuses the name of the device.
   if (!std::filesystem::exists(path_, ignored)) {
     throw Failure(Kind::system,
                   "the kernel did not make " + path_ + ": see what it says in dmesg, or choose another name");

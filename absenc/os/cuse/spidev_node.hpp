@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A character device that this process serves (CUSE): any program that uses spidev reaches a Spidev. It is a library of
-// its own and not installed, so that users of absenc-os do not need libfuse.
+// A character device that this process serves (CUSE): programs that use spidev reach a Spidev.
 #pragma once
 
 #include <cstdint>
@@ -16,9 +15,8 @@ namespace absenc::os {
 
 class SpidevNode {
  public:
-  /// Creates /dev/`name`, which is removed with the object. `spidev` must outlive it. Throws Failure: `not_found` (the
-  /// kernel module is not loaded), `no_permission`, `in_use` (the name), `unsupported` (the name is invalid), `lost`,
-  /// `system`; throws Interrupted and Ended as `wait_for` does.
+  /// Creates /dev/`name`, which is removed with the object. `spidev` must outlive it. Throws Failure, and as `wait_for`
+  /// does.
   SpidevNode(const std::string& name, Spidev& spidev);
   SpidevNode(const SpidevNode&) = delete;
   SpidevNode& operator=(const SpidevNode&) = delete;
@@ -26,8 +24,7 @@ class SpidevNode {
 
   [[nodiscard]] const std::string& path() const { return path_; }
 
-  /// Answers requests of programs until `end`, one SPI message at a time; the reply is sent when its message has ended.
-  /// Throws as `wait_for` does (os/signals.hpp), and Failure if the kernel removes the device.
+  /// Answers requests of programs until `end`. Throws Failure, and as `wait_for` does.
   void serve(Time end = never);
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Requirements of the protocol's document on encoder and host, each with its paragraph, for conformance tests.
+// Requirements of the protocol's document on encoder and host, each with its paragraph.
 #include <array>
 
 #include "absenc/protocol/amt21/unit.hpp"

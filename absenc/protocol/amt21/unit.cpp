@@ -28,8 +28,7 @@ constexpr Request request(const Format& format, Arguments = {}) {
 constexpr Request request_to(std::size_t node) { return {Ask::position, static_cast<std::uint8_t>(4 * node)}; }
 constexpr std::size_t addresses = 64;
 
-// Reads the position once, then the turns and the position, the latter two up to three times. The turns are valid only
-// if the shaft did not pass zero between the positions before and after them.
+// The turns are valid only if the shaft did not pass zero between the positions around them.
 Procedure read_both(Dialog& dialog, PositionAndTurns& found) {
   const Format format = dialog.format();
   std::uint64_t before = co_await look(dialog, found, request<Ask::position>(format));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames, checks and times of the CUI AMT21: a request of one or two bytes, a reply of two. README.md draws them.
+// Frames, checks and times of the CUI AMT21. README.md draws them.
 #pragma once
 
 #include <array>
@@ -36,7 +36,7 @@ struct Format {
   [[nodiscard]] constexpr Resolution resolution() const { return {singleturn_bits, multiturn_bits, 0, true}; }
 };
 
-/// Kind of request: the number that is added to the address. For zero and reset, which add 2, it is the second byte.
+/// Kind of request: the number added to the address; for zero and reset the second byte.
 enum class Ask : std::uint8_t { position, turns, zero = 0x5E, reset = 0x75 };
 
 /// A request to the encoder.
@@ -44,7 +44,7 @@ struct Request {
   Ask ask = Ask::position;      ///< Purpose of the request.
   std::uint8_t address = 0x54;  ///< Address of the encoder, a multiple of 4.
 
-  /// Returns whether the request has a reply. The encoder executes zero and reset without a reply, and restarts.
+  /// Returns whether the request has a reply.
   [[nodiscard]] constexpr bool is_answered() const { return ask == Ask::position || ask == Ask::turns; }
 };
 
@@ -53,8 +53,7 @@ struct Reply {
   std::int32_t value = 0;  ///< Position in counts, or turns, depending on the request.
 };
 
-/// Returns whether the two check bits are right: K1 makes the number of ones among the odd bits odd, K0 the number
-/// among the even bits.
+/// Returns whether K1 makes the odd bits, and K0 the even bits, odd in number of ones.
 [[nodiscard]] constexpr bool parity_is_right(std::uint16_t word) {
   return odd_parity(word & 0xAAAA) && odd_parity(word & 0x5555);
 }
@@ -74,13 +73,12 @@ struct Protocol {
     const Time character = format.line().character();
     return {.answer_limit = 2 * turn_around[format.rate] + 2 * character, .gap_limit = 2 * character};
   }
-  /// Returns how a request is sent: zero and reset once and without a reply. One wrong reply in four passes the two
-  /// parity bits, so a reply must have exactly two bytes and end with silence.
+  /// Returns how a request is sent. One wrong reply in four passes the parity bits, so replies end by silence.
   static constexpr author::Manner manner(const Format&, const Request& request) {
     return {
         .repeats = request.is_answered() ? 2u : 0u, .expects_reply = request.is_answered(), .ends_by_silence = true};
   }
-  /// Returns the length of the request that begins with `begin`, in bytes: 1 or 2; 0 if no request begins so.
+  /// Returns the length in bytes of the request that begins with `begin`; 0 if none does.
   static constexpr std::size_t request_size(const Format&, Bytes begin) {
     return std::array<std::size_t, 4>{1, 1, 2, 0}[begin[0] & 3];
   }
@@ -106,8 +104,7 @@ struct Protocol {
   static constexpr std::size_t reply_size(const Format&, const Request& request) {
     return request.is_answered() ? 2 : 0;
   }
-  /// Returns the length of the reply to `request`, in bytes: 2, or 0 if it has no reply. The received bytes do not
-  /// matter.
+  /// Returns the length of the reply to `request`, in bytes.
   static constexpr std::size_t expected(const Format& format, const Request& request, Bytes) {
     return reply_size(format, request);
   }
@@ -141,9 +138,9 @@ struct Protocol {
     if (request.ask == Ask::turns) return author::turns_reading(reply.value, {0, turns_bits, 0, true});
     return author::position_reading(static_cast<std::uint64_t>(reply.value), format.singleturn_bits);
   }
-  /// Returns the time taken as the latch of the position in the reply to a request: its end at `sent_at`.
+  /// Returns the time taken as the latch of the position: the end of the request.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
-  /// Returns the times of the virtual encoder: duration of a character, time until a reply, time to start.
+  /// Returns the times of the virtual encoder.
   static constexpr author::DeviceTimes device_times(const Format& format) {
     return {format.line().character(), turn_around[format.rate], restart_time};
   }

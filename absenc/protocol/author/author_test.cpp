@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of the engine, procedures, scan and reports, with a protocol of one byte: the reply is the request with its
-// high bit set. Then tests of texts and of the standstill.
+// Tests of engine, procedures, scan, reports, texts and standstill with a toy protocol.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -60,7 +59,7 @@ using Wire = std::vector<std::uint8_t>;
 
 constexpr std::uint8_t damaged = 0x55;  // a byte that is received as a damaged character
 
-/// Runs a conversation in virtual time; `encoder` returns the reply to the n-th request, no bytes for silence.
+/// Runs a conversation in virtual time; `encoder` returns the reply to the n-th request.
 struct Bench {
   using Encoder = std::function<Wire(std::uint8_t, unsigned)>;
   explicit Bench(Encoder answers) : encoder(std::move(answers)) {}
@@ -246,7 +245,7 @@ TEST(Procedures, StopFromAnyDepth) {
 TEST(Procedures, ReportStorageThatIsTooSmall) {
   const std::array<std::int64_t, 1> depth{12};
   const std::size_t needed = Case<many_parts>(echo, {}, depth).host.frames_size();
-  // This storage is just large enough for all nested parts: the procedure ends itself with out_of_range.
+  // Just large enough for all nested parts: the procedure ends itself with out_of_range.
   EXPECT_EQ(Case<many_parts>(echo, {}, depth, needed).host.error(), Error::out_of_range);
   // One byte less is too small for the frame of the last part.
   EXPECT_EQ(Case<many_parts>(echo, {}, depth, needed - 1).host.error(), Error::buffer_too_small);

@@ -9,16 +9,14 @@
 
 namespace absenc::author {
 
-/// Returns the range of `count` bits that begins with bit `first` of byte number `byte`; later bytes are more
-/// significant. Returns no range for 0 bits.
+/// Returns the range of `count` bits from bit `first` of byte number `byte` on; none for 0 bits.
 [[nodiscard]] constexpr BitRanges bits_of(std::size_t byte, std::size_t first, std::size_t count) {
   BitRanges ranges;
   if (count != 0) ranges.push_back({8 * byte + first, count});
   return ranges;
 }
 
-/// Returns the ranges of `count` bits, from bit `first` (0: the lowest) on, of a big-endian number: it occupies `size`
-/// bytes from byte number `byte` on, the most significant byte first.
+/// Returns the ranges of `count` bits, from bit `first` on, of the big-endian number in `size` bytes from `byte` on.
 [[nodiscard]] constexpr BitRanges big_endian_bits(std::size_t byte, std::size_t size, std::size_t count,
                                                   std::size_t first = 0) {
   BitRanges ranges;

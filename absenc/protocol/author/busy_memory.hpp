@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of an encoder memory that is busy for a while: repeats a request until the encoder executes it.
+// Host side of an encoder memory that is busy for a while.
 #pragma once
 
 #include <algorithm>
@@ -16,9 +16,7 @@ struct BusyWait {
   bool after_busy = false;  ///< Whether the result must be a reply that follows a busy reply.
 };
 
-/// Sends `request` until a valid reply has `busy` false, and returns this reply; with `after_busy` at least one busy
-/// reply must come before it. A busy encoder has not executed the request, so even a write may be repeated. Errors:
-/// busy (the time limit has passed), or the error of the last invalid reply.
+/// Repeats a request to a busy memory, and returns the last reply or an error.
 template <class P>
 Part<Result<typename P::Reply>> until_ready(DialogOf<P>& dialog, typename P::Request request, BusyWait wait) {
   Time last_attempt = never;

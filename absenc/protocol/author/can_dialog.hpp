@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of a procedure on a CAN bus: sends a frame, or listens, and then awaits the received frames one by one. A
-// protocol on CAN must have these members:
+// Host side of a procedure on a CAN bus. A protocol on CAN must have these members:
 //
 //   struct Protocol {
 //     using Item = CanFrame;
@@ -32,16 +31,14 @@ class DialogOf<P> : public CanEngine, public Routine {
   /// Returns the format of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
 
-  /// Sets the frame to send next, not before `pause` after the last request, or its answer if `keep` stored one. `ask`,
-  /// `ask_for`, `listen` or `configure` must be called before the first await of a received frame.
+  /// Sets the frame to send next, at least `pause` after the last request or its kept answer.
   void ask(const CanFrame& frame, Time pause = {}) { CanEngine::ask(frame, P::host_times(format_), pause); }
   using CanEngine::ask_for;
   using CanEngine::configure;
   using CanEngine::listen;
   using CanEngine::overhear;
 
-  /// Returns an awaitable for the next frame on the bus, from any node; nothing when a time limit of the last `ask`,
-  /// `ask_for`, `listen` or `configure` has passed: `const std::optional<CanFrame> frame = co_await dialog.heard()`.
+  /// Returns an awaitable for the next received frame; nothing when a time limit has passed.
   [[nodiscard]] auto heard() {
     struct Hear {
       DialogOf& dialog;
@@ -53,14 +50,14 @@ class DialogOf<P> : public CanEngine, public Routine {
   }
   /// Returns the time at which the last awaited frame was complete.
   [[nodiscard]] Time heard_at() const { return heard_at_; }
-  /// Returns whether the last awaited frame was received before the request was sent, which `overhear` permits.
+  /// Returns whether the last awaited frame came early; see `overhear`.
   using CanEngine::came_early;
   [[nodiscard]] ChangeSent change_sent() const final { return change(); }
   /// Stores the last awaited frame as the answer to the request, for `exchange`.
   void keep() { CanEngine::keep(*frame_, heard_at_); }
 
  protected:
-  /// Constructs the conversation with an encoder of this format; the coroutine frames of its procedure are in `arena`.
+  /// Constructs the conversation; the coroutine frames of its procedure are in `arena`.
   DialogOf(const Format& format, std::span<std::byte> arena) : Routine(arena), format_(format) {}
   ~DialogOf() = default;
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of a CAN bus: sends a frame, and receives all frames on the bus for a time, including those of other nodes.
-// It knows no protocol, and is compiled once.
+// Host side of a CAN bus: sends a frame, and receives all frames on the bus for a time.
 #pragma once
 
 #include <cstdint>
@@ -17,9 +16,7 @@ struct CanHostTimes {
   Time busy_limit{};    ///< time after which the host stops waiting although other nodes keep the bus busy
 };
 
-/// Conversation that sends one frame at a time and receives frames; a subclass decides which frame is sent next. Frames
-/// that were complete before the request was sent, or before `listen` began, are not delivered to the subclass, unless
-/// it calls `overhear`.
+/// Conversation that sends one frame at a time and receives frames; a subclass decides which.
 class CanEngine : public Conversation<CanFrame> {
  public:
   /// Not copyable: requests and replies are views into the conversation itself.
@@ -30,7 +27,7 @@ class CanEngine : public Conversation<CanFrame> {
   void feed(const Event<CanFrame>& event) final;
   /// Returns the next step that the port must take.
   Step<CanFrame> next(Time now) final;
-  /// Puts nothing, so that the names and texts of fields are linked only where Reported (command.hpp) is used.
+  /// Puts nothing: Reported (command.hpp) puts the fields.
   void report(FieldSink&) const override {}
   [[nodiscard]] Error error() const final { return outcome_.error; }
   [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
@@ -45,8 +42,7 @@ class CanEngine : public Conversation<CanFrame> {
 
   /// Returns the time at which the last request was sent completely.
   [[nodiscard]] Time sent_at() const { return sent_at_; }
-  /// Returns whether a bus error, which may have destroyed frames, was reported since the last request or `listen`,
-  /// whichever is later.
+  /// Returns whether a bus error was reported since the last request or `listen`.
   [[nodiscard]] bool is_disturbed() const { return disturbed_; }
   /// Returns why no answer was received: timeout, or bad_framing on a bus with errors.
   [[nodiscard]] Error missing() const { return disturbed_ ? Error::bad_framing : Error::timeout; }
@@ -57,33 +53,29 @@ class CanEngine : public Conversation<CanFrame> {
   CanEngine() = default;
   ~CanEngine() = default;
 
-  /// Sets that `frame` is sent next, not before `pause` after the last request, or its answer if `keep` stored one, and
-  /// that frames are then received until the bus is silent for `times.answer_limit` or `times.busy_limit` has passed.
+  /// Sets that `frame` is sent next, at least `pause` after the last request or its kept answer, and by `times` how
+  /// long frames are then received.
   void ask(const CanFrame& frame, const CanHostTimes& times, Time pause = {});
-  /// Sets that `frame` is sent next, without a pause, and that frames are then received for exactly `duration`.
+  /// Sets that `frame` is sent next, and that frames are then received for `duration`.
   void ask_for(const CanFrame& frame, Time duration);
-  /// Sets whether frames that were received before the request was sent are delivered, not only later ones: they may
-  /// answer earlier requests.
+  /// Sets whether early frames, from before the request or `listen`, are delivered, too.
   void overhear(bool yes = true) { receives_early_ = yes; }
   /// Returns whether the delivered frame was received before the request was sent.
   [[nodiscard]] bool came_early() const { return early_; }
   /// Sets that frames are received next for `duration` without sending.
   void listen(Time duration);
-  /// Sets that the next step switches this end of the bus to `rate` bits per second, and that frames are then received
-  /// for `duration` without sending.
+  /// Sets that this end of the bus changes to `rate` bits per second, and listens for `duration`.
   void configure(std::uint32_t rate, Time duration);
   /// Ends the conversation with the error and texts of `outcome`.
   void finish(const Outcome& outcome);
   /// Stores `frame`, which was complete at `at`, as the answer to the request, for `exchange`.
   void keep(const CanFrame& frame, Time at);
-  /// Returns whether the explanation of the last reply is left out, because the texts of the outcome replace it
-  /// (`only`).
+  /// Returns whether the explanation of the last reply is left out (`only`).
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
 
-  /// Handles a received frame, which was complete at `at`. To send, listen or end, it calls one of the functions above;
-  /// otherwise receiving continues.
+  /// Handles a received frame, which was complete at `at`.
   virtual void heard(const CanFrame& frame, Time at) = 0;
-  /// Handles the end of a time limit. Calls one of the functions above, otherwise the conversation ends.
+  /// Handles the end of a time limit. The conversation ends unless this function continues it.
   virtual void over() = 0;
 
  private:

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Device side of a clocked line: the virtual encoder drives its bits while the host clocks. It knows no protocol, and
-// is compiled once.
+// Device side of a clocked line: the virtual encoder drives its bits while the host clocks.
 #pragma once
 
 #include <cstddef>
@@ -11,8 +10,7 @@
 
 namespace absenc::author {
 
-/// Bits that the encoder drives on the line, one for each clock. After them the line is high, or low if `hold_low` was
-/// called.
+/// Bits that the encoder drives on the line, one for each clock.
 using DrivenBits = BitBuffer<512>;
 
 /// A virtual encoder on a clocked link; a subclass provides the bits.
@@ -31,17 +29,14 @@ class ClockedDevice : public EncoderOn<std::uint8_t> {
   explicit ClockedDevice(Time start_time = {}) : EncoderOn(start_time) {}
   ~ClockedDevice() = default;
 
-  /// Is called when the clock starts while the encoder is on. Puts the bits that the encoder drives into `bits`, which
-  /// is empty. `period`: period of the clock; 0: unknown. `held_low`: the clock line was held low before, not idle,
-  /// which few protocols use.
+  /// Puts the bits to drive into `bits`, which is empty, when the clock starts. `period`: of the clock; 0: unknown.
+  /// `held_low`: whether the clock line was held low before.
   virtual void selected(Time at, Time period, bool held_low, DrivenBits& bits) = 0;
   /// Is called when the host has stopped the clock after `clocks` clocks, at least one.
   virtual void clocked(Time at, std::size_t clocks) = 0;
-  /// Makes the encoder drive the data line low for `time` after the last edge of the clock. To be called from
-  /// `selected`.
+  /// Makes the encoder drive the data line low for `time` after the last clock edge. Call it from `selected`.
   void hold_low(Time time) { low_after_ = time; }
-  /// Sets how many of the driven bits hosts read: simulated faults of the line flip bits only in the bytes that have
-  /// these bits. To be called from `selected`.
+  /// Sets how many of the driven bits hosts read. Call it from `selected`.
   void hosts_take(std::size_t bits) { taken_ = bits; }
 
  private:

@@ -22,8 +22,7 @@ void ClockedEngine::finish(Error error) {
 // ---- Steps
 
 ByteStep ClockedEngine::next(Time now) {
-  // A lambda makes the step, because for a plain variable the compiler would call a function that first fills it with
-  // zeros.
+  // A lambda, because the compiler would first fill a plain variable with zeros.
   ByteStep step = [this]() -> ByteStep { return {.expect = (count_ + 7) / 8, .bits = count_, .at = never}; }();
   const bool begins = state_ != State::over && !begun_;
   if (begins) {
@@ -65,7 +64,7 @@ void ClockedEngine::received(const ByteEvent& event) {
   size_ = std::min(event.items.size(), whole);
   std::copy_n(event.items.begin(), size_, storage_.begin());
   if (size_ < whole) return finish(Error::wrong_length);
-  // Zeros alone on a line that was idle high are a position; a line that was low all the time is shorted.
+  // Zeros on a line that was idle high are a position; a line that was always low is shorted.
   if (event.idle_low) {
     std::uint8_t any = 0;
     for (const std::uint8_t byte : storage_.first(size_)) any |= byte;

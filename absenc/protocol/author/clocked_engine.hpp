@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of a clocked line: waits until the clock has rested, clocks bits out of the encoder, and delivers them. It
-// knows no protocol, and is compiled once.
+// Host side of a clocked line: clocks bits out of the encoder and delivers them.
 #pragma once
 
 #include <cstddef>
@@ -14,12 +13,10 @@ namespace absenc::author {
 /// Rate and pause of the clock, which the options of the encoder select.
 struct ClockedHostTimes {
   std::uint32_t rate = 0;  ///< rate of the clock in Hz, set before the first transfer; 0: the line keeps its rate
-  Time rest{};  ///< shortest pause of the clock before each transfer, after which the encoder latches a new position
+  Time rest{};             ///< shortest pause of the clock before each transfer
 };
 
-/// Conversation that clocks one transfer after the other; a subclass decides the number of clocks and handles the bits.
-/// The host drives the clock, so the engine has no timeout and repeats nothing. The clock rests before every transfer,
-/// even the first, because another host may have clocked just before.
+/// Conversation that clocks one transfer after the other; a subclass handles the bits.
 class ClockedEngine : public Conversation<std::uint8_t> {
  public:
   /// Not copyable: requests and replies are views into the conversation itself.
@@ -31,15 +28,14 @@ class ClockedEngine : public Conversation<std::uint8_t> {
   /// Returns the next step that the port must take.
   Step<std::uint8_t> next(Time now) override;
   [[nodiscard]] Error error() const final { return error_; }
-  /// Puts nothing, so that the names and texts of fields are linked only where Reported (command.hpp) is used.
+  /// Puts nothing: Reported (command.hpp) puts the fields.
   void report(FieldSink&) const override {}
   /// Returns the bits of the last transfer, as bytes, and its times.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const final {
     return {{}, Bytes(storage_).first(size_), sent_at_, received_at_};
   }
 
-  /// Returns the time of the first clock edge of the last transfer: computed from the end of the transfer if the rate
-  /// is known, otherwise the time at which the transfer was due.
+  /// Returns the time of the first clock edge of the last transfer, as far as it is known.
   [[nodiscard]] Time begun_at() const { return begun_at_; }
   /// Returns the time at which the last transfer was received completely.
   [[nodiscard]] Time received_at() const { return received_at_; }
@@ -47,12 +43,12 @@ class ClockedEngine : public Conversation<std::uint8_t> {
   [[nodiscard]] bool is_noisy() const { return false; }
 
  protected:
-  /// Constructs an engine. `storage` must have room for the bits of the longest transfer, and outlive the engine.
+  /// Constructs an engine. `storage`: room for the longest transfer, which must outlive the engine.
   ClockedEngine(const ClockedHostTimes& times, MutableBytes storage) : times_(times), storage_(storage) {}
   ~ClockedEngine() = default;
 
-  /// Sets that a transfer of `count` clocks follows after a pause of the clock, in which the clock line is idle (high)
-  /// or, with `hold_low`, held low. If the storage is too small, the conversation ends with invalid_argument.
+  /// Sets that a transfer of `count` clocks follows after a pause, in which the clock line is high or, with `hold_low`,
+  /// low. Ends the conversation with invalid_argument if the storage is too small.
   void clock(unsigned count, bool hold_low = false);
   /// Ends the conversation with `error`; `Error::none`: with success.
   void finish(Error error);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Combines the engine of a clocked line with a protocol: conversations with decoded replies, and the command that reads
-// one position.
+// Combines the engine of a clocked line with a protocol.
 #pragma once
 
 #include <array>
@@ -33,7 +32,7 @@ concept Clocked = requires {
 struct Later {};
 inline constexpr Later later{};  ///< Argument of a constructor: the host begins no transfer until its subclass does.
 
-/// A conversation on a clocked line with decoded replies; a subclass handles the bits of each transfer.
+/// A conversation on a clocked line with decoded replies; a subclass handles the bits.
 template <Clocked P>
 class ClockedHostOf : public ClockedEngine {
  public:
@@ -66,7 +65,7 @@ class ClockedHostOf : public ClockedEngine {
 
   /// Sets that a transfer of one reading follows.
   void ask() { clock(P::clocks(format_)); }
-  /// Decodes the bits of a transfer, and stores a valid reply. Returns the first error of an invalid one.
+  /// Decodes the bits of a transfer, and stores a valid reply. Returns the error of decoding.
   [[nodiscard]] Error take(BitView bits) {
     const Result<Reply> reply = P::decode(format_, bits);
     if (reply) last_ = *reply;
@@ -108,8 +107,7 @@ class ReadClocked : public ClockedHostOf<P> {
   void clocked(BitView bits) final { this->conclude(this->take(bits)); }
 };
 
-/// Returns the declaration of a command on a clocked line. The conversation `Reader` executes it, and is constructed
-/// from the format.
+/// Returns the declaration of a command on a clocked line that `Reader` executes.
 template <const auto& unit_report, class Reader = ReadClocked<ReportedProtocol<unit_report>>>
 [[nodiscard]] constexpr CommandOf<ReportedProtocol<unit_report>> clocked_reading(const Command& info) {
   using Format = typename ReportedProtocol<unit_report>::Format;
@@ -121,7 +119,7 @@ template <const auto& unit_report, class Reader = ReadClocked<ReportedProtocol<u
           .size = sizeof(Made)};
 }
 
-/// Returns the bits of a frame of a clocked link; if the member `bits` of the frame is 0, all bits of its bytes.
+/// Returns the bits of a frame of a clocked link; if `frame.bits` is 0, all bits of its bytes.
 [[nodiscard]] constexpr BitView to_bits(const Frame& frame) {
   return {frame.bytes, frame.bits != 0 ? frame.bits : frame.bytes.size() * 8};
 }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of the engine and the device of clocked lines, with a toy protocol: the first byte of each transfer decides
-// whether another transfer follows, and how many clocks that has.
+// Tests of the engine and the device of clocked lines, with a toy protocol.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -32,8 +31,7 @@ struct Toy {
   static Reading reading(const Format&, const Reply& reply) { return {.singleturn = reply, .singleturn_bits = 8}; }
 };
 
-/// A host that adds transfers until there are more than the first byte of the last one states, or an error occurs. Each
-/// added transfer has 16 clocks more than the first byte of the one before states.
+/// A host that adds transfers as the first byte of the last one states.
 class Host final : public ClockedHostOf<Toy> {
  public:
   explicit Host(const Toy::Format& format) : ClockedHostOf(format) {}
@@ -49,8 +47,7 @@ class Host final : public ClockedHostOf<Toy> {
   }
 };
 
-/// Feeds the host with `transfers`, each 100 us long, and expects that it waits during each. Returns as text how it
-/// sets the rate, its transfers, and whether it ends or waits for more.
+/// Feeds the host with `transfers`, each 100 us long. Returns as text what the host does.
 std::string run(Host& host, const std::vector<std::vector<std::uint8_t>>& transfers) {
   std::string log;
   Time now = 1ms;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Declares commands of a unit: each by its description, its request and the conversation that executes it.
+// Declares commands of a unit.
 #pragma once
 
 #include <algorithm>
@@ -48,12 +48,12 @@ struct ItemOf<P> {
 };
 }  // namespace detail
 
-/// The item that the line of the protocol `P` carries: `P::Item` if the protocol has it, otherwise a byte.
+/// The item that the line of the protocol `P` carries: `P::Item`, or else a byte.
 template <class P>
 using ItemOf = typename detail::ItemOf<P>::Item;
 
-/// Functions that turn requests and replies of a unit into fields, and errors into texts for people. `Host` is a base
-/// class of the conversations that use the report.
+/// Functions that turn requests and replies into fields, and errors into texts. `Host`: base class of the conversations
+/// that use the report.
 template <class P, class Host = Conversation<ItemOf<P>>>
 struct Report {
   /// Class with the functions of the protocol.
@@ -71,20 +71,18 @@ struct Report {
   void (*put_request)(FieldSink&, const Format&, const Request&) = nullptr;
   /// Puts the fields of a valid reply to the request into the sink.
   void (*put_reply)(FieldSink&, const Format&, const Request&, const Reply&) = nullptr;
-  /// Returns the unit's explanation of an invalid or missing reply, for errors that a procedure has not explained
-  /// itself. Null: none.
+  /// Returns the unit's explanation of an invalid or missing reply. Null: none.
   Explanation (*explain)(const Format&, Error, Items request, Items reply) = nullptr;
-  /// Returns the explanation of the error of a conversation. If set, conversations use it instead of `explain`.
+  /// Returns the explanation of the error of a conversation, which is used instead of `explain`.
   Explanation (*explain_host)(const Host&) = nullptr;
-  /// Writes the explanation of the error of `host` into the sentence. If set, conversations use it instead of the
-  /// details of `explain` and `explain_host`.
+  /// Writes the explanation of the error of `host`, which is used instead of the others' details.
   void (*tell)(Sentence&, const Host& host) = nullptr;
   /// Advice for the error that the line is never silent.
   std::string_view noise_advice = endless_noise.advice;
 };
 
-/// Functions that report the result, of type `T`, of a procedure. `put` and `put_left` get the format or, if `Subject`
-/// is a base class of the conversation, the conversation.
+/// Functions that report the result, of type `T`, of a procedure. `Subject`: the format, or a base class of the
+/// conversation.
 template <class Subject, class T>
 struct Finding {
   /// The format, or the class of the conversation, that the functions get.
@@ -94,10 +92,9 @@ struct Finding {
 
   /// Puts the fields of the result of a successful procedure into the sink.
   void (*put)(FieldSink&, const Subject&, const T&) = nullptr;
-  /// Puts into the sink the changes that an interrupted procedure leaves in the encoder. Null: there are none.
+  /// Puts the changes that an interrupted procedure leaves in the encoder. Null: none.
   void (*put_left)(FieldSink&, const Subject&, const T&) = nullptr;
-  /// Returns a sentence about the changes that a failed procedure leaves in the encoder; "": there are none. Null:
-  /// never.
+  /// Returns a sentence about the changes that a failed procedure leaves; "": none. Null: never.
   std::string_view (*left)(const T&) = nullptr;
 };
 
@@ -107,8 +104,7 @@ constexpr void put_values(FieldSink& sink, const What&... what) {
   fields.put(sink, values(what...));
 }
 
-/// The conversation `Base`, which also reports fields and texts by the functions of `unit_report`. `finding` reports
-/// the result of a procedure; without it the last reply is the result.
+/// The conversation `Base`, which also reports fields and texts by the functions of `unit_report`.
 template <const auto& unit_report, class Base, const auto&... finding>
 class Reported final : public Base {
  public:
@@ -116,7 +112,7 @@ class Reported final : public Base {
   static_assert(sizeof...(finding) == 1 || unit_report.put_reply != nullptr, "a report needs put_reply");
   static_assert(((finding.put != nullptr) && ...), "a finding needs put");
 
-  /// Puts the fields of the command's result, and the reading if there is one, into `sink`; nothing after an error.
+  /// Puts the fields of the command's result into `sink`; nothing after an error.
   void report(FieldSink& sink) const override {
     if (this->error() != Error::none) return;
     if constexpr (sizeof...(finding) == 0) {
@@ -128,8 +124,7 @@ class Reported final : public Base {
   }
   /// Puts into `sink` the changes that an interrupted procedure leaves in the encoder.
   void report_left(FieldSink& sink) const override { (put_left<finding>(sink), ...); }
-  /// Returns a text for people: the explanation of the error, the procedure's own text, and the changes left in the
-  /// encoder. May be empty.
+  /// Returns a text for people about the result or the error. May be empty.
   [[nodiscard]] std::string_view detail() const override {
     words_.clear();
     const std::string_view own = Base::detail();
@@ -195,7 +190,7 @@ constexpr bool asks_by_pulse(const typename P::Format& format, const typename P:
 /// Empty request, for protocols whose host sends nothing but clocks.
 struct NoRequest {};
 
-/// Declaration of a command of the protocol `P`: its description, its request, and the conversation that executes it.
+/// Declaration of a command: its description, its request, and the conversation that executes it.
 template <class P>
 struct CommandOf {
   /// Format of the encoder: the values of its options.
@@ -204,16 +199,14 @@ struct CommandOf {
   using Request = typename P::Request;
 
   Command info;  ///< Description of the command.
-  /// Returns the main request of the command; an error, or a request that P::encode refuses, if the arguments are
-  /// impossible. Null: no request is known beforehand.
+  /// Returns the main request of the command, or an error. Null: no request is known beforehand.
   Result<Request> (*request)(const Format&, Arguments);
-  /// Constructs the conversation of the command, and the coroutine frames of a procedure, in the storage. Returns an
-  /// empty Any if the storage is too small.
+  /// Constructs the conversation in the storage. Returns an empty Any if the storage is too small.
   Any<Conversation> (*make)(const Format&, Arguments, std::span<std::byte>);
   std::size_t size;  ///< bytes of storage that the conversation needs, without the frames of coroutines
-  /// Returns why an encoder of this format lacks the command; "": it has the command. Null: every encoder has it.
+  /// Returns why an encoder of this format lacks the command; "": it has it. Null: all have it.
   std::string_view (*missing)(const Format&) = nullptr;
-  /// Constructs the conversation for formats for which `is_other` is true, instead of `make`. Null if `is_other` is.
+  /// Constructs the conversation instead of `make` for formats for which `is_other` is true.
   Any<Conversation> (*make_other)(const Format&, Arguments, std::span<std::byte>) = nullptr;
   /// Returns whether `make_other` makes the conversation for this format; null: never.
   bool (*is_other)(const Format&) = nullptr;
@@ -226,13 +219,13 @@ struct CommandOf {
     one.missing = why;
     return one;
   }
-  /// Returns a copy of this command that is possible only for formats for which `is_possible` is true.
+  /// Returns a copy that is possible only for formats for which `is_possible` is true.
   [[nodiscard]] constexpr CommandOf only_if(bool (*is_possible)(const Format&)) const {
     CommandOf one = *this;
     one.possible = is_possible;
     return one;
   }
-  /// Returns a copy of this command that the conversation of `other` executes for formats for which `is` is true.
+  /// Returns a copy that the conversation of `other` executes for formats for which `is` is true.
   [[nodiscard]] constexpr CommandOf or_when(bool (*is)(const Format&), const CommandOf& other) const {
     CommandOf one = *this;
     one.is_other = is;
@@ -240,8 +233,7 @@ struct CommandOf {
     one.size = std::max(size, other.size);
     return one;
   }
-  /// Returns false if P::encode refuses the request, unless the request is a pulse. Returns true if `request` returns
-  /// an error, which the conversation then reports.
+  /// Returns whether the request can be sent, as far as it is known.
   [[nodiscard]] bool can_ask(const Format& format, Arguments arguments) const {
     if constexpr (std::is_same_v<Request, NoRequest>) {
       return true;
@@ -251,8 +243,8 @@ struct CommandOf {
       return !asked || !P::encode(format, *asked).empty() || asks_by_pulse<P>(format, *asked);
     }
   }
-  /// Constructs the conversation of the command in `storage`. It is a Refusal if the encoder lacks the command. Returns
-  /// an empty Any if `possible` or `can_ask` returns false, or the storage is too small.
+  /// Constructs the conversation of the command in `storage`. It is a Refusal if the encoder lacks the command. May
+  /// return an empty Any.
   [[nodiscard]] Any<Conversation> run(const Format& format, Arguments arguments, std::span<std::byte> storage) const {
     const std::string_view why = missing != nullptr ? missing(format) : std::string_view{};
     if (!why.empty()) return make_host<Refusal<ItemOf<P>>>(storage, Error::unsupported, why);
@@ -291,8 +283,7 @@ Any<Conversation> make_run(const typename Machine::Format& format, Arguments arg
 template <const auto& unit_report>
 using ReportedProtocol = typename std::remove_cvref_t<decltype(unit_report)>::Protocol;
 
-/// Returns the declaration of a command that reads a position or another value. `request` makes its request from the
-/// format, and the conversation `Reader` executes it.
+/// Returns the declaration of a command that `Reader` executes with the `request` of the format.
 template <const auto& unit_report, auto request, class Reader = ReadPosition<ReportedProtocol<unit_report>>>
 [[nodiscard]] constexpr CommandOf<ReportedProtocol<unit_report>> reading(const Command& info) {
   using P = ReportedProtocol<unit_report>;
@@ -308,8 +299,7 @@ template <const auto& unit_report, auto request, class Reader = ReadPosition<Rep
           .size = sizeof(Made)};
 }
 
-/// Returns the declaration of a command that a procedure executes. `request(format, arguments)` returns a Request or a
-/// Result; see CommandOf::request. `finding` delivers the result of the procedure.
+/// Returns the declaration of a command that a procedure executes. `finding` reports its result.
 template <const auto& unit_report, const auto& finding, auto procedure, auto request, auto... bound>
 [[nodiscard]] constexpr CommandOf<ReportedProtocol<unit_report>> command(const Command& info) {
   using P = ReportedProtocol<unit_report>;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Conversation that reads a position of an encoder whose single reply does not always prove that the position is right.
+// Conversation that reads a position where a single reply may not prove that it is right.
 #pragma once
 
 #include <optional>
@@ -8,8 +8,8 @@
 
 namespace absenc::author {
 
-/// Conversation that reads a position, and requests a second reply if the first one does not prove it. The error is
-/// that of the exchange, or of comparing both replies. The protocol needs these functions besides those of dialog.hpp:
+/// Conversation that reads a position, and requests a second reply if the first one does not prove it. The protocol
+/// needs these functions besides those of dialog.hpp:
 ///
 ///   static bool needs_another(const Format&, const Reply&);   // whether this first reply proves nothing alone
 ///   static Error agree(const Format&, const Reply& first, const Reply& second, Time between);

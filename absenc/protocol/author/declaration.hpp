@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The declaration of a unit by its author: one aggregate with designated initializers, so that a misspelt member does
-// not compile. docs/protocol-template is a complete example.
+// The declaration of a unit by its author. docs/protocol-template is a complete example.
 #pragma once
 
 #include <cstddef>
@@ -16,10 +15,8 @@
 
 namespace absenc::author {
 
-/// The properties of a unit of the protocol `P`, from which Descriptor (unit.hpp) makes the Unit. `P` has the members
-/// that its kind of line needs: those of dialog.hpp and device.hpp, of clocked_host.hpp, or of can_dialog.hpp.
-/// `VirtualEncoder`, a Device such as BusDevice or ClockedDevice, is constructed from (format, shaft). `Host`: as in
-/// Report.
+/// The properties of a unit of the protocol `P`, from which Descriptor (unit.hpp) makes the Unit. `P`: see dialog.hpp,
+/// clocked_host.hpp or can_dialog.hpp. `VirtualEncoder` is constructed from (format, shaft). `Host`: as in Report.
 template <class P, class VirtualEncoder, class Host = Conversation<ItemOf<P>>>
 struct Declaration {
   /// Class with the functions of the protocol.
@@ -38,14 +35,14 @@ struct Declaration {
   std::span<const std::string_view> known_as{};
   LinkKind link{};                    ///< Kind of link between host and encoder.
   std::span<const Option> options{};  ///< options of the unit: OptionsOf::infos (option.hpp)
-  /// Returns the format with these option values: `format_of` if the options are members of the format.
+  /// Returns the format with these option values, for example `format_of`.
   Format (*format)(const Options&) = nullptr;
   std::span<const ModelText> models{};       ///< models, with their option values as text (option.hpp)
   std::span<const FieldInfo> fields{};       ///< fields of the unit: FieldsOf::infos (field.hpp)
   std::span<const CommandOf<P>> commands{};  ///< commands of the unit (command.hpp)
-  /// Test vectors (text.hpp); a vector without open bytes that does not decode as stated does not compile.
+  /// Test vectors (text.hpp).
   std::span<const VectorText> vectors{};
-  /// True: frames of vectors are plain texts, not hexadecimal, as always on clocked links (texts of 0 and 1).
+  /// Whether frames of vectors are plain texts, not hexadecimal; on clocked links they always are.
   bool frames_are_texts = false;
   std::size_t frames_size = 0;  ///< most bytes of storage that the coroutine frames of one procedure need
   Report<P, Host> report{};     ///< Functions that deliver requests, replies and errors as fields and texts.
@@ -56,37 +53,30 @@ struct Declaration {
   LineSettings (*line)(const Format&) = nullptr;
   /// Returns the resolution of the encoder. Null: `format.resolution()` does.
   Resolution (*resolution)(const Format&) = nullptr;
-  /// Returns whether the options do not contradict each other, so that a virtual encoder can be made and clocked frames
-  /// can be decoded. Null: always.
+  /// Returns whether the options do not contradict each other. Null: always.
   bool (*is_usable)(const Format&) = nullptr;
-  /// Returns the request that this reply answers, as far as the reply alone shows it, or an error. Required if `decode`
-  /// is null, except on clocked lines.
+  /// Returns the request that this reply answers, as far as the reply shows it, or an error.
   Result<Request> (*guess_request)(const Format&, Bytes reply) = nullptr;
-  /// Returns the length of the reply that begins with the bytes `begin`; 0: no reply does. Null: every reply has the
-  /// length P::longest_reply.
+  /// Returns the length of the reply that begins with `begin`; 0: none does. Null: P::longest_reply.
   std::size_t (*reply_size)(const Format&, Bytes begin) = nullptr;
-  /// Returns the error to report for the reply to an invalid request: for example, that the encoder rejected it.
-  /// `error`: error of the request; `reply` is empty if only the request is decoded. Null: `error` is reported.
+  /// Returns the error to report for the reply to an invalid request. Null: its error `error`.
   Error (*answer_to_bad)(const Format&, Bytes request, Error error, Bytes reply) = nullptr;
-  /// Checks a frame and puts its fields into the sink. Null: functions of the protocol and the report do.
+  /// Checks a frame and puts its fields into the sink. Null: the protocol and the report do.
   Error (*decode)(const Format&, Frame request, Frame reply, FieldSink&) = nullptr;
-  /// For clocked links with `control_bit`: checks the bits that host and encoder exchanged, one with each frame, and
-  /// puts their fields into the sink.
+  /// For clocked links with `control_bit`: checks the exchanged bits and puts their fields.
   Error (*decode_control)(Frame request, Frame reply, FieldSink&) = nullptr;
 
-  /// For clocked links: writes the bits that the host sends for a command into `out`, as text of 0 and 1, and returns
-  /// their number. Null: the host only clocks.
+  /// For clocked links: writes the host's bits of a command into `out`, as text of 0 and 1, and returns their number.
+  /// Null: the host only clocks.
   Result<std::size_t> (*encode)(const Format&, const Command&, Arguments, MutableBytes out) = nullptr;
 
   // ---- As in Unit (protocol/unit.hpp)
 
-  /// Returns where a frame ends. Null: the lengths of requests and replies decide; on clocked links all bytes are one
-  /// frame.
+  /// Returns where a frame ends. Null: the lengths decide; on clocked links all bytes are one frame.
   FrameEnd (*frame_end)(const Options&, Direction, Bytes) = nullptr;
-  /// Returns whether a request is answered. Null: Protocol::manner decides; on clocked links and with `decode`, every
-  /// request is answered.
+  /// Returns whether a request is answered.
   bool (*is_answered)(const Options&, Frame request) = nullptr;
-  /// Returns whether the checks must detect that this bit of a valid reply was flipped; null: every bit.
+  /// Returns whether the checks must detect a flip of this bit of a valid reply; null: every bit.
   bool (*is_checked)(const Options&, Frame request, Frame reply, std::size_t bit) = nullptr;
   /// Returns the bits of a valid reply that carry a field. Without this function they are unknown.
   BitRanges (*bits)(const Options&, Frame request, Frame reply, const FieldInfo&) = nullptr;
@@ -96,15 +86,14 @@ struct Declaration {
   bool (*streams)(const Options&) = nullptr;
   /// Returns the wires beside the data line that an encoder with these options needs; null: none.
   ExtraWires (*extra_wires)(const Options&) = nullptr;
-  /// For clocked links: returns the index of the bit in a reply that the encoder sends in exchange for the level of the
-  /// clock line in the pause; null: no reply has such a bit.
+  /// For clocked links: returns the index of the bit of a reply that answers the level of the clock line in the pause;
+  /// null: no reply has one.
   std::optional<std::size_t> (*control_bit)(const Options&, Frame reply) = nullptr;
   /// Returns the alarms that an encoder with these options can report; null: all.
   std::uint32_t (*reportable)(const Options&) = nullptr;
   /// Completes a reading by values of earlier readings; null: each reading is complete.
   Reading (*remembered)(const Reading& before, Reading now) = nullptr;
-  /// Constructs a Follower, which finds frames that several exchanges of a capture carried; null: there are no such
-  /// frames.
+  /// Constructs a Follower for frames that several exchanges carried; null: there are none.
   Follower* (*follower)(const Options&, std::span<std::byte>) = nullptr;
   std::size_t follower_storage = 0;           ///< Bytes of storage that `follower` needs.
   const FieldInfo* status = nullptr;          ///< Field that describes the flags of Reading::status; null: none.

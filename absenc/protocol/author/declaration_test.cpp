@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests that the members of a Declaration reach the Unit. tests/unit_declaration_test.py shows that a misspelt member
-// does not compile.
+// Tests that the members of a Declaration reach the Unit.
 #include "absenc/protocol/author/declaration.hpp"
 
 #include <gtest/gtest.h>
@@ -293,8 +292,7 @@ TEST(Declaration, SizesReplies) {
   EXPECT_EQ(end.size, 9u);
 }
 
-// A declaration with a `decode` and no `is_answered` makes a Unit that decodes by it, and has neither `is_answered` nor
-// `pause`.
+// With a `decode` and no `is_answered`, the Unit has neither `is_answered` nor `pause`.
 TEST(Declaration, DecodesByItself) {
   NoFields sink;
   constexpr Unit made = Descriptor<decoding>::make();

@@ -8,10 +8,9 @@ namespace absenc::author {
 
 namespace {
 constexpr std::string_view turn_rule = "request during the encoder's transmission";
-// Shortest time that a host is assumed to wait for a reply: a pseudo-terminal alone may delay the bytes by this time.
+// Shortest time that a host is assumed to wait: a pseudo-terminal alone may delay by this time.
 constexpr Time least_patience = std::chrono::milliseconds(1);
-// Greatest number of consecutive replies during which the host may send without a violation, because a delay of this
-// program can explain it.
+// Greatest number of consecutive replies for which a delay of this program is an excuse.
 constexpr unsigned most_excuses = 2;
 }  // namespace
 
@@ -70,8 +69,6 @@ void Responder::forget() {
   skip_begins_ = damaged_ = false;
 }
 
-// Notes a damaged character: the rest of the request is ignored until the line is silent. While the encoder is off or
-// sends, it only forgets the begun request, or the reply of another encoder.
 void Responder::damage(Time at) {
   if (!is_on(at) || transmitting_) return forget();
   received_at_ = at;
@@ -79,8 +76,6 @@ void Responder::damage(Time at) {
   refusing_ = is_refused(Flaw::damaged, request_) || refusing_;
 }
 
-// Handles silence of the line, which ends an incomplete request. A request that was refused is answered now, unless the
-// encoder is off or sends.
 void Responder::end_run(Time at) {
   reply_.clear();
   if (is_on(at) && !transmitting_) {
@@ -120,15 +115,13 @@ void Responder::receive_byte(std::uint8_t byte, Time at) {
   request_.clear();
 }
 
-// Checks the pause before the byte that is received at `at`, if it begins a later frame of a request. Bytes that arrive
-// together do not show the pause between them.
+// Bytes that arrive together do not show the pause between them.
 void Responder::check_frame_pause(Time at, Time before) {
   if (times_.frame == 0 || request_.empty() || request_.size() % times_.frame != 0 || at == before) return;
   expect(at - times_.character - (before - late_) >= times_.frame_pause, times_.frame_rule, at);
 }
 
-// Searches for a request at the later received bytes, because none begins with the first byte; a refusal ends the
-// search.
+// Searches for a request at the later received bytes: none begins with the first byte.
 void Responder::search_again(Time at) {
   refusing_ = is_refused(Flaw::unknown, request_);
   const ByteBuffer<32> heard = request_;
@@ -137,9 +130,7 @@ void Responder::search_again(Time at) {
   for (const std::uint8_t byte : heard.view().subspan(1)) receive_byte(byte, at);
 }
 
-// Handles a byte received while the encoder sends. A request breaks a rule then, unless this program was delayed so
-// long that the host may have repeated the request after its timeout. At most `most_excuses` consecutive replies are
-// excused.
+// This program may have been delayed so long that the host rightly repeated its request.
 void Responder::receive_while_transmitting(std::uint8_t byte, Time at) {
   if (!interruption_.begins_request(request_size({&byte, 1}), at, times_.character)) return;
   ++interrupted_;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Device side of a line of characters (UART): Responder recognizes requests, answers those for this encoder, and checks
-// that hosts do not send meanwhile. It knows no protocol, and is compiled once. BusDevice adds a protocol and a memory.
+// Device side of a line of characters (UART).
 #pragma once
 
 #include <array>
@@ -26,12 +25,11 @@ struct DeviceTimes {
   std::uint8_t frame = 0;  ///< bytes of each frame of a request; 0: a request is one frame
   Time frame_pause{};      ///< shortest pause between two frames of a request
   std::string_view frame_rule{};  ///< rule that hosts must keep this pause
-  /// Whether requests received during a transmission are stored and answered afterwards, as on full-duplex lines.
+  /// Whether requests received during a transmission are stored and answered afterwards.
   bool keeps_requests = false;
 };
 
-/// A virtual encoder on a line of characters; a subclass recognizes and answers requests. BusDevice makes such an
-/// encoder from a protocol.
+/// A virtual encoder on a line of characters; a subclass recognizes and answers requests.
 class Responder : public EncoderOn<std::uint8_t> {
  public:
   /// Handles an event that the port reports.
@@ -47,21 +45,19 @@ class Responder : public EncoderOn<std::uint8_t> {
   explicit Responder(const DeviceTimes& times) : EncoderOn(times.start_time), times_(times) {}
   ~Responder() = default;
 
-  /// Sets that `bytes` are sent at `at` without a request on the line: after chip select, or unsolicited.
+  /// Sets that `bytes` are sent at `at` without a request on the line.
   void transmit(Bytes bytes, Time at);
   /// Returns whether the encoder is sending, or is about to send a reply.
   [[nodiscard]] bool is_transmitting() const { return transmitting_; }
-  /// Returns the earliest time at which the last received bytes, delivered at `at`, may have arrived, because the
-  /// program that delivers them may have been delayed.
+  /// Returns the earliest time at which the last received bytes, delivered at `at`, may have arrived.
   [[nodiscard]] Time earliest(Time at) const { return at - late_; }
 
-  /// Returns the length of the request that begins with the bytes `begin`, or how many bytes are needed to know the
-  /// length. 0: no request begins with these bytes.
+  /// Returns the length of the request that begins with `begin`, or how many bytes are needed to know it; 0: none
+  /// begins so.
   [[nodiscard]] virtual std::size_t request_size(Bytes begin) const = 0;
   /// Returns the length of the reply to `request`, which is for another encoder; 0: none.
   [[nodiscard]] virtual std::size_t others_reply_size(Bytes request) const = 0;
-  /// Returns whether the reply of another encoder may begin with this byte. If not, that encoder did not answer and the
-  /// byte belongs to a new request. By default true.
+  /// Returns whether the reply of another encoder may begin with this byte. By default true.
   [[nodiscard]] virtual bool begins_others_reply(std::uint8_t) const { return true; }
   /// Whether and how a request is answered.
   enum class Answer : std::uint8_t {
@@ -72,16 +68,14 @@ class Responder : public EncoderOn<std::uint8_t> {
   };
   /// Sets that the present reply begins later by `time`. To be called from `respond`.
   void take_longer(Time time) { longer_ = time; }
-  /// States that all encoders of the line answer the present request in turn: this one `delay` later than it would
-  /// alone. The last reply ends before `all` has passed since the first one began. To be called from `respond`.
+  /// States that all encoders answer in turn: this one `delay` later, all of them within `all`. Call it from `respond`.
   void take_turn(Time delay, Time all) {
     longer_ = delay;
     turns_ = all;
   }
-  /// Is called when the last bit of a reply, or of bytes given to `transmit`, was sent, with that time.
+  /// Handles the end of a transmission.
   virtual void replied(Time) {}
-  /// Answers the complete request `request`, received at `at`: writes the reply into `reply`, and returns how the
-  /// request is answered.
+  /// Answers `request`, received at `at`: writes the reply, and returns how it is answered.
   virtual Answer respond(Bytes request, Time at, ByteBuffer<64>& reply) = 0;
   /// Reason why received bytes are no valid request.
   enum class Flaw : std::uint8_t {
@@ -89,10 +83,9 @@ class Responder : public EncoderOn<std::uint8_t> {
     unknown,    ///< no request begins with these bytes
     cut_short,  ///< silence ended the request before it was complete
   };
-  /// Returns whether the encoder replies to an invalid request with a refusal; false: the request is ignored. `heard`:
-  /// the received bytes; for a damaged request those before the damage, possibly none. By default false.
+  /// Returns whether the encoder replies to an invalid request. `heard`: the received bytes. By default false.
   virtual bool is_refused(Flaw, Bytes /*heard*/) { return false; }
-  /// Writes the reply to a refused request into `reply`; called when the line is silent. By default empty.
+  /// Writes the reply to a refused request, when the line is silent. By default empty.
   virtual void refuse(Time, ByteBuffer<64>& /*reply*/) {}
 
  private:
@@ -127,8 +120,8 @@ class Responder : public EncoderOn<std::uint8_t> {
   Interruption interruption_;
 };
 
-/// A virtual encoder of a protocol with requests and replies. It has `memory_size` bytes that survive power off.
-/// Besides the functions of dialog.hpp the protocol needs these:
+/// A virtual encoder of a protocol with requests and replies. Its `memory_size` bytes survive power off. Besides the
+/// functions of dialog.hpp the protocol needs these:
 ///
 ///   static DeviceTimes device_times(const Format&);
 ///   static std::size_t request_size(const Format&, Bytes begin);       // 0: no request begins with these bytes
@@ -136,8 +129,7 @@ class Responder : public EncoderOn<std::uint8_t> {
 ///   static Result<Request> decode_request(const Format&, Bytes);
 ///   static ByteBuffer<N> encode_reply(const Format&, const Request&, const Reply&);
 ///
-/// `Derived` has `bool is_mine(const Request&)`, and `std::optional<Reply> answer(const Request&, Time at)`, which
-/// returns nothing for no reply.
+/// `Derived` has `bool is_mine(const Request&)` and `std::optional<Reply> answer(const Request&, Time at)`.
 template <class P, class Derived, std::size_t memory_size>
 class BusDevice : public Responder {
  public:
@@ -161,14 +153,12 @@ class BusDevice : public Responder {
   [[nodiscard]] const Format& format() const { return format_; }
   /// Returns position and motion of the shaft at the time `at`.
   [[nodiscard]] ShaftState shaft(Time at) const { return shaft_->at(at); }
-  /// Returns the position of the shaft at `at` in counts of 2^-bits revolution, measured from the zero that
-  /// `store_zero` stored at `zero_address`. It is continuous from turn to turn, negative below the zero.
+  /// Returns the position of the shaft at `at` in counts of 2^-bits revolution from the zero at `zero_address`.
   [[nodiscard]] std::int64_t counts(Time at, unsigned bits, std::size_t zero_address) const {
     const auto zero = static_cast<std::int64_t>(load_little_endian(Bytes(memory_).subspan(zero_address, 4)));
     return (shaft(at).position - zero) >> (32 - bits);
   }
-  /// Stores the position of the shaft within its turn at `at` as the zero, in four bytes of the memory at
-  /// `zero_address`.
+  /// Stores the position within the turn at `at` as the zero, in four bytes at `zero_address`.
   void store_zero(Time at, std::size_t zero_address) {
     const auto here = static_cast<std::uint64_t>(shaft(at).position) & low_mask(32);
     store_little_endian(MutableBytes(memory_).subspan(zero_address, 4), here);

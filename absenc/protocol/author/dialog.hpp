@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Combines the engine of a line of characters with a protocol: conversations with one request, and procedures with
-// several requests.
+// Combines the engine of a line of characters with a protocol.
 #pragma once
 
 #include <array>
@@ -17,8 +16,7 @@
 
 namespace absenc::author {
 
-/// The functions that a protocol must have; `reading` and `latched` only if `last_reading` is used. A misspelt name
-/// does not compile.
+/// A conversation with encoded requests and decoded replies. The protocol must have these members:
 ///
 ///   struct Protocol {
 ///     using Format, Request, Reply;                                  // Format: made from the options
@@ -29,11 +27,10 @@ namespace absenc::author {
 ///     static std::size_t expected(const Format&, const Request&, Bytes reply);   // see Engine
 ///     static Result<Reply> decode(const Format&, const Request&, Bytes reply);   // of at least one byte
 ///     static bool is_whole(const Format&, Error);                    // see Engine
+///     // only for `last_reading`:
 ///     static Reading reading(const Format&, const Request&, const Reply&);
-///     static Time latched(const Format&, Time sent_at);              // when the encoder latches the position; if the
-///   };                                                               // document does not say: `sent_at` is assumed
-///
-/// A conversation with encoded requests and decoded replies; a subclass sends the requests and handles the replies.
+///     static Time latched(const Format&, Time sent_at);              // when the encoder latches the position
+///   };
 template <class P>
 class HostOf : public Engine {
  public:
@@ -57,7 +54,7 @@ class HostOf : public Engine {
     reading.received = received_at();
     return reading;
   }
-  /// Returns false: the explanation of a reply is added to the error's texts. Only procedures can replace it.
+  /// Returns false: the explanation of a reply is added to the error's texts.
   [[nodiscard]] static constexpr bool is_alone() { return false; }
 
  protected:
@@ -89,12 +86,11 @@ class HostOf : public Engine {
   Request request_{};
   decltype(P::encode(Format{}, Request{})) request_bytes_{};
   Reply last_{};
-  // Bytes of the reply. There is more room than for the longest reply, so that a reply that is too long is detected.
+  // More room than for the longest reply, so that a reply that is too long is detected.
   std::array<std::uint8_t, 3 * P::longest_reply> storage_;
 };
 
-/// Conversation that reads a position or another value with one request. It must be fast, because a drive may read ten
-/// thousand positions a second.
+/// Conversation that reads a position or another value with one request.
 template <class P>
 class ReadPosition : public HostOf<P> {
  public:
@@ -118,8 +114,7 @@ class ReadPosition : public HostOf<P> {
   Reading reading_{};
 };
 
-/// A conversation that a procedure (a coroutine) controls: the procedure awaits replies to its requests. The coroutine
-/// frames are in storage that the constructor gets.
+/// A conversation that a procedure (a coroutine) controls.
 template <class P>
 class DialogOf : public HostOf<P>, public Routine {
  public:
@@ -128,8 +123,7 @@ class DialogOf : public HostOf<P>, public Routine {
   /// Type of the protocol's replies.
   using Reply = typename P::Reply;
 
-  /// A request that a procedure can await, after setting its properties. With `must` awaiting it gives the reply, and
-  /// ends the procedure if there is no valid one; otherwise it gives the reply or the error.
+  /// A request that a procedure can await. With `must`, the procedure ends without a valid reply.
   template <bool must>
   class [[nodiscard]] Question {
    public:
@@ -140,7 +134,7 @@ class DialogOf : public HostOf<P>, public Routine {
       dialog_.earliest_ = dialog_.received_at() + pause;
       return *this;
     }
-    /// Sets that the request is sent once: an invalid or missing reply is not followed by a repetition.
+    /// Sets that an invalid or missing reply is not followed by a repetition.
     Question& once() {
       dialog_.asking_.repeats = 0;
       return *this;
@@ -155,7 +149,7 @@ class DialogOf : public HostOf<P>, public Routine {
       dialog_.changing_ = true;
       return *this;
     }
-    /// Sets that the reply is accepted only when silence follows it, as with Manner::ends_by_silence.
+    /// Sets that the reply is accepted only when silence follows it.
     Question& until_silence() {
       dialog_.asking_.ends_by_silence = true;
       return *this;
@@ -168,7 +162,7 @@ class DialogOf : public HostOf<P>, public Routine {
 
     /// Returns false, so that co_await always suspends the procedure: a reply takes time.
     [[nodiscard]] bool await_ready() const { return false; }
-    /// Sets that the request is sent next; the procedure continues, or ends, when the exchange has ended.
+    /// Sets that the request is sent next.
     void await_suspend(std::coroutine_handle<>) { dialog_.ask_it(must); }
     /// Returns the reply; without `must` the reply or the error.
     auto await_resume() const {
@@ -183,7 +177,7 @@ class DialogOf : public HostOf<P>, public Routine {
     DialogOf& dialog_;
   };
 
-  /// Returns an awaitable that sends `request` and gives the reply. Without a valid reply the procedure ends there.
+  /// Returns an awaitable that sends `request` and gives the reply, or ends the procedure.
   [[nodiscard]] Question<true> ask(const Request& request) {
     prepare(request);
     return Question<true>(*this);
@@ -193,8 +187,7 @@ class DialogOf : public HostOf<P>, public Routine {
     prepare(request);
     return Question<false>(*this);
   }
-  /// Returns an awaitable that waits until `pause` after the last received or sent character: `co_await
-  /// dialog.rest(10ms)`.
+  /// Returns an awaitable that waits until `pause` after the last received or sent character.
   [[nodiscard]] auto rest(Time pause) {
     struct Rest {
       DialogOf& dialog;
@@ -205,28 +198,26 @@ class DialogOf : public HostOf<P>, public Routine {
     };
     return Rest{*this, pause};
   }
-  /// Sets that the caller gets the present result (step `emit`) before the next pause or request, or before the end.
+  /// Sets that the caller gets the present result (step `emit`).
   void emit() { HostOf<P>::emit(); }
   using HostOf<P>::set_format;
-  /// Sets that this end of the line is switched to `rate` bits per second before the next request, pause or end, and
-  /// replaces the time limits by `times`.
+  /// Sets that this end of the line changes to `rate` bits per second, and the time limits to `times`.
   void set_rate(std::uint32_t rate, const HostTimes& times) {
     HostOf<P>::set_rate(rate);
     this->set_times(times);
   }
-  /// Sets that the line is listened to for `duration`, without sending, from the next await of `heard` on; awaiting
-  /// `heard` again gives further bytes until the time is over.
+  /// Sets that awaiting `heard` listens to the line for `duration`, without sending.
   void listen(Time duration) {
     heard_ = {};
     HostOf<P>::listen(duration);
   }
   /// Result of awaiting `heard`: bytes received while listening, or the end of the time.
   struct Heard {
-    /// Received bytes, valid until the next await. Empty although `over` is false: a damaged character was received.
+    /// Received bytes, valid until the next await. Empty, with `over` false: a damaged character.
     Bytes bytes{};
     bool over = false;  ///< whether the time of `listen` is over
   };
-  /// Returns an awaitable for the next bytes received while listening, or the end of the time of `listen`.
+  /// Returns an awaitable for the next received bytes, or the end of the time of `listen`.
   [[nodiscard]] auto heard() {
     struct Hear {
       DialogOf& dialog;
@@ -238,14 +229,12 @@ class DialogOf : public HostOf<P>, public Routine {
   }
   [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
   [[nodiscard]] std::string_view advice() const override { return outcome_.advice; }
-  /// Returns whether the explanation of the last reply is left out, because the texts of the procedure's outcome
-  /// replace it (`only`).
+  /// Returns whether the explanation of the last reply is left out (`only`).
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
   [[nodiscard]] ChangeSent change_sent() const final { return change(); }
-  /// Declares that from now on the procedure, when it is asked to end early, restores the encoder before it ends. Such
-  /// a procedure must check `is_aborted`. `yes` false: withdraws the declaration.
+  /// Declares whether the procedure, when asked to end early, restores the encoder first: it must check `is_aborted`.
   void restores(bool yes = true) { restores_ = yes; }
-  /// Returns whether the caller has asked the procedure to end early, while `restores` was declared.
+  /// Returns whether the caller has asked the procedure to end early, after `restores`.
   [[nodiscard]] bool is_aborted() const { return aborted_; }
   bool abort() final {
     aborted_ = aborted_ || restores_;
@@ -253,7 +242,7 @@ class DialogOf : public HostOf<P>, public Routine {
   }
 
  protected:
-  /// Constructs the conversation with an encoder of this format; the coroutine frames of its procedure are in `arena`.
+  /// Constructs the conversation; the coroutine frames of its procedure are in `arena`.
   DialogOf(const typename P::Format& format, std::span<std::byte> arena) : HostOf<P>(format), Routine(arena) {}
   ~DialogOf() = default;
 
@@ -314,15 +303,12 @@ struct ProcedureDialog<P> {
 };
 }  // namespace detail
 
-/// Type of the dialog of a protocol's procedures: `P::Dialog` if the protocol declares it, otherwise DialogOf.
-/// `P::Dialog` is a Routine and an engine of its kind of line, constructed from (format, arena).
+/// Type of the dialog of a protocol's procedures: `P::Dialog`, or else DialogOf.
 template <class P>
 using ProcedureDialog = typename detail::ProcedureDialog<P>::Type;
 
-/// A conversation that runs `procedure(dialog, found, bound..., arguments)`; the arguments are passed only if the
-/// procedure takes them. Its result is `Found`, whose member `reading`, if it has one, is the position; otherwise the
-/// `reading` of the dialog is. If `Found` has a member `streams`, each `emit` is a result, and the procedure ends only
-/// with an error.
+/// A conversation that runs `procedure(dialog, found, bound..., arguments)`, or without the arguments. Its result is
+/// `Found`.
 template <class P, class Found, auto procedure, auto... bound>
 class Run : public ProcedureDialog<P> {
  public:
@@ -341,7 +327,7 @@ class Run : public ProcedureDialog<P> {
   [[nodiscard]] const Found& found() const { return found_; }
   /// Returns the counts of a procedure that streams; null: it ends by itself.
   [[nodiscard]] const StreamCounts* stream() const final { return goes_on ? &counts_ : ProcedureDialog<P>::stream(); }
-  /// Returns whether `Found` has a member `streams`; the procedure then sends a request for each result.
+  /// Returns whether `Found` has a member `streams`.
   [[nodiscard]] bool asks() const final { return goes_on; }
   /// Returns the position that is the result; null after an error, or if there is none.
   [[nodiscard]] const Reading* reading() const final {

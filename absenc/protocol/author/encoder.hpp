@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Base of virtual encoders on lines of characters and on clocked lines: power, alarms raised by tests and users,
-// breaches of rules, and the number of answers. Virtual encoders on Modbus and CAN do not derive from it.
+// Base of virtual encoders on lines of characters and on clocked lines.
 #pragma once
 
 #include <cstdint>
@@ -11,11 +10,11 @@
 
 namespace absenc::author {
 
-/// A virtual encoder with the parts that most share: power, alarms, rule checks and counters. Subclasses add the line.
+/// A virtual encoder with power, alarms, rule checks and counters. Subclasses add the line.
 template <class Item>
 class EncoderOn : public Device<Item> {
  public:
-  /// Switches the encoder on at `now`; it is ready after the start-up time, or at once with `PowerOn::skip`.
+  /// Switches the encoder on at `now`; it is ready after the start-up time, at once with `skip`.
   void power_on(Time now, typename Device<Item>::PowerOn kind) override {
     power_ = Power::starting;
     ready_at_ = kind == Device<Item>::PowerOn::skip ? now : now + start_time_;
@@ -38,19 +37,17 @@ class EncoderOn : public Device<Item> {
   [[nodiscard]] std::uint32_t violation_count() const final { return rules_.violation_count(); }
   /// Sets the observer of rule checks; null: none.
   void watch_rules(RuleWatch* watch) final { rules_.watch(watch); }
-  /// Returns how many answers the encoder has given: replies, unsolicited transmissions, and those requests
-  /// without a reply for which the subclass calls `count_answer` or returns Answer::none, executed or not.
+  /// Returns how many answers the encoder has given.
   [[nodiscard]] std::uint64_t answer_count() const final { return answer_count_; }
 
  protected:
-  /// Constructs an encoder that is off. `start_time`: time from power on until requests are answered.
+  /// Constructs an encoder that is off. `start_time`: from power on until requests are answered.
   explicit EncoderOn(Time start_time) : start_time_(start_time) {}
   ~EncoderOn() = default;
 
-  /// Records whether the host kept a rule of the document, and returns `kept`. A broken rule is a violation.
+  /// Records whether the host kept a rule of the document, and returns `kept`.
   bool expect(bool kept, std::string_view rule, Time at) { return rules_.expect(kept, rule, at); }
-  /// Notifies only the observer that the host kept or broke a rule. Breaking this rule is no violation, because the
-  /// document permits a host to do so, or the host may have given up after an error.
+  /// Notifies the observer that the host kept or broke a rule; breaking it is no violation.
   void note(bool kept, std::string_view rule) { rules_.note(kept, rule); }
   /// Returns the rules of the encoder, for parts of it that check some of them.
   [[nodiscard]] HostRules& rules() { return rules_; }
@@ -59,8 +56,7 @@ class EncoderOn : public Device<Item> {
     power_ = Power::starting;
     ready_at_ = until;
   }
-  /// Returns whether the encoder is switched on and its start-up is over at `now`. Calls `started` if the start-up has
-  /// ended since the last call.
+  /// Returns whether the encoder is switched on and its start-up is over at `now`.
   [[nodiscard]] bool is_on(Time now) {
     if (power_ == Power::starting && now >= ready_at_) {
       power_ = Power::on;

@@ -43,12 +43,11 @@ void Engine::finish(Error error, Time hold) {
 // ---- Steps
 
 ByteStep Engine::next(Time now) {
-  // A lambda makes the step, because for a plain variable the compiler would call a function that first fills it with
-  // zeros.
+  // The lambda saves a call that fills a plain variable with zeros first.
   ByteStep step = [this]() -> ByteStep {
     return {.expect = due_, .at = never, .answer = manner_.answer_limit, .gap = times_.gap_limit};
   }();
-  // While a reply is received, the checks below are left out: between two characters there is little time.
+  // Between two characters there is little time, so the checks below are left out.
   if (state_ == State::receiving) return step;
   step.expect = 0;
   // The traffic before this conversation is unknown, so pauses are measured from now.
@@ -69,8 +68,7 @@ ByteStep Engine::next(Time now) {
   return step;
 }
 
-// Calls `woken` when a sleep or the time of listening is over. The subclass may sleep again in `woken`. Steps that the
-// subclass has requested (`emit`, `configure`) come first.
+// Loops, because `woken` may begin a sleep that is already over.
 void Engine::wake(Time now) {
   while ((state_ == State::sleeping || state_ == State::listening) && rate_ == 0 && !emitting_) {
     if (state_ == State::listening && earliest_ == never) earliest_ = now + listening_;
@@ -81,8 +79,7 @@ void Engine::wake(Time now) {
   }
 }
 
-// Returns the time until which `next` only returns `wait`; Time::min() if it need not wait. A request that waits for
-// `earliest_` alone is returned at once, with that time in its step.
+// A request that waits for no silence is returned at once: its step has the earliest time.
 Time Engine::rest_end() const {
   if (state_ == State::ready && times_.silence != Time{}) return std::max(received_at_ + times_.silence, earliest_);
   return state_ >= State::sleeping && state_ != State::over ? earliest_ : Time::min();
@@ -135,8 +132,7 @@ void Engine::feed(const ByteEvent& event) {
   if (noisy_) end_noise(before);
 }
 
-// Handles bytes or a damaged character received while no reply is awaited. Returns true if the event needs no further
-// handling.
+// Returns true if the event needs no further handling.
 bool Engine::handle_unawaited(const ByteEvent& event) {
   const bool damaged = event.kind == ByteEvent::Kind::line_error;
   if (state_ == State::listening) {
@@ -166,8 +162,7 @@ void Engine::sent(Time at) {
   check_reply();  // bytes may have been received during a pulse
 }
 
-// Checks a complete reply, unless the manner demands silence first. After a valid reply or a refusal the engine
-// continues at once, after any other error it waits for silence.
+// After an error more bytes may follow, and sending into them can destroy the encoder's driver.
 void Engine::check_reply() {
   if (state_ != State::receiving) return;
   const std::size_t whole = expected();
@@ -183,7 +178,7 @@ void Engine::conclude() {
     if (disturbed_) return conclude_with(Error::bad_framing);
     return conclude_with(manner_.any_reply ? Error::none : Error::timeout);
   }
-  // After damaged or early characters, or on a line that is never silent, the received bytes are not just the reply.
+  // The received bytes may be more than the reply.
   if (disturbed_ || noisy_) return conclude_with(Error::wrong_length);
   conclude_with(manner_.any_reply ? Error::none : check());
 }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of a line on which the encoder answers requests: sends a request, receives the reply, and repeats the
-// request after an error. It knows no protocol, and is compiled once.
+// Host side of a line on which the encoder answers requests. It knows no protocol.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +12,7 @@
 
 namespace absenc::author {
 
-/// Time limits and pauses of a host: those of the protocol's document, or chosen where it states none.
+/// Time limits and pauses of a host: those of the protocol's document, or chosen.
 struct HostTimes {
   Time answer_limit{};          ///< longest time from the end of a request to the first character of its reply
   Time gap_limit{};             ///< longest time between two characters of a reply
@@ -29,8 +28,7 @@ struct Manner {
   bool expects_reply = true;  ///< false: the encoder does not reply, so the exchange ends with the request
   /// Whether a reply is checked only after the silence that follows it.
   bool ends_by_silence = false;
-  /// Whether any undamaged reply, or none, is accepted: the received bytes are not checked, and silence ends the
-  /// exchange.
+  /// Whether the content of the reply is not checked, and a missing reply is no error.
   bool any_reply = false;
   Time answer_limit{};     ///< longest time until the reply begins; 0: HostTimes::answer_limit
   Time hold{};             ///< how long the encoder may still be busy with the request after an error
@@ -40,12 +38,7 @@ struct Manner {
   ExtraWire wire{};        ///< Wire that is pulsed, if `pulse` is not 0.
 };
 
-/// Conversation on a line of characters; a subclass recognizes a complete reply and handles it. HostOf makes such a
-/// class from a protocol. CAN and clocked lines have engines of their own, because replies end differently there.
-///
-/// After an invalid reply the engine waits for silence before it ends or sends again: sending while an encoder sends
-/// can destroy the encoder's driver. If the line is not silent within HostTimes::patience, the exchange ends with an
-/// error. After a valid reply or a refusal (`is_whole`) the engine waits for silence only if Manner demands it.
+/// Conversation on a line of characters; a subclass provides the protocol.
 class Engine : public Conversation<std::uint8_t> {
  public:
   /// Not copyable: requests and replies are views into the conversation itself.
@@ -57,67 +50,55 @@ class Engine : public Conversation<std::uint8_t> {
   /// Returns the next step that the port must take.
   Step<std::uint8_t> next(Time now) final;
   [[nodiscard]] Error error() const final { return error_; }
-  /// Puts nothing, so that the names and texts of fields are linked only where Reported (command.hpp) is used.
+  /// Puts nothing, so that the names and texts of fields are linked only where needed.
   void report(FieldSink&) const override {}
   /// Returns the last request, none after `listen`, and the bytes of `reply`.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const final { return {out_, reply(), sent_at_, received_at_}; }
 
   /// Returns the time at which the last request was due to begin.
   [[nodiscard]] Time begun_at() const { return begun_at_; }
-  /// Returns the time at which the last bit of the last request was sent; for a pulse, the time Manner::pulse before
-  /// the end of the pulse.
+  /// Returns the end of the last sent request; for a pulse, its end minus Manner::pulse.
   [[nodiscard]] Time sent_at() const { return sent_at_; }
-  /// Returns the time from which pauses are measured: the end of the last request, received byte or time of listening;
-  /// before these, the first step.
+  /// Returns the time from which pauses are measured.
   [[nodiscard]] Time received_at() const { return received_at_; }
-  /// Returns the bytes received since the last request, or listening, began, valid or not, as far as there is room.
+  /// Returns the bytes received last, valid or not, as far as there is room.
   [[nodiscard]] Bytes reply() const { return Bytes(storage_).first(size_); }
-  /// Returns whether the last exchange was abandoned because the line is never silent. Repeating the request does not
-  /// help then.
+  /// Returns whether the last exchange was given up because the line seemed never silent.
   [[nodiscard]] bool is_noisy() const { return noisy_; }
-  /// Returns whether, since the last request began, a character was damaged or was received while no reply was awaited.
-  /// Characters received while listening do not count, nor undamaged ones during a pulse.
+  /// Returns whether a damaged character, or one that came too early, disturbed the last exchange.
   [[nodiscard]] bool is_disturbed() const { return disturbed_; }
 
  protected:
-  /// Constructs an engine. `storage` must outlive it, and have more room than the longest reply needs, so that a reply
-  /// that is too long is detected.
+  /// Constructs an engine. `storage` must outlive it, and have more room than the longest reply needs.
   Engine(const HostTimes& times, MutableBytes storage) : storage_(storage), times_(times) {}
   ~Engine() = default;
 
-  /// Sets that `request` is sent next, as `manner` states, not before `earliest`. The bytes must stay valid until the
-  /// exchange has ended.
+  /// Sets that `request`, whose bytes must stay valid, is sent next, not before `earliest`.
   void send(Bytes request, const Manner& manner, Time earliest);
-  /// Sets that the caller gets the present result (step `emit`) before any other step but a change of the rate.
+  /// Sets that the caller gets the present result, by the step `emit`.
   void emit() { emitting_ = true; }
-  /// Sets that this end of the line is switched to `rate` bits per second before any other step; 0: it is not.
+  /// Sets that this end of the line is next switched to `rate` bits per second; 0: it is not.
   void set_rate(std::uint32_t rate) { rate_ = rate; }
   /// Replaces the time limits, for example after a change of the rate.
   void set_times(const HostTimes& times) { times_ = times; }
   /// Sets that nothing is sent until `time`, and that `woken` is called then.
   void sleep(Time time);
-  /// Sets that the line is listened to for `duration`, from the next step on. `heard` is called for received bytes and
-  /// for each damaged character, and `woken` at the end.
+  /// Sets that the line is listened to for `duration`; `heard` gets what is received.
   void listen(Time duration);
   /// Continues to listen until the end of the time. To be called after `heard`.
   void listen_on() { state_ = State::listening; }
-  /// Sets that the conversation ends with `error`, but not before `hold` has passed since the last sent or received
-  /// character: until then the encoder must not be disturbed.
+  /// Sets that the conversation ends with `error`, at the earliest `hold` after `received_at()`.
   void finish(Error error, Time hold = {});
   /// Returns the manner of the present request, with the repetitions that are left.
   [[nodiscard]] const Manner& manner() const { return manner_; }
 
-  /// Returns the length of the reply that begins with the bytes `reply()`; 0: it is not known yet, or only silence ends
-  /// the reply.
+  /// Returns the length of the reply that begins with `reply()`; 0: it is not known.
   [[nodiscard]] virtual std::size_t expected() const = 0;
-  /// Checks the reply in `reply()`, which has ended, and stores its content if it is valid. Returns the first error, or
-  /// none.
+  /// Checks the reply in `reply()`, and stores its content if it is valid. Returns the first error.
   [[nodiscard]] virtual Error check() = 0;
-  /// Returns whether a reply with this error is complete, as a refusal is, so that nothing follows it. After any other
-  /// error more bytes may follow, which must not collide with the next request.
+  /// Returns whether a reply with this error is complete, so that nothing follows it.
   [[nodiscard]] virtual bool is_whole(Error error) const = 0;
-  /// Handles the end of an exchange. `error`: none, or the error of the last attempt. Calls `send`, `sleep`,
-  /// `listen` or `finish`.
+  /// Handles the end of an exchange. `error` is that of the last attempt, or none.
   virtual void concluded(Error error) = 0;
   /// Is called when the time of `sleep` or `listen` has passed.
   virtual void woken() {}
@@ -155,8 +136,7 @@ class Engine : public Conversation<std::uint8_t> {
   void conclude_with(Error error);
   void start(Time earliest);
 
-  // Byte members that every received character needs come first: a Cortex-M0+ loads a byte in one instruction only from
-  // the first 32 bytes of an object.
+  // Byte members come first: a Cortex-M0+ loads a byte fast only from an object's first 32 bytes.
   State state_ = State::over;
   bool disturbed_ = false;
   bool item_received_ = false;  // a byte, or a damaged character, was received in this exchange

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Declares a field by the member of a struct that has its value, or by a function that computes the value from the
-// struct. The type of the value gives the kind of the field, apart from flags, and the order of the declarations is the
-// order in which fields are put.
+// Declares a field by the member of a struct that has its value, or by a function that computes it.
 #pragma once
 
 #include <algorithm>
@@ -18,8 +16,7 @@
 
 namespace absenc::author {
 
-/// Description of a field together with the source of its value: a member of a struct `Values`, or a function that
-/// computes the value from the struct.
+/// Description of a field whose value is a member of a struct, or the result of a function.
 template <auto member>
 struct FieldOf {
   FieldInfo info;  ///< Description of the field.
@@ -55,15 +52,14 @@ constexpr FieldInfo::Kind kind_of() {
 }
 }  // namespace detail
 
-/// Returns the declaration of a field whose value is `member`, or the result of the function `member`. The type of the
-/// value gives the kind of the field. A value that is an empty optional is not put.
+/// Returns the declaration of a field with the value of `member`; an empty optional is not put.
 template <auto member>
 [[nodiscard]] constexpr FieldOf<member> field(std::string_view name, std::string_view unit, std::string_view meaning,
                                               Role role = Role::other) {
   return {
       {.name = name, .kind = detail::kind_of<detail::Held<member>>(), .unit = unit, .meaning = meaning, .role = role}};
 }
-/// Returns the declaration of a field of flags whose value is `member`; `flags[n]` describes bit n.
+/// Returns the declaration of a field of flags whose value is `member`.
 template <auto member>
 [[nodiscard]] constexpr FieldOf<member> field(std::string_view name, std::string_view meaning,
                                               std::span<const FlagInfo> flags) {
@@ -77,13 +73,13 @@ template <auto member>
   return one;
 }
 
-/// Table of the fields of a struct `Values`, which has their values as members or as results of functions.
+/// Table of the fields of a struct `Values`.
 template <class Values, auto... members>
 struct FieldsOf {
   /// Constructs the table from the fields, in the order in which they are put.
   constexpr explicit FieldsOf(const FieldOf<members>&... all) : infos{all.info...} {}
 
-  /// Puts each field of `values` into `sink`, in the order of the table; values that are empty optionals are left out.
+  /// Puts the fields of `values` into `sink`, in the order of the table, except empty optionals.
   constexpr void put(FieldSink& sink, const Values& values) const {
     std::size_t index = 0;
     (put_one(sink, infos[index++], shown<members>(values)), ...);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Commands that an encoder executes only after their request was sent several times in a row: resets, zero, presets.
+// Commands that an encoder executes only after several equal requests in a row.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace absenc::author {
 
-/// The document's demands on requests that are sent in a row, and what a virtual encoder accepts.
+/// The document's demands on requests in a row, and what a virtual encoder accepts.
 struct InARow {
   /// From where to where hosts keep `interval`.
   enum class IntervalBounds : std::uint8_t {
@@ -21,8 +21,7 @@ struct InARow {
   unsigned requests = 0;  ///< number of equal requests that execute the command, 2 or more
   Time interval{};        ///< shortest time before the next request of the row, as hosts keep it
   IntervalBounds between = IntervalBounds::reply_and_request;  ///< the events between which hosts keep `interval`
-  /// Shortest time from the end of a request, or of its reply (RowCounter::measure_from), to the end of the next
-  /// request that a virtual encoder accepts. A request that follows sooner is the first of a new row.
+  /// Shortest time between two requests of a row that a virtual encoder accepts.
   Time accepted{};
   std::string_view number_rule{};    ///< rule of the virtual encoder: the host sent too few requests
   std::string_view interval_rule{};  ///< rule of the virtual encoder: the host sent two requests too fast
@@ -34,8 +33,7 @@ class RowCounter {
   /// Constructs a counter. `row` and `rules` must outlive it.
   RowCounter(const InARow& row, HostRules& rules) : row_(&row), rules_(&rules) {}
 
-  /// Counts a request of a row, received at `at`. `code` distinguishes the commands of the encoder. `earliest`:
-  /// earliest time at which the request may have arrived. Returns whether the encoder must execute the command now.
+  /// Counts a request of the command `code`, received from `earliest` to `at`. Returns whether to execute it now.
   [[nodiscard]] bool count(unsigned code, Time at, Time earliest) {
     if (code != code_) end();
     code_ = code;
@@ -46,10 +44,9 @@ class RowCounter {
     counted_ = 0;
     return true;
   }
-  /// Measures the time to the next request from `at`, the end of the reply, instead of from the end of the request.
+  /// Measures the time to the next request from `at`, the end of a reply.
   void measure_from(Time at) { since_ = at; }
-  /// Ends the row, because the host sent a request that is not of the row. A row that is too short is noted as a broken
-  /// rule.
+  /// Ends the row; one that is too short breaks `number_rule`.
   void end() {
     if (sent_ > 0 && sent_ < row_->requests) rules_->note(false, row_->number_rule);
     forget();
@@ -66,10 +63,8 @@ class RowCounter {
   Time since_{};
 };
 
-/// Sends `request` as often as `row` demands, never more often. Without a valid reply to one before the last the
-/// procedure ends, because an encoder that has missed a request does nothing. If only the last reply is missing or
-/// invalid, the encoder may have executed the command, and reading shows it: the result is whether that reply was
-/// valid.
+/// Sends `request` as often as `row` demands, and returns whether the last reply was valid. A missing or invalid
+/// earlier reply ends the procedure.
 template <class P>
 Part<bool> send_in_a_row(DialogOf<P>& dialog, typename P::Request request, const InARow& row) {
   Time pause = row.between == InARow::IntervalBounds::reply_and_request ? row.interval : Time{};

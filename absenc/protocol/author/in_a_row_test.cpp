@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of the counter for requests in a row. The tests of tformat and esl test the host's side with their encoders.
+// Tests of the counter for requests in a row.
 #include "absenc/protocol/author/in_a_row.hpp"
 
 #include <gtest/gtest.h>

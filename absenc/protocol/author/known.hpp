@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads the position of an encoder whose format and request are known at compile time, as a drive knows them: values
-// that follow from them are not computed at run time, and cases that they exclude are not linked.
+// Reads the position of an encoder whose format and request are known at compile time.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +8,7 @@
 
 namespace absenc::author {
 
-/// A protocol made of the protocol P with the constants `format` and `request`; its own Format and Request are empty.
+/// Protocol P with constant `format` and `request`; its own Format and Request are empty.
 template <class P, const typename P::Format& format, const typename P::Request& request>
 struct Known {
   struct Format {};
@@ -24,11 +23,11 @@ struct Known {
   static constexpr Manner manner(const Format&, const Request&) { return P::manner(format, request); }
   /// Returns the bytes of the request.
   static constexpr auto encode(const Format&, const Request&) { return P::encode(format, request); }
-  /// Returns the length of the reply in bytes, as far as its first bytes `so_far` show it; 0: unknown.
+  /// Returns the length in bytes of the reply that begins with `so_far`; 0: unknown.
   static constexpr std::size_t expected(const Format&, const Request&, Bytes so_far) {
     return P::expected(format, request, so_far);
   }
-  /// Checks and decodes the bytes of a reply. Returns the reply, or the error of the first failed check.
+  /// Returns the decoded reply, or the error of a failed check.
   [[gnu::flatten]] static constexpr Result<Reply> decode(const Format&, const Request&, Bytes bytes) {
     return P::decode(format, request, bytes);
   }
@@ -38,12 +37,11 @@ struct Known {
   [[gnu::flatten]] static constexpr Reading reading(const Format&, const Request&, const Reply& reply) {
     return P::reading(format, request, reply);
   }
-  /// Returns the latch time that P states or assumes for the reply to a request that was sent at `sent_at`.
+  /// Returns the latch time that P gives for a request that was sent at `sent_at`.
   static constexpr Time latched(const Format&, Time sent_at) { return P::latched(format, sent_at); }
 };
 
-/// Conversation that reads the position with a format and a request that are constants: `static constexpr Format
-/// format{...}; static constexpr Request request{...};`. It is for protocols in which one reply proves the position.
+/// Conversation that reads the position with a constant format and request.
 template <class P, const typename P::Format& format, const typename P::Request& request>
 requires(!requires { P::needs_another; }) class ReadKnownPosition final
     : public ReadPosition<Known<P, format, request>> {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For the tests of units: checks that a reader whose format is known at compile time behaves like any other reader.
+// Checks that a reader whose format is known at compile time behaves like any other reader.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -11,8 +11,7 @@
 
 namespace absenc::author::testing {
 
-/// Runs a conversation whose requests are answered with `reply`, in one piece if `whole`, otherwise byte by byte, and
-/// then silence. Returns the bytes of its requests.
+/// Answers each request with `reply`, in one piece or byte by byte. Returns the requests.
 template <class Reader>
 std::vector<std::vector<std::uint8_t>> talk(Reader& reader, const std::vector<std::uint8_t>& reply, bool whole) {
   using Kind = Event<std::uint8_t>::Kind;
@@ -37,8 +36,7 @@ std::vector<std::vector<std::uint8_t>> talk(Reader& reader, const std::vector<st
   return sent;
 }
 
-/// Expects that ReadKnownPosition and ReadPosition give the same result for the valid reply `good`, for the reply with
-/// any one of its bits wrong, and for each incomplete reply.
+/// Expects the same results of ReadKnownPosition and ReadPosition for `good` and damaged replies.
 template <class P, const typename P::Format& format, const typename P::Request& request>
 void expect_known_as_any(const std::vector<std::uint8_t>& good) {
   std::vector<std::vector<std::uint8_t>> replies{good};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Parts that the procedures of several units share: reading the position, and checking whether a zero may be set.
+// Parts of procedures: reading the position, and checking whether a zero may be set.
 #pragma once
 
 #include <cstdint>
@@ -26,8 +26,7 @@ namespace absenc::author {
   return reading;
 }
 
-/// The last exchange that `look` stored. The `Found` of a procedure that calls `look` is this struct, or derives from
-/// it.
+/// The last exchange that `look` stored.
 template <class P>
 struct Looked {
   typename P::Request request{};  ///< The request that was sent.
@@ -35,8 +34,8 @@ struct Looked {
   Reading reading{};              ///< The reading of the reply, with the times of the exchange.
 };
 
-/// Requests the position, as often as Protocol::manner permits, and stores the valid exchange in `found`. The result is
-/// the position in counts. Without a valid reply the procedure ends.
+/// Requests the position, stores the exchange in `found`, and returns the position in counts. Without a valid reply the
+/// procedure ends.
 template <class P>
 Part<std::uint64_t> look(DialogOf<P>& dialog, Looked<P>& found, typename P::Request request) {
   found.reply = co_await dialog.ask(request);
@@ -45,8 +44,7 @@ Part<std::uint64_t> look(DialogOf<P>& dialog, Looked<P>& found, typename P::Requ
   co_return found.reading.singleturn;
 }
 
-/// Reads the position twice. Ends the procedure with the reason if a zero must not be set now; nothing is changed then.
-/// Otherwise the result is true.
+/// Reads the position twice, and ends the procedure if a zero must not be set now.
 template <class P>
 Part<bool> may_set_zero(DialogOf<P>& dialog, Looked<P>& found, typename P::Request request) {
   co_await look(dialog, found, request);

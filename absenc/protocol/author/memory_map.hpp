@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Functions on the areas of an encoder's memory: find the area of a byte, and compute the offset of the byte if some
-// areas are stored one after the other.
+// Functions on the areas of an encoder's memory.
 #pragma once
 
 #include <algorithm>
@@ -24,7 +23,7 @@ namespace absenc::author {
   return std::any_of(areas.begin(), areas.end(), [&](const MemoryArea& each) { return page - each.page < each.pages; });
 }
 
-/// Returns the number of bytes in those areas for which `counts(area)` is true. Each area has one page.
+/// Returns the bytes of the areas, each of one page, for which `counts(area)` is true.
 template <class Counts>
 [[nodiscard]] constexpr std::size_t size_of(std::span<const MemoryArea> areas, Counts counts) {
   std::size_t bytes = 0;
@@ -32,8 +31,8 @@ template <class Counts>
   return bytes;
 }
 
-/// Returns the offset of the byte at `address` of `page` in a buffer that stores the areas for which `counts(area)` is
-/// true, one after the other. Each area has one page, and one of them must include the byte.
+/// Returns the offset of a byte in a buffer of the areas for which `counts(area)` is true. Each area has one page, and
+/// one of these areas must include the byte.
 template <class Counts>
 [[nodiscard]] constexpr std::size_t offset_of(std::span<const MemoryArea> areas, unsigned page, unsigned address,
                                               Counts counts) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Declares the options of a unit: each by the member of the format that it sets. The unit's table of options, the
-// format, and the option values of models and vectors follow from the declarations.
+// Declares the options of a unit, each by the member of the format that it sets.
 #pragma once
 
 #include <array>
@@ -55,8 +54,7 @@ struct OptionOf {
   }
 };
 
-/// Returns the declaration of an option that is a number from `minimum` to `maximum`, in steps of `step`. The default
-/// is the initial value of the member.
+/// Returns the declaration of a numeric option; its default is the member's initial value.
 template <auto member>
 [[nodiscard]] constexpr OptionOf<member> option(std::string_view name, std::string_view meaning, std::int64_t minimum,
                                                 std::int64_t maximum, std::uint32_t step = 1) {
@@ -69,8 +67,7 @@ template <auto member>
            .step = step}};
 }
 
-/// Returns the declaration of an option that is one of `choices`, in the order of the member's enumeration. The default
-/// is the initial value of the member.
+/// Returns the declaration of an option whose value n is `choices[n]`; its default is the member's initial value.
 template <auto member>
 [[nodiscard]] constexpr OptionOf<member> option(std::string_view name, std::string_view meaning,
                                                 std::span<const std::string_view> choices) {
@@ -78,7 +75,7 @@ template <auto member>
   return {{.name = name, .meaning = meaning, .default_value = static_cast<std::int64_t>(value), .choices = choices}};
 }
 
-/// Returns the declaration of an option that is true or false. The default is the initial value of the member.
+/// Returns the declaration of a boolean option; its default is the member's initial value.
 template <auto member>
 [[nodiscard]] constexpr OptionOf<member> option(std::string_view name, std::string_view meaning) {
   return option<member>(name, meaning, std::span<const std::string_view>(boolean_choices));
@@ -98,37 +95,35 @@ template <auto member>
   return one;
 }
 
-/// Returns the option `one`, marked so that users may write up to `decimals` digits after the decimal point; its values
-/// are in units of the last digit.
+/// Returns the option `one` as a decimal number, with values in units of 10^-`decimals`.
 template <unsigned decimals, auto member>
 [[nodiscard]] constexpr OptionOf<member> decimal(OptionOf<member> one) {
   one.info.decimals = decimals;
   return one;
 }
 
-/// Returns the option `one`, marked so that 0 is permitted too, although it is below the minimum.
+/// Returns the option `one`, marked so that 0 is permitted too.
 template <auto member>
 [[nodiscard]] constexpr OptionOf<member> or_zero(OptionOf<member> one) {
   one.info.or_zero = true;
   return one;
 }
 
-/// Returns the option `one` with the role `role`, by which programs that do not know the unit find it.
+/// Returns the option `one` with the role `role`.
 template <Role role, auto member>
 [[nodiscard]] constexpr OptionOf<member> with_role(OptionOf<member> one) {
   one.info.role = role;
   return one;
 }
 
-/// Returns the option `one`, marked so that texts show its value in hexadecimal; users may write it in hexadecimal or
-/// decimal.
+/// Returns the option `one`, marked so that texts show its value in hexadecimal.
 template <auto member>
 [[nodiscard]] constexpr OptionOf<member> in_hex(OptionOf<member> one) {
   one.info.in_hex = true;
   return one;
 }
 
-/// Table of a unit's options, each with its member of the format struct or of a base of that struct.
+/// Table of a unit's options, with their members of the format.
 template <auto... members>
 struct OptionsOf {
   /// Format of the encoder: the values of its options.

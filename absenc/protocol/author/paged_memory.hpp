@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Device side of a paged memory with an EEPROM and registers: it is busy for a while after a page change and after a
-// write into the EEPROM. It knows no protocol, and is compiled once.
+// Device side of a paged memory with an EEPROM and registers. It knows no protocol.
 #pragma once
 
 #include <cstdint>
@@ -21,12 +20,11 @@ struct PagedMemory {
   std::uint8_t start_page;  ///< Page that is selected after power on.
   Time page_time;           ///< How long the memory is busy after a page change.
   Time write_time;          ///< How long the memory is busy after a write.
-  /// Shortest time between the request that fetches a byte and the one that returns it; 0: the first one returns it.
+  /// Shortest time from fetching a byte to reading it; 0: bytes are read without fetching.
   Time fetch_time{};
-  /// Whether page changes and writes exclude each other: only one of the two busy times runs, that of the last change.
+  /// Whether only the busy time of the last page change or write runs; false: both may run.
   bool exclusive = true;
-  /// Returns whether the byte at `address` of `page` is read and written without fetching and without waiting for
-  /// writes; after a page change it is busy like any byte. Null: returns false for every byte.
+  /// Returns whether a byte is accessed without fetching and during writes; null: no byte is.
   bool (*is_immediate)(unsigned page, unsigned address) = nullptr;
   std::string_view page_rule;          ///< Rule for the host: access waits for `page_time`.
   std::string_view write_rule;         ///< Rule for the host: a write follows the write before by `write_time`.
@@ -54,21 +52,19 @@ class PagedMemoryDevice : public Responder {
   PagedMemoryDevice(const DeviceTimes& times, const PagedMemory& memory) : Responder(times), memory_(&memory) {}
   ~PagedMemoryDevice() = default;
 
-  /// Returns the value of a byte of the memory. It need not be stored: it may be a measured temperature.
+  /// Returns the value of a byte of the memory, stored or measured.
   [[nodiscard]] virtual std::uint8_t load(std::uint8_t page, std::uint8_t address) = 0;
   /// Stores a byte in a writable area of the memory.
   virtual void store(std::uint8_t page, std::uint8_t address, std::uint8_t value) = 0;
 
-  /// Executes a request that was received at `at`, and returns the content of the reply; nothing if the memory is not
-  /// busy and `exists` is false for the request. Busy times are measured from `since`, which may be earlier than `at`.
+  /// Executes a request received at `at`, and returns the content of the reply, if there is one. Busy times begin at
+  /// `since`.
   std::optional<MemoryAnswer> access(const Access& request, Time at, Time since);
-  /// Returns whether the request can be executed: an area has the byte (a writable area, to write it), or has the page
-  /// that is to be selected. The selected page can always be read.
+  /// Returns whether the memory has the byte, or the page to be selected, and permits the access.
   [[nodiscard]] bool exists(const Access& request) const;
   /// Makes the memory busy until the time `until`, as a write does.
   void write_lasts(Time until);
-  /// Returns the time at which the busy time of the last write ends; 0: nothing was written since power on, or since a
-  /// page change that ended the busy time.
+  /// Returns the end of the busy time of the last write; 0: there is none.
   [[nodiscard]] Time written_at() const { return written_at_; }
   /// Selects the start page and ends all busy times; to be called at power on.
   void restart_memory();
@@ -83,7 +79,7 @@ class PagedMemoryDevice : public Responder {
   bool page_changed_ = false;  // no access was received yet after the busy time of the last page change
   Time page_ready_at_{};
   Time written_at_{};  // end of the busy time of the last write; 0: none
-  // Address of the last request, if it was a read during a write and `refused_rule` is not empty.
+  // Address of the last request if it was a read during a write, for `refused_rule`.
   std::optional<std::uint8_t> refused_address_{};
   bool fetching_ = false;
   std::uint8_t fetch_address_ = 0;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs procedures (commands of several requests) as coroutines, so that each reads like its paragraph of the document.
-// The coroutine frames are in storage of the caller, without a heap.
+// Runs procedures (commands of several requests) as coroutines, without a heap.
 #pragma once
 
 #include <coroutine>
@@ -16,7 +15,7 @@
 #include "absenc/core/time.hpp"
 #include "absenc/protocol/conversation.hpp"
 
-// Without optimisation g++ 12 warns in every coroutine that the frame's operators new and delete do not match.
+// Without optimisation g++ 12 warns in coroutines that operators new and delete do not match.
 #pragma GCC diagnostic ignored "-Wmismatched-new-delete"
 
 namespace absenc::author {
@@ -39,14 +38,13 @@ inline constexpr Outcome done{};
   return {.error = error, .detail = detail, .advice = advice, .alone = true};
 }
 
-/// Runs one procedure and its parts (coroutines that it awaits); a subclass resumes it when an awaited result is
-/// available. Not copyable, because coroutine frames point to it.
+/// Runs one procedure and its parts; not copyable, because coroutine frames point to it.
 class Routine {
  public:
   Routine(const Routine&) = delete;
   Routine& operator=(const Routine&) = delete;
 
-  /// Returns storage for a coroutine frame of `size` bytes; null if there is no room. Only coroutines call it.
+  /// Returns storage for a coroutine frame of `size` bytes; null if there is no room.
   [[nodiscard]] void* take(std::size_t size) {
     const std::size_t needed = (size + alignment - 1) / alignment * alignment;
     if (needed > arena_.size() - used_) return nullptr;
@@ -70,14 +68,12 @@ class Routine {
 
   /// Notes that requests from now on may change the encoder.
   void changes() { change_ = ChangeSent::yes; }
-  /// Notes that the encoder has not changed since `changes` was called: it refused the request, or reading back shows
-  /// it.
+  /// Notes that the encoder has not changed since `changes` was called.
   void refused() { change_ = ChangeSent::refused; }
   /// Returns what `changes` or `refused` noted last; `no` if neither was called.
   [[nodiscard]] ChangeSent change() const { return change_; }
 
-  /// Returns an awaitable that ends the procedure, also from within a part: `co_await dialog.stop({Error::busy,
-  /// "..."})`.
+  /// Returns an awaitable that ends the procedure: `co_await dialog.stop({Error::busy, "..."})`.
   [[nodiscard]] auto stop(const Outcome& outcome) {
     struct Stop {
       Routine& routine;
@@ -90,16 +86,14 @@ class Routine {
   }
 
  protected:
-  /// Constructs a routine without a procedure. `arena`: storage for coroutine frames, aligned for any type; it must
-  /// outlive the routine.
+  /// Constructs a routine. `arena` is aligned for any type, and outlives the routine.
   explicit Routine(std::span<std::byte> arena) : arena_(arena) {}
   ~Routine() = default;
 
   /// Handles the end of the whole procedure, also if a part ended it.
   virtual void ended(const Outcome& outcome) = 0;
 
-  /// Resumes the coroutine whose awaited result is available. Coroutines are resumed one after the other from here, not
-  /// from within each other.
+  /// Resumes the coroutine whose awaited result is available.
   void resume() {
     next_ = current_;
     while (next_) {
@@ -107,8 +101,7 @@ class Routine {
       current_.resume();
     }
   }
-  /// Begins the procedure whose coroutine is `first`. Null: there was no storage, and the procedure ends with
-  /// buffer_too_small.
+  /// Begins the procedure `first`; if it is null, the procedure ends with buffer_too_small.
   void begin(std::coroutine_handle<> first) {
     current_ = first;
     if (!first) return ended({.error = Error::buffer_too_small, .detail = "the storage is too small for this command"});
@@ -126,15 +119,14 @@ class Routine {
   std::coroutine_handle<> next_{};
 };
 
-/// Base of the coroutine frames of procedures and parts. The first parameter of the coroutine is the Routine.
+/// Base of the coroutine frames of procedures and parts, whose first parameter is the Routine.
 struct FrameInRoutine {
   /// Allocates a coroutine frame in the arena of `routine`; returns null if the arena is full.
   template <class... Parameters>
   static void* operator new(std::size_t size, Routine& routine, const Parameters&...) noexcept {
     return routine.take(size);
   }
-  /// Does nothing: Part::await_resume returns the storage of a part to the routine, and the storage of the procedure
-  /// belongs to the caller.
+  /// Does nothing: Part::await_resume gives the storage of a part back.
   static void operator delete(void*, std::size_t) {}
 
   /// Constructs the frame of a coroutine that the routine `carrier` runs.
@@ -149,8 +141,7 @@ struct FrameInRoutine {
   Routine& routine;  ///< The routine that runs this coroutine.
 };
 
-/// Return type of a coroutine that executes a whole command: `Procedure name(Dialog& dialog, Found& found, ...)`. Such
-/// a coroutine returns an Outcome: `co_return done;` or `co_return {Error::..., "..."};`.
+/// Return type of a coroutine that executes a whole command and returns an Outcome.
 struct Procedure {
   /// Functions that the compiler calls for a coroutine that returns a Procedure.
   struct promise_type : FrameInRoutine {
@@ -167,8 +158,7 @@ struct Procedure {
   std::coroutine_handle<> handle{};  ///< The coroutine; null: there was no room for its frame.
 };
 
-/// Return type of a coroutine that is a part of a procedure and has a result: `const Reply reply = co_await
-/// look(dialog);`.
+/// Return type of a coroutine that is a part of a procedure and has a result.
 template <class T>
 struct [[nodiscard]] Part {
   /// Functions that the compiler calls for a coroutine that returns a Part.
@@ -198,8 +188,7 @@ struct [[nodiscard]] Part {
 
   /// Returns false: awaiting a part always runs it first.
   [[nodiscard]] bool await_ready() const { return false; }
-  /// Begins the part; the coroutine `caller` continues when the part has ended. Without a frame the procedure ends with
-  /// buffer_too_small.
+  /// Begins the part; without a frame the procedure ends with buffer_too_small.
   template <class Caller>
   void await_suspend(std::coroutine_handle<Caller> caller) {
     Routine& routine = caller.promise().routine;
@@ -210,8 +199,7 @@ struct [[nodiscard]] Part {
     handle.promise().caller = caller;
     routine.go_on_with(handle);
   }
-  /// Returns the result of the part, by value: a reference would point into the coroutine frame, which is released
-  /// here.
+  /// Returns the result by value, because the frame that has it is released here.
   T await_resume() {
     const T result = *handle.promise().result;
     Routine& routine = handle.promise().routine;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decides whether the shaft stands still, and whether a zero may be set. The limits for this, as angles, are here.
+// Decides whether the shaft stands still, and whether a zero may be set.
 #pragma once
 
 #include <algorithm>
@@ -11,14 +11,14 @@
 
 namespace absenc::author {
 
-/// Time between two readings that show whether the shaft stands still: 0.02 degrees in this time are 0.33 rpm.
+/// Time between two readings that show whether the shaft stands still.
 inline constexpr Time between_looks = std::chrono::milliseconds(10);
 /// Greatest difference of two positions of a standing shaft, caused by noise, in 1/1000 degree.
 inline constexpr std::uint32_t standstill_millidegrees = 20;
-/// Largest distance from 0 after a zero was set, in 1/1000 degree, as the hosts of EncoLink and RAA38 check it.
+/// Largest distance from 0 after a zero was set, in 1/1000 degree.
 inline constexpr std::uint32_t zero_millidegrees = 350;
 
-/// Returns the angle `millidegrees` in counts of a circle with 2^bits counts (1 to 64 bits); at least one count.
+/// Returns an angle in counts of a circle with 2^bits counts; at least 1.
 [[nodiscard]] constexpr std::int64_t counts_of_angle(unsigned bits,
                                                      std::uint32_t millidegrees = standstill_millidegrees) {
   const unsigned more = bits > 40 ? bits - 40 : 0;
@@ -26,8 +26,7 @@ inline constexpr std::uint32_t zero_millidegrees = 350;
   return std::max<std::int64_t>(static_cast<std::int64_t>(counts), 1);
 }
 
-/// Returns whether two positions on a circle of 2^bits counts (1 to 63 bits) differ by at most the angle
-/// `millidegrees`, or by one count.
+/// Returns whether two positions of `bits` bits (1 to 63) differ by at most `millidegrees`, or by one count.
 [[nodiscard]] constexpr bool is_near(std::uint64_t counts, std::uint64_t other, unsigned bits,
                                      std::uint32_t millidegrees = standstill_millidegrees) {
   const std::int64_t apart = wrapped_difference(counts, other, bits);
@@ -35,16 +34,13 @@ inline constexpr std::uint32_t zero_millidegrees = 350;
   return apart <= limit && -apart <= limit;
 }
 
-/// Returns why a command that needs a standing shaft must not be sent after these two readings, taken `between_looks`
-/// apart: not_still; no error: it may be sent.
+/// Returns not_still if two readings `between_looks` apart show a turning shaft; else no error.
 [[nodiscard]] constexpr Outcome objection_to_moving(const Reading& first, const Reading& second) {
   if (is_near(second.singleturn, first.singleturn, second.singleturn_bits)) return {};
   return {Error::not_still, "nothing was changed"};
 }
 
-/// Returns why a zero must not be set after these two readings, taken `between_looks` apart: invalid_argument (the
-/// encoder is starting, or a position is invalid, so the zero would be wrong for ever), not_still (the shaft turns); no
-/// error: the zero may be set.
+/// Returns why a zero must not be set after these two readings: invalid_argument or not_still; no error: it may.
 [[nodiscard]] constexpr Outcome objection_to_zero(const Reading& first, const Reading& second) {
   for (const Reading& look : {first, second}) {
     if (!look.ready) {

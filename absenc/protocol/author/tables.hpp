@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Makes the tables to which the descriptor of a unit points from the unit's Declaration. Texts of models and vectors
-// are parsed at compile time.
+// Makes the tables of a unit's descriptor from its Declaration, at compile time.
 #pragma once
 
 #include <algorithm>
@@ -47,7 +46,7 @@ struct Tables {
     return i;
   }
 
-  /// Returns the option values of a model, parsed from its text. A text that cannot be parsed does not compile.
+  /// Returns the option values of a model; a text that cannot be parsed does not compile.
   static constexpr Buffer<OptionValue, maximum_options> values_of(const ModelText& model) {
     Buffer<OptionValue, maximum_options> made;
     const bool good = for_each_value(model.values, [&](std::string_view name, std::string_view text) {
@@ -59,7 +58,7 @@ struct Tables {
     if (!good) this_model_has_an_option_or_a_value_that_the_unit_does_not_have();
     return made;
   }
-  /// Option values of all models, one after the other, so that they need no more space than values written by hand.
+  /// Option values of all models, one after the other.
   static constexpr auto model_values = [] {
     constexpr std::size_t size = [] {
       std::size_t sum = 0;

@@ -13,10 +13,8 @@
 
 namespace absenc::author {
 
-/// A test vector as text: a frame with the fields, or the error, that decoding must give. A value in `fields` is an
-/// integer, a real number if it has a point, or a text. Frames are hexadecimal, or plain text on clocked links and if
-/// Declaration::frames_are_texts. A checksum can be left open: `..` for a byte, `.` for a bit of a clocked frame. Such
-/// a vector compiles; the kit's test of the unit fails, and prints the complete frame.
+/// A test vector as text: a frame with the fields, or the error, that decoding must give. Frames are hexadecimal; on
+/// clocked links, and if Declaration::frames_are_texts, they are plain text.
 struct VectorText {
   std::string_view id;       ///< Identifier of the vector, unique within the unit.
   std::string_view meaning;  ///< The case that the vector shows, as a phrase.
@@ -27,18 +25,17 @@ struct VectorText {
   std::string_view fields;  ///< Expected fields as `name=value` separated by blanks, or the name of the expected error.
 };
 
-/// Reports a wrong text of fields: it is neither constexpr nor defined, so a call at compile time is an error whose
-/// message contains the function's name.
+/// Is never defined: a call at compile time is an error that names this function.
 void fields_of_a_vector_are_name_equals_value_or_the_name_of_an_error();
-/// Is declared but never defined: a call at compile time is an error whose message contains this function's name.
+/// Is never defined: a call at compile time is an error that names this function.
 void a_frame_of_a_vector_is_hexadecimal_and_has_at_most_128_bytes();
-/// Is declared but never defined: a call at compile time is an error whose message contains this function's name.
+/// Is never defined: a call at compile time is an error that names this function.
 void open_bytes_of_a_frame_are_not_consecutive();
-/// Is declared but never defined: a call at compile time is an error whose message contains this function's name.
+/// Is never defined: a call at compile time is an error that names this function.
 void this_model_has_an_option_or_a_value_that_the_unit_does_not_have();
 
-/// Calls `take(name, value)` for each "name=value" of a text until it returns false. Returns whether the whole text has
-/// this form and all calls returned true. A value may have blanks inside, but no equals sign.
+/// Calls `take(name, value)` for each "name=value" of a text, until one returns false. Returns whether none did and the
+/// text has this form.
 template <class Take>
 constexpr bool for_each_value(std::string_view text, Take&& take) {
   while (!text.empty()) {
@@ -52,8 +49,7 @@ constexpr bool for_each_value(std::string_view text, Take&& take) {
   return true;
 }
 
-/// Parses a decimal number with a point into `number`. Returns false, without a change, if the text is not such a
-/// number.
+/// Parses a decimal number with a point into `number`, and returns whether that worked.
 constexpr bool to_real(std::string_view text, double& number) {
   const bool negative = text.starts_with('-');
   if (negative) text.remove_prefix(1);

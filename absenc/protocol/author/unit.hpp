@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Makes the descriptor of a unit (Unit) from the declaration that its author wrote (declaration.hpp).
+// Makes the descriptor of a unit (Unit) from its Declaration.
 #pragma once
 
 #include <algorithm>
@@ -23,8 +23,7 @@
 
 namespace absenc::author {
 
-/// Functions of the unit that the Declaration `declared` describes, and `make`, which returns its Unit. The declaration
-/// is a constexpr object with static storage.
+/// Functions of the unit that the Declaration `declared` describes; `make` returns its Unit.
 template <const auto& declared>
 struct Descriptor {
   /// Type of the declaration.
@@ -46,8 +45,7 @@ struct Descriptor {
   static_assert(Clocked<P> || declared.decode != nullptr || declared.report.put_request != nullptr,
                 "a report needs put_request");
 
-  /// Whether functions of the protocol decode requests and replies; false: the link is clocked, or the declaration has
-  /// a `decode` of its own.
+  /// Whether functions of the protocol decode requests and replies.
   static constexpr bool has_requests = !Clocked<P> && declared.decode == nullptr;
 
   // ---- Functions of the descriptor
@@ -56,8 +54,7 @@ struct Descriptor {
   static constexpr Error decode(const Options& values, Frame asked, Frame frame, FieldSink& sink) {
     return decode_by(declared.format(values), asked, frame, sink);
   }
-  /// Checks a frame of an encoder with the format `f` and puts its fields into `sink`. `AnyFormat`: Format or
-  /// Format::Compiled. Returns the first error.
+  /// Checks a frame and puts its fields into `sink`. `AnyFormat`: Format or Format::Compiled.
   template <class AnyFormat>
   static constexpr Error decode_by(const AnyFormat& f, Frame asked, Frame frame, FieldSink& sink) {
     if constexpr (declared.decode_control != nullptr) {
@@ -72,7 +69,7 @@ struct Descriptor {
     }
   }
 
-  /// Whether the protocol compiles formats, so that a decoder of many frames is faster than `decode`.
+  /// Whether the protocol compiles formats, to decode many frames faster.
   static constexpr bool compiles_formats = requires { typename Format::Compiled; };
   /// Decodes frames by the compiled format of the options.
   template <class F = Format>
@@ -98,8 +95,7 @@ struct Descriptor {
     return true;
   }
 
-  /// Checks the bits of a transfer of a clocked link and puts their fields and reading into `sink`. Returns the first
-  /// error.
+  /// Checks a transfer of a clocked link, and puts its fields and reading into `sink`.
   template <class AnyFormat>
   static constexpr Error decode_bits(const AnyFormat& f, const BitView& bits, FieldSink& sink) {
     if (!is_usable(f)) return Error::invalid_argument;
@@ -110,8 +106,7 @@ struct Descriptor {
     return Error::none;
   }
 
-  /// Checks an exchange of bytes. Puts the fields of the reply into `sink`, and its reading if it has a position or
-  /// turns; without a reply, the fields of the request. Returns the first error.
+  /// Checks an exchange of bytes, and puts its fields into `sink`.
   static constexpr Error decode_bytes(const Format& f, Frame asked, Frame frame, FieldSink& sink) {
     const Result<Request> request = request_of(f, asked.bytes, frame.bytes);
     if (!request) return request.error();
@@ -127,8 +122,7 @@ struct Descriptor {
     return Error::none;
   }
 
-  /// Returns the decoded request of an exchange; if `asked` is empty, the request that the reply shows. Returns an
-  /// error if there is no valid request.
+  /// Returns the request of an exchange; if `asked` is empty, the one that the reply shows.
   static constexpr Result<Request> request_of(const Format& f, Bytes asked, Bytes reply) {
     static_assert(declared.guess_request != nullptr, "a unit that sends requests needs `guess_request`");
     if (asked.empty()) {
@@ -145,15 +139,14 @@ struct Descriptor {
   /// Returns the declaration of `command`.
   static constexpr const CommandOf<P>& find(const Command& command) { return declared.commands[command.id]; }
 
-  /// Returns whether `arguments` has one value for each argument of the command, each within its range.
+  /// Returns whether the arguments of the command have the right number and ranges.
   static constexpr bool are_good(const Command& command, Arguments arguments) {
     return std::equal(
         arguments.begin(), arguments.end(), command.arguments.begin(), command.arguments.end(),
         [](std::int64_t value, const Argument& one) { return value >= one.minimum && value <= one.maximum; });
   }
 
-  /// Writes the request of a command into `out` and returns its length, as Unit::encode. Errors: invalid_argument,
-  /// unsupported, buffer_too_small.
+  /// Writes the request of a command into `out` and returns its length, as Unit::encode.
   static Result<std::size_t> encode(const Options& values, const Command& command, Arguments arguments,
                                     MutableBytes out) {
     if (!are_good(command, arguments)) return Error::invalid_argument;
@@ -165,8 +158,7 @@ struct Descriptor {
       return encode_bytes(declared.format(values), find(command), arguments, out);
     }
   }
-  /// Writes the bytes of a command's request into `out` and returns their number. Errors: invalid_argument,
-  /// unsupported, buffer_too_small.
+  /// Writes the bytes of a command's request into `out` and returns their number.
   static Result<std::size_t> encode_bytes(const Format& f, const CommandOf<P>& one, Arguments arguments,
                                           MutableBytes out) {
     if (one.missing != nullptr && !one.missing(f).empty()) return Error::unsupported;
@@ -180,14 +172,12 @@ struct Descriptor {
     return bytes.size();
   }
 
-  /// Returns the length in bytes of the request that begins with the bytes `begin`, or how many bytes are needed to
-  /// know it; 0 if no request does.
+  /// Returns the length in bytes of the request that begins with `begin`, as P::request_size.
   static constexpr std::size_t request_size(const Options& values, Bytes begin) {
     return P::request_size(declared.format(values), begin);
   }
 
-  /// Returns the length in bytes of the reply that begins with the bytes `begin`, 0 if no reply does; always
-  /// P::longest_reply if the declaration has no `reply_size`.
+  /// Returns the declaration's `reply_size`; P::longest_reply if it has none.
   static constexpr std::size_t reply_size(const Options& values, Bytes begin) {
     if constexpr (declared.reply_size != nullptr) {
       return declared.reply_size(declared.format(values), begin);
@@ -212,8 +202,7 @@ struct Descriptor {
     }
   }
 
-  /// Constructs the conversation of a command in `storage`; a Refusal if an argument is missing, outside its range or
-  /// too many, otherwise what CommandOf::run returns.
+  /// Constructs the conversation of a command in `storage`; a Refusal if the arguments are wrong.
   static Any<Conversation> host(const Options& values, const Command& command, Arguments arguments,
                                 std::span<std::byte> storage) {
     if (!are_good(command, arguments)) {
@@ -223,8 +212,7 @@ struct Descriptor {
     return find(command).run(declared.format(values), arguments, storage);
   }
 
-  /// Constructs a virtual encoder in `storage`. Returns an empty Any if the options contradict each other, or the
-  /// storage is too small.
+  /// Constructs a virtual encoder in `storage`. Returns an empty Any if that is impossible.
   static Any<Device> device(const Options& values, const Shaft& shaft, std::span<std::byte> storage) {
     const Format f = declared.format(values);
     if (!is_usable(f)) return {};
@@ -250,8 +238,7 @@ struct Descriptor {
   /// Returns the settings of the line with these options.
   static constexpr LineSettings settings(const Options& values) { return line_of(declared.format(values)); }
 
-  /// Returns whether the encoder answers a request, as Protocol::manner states: false with Manner::any_reply. Returns
-  /// true for an invalid request.
+  /// Returns false if Protocol::manner expects no reply to the request, or accepts any.
   static bool is_answered(const Options& values, Frame asked) {
     const Format f = declared.format(values);
     const Result<Request> request = P::decode_request(f, asked.bytes);
@@ -259,8 +246,7 @@ struct Descriptor {
     const Manner manner = P::manner(f, *request);
     return manner.expects_reply && !manner.any_reply;
   }
-  /// Returns how long a host must wait before it repeats the request, as Protocol::manner states; 0 for an invalid
-  /// request.
+  /// Returns Manner::pause of a request; 0 for an invalid one.
   static Time pause(const Options& values, Frame asked) {
     const Format f = declared.format(values);
     const Result<Request> request = P::decode_request(f, asked.bytes);
@@ -276,7 +262,7 @@ struct Descriptor {
     }
   }
 
-  /// Returns the unit's explanation of an invalid or missing reply, whose error is `error`; without texts: it has none.
+  /// Returns the unit's explanation of an error; without texts if it has none.
   static Explanation explain(const Options& values, Error error, Frame asked, Frame reply) {
     return declared.report.explain(declared.format(values), error, items(asked), items(reply));
   }
@@ -298,8 +284,7 @@ struct Descriptor {
     }
   }
 
-  /// Stores in `values` the default of each option, then the values of `model`, then those of `text`. Returns whether
-  /// the text could be parsed.
+  /// Sets `values` to the defaults, then `model`, then `text`; returns whether `text` is good.
   static constexpr bool resolve(std::string_view text, std::span<const OptionValue> model, Options& values) {
     for (std::size_t i = 0; i < declared.options.size(); ++i) {
       values.values[i] = declared.options[i].default_value;
@@ -319,8 +304,7 @@ struct Descriptor {
                        [&](const OptionValue& one) { return values.values[one.option] == one.value; });
   }
 
-  /// Returns whether the options of a vector are valid and, unless the vector has open bytes, decoding it gives the
-  /// fields or the error that it states.
+  /// Returns whether a vector is right, as far as its open bytes permit to tell.
   static constexpr bool holds(const Vector& vector) {
     Options values;
     bool known = resolve(vector.options, {}, values);

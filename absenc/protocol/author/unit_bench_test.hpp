@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For the tests of units on lines of characters: a bench that connects the virtual encoder with the unit's commands on
-// a line in virtual time.
+// Bench of a virtual encoder and its unit's commands on a line of characters, in virtual time.
 #pragma once
 
 #include <functional>
@@ -59,8 +58,7 @@ struct RunResult : FieldSink {
   Time took{};
 };
 
-/// Returns the option values that resolve_options makes from a text such as "name=value name=value". Throws
-/// std::logic_error if it refuses the text.
+/// Returns the options of a text "name=value name=value". Throws std::logic_error if resolve_options refuses them.
 inline Options options_of(const Unit& unit, std::string_view text) {
   std::vector<OptionText> settings;
   for_each_value(text, [&settings](std::string_view name, std::string_view value) {
@@ -90,7 +88,7 @@ struct BrokenRules final : RuleWatch {
   std::vector<std::string> rules;
 };
 
-/// A conversation for a command of a unit, with its storage. Arguments left out at the end have their default values.
+/// A conversation for a command, with its storage; arguments left out have their defaults.
 template <class Item>
 class Talk {
  public:
@@ -110,11 +108,10 @@ class Talk {
   Conversation<Item>* made_ = nullptr;
 };
 
-/// Function that changes the bytes of number n (from 0) of the `received` events, or of the sent frames, of the
-/// encoder. A sent frame that it leaves without bytes is lost.
+/// Function that changes the bytes of the event or frame number `nth`, from 0.
 using Tamper = std::function<void(unsigned nth, Wire& bytes)>;
 
-/// Wraps a virtual encoder with functions that change the bytes that it receives and sends; by default none is changed.
+/// A virtual encoder with functions that change the bytes that it receives and sends.
 class Tampered final : public Machine<std::uint8_t> {
  public:
   explicit Tampered(Machine<std::uint8_t>& encoder) : encoder_(encoder) {}
@@ -189,8 +186,7 @@ struct UnitBench {
     line.attach(sim::NodeRole::device, tampered);
   }
 
-  /// Runs a command of the unit to its end with these `options`; one that sends a request for each result without end,
-  /// only to its first result. `on_emit` is called at every emit.
+  /// Runs a command; one that sends a request for each result ends at its first result.
   RunResult run(std::string_view name, const std::vector<std::int64_t>& arguments = {}, const OnEmit& on_emit = {}) {
     const Talk<std::uint8_t> talk(unit, options, name, arguments);
     return run(*talk, on_emit);
@@ -211,13 +207,13 @@ struct UnitBench {
     told.took = line.now() - begin;
     return told;
   }
-  /// Runs a conversation that streams. `go_on()` is called for each result, and returns whether to continue.
+  /// Runs a conversation that streams; `go_on()` returns after each result whether to continue.
   void listen(Conversation<std::uint8_t>& conversation, const std::function<bool()>& go_on) {
     line.on_emit = go_on;
     line.converse(conversation);
     line.on_emit = {};
   }
-  /// Sends these bytes at once. Returns the host, which has stored all bytes received until the line was silent.
+  /// Sends these bytes at once, and returns the host with the bytes that it received.
   sim::testing::RawHost raw(Wire request, Time answer = 50ms, Time gap = 5ms) {
     sim::testing::RawHost host(std::move(request), answer, gap, line.now());
     line.converse(host);

@@ -46,7 +46,7 @@ class RawHost final : public Machine<std::uint8_t> {
   int step_ = 0;
 };
 
-/// A bench: a virtual encoder of type `Device` on a line, which several hosts use one after the other.
+/// A virtual encoder of type `Device` on a line, which several hosts use one after the other.
 template <class Device>
 struct ClockedBench {
   template <class Format, class... More>

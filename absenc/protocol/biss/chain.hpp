@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Several BiSS encoders in one frame: one start bit and one CDS bit, then the word of each encoder with its own check.
-// README.md draws the frame. Source: BiSS C Protocol Description rev D2.
+// Several BiSS encoders in one frame, which README.md draws. Source: BiSS C Protocol Description rev D2.
 #pragma once
 
 #include <array>
@@ -9,17 +8,16 @@
 
 namespace absenc::biss {
 
-/// Format of the frames of a chain of encoders. Slave 0 is the farthest from the host and its word comes last: channel
-/// i belongs to slave `count - 1 - i`.
+/// Format of the frames of a chain of encoders. Channel i belongs to slave `count - 1 - i`.
 struct ChainFormat {
   static constexpr unsigned most = 8;    ///< Greatest number of data channels of a frame.
   std::array<Channel, most> channels{};  ///< Word format and check of each channel, in the order of the line.
   std::uint8_t count = 2;                ///< Number of used entries of `channels`.
-  /// Slave, counted from the end of the chain, whose position a reading shows and whose registers are accessed.
+  /// Slave whose position a reading shows and whose registers are accessed.
   std::uint8_t slave = 0;
   RegisterOrder register_order = RegisterOrder::big;  ///< Byte order of a number that several registers hold.
   std::uint16_t register_delay_us = 0;  ///< Time until a virtual encoder has a requested register ready, in us.
-  /// Whether SLO of a virtual encoder stays idle after power on until it receives the start sequence.
+  /// Whether SLO of a virtual encoder stays idle until the start sequence.
   bool start_sequence = false;
   Timeout timeout{};                 ///< BiSS timeout: how long the encoder holds SLO low after the last clock.
   StopBit stop_bit = StopBit::next;  ///< The bit P that a virtual encoder sends after each register.
@@ -33,12 +31,11 @@ struct ChainFormat {
 
   /// Returns the period of MA.
   [[nodiscard]] constexpr Time period() const { return Time((1'000'000 + ma_khz / 2) / ma_khz); }
-  /// Returns the index of the channel that carries the word of `slave`; 0 if the chain has no such slave.
+  /// Returns the index of the channel of `slave`; 0 if the chain has no such slave.
   [[nodiscard]] constexpr unsigned shown() const { return slave < count ? count - 1u - slave : 0u; }
 };
 
-/// Returns whether the chain has a valid number of words and selected slave, and whether each used word has a
-/// position and a usable check.
+/// Returns whether count and slave are valid, and each word has a position and a usable check.
 [[nodiscard]] constexpr bool is_usable(const ChainFormat& format) {
   if (format.count > ChainFormat::most || format.slave >= format.count) return false;
   for (unsigned i = 0; i < format.count; ++i) {
@@ -55,8 +52,7 @@ struct ChainFormat {
   return bits;
 }
 
-/// Returns the number of clocks that the slaves add to the ACK: each slave except the farthest from the host passes
-/// the start bit on one clock later.
+/// Returns the number of clocks by which the other slaves delay the start bit.
 [[nodiscard]] constexpr unsigned relay_bits(const ChainFormat& format) { return format.count - 1u; }
 
 /// A decoded frame of several encoders in a chain.
@@ -67,8 +63,7 @@ struct ChainReply {
   bool cds = false;                                       ///< CDS: the encoders' bit of control communication.
 };
 
-/// Decodes a frame of a chain. Errors: those of `decode` for one word, line_stuck also for a word and CRC of zeros
-/// alone, and invalid_argument (`is_usable` is false). An error in one word rejects the whole frame.
+/// Decodes a frame of a chain. Errors: those of a frame with one word, and invalid_argument.
 [[nodiscard]] constexpr Result<ChainReply> decode(const ChainFormat& format, BitView samples, Cds cds = Cds::zero) {
   if (!is_usable(format)) return Error::invalid_argument;
   ChainReply reply;
@@ -81,8 +76,7 @@ struct ChainReply {
   return error == Error::none ? Result(reply) : error;
 }
 
-/// Appends the frame of `reply` to `out`. `silent`: bit n is set if slave n sends no word. Returns false if `out` is
-/// too small.
+/// Appends the frame of `reply`, without the words of `silent`: bit n is slave n. Returns false if `out` is too small.
 template <std::size_t Capacity>
 constexpr bool encode(const ChainFormat& format, const ChainReply& reply, BitBuffer<Capacity>& out,
                       std::uint8_t silent = 0) {
@@ -102,7 +96,7 @@ constexpr void show(const ChainFormat& format, const ShaftState& state, std::uin
   }
 }
 
-/// Returns the life counter of the slave that the format selects, or -1 if the check of its word has none.
+/// Returns the life counter of the selected slave, or -1 if its check has none.
 [[nodiscard]] constexpr int life_counter_of(const ChainFormat& format, const ChainReply& reply) {
   const unsigned shown = format.shown();
   return format.channels[shown].check.life_counter ? reply.channels[shown].life_counter : -1;

@@ -19,8 +19,7 @@ using namespace author;
 
 constexpr unsigned most = ChainFormat::most;
 
-// Options of the word in one channel of the chain. The names of the options begin with `channel` and its number,
-// counted in the order of the line: channel0_.
+// Options of the word in one channel of the chain.
 template <unsigned>
 struct ChannelSettings {
   std::uint8_t singleturn_bits = 19;

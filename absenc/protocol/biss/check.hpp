@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Life counter and CRC after a BiSS word; the encoder's maker chooses their sizes and parameters. Sources: BiSS C
-// Protocol Description rev D2; application note 21 (the start value of the CRC is the content of the CRC register in
-// normal notation).
+// Life counter and CRC after a BiSS word. Sources: BiSS C Protocol Description rev D2; application note 21.
 #pragma once
 
 #include <cstddef>
@@ -12,12 +10,10 @@
 
 namespace absenc::biss {
 
-/// Number of bits of the life counter. It is sent before the CRC and covered by it, and counts from 0 to 63, then 0
-/// again.
+/// Number of bits of the life counter, which the CRC covers.
 inline constexpr unsigned life_counter_bits = 6;
 
-/// Parameters of the CRC and the life counter after a word. The default is used by nearly all encoders: x^6 + x + 1,
-/// inverted.
+/// Parameters of the CRC and the life counter after a word; the default is x^6 + x + 1, inverted.
 struct Check {
   std::uint8_t width = 6;     ///< Number of bits of the CRC, 0 to 16; 0: no CRC.
   std::uint16_t poly = 0x03;  ///< Polynomial of the CRC without its highest power.
@@ -31,8 +27,7 @@ struct Check {
   friend constexpr bool operator==(const Check&, const Check&) = default;
 };
 
-/// Returns whether the polynomial of the CRC ends in 1: with an even one, the last bit of the CRC never changes, so the
-/// CRC is as weak as a shorter one. True for a check without a CRC.
+/// Returns whether the polynomial ends in 1: an even one makes a weaker CRC. True without a CRC.
 [[nodiscard]] constexpr bool is_usable(const Check& check) { return check.width == 0 || (check.poly & 1) != 0; }
 
 inline constexpr Check crc6{};  ///< Check of most encoders: a CRC of 6 bits.
@@ -66,7 +61,7 @@ template <class Bits>
   return static_cast<std::uint16_t>(remainder ^ (check.inverted ? mask : 0));
 }
 
-/// Returns the CRC of `count` bits from `first` on, as the encoder sends it. `Source` as in word.hpp.
+/// Returns the CRC of `count` bits from `first` on, as sent. `Source` as in word.hpp.
 template <class Source, class Bits>
 [[nodiscard]] constexpr std::uint16_t crc_as_sent(const Source& source, const Bits& bits, std::size_t first,
                                                   std::size_t count) {

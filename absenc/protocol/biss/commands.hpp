@@ -151,8 +151,7 @@ template <const auto& report, class F>
   };
 }
 
-/// Returns the cause of `error` of a frame, with advice where the general advice does not suffice; empty if no cause is
-/// known.
+/// Returns the cause of an error of a frame; empty if no cause is known.
 template <class F>
 [[nodiscard]] Explanation explain_frame(const F& format, Error error, Bytes = {}, Bytes reply = {}) {
   switch (error) {
@@ -172,15 +171,14 @@ template <class F>
   }
 }
 
-/// Returns whether the checks must detect an error in sample `bit`. At the last idle sample an error only makes the ACK
-/// longer. Within the ACK and at the start bit it moves the frame, which a CRC of 6 bits misses once in 64 times.
+/// Returns false for the last idle sample, the ACK and the start bit, where errors may pass.
 [[nodiscard]] inline bool is_behind_ack(Frame reply, std::size_t bit) {
   const BitView samples = author::to_bits(reply);
   const std::size_t idle = samples[0] ? samples.end_of_run(0) : 0;
   return bit + 1 < idle || bit > samples.end_of_run(idle);
 }
 
-/// Returns the index of the CDS sample, which follows the start bit; no value if the reply ends before it.
+/// Returns the index of the CDS sample; no value if the reply ends before it.
 [[nodiscard]] inline std::optional<std::size_t> place_of_cds(Frame reply) {
   const BitView samples = author::to_bits(reply);
   if (samples.size == 0) return std::nullopt;
@@ -190,9 +188,8 @@ template <class F>
 
 // ---- Parts of the declaration that all BiSS units share
 
-/// Writes the CDM bits of the command's control frame to `out` as '0' and '1' and returns their number; 0 for the
-/// commands `position` and `info`. If a command sends several control frames, writes the one that reads or changes the
-/// register.
+/// Writes the CDM bits of a command's control frame as '0' and '1', and returns their number; 0 for `position` and
+/// `info`.
 template <class F>
 Result<std::size_t> encode_control(const F& format, const Command& command, Arguments arguments, MutableBytes out) {
   ControlMaster master;
@@ -233,7 +230,7 @@ constexpr LineSettings line_of(const F&) {
   return line_settings;  // the conversation sets the clock rate itself
 }
 
-/// Decodes a control frame into `sink` and returns its error: `asked` has its CDM bits, `answered` its CDS bits.
+/// Decodes a control frame into `sink`: `asked` has its CDM bits, `answered` its CDS bits.
 inline Error decode_control_frame(Frame asked, Frame answered, FieldSink& sink) {
   const Result<ControlFrame> frame = decode_control(author::to_bits(asked), author::to_bits(answered));
   if (!frame) return frame.error();

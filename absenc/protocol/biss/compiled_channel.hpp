@@ -31,7 +31,7 @@ class CompiledChannel {
     crc_ = BitCrc<Entry, rows>(parameters_of(format.check), covered_);
   }
 
-  /// Returns whether word and life counter together have 1 to 64 bits, so that `load` may be called.
+  /// Returns whether word and life counter together have 1 to 64 bits, as `load` demands.
   [[nodiscard]] constexpr bool is_possible() const { return covered_ >= 1 && covered_ <= CompiledWord::maximum_bits; }
   /// Returns the number of bits of word, life counter and CRC.
   [[nodiscard]] constexpr unsigned bits() const { return covered_ + width_; }
@@ -43,7 +43,7 @@ class CompiledChannel {
     std::uint64_t covered = 0;  ///< Word and life counter.
     std::uint16_t crc = 0;      ///< CRC as the encoder sent it; 0: there is none.
   };
-  /// Returns the bits of the word that begins at index `first` of `samples`, which have `bits()` bits from there on.
+  /// Returns the bits of the word that begins at index `first` of `samples`.
   [[nodiscard, gnu::always_inline]] constexpr Bits load(const BitView& samples, std::size_t first) const {
     return {
         samples.load_quickly(first, covered_),

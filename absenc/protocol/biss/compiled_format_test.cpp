@@ -35,7 +35,7 @@ ChannelData random_data(sim::Random& random) {
   return {.word = random_values(random), .life_counter = static_cast<std::uint8_t>(random.next() & 0x3F)};
 }
 
-// Returns the samples as a line may change them: cut off, with bits after the frame, with flipped bits, or unchanged.
+// Returns the samples as a line may change them.
 Samples disturbed(const Samples& samples, sim::Random& random) {
   Samples changed;
   const std::uint64_t kind = random.below(8);
@@ -69,8 +69,7 @@ void expect_equal_data(const Data& data, const Data& expected) {
   EXPECT_EQ(data.crc, expected.crc);
 }
 
-// Returns a number of ACK bits as on real lines, or at times so many that the start bit is not in the first machine
-// word.
+// Returns a number of ACK bits, at times too many for the first machine word.
 unsigned random_ack(sim::Random& random) {
   return static_cast<unsigned>(1 + random.below(random.below(4) == 0 ? 90 : 20));
 }
@@ -155,8 +154,7 @@ TEST(BissCompiledSafetyFormat, EqualsFormatForRandomFormatsAndFrames) {
   EXPECT_GT(good, 5'000u);
 }
 
-// A CRC that begins with 0 and is not inverted is right for zeros, but a word of zeros is refused: a slave whose
-// process data are switched off sends it.
+// A CRC that is not inverted is right for zeros, but a word of zeros is refused.
 TEST(BissCompiledSafetyFormat, RefusesZerosInPlaceOfEitherWord) {
   constexpr Check plain{.width = 8, .poly = 0x07, .init = 0, .inverted = false};
   constexpr SafetyFormat format{.cpw = {.word = "position:16"_word, .check = plain},
@@ -173,7 +171,7 @@ TEST(BissCompiledSafetyFormat, RefusesZerosInPlaceOfEitherWord) {
   }
 }
 
-// ---- Formats that are known at compile time are compiled by the compiler, where a machine word has 64 bits
+// ---- Formats that are known at compile time
 
 constexpr std::array known_formats{
     Format{.word = "position:19 error:1! warning:1!"_word},

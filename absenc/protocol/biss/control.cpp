@@ -116,8 +116,7 @@ bool ControlMaster::direction(bool cds) {
   }
 }
 
-// Repeats the host's start bit until the encoder sends its own, which may take 20 ms; before the first written byte the
-// encoder must send it at once.
+// Before the first written byte the encoder must send its start bit at once.
 bool ControlMaster::started(bool cds) {
   const bool write = frame_.request.operation == Operation::write;
   if (!cds) {
@@ -252,8 +251,7 @@ bool ControlSlaves::direction(bool cdm, ControlTarget& target) {
   }
 }
 
-// Begins a data byte as soon as the encoder is ready, a first written byte at once. For a read, `bits_` are then the
-// bits to send.
+// The encoder may delay each byte but the first written one.
 bool ControlSlaves::begin_byte(ControlTarget& target) {
   const bool write = request_.operation == Operation::write;
   const bool may_wait = !write || bytes_ > 0;
@@ -277,8 +275,7 @@ bool ControlSlaves::next_allowed(const ControlTarget& target) const {
          target.allows(request_.slave, next, request_.operation == Operation::write);
 }
 
-// Returns the next bit of a data byte and its CRC, then P. After P, begins the next byte if the host sends a start bit
-// and that register may be read.
+// After P, a start bit of the host asks for the next register.
 bool ControlSlaves::read(bool cdm, ControlTarget& target) {
   const unsigned at = at_++;
   if (at < byte_bits) return (bits_ >> (byte_bits - 1 - at) & 1) != 0;
@@ -289,7 +286,7 @@ bool ControlSlaves::read(bool cdm, ControlTarget& target) {
   return begin_byte(target);
 }
 
-// Receives the next bit of a data byte and its CRC, and returns it. A byte with a wrong CRC is not stored.
+// A byte with a wrong CRC is not stored.
 bool ControlSlaves::write(bool cdm, ControlTarget& target) {
   const unsigned at = at_++;
   if (at < byte_bits) {

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// BiSS control communication: the content of a control frame, and both sides of it. The host sends one bit (CDM) after
-// each position frame, and the encoders send one bit (CDS) in each position frame. README.md draws it. Source: BiSS C
-// Protocol Description rev D2.
+// Both sides of BiSS control frames, which README.md draws. Source: BiSS C Protocol Description rev D2.
 #pragma once
 
 #include <array>
@@ -21,7 +19,7 @@ inline constexpr unsigned control_pause = 14;
 inline constexpr unsigned control_slaves = 8;    ///< Greatest number of slaves that can have an ID.
 inline constexpr std::size_t control_most = 64;  ///< Greatest number of data bytes of one control frame.
 
-/// CRC of control frames: x^4 + x + 1, inverted; over CTS and the ten bits after it, and over each byte.
+/// CRC of control frames: x^4 + x + 1, inverted.
 inline constexpr Check crc4{4, 0x3};
 
 /// Returns the CRC of 4 bits over the lowest `count` bits of a number.
@@ -60,7 +58,7 @@ inline constexpr unsigned header_bits = 15;  ///< Number of header bits after th
   return static_cast<std::uint16_t>(bits << 4 | crc4_of(bits, 11));
 }
 
-/// Decodes a header. Error: bad_checksum. The header does not contain whether a register is read or written.
+/// Decodes a header, which does not tell read from write. Error: bad_checksum.
 [[nodiscard]] constexpr Result<ControlRequest> request_of_header(std::uint16_t header) {
   const std::uint32_t bits = header >> 4;
   if (crc4_of(bits, 11) != (header & 0xF)) return Error::bad_checksum;
@@ -91,21 +89,13 @@ struct ControlFrame {
 };
 
 /// Decodes a control frame from the bits of CDM and CDS, one of each per position frame. The start bit is the first
-/// bit, or follows at least 14 zeros. Without CDS bits only the request is decoded: written data is taken from CDM, and
-/// repeated start bits are separated from data by the CRC. Errors: wrong_length (no CDM bits, or more than 64 data
-/// bytes), bad_framing (no start bit, too few zeros before it, neither read nor write, a command without start bit S,
-/// or a delayed first written byte), truncated, bad_checksum (header or a byte), timeout (no slave has this ID, the
-/// slave does not answer, or the host sends no start bit S for an access), unexpected_reply (written data is returned
-/// with another value, a write is answered as a read, or a slave acknowledges a command that is not for it),
-/// request_rejected.
+/// bit, or follows at least 14 zeros. Without CDS bits only the request is decoded.
 [[nodiscard]] Result<ControlFrame> decode_control(BitView cdm, BitView cds);
 
-/// The host's side of control frames. It owns no line: the caller passes the CDS of each position frame to `next` and
-/// sends the CDM that `next` returns.
+/// The host's side of control frames, without a line.
 class ControlMaster {
  public:
-  /// Construct once and use for several control frames: the object counts the zeros before the next start bit across
-  /// them.
+  /// Construct once: the object counts the zeros before the next start bit across control frames.
   ControlMaster() = default;
 
   /// Begins to read `count` registers (1 to 64) of `slave` from `address` on.
@@ -128,7 +118,7 @@ class ControlMaster {
   [[nodiscard]] bool is_waiting() const { return !over_ && state_ == State::start; }
   /// Returns the error that ended the control frame; `none` while it runs or after success.
   [[nodiscard]] Error error() const { return error_; }
-  /// Returns the control frame as received so far; after an error, with the bytes before the error.
+  /// Returns the control frame as received so far.
   [[nodiscard]] const ControlFrame& frame() const { return frame_; }
 
  private:
@@ -149,7 +139,7 @@ class ControlMaster {
   std::uint16_t in_ = 0;  // Bits of the present data byte and its CRC that were received so far.
   std::uint16_t out_ = 0;
   std::size_t count_ = 0;  // Number of data bytes to transfer.
-  // Number of frames since the start bit of the control frame, or since that of the present data byte.
+  // Number of frames since the start bit of the control frame, or of the data byte.
   unsigned at_ = 0;
   unsigned zeros_ = 0;
   unsigned delay_ = 0;
@@ -160,12 +150,10 @@ class ControlMaster {
   Error error_ = Error::none;
 };
 
-/// Appends the CDM bits of the control frame that `master` has begun, one per position frame, including the zeros
-/// before the start bit and after the end. Assumes `slaves` encoders with an ID that answer at once.
+/// Appends the CDM bits of a begun control frame, for `slaves` encoders that answer at once.
 void append_cdm(ControlMaster master, unsigned slaves, BitBuffer<1024>& out);
 
-/// Registers and commands of virtual encoders, as ControlSlaves accesses them. `slave` is always the ID of an existing
-/// slave.
+/// Registers and commands of virtual encoders; `slave` is always the ID of an existing slave.
 struct ControlTarget {
   /// Returns whether the register of `slave` at `address` may be read, or written if `write`.
   [[nodiscard]] virtual bool allows(unsigned slave, unsigned address, bool write) const = 0;
@@ -173,12 +161,11 @@ struct ControlTarget {
   [[nodiscard]] virtual std::uint8_t read(unsigned slave, unsigned address) = 0;
   /// Writes `value` to the register of `slave` at `address`.
   virtual void write(unsigned slave, unsigned address, std::uint8_t value) = 0;
-  /// Returns the bit P that is sent after a register. `next_allowed`: whether the register after it may be accessed.
+  /// Returns the bit P after a register. `next_allowed`: whether the next one may be accessed.
   [[nodiscard]] virtual bool stop_bit(bool next_allowed) const { return !next_allowed; }
-  /// Returns whether the next data byte can begin now: its value is available, or the encoder can accept a new one.
+  /// Returns whether the next data byte can begin now.
   [[nodiscard]] virtual bool is_ready() const = 0;
-  /// Returns whether control communication of `slave` is on: it takes part in register accesses and may acknowledge
-  /// commands. BiSS command 1 switches it off in the slaves that are addressed, and on again if sent to all slaves.
+  /// Returns whether control communication of `slave` is on.
   [[nodiscard]] virtual bool listens(unsigned) const { return true; }
   /// Returns whether `slave` acknowledges the command with number `command`.
   [[nodiscard]] virtual bool obeys(unsigned slave, unsigned command) const = 0;
@@ -195,8 +182,7 @@ class ControlSlaves {
   /// Creates the encoders' side of a line with `count` slaves.
   explicit ControlSlaves(unsigned count) : count_(count) {}
 
-  /// Processes the CDM that the host sent after the last frame, and sets the CDS of the next frame, which `cds`
-  /// returns.
+  /// Processes the CDM that the host sent after the last frame, and sets `cds()`.
   void take(bool cdm, ControlTarget& target);
   /// Returns the CDS that the slaves send in the next frame.
   [[nodiscard]] bool cds() const { return cds_; }

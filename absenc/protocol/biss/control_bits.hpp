@@ -11,8 +11,7 @@ namespace absenc::biss::control_bits {
 /// Kind of a control request.
 using Operation = ControlRequest::Operation;
 
-/// Position of the first lock bit in CDS. All positions here count position frames from the start bit of the control
-/// frame.
+/// Position of the first lock bit in CDS, in frames from the start bit of the control frame.
 inline constexpr unsigned lock_bits_at = 1;
 inline constexpr unsigned more_slaves_at = 9;  ///< Position of the bit that announces slaves without an ID.
 /// Position of R, the first of the CDM bits R, W and S; in CDS these bits are one frame later.

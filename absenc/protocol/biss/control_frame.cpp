@@ -10,7 +10,7 @@ using namespace control_bits;
 
 namespace {
 
-// A view of the bits of one control frame: index 0 is its start bit, and `[]` returns 0 beyond the end.
+// The bits of one control frame from its start bit on; `[]` gives 0 beyond the end.
 struct ControlBits {
   BitView bits;
   std::size_t start;
@@ -53,7 +53,7 @@ Error decode_bytes(const ControlBits& cdm, const ControlBits& cds, bool write, C
   }
 }
 
-// Decodes the data that the host writes, from CDM alone. The host repeats its start bit while an encoder is not ready.
+// The host repeats its start bit while an encoder is not ready.
 Error decode_written(const ControlBits& cdm, ControlFrame& frame) {
   for (unsigned at = direction_at + 3;; at += byte_bits + 2) {
     while (!frame.data.empty() && cdm.has(at + byte_bits) && cdm[at] && !is_good_byte(cdm.load(at, byte_bits))) ++at;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Results of BiSS control communication and their fields, for captured control frames and for procedures.
+// Results of BiSS control communication and their fields.
 #pragma once
 
 #include <algorithm>
@@ -35,8 +35,7 @@ class NumberList {
   Buffer<char, 96> text_;  // Text of the list; characters that do not fit are dropped.
 };
 
-/// The two characters of a manufacturer as text; a space, a backslash and a byte that is not printable are shown as a
-/// backslash, x and two hexadecimal digits.
+/// The two characters of a manufacturer as text; some are shown as hexadecimal digits.
 class MakerName {
  public:
   /// Appends these bytes of the manufacturer registers.
@@ -59,8 +58,7 @@ class MakerName {
   Buffer<char, 8> text_;
 };
 
-/// Results of a captured control frame, or of a procedure that sends control frames. Only members with a value are
-/// reported.
+/// Results of a captured control frame, or of a procedure that sends control frames.
 struct ControlResults {
   // ---- Results of a control frame
   std::optional<std::uint8_t> slaves{};         ///< Number of slaves with an ID.
@@ -82,7 +80,7 @@ struct ControlResults {
   NumberList acknowledged;                      ///< IDs of the slaves that acknowledged a command.
   std::optional<bool> executed{};               ///< Whether the host let the slaves execute the command (bit EX).
   // ---- Results of procedures
-  /// False: the register had this value already, so nothing was written.
+  /// False: the register had this value already.
   std::optional<bool> written{};
   /// True: the encoder refused to read the register; otherwise no value.
   std::optional<bool> missing{};

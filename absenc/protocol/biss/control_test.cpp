@@ -48,7 +48,7 @@ std::string cdm_of(const ControlMaster& master) {
   return text;
 }
 
-// Compares CDM bits with drawn ones up to their last 1. At least 14 zeros, and no 1, must follow.
+// At least 14 zeros, and no 1, must follow the last drawn 1.
 TEST(BissControl, EncodesRequestsOfTheDocument) {
   const auto expect = [](const ControlMaster& master, std::string_view drawn) {
     const std::string cdm = cdm_of(master);
@@ -88,7 +88,7 @@ TEST(BissControl, DecodesWrittenDataFromCdmAlone) {
 }
 
 TEST(BissControl, DetectsEachFlippedBitOfAnAnswer) {
-  // Flips the bits of CDS from the answer to R to the CRC of the byte; P affects only `next_address_accepted`.
+  // Flips the bits of CDS from the answer to R to the CRC of the byte.
   for (std::size_t i = 14 + 17; i < 14 + 32; ++i) {
     std::string cds(read_44_answer);
     cds[i] = cds[i] == '1' ? '0' : '1';
@@ -143,8 +143,7 @@ struct Transcript {
   std::string cds;
 };
 
-/// Runs host and encoders until the control frame ends, for at most 2000 position frames. `flip`: index of a CDS bit
-/// that the host receives wrong.
+/// Runs host and encoders until the control frame ends. `flip`: CDS bit that is received wrong.
 Transcript run(ControlMaster& master, ControlSlaves& slaves, Target& target, std::size_t flip = ~std::size_t{0}) {
   Transcript transcript;
   for (unsigned i = 0; !master.is_over() && i < 2'000; ++i) {
@@ -253,7 +252,7 @@ TEST(BissControl, RandomAccessesEndWithExpectedResult) {
   }
 }
 
-// A lost start bit shifts all bits after it, which four bits of CRC may miss: the loss shows as a delay of the byte.
+// The four bits of a byte's CRC may miss a lost start bit, which then shows as a delay.
 TEST(BissControl, FlippedCdsBitIsDetectedOrShowsAsDelay) {
   for (std::size_t flip = 0; flip < 14 + 33 + 14; ++flip) {
     for (const bool write : {false, true}) {

@@ -31,7 +31,7 @@ void LineDelay::apply(const Behaviour& behaviour, Time period, Samples& samples)
 // ---- Registers
 
 namespace {
-// Index of the registers outside the banks in the memory of a slave; the banks come before them.
+// Index of the registers outside the banks in the memory of a slave.
 constexpr std::size_t direct = VirtualRegisters::banks * registers::bank_size;
 
 // Initial content of the registers device ID (6 bytes) and manufacturer (2 bytes).
@@ -68,8 +68,7 @@ std::size_t VirtualRegisters::place(unsigned slave, unsigned address) const {
   return first + direct + (address - registers::bank_size);
 }
 
-// Refuses registers of banks that do not exist. Outside the banks, only bank select and the registers from `device` to
-// before `device_id` may be written.
+// Outside the banks, only bank select and the maker's registers may be written.
 bool VirtualRegisters::allows(unsigned slave, unsigned address, bool write) const {
   if (address < registers::bank_size) return bank_[slave] < banks;
   if (!write || address == registers::bank_select) return true;

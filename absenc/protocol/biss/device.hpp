@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual BiSS-C encoder: its samples on SLO at any clock, its registers, and checks of the host's timing.
+// A virtual BiSS-C encoder: its samples on SLO, its registers, and checks of the host's timing.
 #pragma once
 
 #include "absenc/core/shaft.hpp"
@@ -14,7 +14,7 @@ namespace absenc::biss {
 /// Times of a virtual encoder and of the line between it and the host.
 struct Behaviour {
   Time latency = 10us;  ///< Time that the encoder needs for a position, from the second rising edge of MA.
-  /// Delay of the line, there and back. The host samples SLO one period of MA after the edge that drives it.
+  /// Delay of the line, there and back.
   Time line_delay{};
   Time edge_noise = 20ns;       ///< A sample closer than this to a delayed edge reads the old or new bit, at random.
   Time register_delay{};        ///< Time from the request for a register until it is ready.
@@ -24,8 +24,7 @@ struct Behaviour {
 /// Samples of SLO, one per clock of MA.
 using Samples = author::DrivenBits;
 
-/// Delays samples as a line does: by whole clocks, and at random by one clock more or less where an edge falls on a
-/// sample.
+/// Delays samples as a line does.
 class LineDelay {
  public:
   /// Delays `samples`, which were taken at this period of MA, by `behaviour.line_delay`.
@@ -35,8 +34,7 @@ class LineDelay {
   std::uint32_t noise_ = 1;
 };
 
-/// A virtual encoder apart from its port: makes the samples of SLO, with the delay of its line. VirtualEncoderOf and a
-/// virtual adapter (e201) use it.
+/// A virtual encoder apart from its port: makes the samples of SLO.
 template <class F>
 class EncoderOf {
  public:
@@ -44,8 +42,7 @@ class EncoderOf {
   EncoderOf(const F& format, const Shaft& shaft, const Behaviour& behaviour)
       : format_(format), shaft_(&shaft), behaviour_(behaviour) {}
 
-  /// Fills `samples` with SLO, as the line delays it, for a frame whose first falling edge of MA is at `at`: the whole
-  /// frame, then zeros up to a full byte. SLO is idle if MA is too slow; a frame that is too long has no start bit.
+  /// Fills `samples` with SLO for a frame whose first falling edge of MA is at `at`.
   void sample(Time at, Time period, Samples& samples, bool cds = false) {
     samples.clear();
     // If half a period is as long as the timeout or longer, the frame ends at once and SLO is idle.
@@ -64,7 +61,7 @@ class EncoderOf {
     }
     life_counter_ = static_cast<std::uint8_t>((life_counter_ + 1u) & low_mask(life_counter_bits));
     const std::size_t whole = std::min<std::size_t>(clocks(format_, behaviour_.latency, period), Samples::capacity());
-    // Slaves whose process data are switched off send no words; zeros at the end of the frame take their place.
+    // Zeros at the end take the place of words that are switched off.
     while (samples.size() < whole) samples.append(0, 1);
     delay_.apply(behaviour_, period, samples);
     while (samples.size() % 8 != 0) samples.append(0, 1);
@@ -98,7 +95,7 @@ class EncoderOf {
 /// A virtual encoder with one position word.
 using Encoder = EncoderOf<Format>;
 
-/// The registers of all virtual slaves on a line. `memory` returns the part that is not lost at power off.
+/// The registers of all virtual slaves on a line.
 class VirtualRegisters final : public ControlTarget {
  public:
   static constexpr unsigned banks = 4;  ///< Number of register banks of each slave.
@@ -128,7 +125,7 @@ class VirtualRegisters final : public ControlTarget {
   [[nodiscard]] bool is_ready() const override;
   [[nodiscard]] bool listens(unsigned slave) const override { return (control_off_ >> slave & 1) == 0; }
   [[nodiscard]] bool obeys(unsigned slave, unsigned command) const override;
-  /// Executes command 0 or 1 on all slaves whose bit is set in `slaves`; 0: on all slaves. Ignores other commands.
+  /// Executes command 0 or 1 on the slaves in the mask `slaves`, 0: all; ignores other commands.
   void execute(std::uint8_t slaves, unsigned command) override;
 
  private:
@@ -154,18 +151,18 @@ class VirtualRegisters final : public ControlTarget {
 /// Returns the number of slaves in the chain.
 [[nodiscard]] constexpr unsigned slaves_of(const ChainFormat& format) { return format.count; }
 
-/// A virtual encoder, or a chain of virtual encoders, with registers and checks of the host's timing.
+/// A virtual encoder, or a chain, with registers and checks of the host's timing.
 template <class F>
 class VirtualEncoderOf final : public author::ClockedDevice {
  public:
-  /// Creates an encoder with the times of `format` that is off until `power_on`. `shaft` must outlive it.
+  /// Creates an encoder with the times of `format`; it is off. `shaft` must outlive it.
   VirtualEncoderOf(const F& format, const Shaft& shaft)
       : VirtualEncoderOf(format, shaft,
                          {.latency = format.ready > 0ns ? format.ready : std::min(format.latency, Behaviour{}.latency),
                           .line_delay = Time(format.line_delay_ns),
                           .register_delay = std::chrono::microseconds(format.register_delay_us),
                           .start_sequence = format.start_sequence}) {}
-  /// Creates an encoder with the times of `behaviour` that is off until `power_on`. `shaft` must outlive it.
+  /// Creates an encoder with the times of `behaviour`; it is off. `shaft` must outlive it.
   VirtualEncoderOf(const F& format, const Shaft& shaft, const Behaviour& behaviour)
       : encoder_(format, shaft, behaviour),
         slaves_(slaves_of(format)),
@@ -199,7 +196,7 @@ class VirtualEncoderOf final : public author::ClockedDevice {
     needed_ = clocks(encoder_.format(), behaviour.latency, period);
   }
   void clocked(Time at, std::size_t clocks) override {
-    // The start sequence is accepted at any time, because a host cannot know whether the encoder needs it.
+    // A host cannot know whether the encoder needs the start sequence, so it is always accepted.
     if (is_start_sequence(clocks)) {
       start_sequence_received_ = true;
     } else if (needed_ > 0) {
@@ -215,8 +212,7 @@ class VirtualEncoderOf final : public author::ClockedDevice {
     clocked_before_ = false;
     start_sequence_received_ = false;
   }
-  // Returns whether `clocks` clocks are a start sequence: two, or eight, as an SPI controller can only clock whole
-  // bytes.
+  // Eight clocks count too, because an SPI controller can only clock whole bytes.
   static bool is_start_sequence(std::size_t clocks) { return clocks == start_pulses || clocks == 8; }
 
   EncoderOf<F> encoder_;

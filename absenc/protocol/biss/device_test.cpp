@@ -13,7 +13,7 @@ using testing::Bench;
 
 const Format bits_19{};
 
-// Assigns the members separately: clang 14 leaves some members uninitialised with Format{.ready = ready}.
+// clang 14 leaves some members uninitialised with Format{.ready = ready}.
 Format format_with(Time latency, Time ready, Time line_delay = {}) {
   Format format = bits_19;
   format.latency = latency;
@@ -57,7 +57,7 @@ TEST(BissDevice, ReportsBrokenTimingRules) {
   EXPECT_EQ(soon.last_rule(), "clocked before the BiSS timeout has passed");
   EXPECT_EQ(soon.encoder.answer_count(), 1u);
   EXPECT_EQ(soon.clock(16, 20us, 1'000'000), "1100000000001000");
-  // The two violations are the clock before the timeout, and the frame of only 16 clocks after it.
+  // The clock before the timeout, and the frame of only 16 clocks after it.
   EXPECT_EQ(soon.encoder.violation_count(), 2u);
 }
 
@@ -93,7 +93,7 @@ TEST(BissDevice, ReadyTimeIsThatOfOptionsOrAtMostTenMicroseconds) {
   EXPECT_EQ(ack(4us, 7us), 7u);
 }
 
-/// Returns how many of 100 frames are received unchanged with this period of MA and this delay of the line.
+/// Returns how many of 100 frames are received unchanged.
 unsigned good_frames(Time line_delay, Time period) {
   testing::TestShaft shaft;
   shaft.state.position = 0x1234'5678'9ABC;

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Connects a procedure that sends BiSS control frames with the line, frame by frame. Each frame carries a position,
-// which is decoded and checked, and the encoder's bit (CDS). The host's bit (CDM) is the level of MA between two
-// frames.
+// Connects a procedure that sends BiSS control frames with the line.
 #pragma once
 
 #include "absenc/protocol/author/dialog.hpp"
@@ -10,7 +8,7 @@
 
 namespace absenc::biss {
 
-/// A conversation that reads positions while a procedure sends and receives control frames bit by bit.
+/// A conversation that reads positions while a procedure exchanges control frames bit by bit.
 template <class F>
 class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author::Routine {
   using Base = author::ClockedHostOf<ProtocolOf<F>>;
@@ -19,7 +17,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
   /// Type of a decoded position frame.
   using Reply = typename ProtocolOf<F>::Reply;
 
-  /// Returns an awaitable that clocks the next frame: `const Result<Reply> reply = co_await dialog.frame()`.
+  /// Returns an awaitable that clocks the next frame: `co_await dialog.frame()`.
   [[nodiscard]] auto frame() {
     struct Frame {
       ControlDialog& dialog;
@@ -31,19 +29,18 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
   }
   /// Sets the CDM bit that is sent after the last frame.
   void set_cdm(bool cdm) { cdm_ = cdm; }
-  /// Returns the number of clocked frames, without a stuck first frame that the start sequence follows.
+  /// Returns the number of frames; a stuck one before the start sequence does not count.
   [[nodiscard]] std::uint32_t frames() const { return frames_; }
-  /// Returns the number of frames that failed a check, without frames that are accepted although they lack data.
+  /// Returns the number of frames that were refused.
   [[nodiscard]] std::uint32_t bad_frames() const { return bad_frames_; }
   /// Returns the time at which the last frame was received.
   [[nodiscard]] Time now() const { return this->received_at(); }
   [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
   [[nodiscard]] std::string_view advice() const override { return outcome_.advice; }
-  /// Returns whether the texts of the outcome suffice, so that no explanation of the last reply is added.
+  /// Returns whether no explanation of the last reply is added to the outcome's texts.
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
   [[nodiscard]] ChangeSent change_sent() const final { return this->change(); }
-  /// Makes the dialog accept frames without process data, because a command may have switched the data off. The CDS
-  /// of such frames is valid.
+  /// Makes the dialog accept frames without process data; the CDS of such frames is valid.
   void accept_empty_frames() { accepts_empty_ = true; }
   /// Makes the conversation emit each valid position before the next frame begins.
   void emit_positions() { emits_ = true; }
@@ -60,8 +57,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
   ~ControlDialog() = default;
 
  private:
-  // Returns sequence_mismatch if the life counter of this frame does not follow that of the frame before, if both are
-  // known.
+  // Returns sequence_mismatch if two known life counters do not follow each other.
   [[nodiscard]] Error check_life_counter(const Reply& reply) {
     const int now = life_counter_of(this->format(), reply);
     const int before = std::exchange(life_counter_, now);
@@ -83,8 +79,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
     if (last_) {
       const unsigned head = last_->delay_bits + last_->ack_bits;
       const unsigned expected = head_bits(this->format(), this->format().latency, this->format().period());
-      // Called for every frame that decodes, because a late frame is confirmed by the delay of the one decoded before
-      // it.
+      // Called for every decoded frame: a late frame is confirmed by the delay of the one before.
       const bool again = late_.is_again(head);
       if (head > expected && !again) last_ = Error::truncated;
     }

@@ -27,8 +27,7 @@ inline constexpr auto frame_fields = author::fields_of<FrameValues>(
     author::field<&FrameValues::line_delay_us>("line_delay_us", "us",
                                                "the same at the clock of ma_khz: 100 m of cable make 1 us"));
 
-/// Puts the delay of the line into `sink`; nothing if it is less than a clock. The delay is known only if the samples
-/// begin with the clock; other captures may begin anywhere in the idle line.
+/// Puts the delay of the line into `sink`; nothing if it is less than a clock.
 template <class F, class ReplyType>
 constexpr void put_line_delay(FieldSink& sink, const F& format, const ReplyType& reply) {
   if (reply.delay_bits == 0) return;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// BiSS-C frames of one encoder as samples of SLO, one for each clock of MA: layout, encoding, decoding with all checks,
-// and times. README.md draws the frame. Sources: RLS "E201-9S Decoding the BiSS information"; BiSS C rev D2.
+// BiSS-C frames of one encoder as samples of SLO, one for each clock of MA. README.md draws them. Sources: RLS "E201-9S
+// Decoding the BiSS information"; BiSS C rev D2.
 #pragma once
 
 #include <algorithm>
@@ -35,8 +35,7 @@ inline constexpr Time timeout_maximum = 40us;
 /// Number of pulses of MA in the start sequence after power on.
 inline constexpr unsigned start_pulses = 2;
 
-/// BiSS timeout, the time for which SLO stays low after the last clock: fixed, or one and a half periods of MA
-/// (adaptive). An object takes one byte of memory.
+/// BiSS timeout, for which SLO stays low after the last clock: fixed, adaptive or unknown.
 class Timeout {
  public:
   constexpr Timeout() = default;  // An unknown timeout: the host waits 40 us, the virtual encoder takes 20 us.
@@ -45,8 +44,7 @@ class Timeout {
   /// Returns the timeout that adapts to the clock: one and a half periods of MA.
   static constexpr Timeout adaptive() { return Timeout(is_adaptive); }
 
-  /// Returns the pause that the host leaves between frames with this period of MA. An adaptive timeout gets 1 us more,
-  /// because an encoder may end it up to three of its own samples late (iC-PVS, table 50).
+  /// Returns the host's pause between frames; an adaptive timeout gets 1 us more (iC-PVS, table 50).
   [[nodiscard]] constexpr Time of_host(Time period) const {
     if (code_ == is_adaptive) return Time(static_cast<std::int32_t>(one_and_a_half(period) + 1000));
     return Time(static_cast<std::int32_t>((code_ != 0 ? code_ : 80u) * 500u));
@@ -71,8 +69,7 @@ class Timeout {
   std::uint8_t code_ = 0;  // timeout in units of 0.5 us; 0: unknown, 1: adaptive
 };
 
-/// The bit P that the virtual encoder sends after each register: 0 if the next register may be accessed, or always 0,
-/// or always 1.
+/// The bit P that the virtual encoder sends after each register: by the next register, 0, or 1.
 enum class StopBit : std::uint8_t { next, zero, one };
 /// Values of the option `stop_bit`, in the order of StopBit.
 inline constexpr std::array<std::string_view, 3> stop_bit_choices{"next", "zero", "one"};
@@ -92,7 +89,7 @@ struct Format {
   /// Whether the encoder is linear, and the length of a count.
   Scale scale{};
   std::uint16_t ma_khz = 1000;  ///< Clock MA in kHz, 10 to 10 000.
-  // The members for registers and start sequence fit into padding, so that a reader of positions needs no more memory.
+  // These members fit into padding, so that a reader of positions needs no more memory.
   std::uint8_t slave = 0;  ///< Slave whose registers are accessed: 0 to 7, counted from the end of the chain.
   RegisterOrder register_order = RegisterOrder::big;  ///< Byte order of a number that several registers hold.
   std::uint16_t register_delay_us = 0;  ///< Virtual encoder: time in us until a requested register is ready.
@@ -110,7 +107,7 @@ struct Format {
   [[nodiscard]] constexpr Time period() const { return Time((1'000'000u + ma_khz / 2u) / ma_khz); }
 };
 
-/// Returns the format of a word with the position and turns of `bits`, followed by nError and nWarning.
+/// Returns the format of a word with position, turns, nError and nWarning.
 [[nodiscard]] constexpr WordFormat word_with_status(const PositionBits& bits) {
   WordFormat word = word_format(bits);
   word.add({"error", Meaning::error, 1, true});
@@ -121,21 +118,20 @@ struct Format {
 /// Returns the number of bits after the CDS bit: word, life counter and CRC.
 [[nodiscard]] constexpr unsigned data_bits(const Format& format) { return format.word.bits() + format.check.bits(); }
 
-/// Returns the number of ACK bits, at least 1, of an encoder whose position is ready `latency` after the second rising
-/// edge of MA. Both arguments are at most a second, because the result is computed in 32 bits.
+/// Returns the number of ACK bits, at least 1. Both arguments are at most a second.
 [[nodiscard]] constexpr unsigned ack_bits(Time latency, Time period) {
   const auto needed = static_cast<std::uint32_t>(latency.count());
   const auto clock = static_cast<std::uint32_t>(period.count());
   return std::max(1u, static_cast<unsigned>((needed + clock - 1) / clock));
 }
 
-/// Returns 0: no slave delays the start bit on its way to the host. ChainFormat has a function of its own.
+/// Returns 0: no slave delays the start bit on its way to the host.
 template <class AnyFormat>
 [[nodiscard]] constexpr unsigned relay_bits(const AnyFormat&) {
   return 0;
 }
 
-/// Returns the number of clocks between the idle samples and the start bit: ACK bits and delay by other slaves.
+/// Returns the number of clocks between the idle samples and the start bit.
 template <class AnyFormat>
 [[nodiscard]] constexpr unsigned head_bits(const AnyFormat& format, Time latency, Time period) {
   return ack_bits(latency, period) + relay_bits(format);
@@ -168,7 +164,7 @@ enum class Cds : std::uint8_t { zero, any };
 
 namespace detail {
 
-// Decodes a word and its check from `bits`, beginning at index `first`. Returns the first error.
+// Decodes a word and its check from index `first` of `bits` on. Returns the first error.
 template <class Source, class Bits, class Data>
 constexpr Error take_data(const Source& source, const Bits& bits, std::size_t first, Data& data) {
   const Check& check = source.format.check;
@@ -184,8 +180,7 @@ constexpr Error take_data(const Source& source, const Bits& bits, std::size_t fi
   return absenc::detail::take_word(source, bits, first, data.word);
 }
 
-// Decodes the bits before the data, and checks that `size` bits follow. Sets `first` to the index after the CDS bit,
-// and ACK, delay and CDS in `head`.
+// Decodes the bits before the data, and checks that `size` bits follow.
 template <class ReplyType>
 constexpr Error take_head(const BitView& samples, std::size_t size, Cds cds, ReplyType& head, std::size_t& first) {
   if (samples.size == 0) return Error::wrong_length;
@@ -235,8 +230,7 @@ struct Head {
   [[nodiscard]] constexpr unsigned delay_bits() const { return idle > idle_bits ? idle - idle_bits : 0; }
 };
 
-// Finds the data, `size` bits, of a frame whose start bit and CDS are in the first machine word. Returns false if the
-// samples have no such frame, or too few bytes, or a CDS that is not accepted.
+// Finds the data, `size` bits; returns false for a frame that the fast way cannot decode.
 [[nodiscard, gnu::always_inline]] constexpr bool find_data(const BitView& samples, std::size_t size, Cds cds,
                                                            Head& head) {
   if (samples.bytes.size() < sizeof(std::size_t)) return false;
@@ -251,8 +245,7 @@ struct Head {
   return !head.cds || cds == Cds::any;
 }
 
-// Decodes a usual frame without errors by a compiled word and check; calls `otherwise` for any other frame. The reply
-// is constructed in place.
+// Decodes a usual frame without errors fast; calls `otherwise` for any other frame.
 template <class Values, class Channel, class Otherwise>
 [[nodiscard, gnu::always_inline]] constexpr Result<ReplyWith<Values>> decode_compiled(const Channel& channel,
                                                                                       const BitView& samples, Cds cds,
@@ -271,8 +264,7 @@ template <class Values, class Channel, class Otherwise>
   });
 }
 
-// The word and check of a format that is known at compile time, with a table of the rows that the word and a life
-// counter need.
+// The compiled word and check of a format that is known at compile time.
 template <const Format& format>
 inline constexpr CompiledChannel<std::conditional_t<(format.check.width > 8), std::uint16_t, std::uint8_t>,
                                  (format.word.bits() + life_counter_bits + 3) / 4>
@@ -294,8 +286,7 @@ constexpr void append_data(const Format& format, const Data& data, BitBuffer<Cap
   out.append(crc_as_sent(source, out.view(), first, out.size() - first), format.check.width);
 }
 
-// Appends idle bits, ACK, start bit and CDS to `out`. Returns false, without a change, if these and `size` more bits do
-// not fit.
+// Appends idle bits, ACK, start bit and CDS. Returns false if `size` more bits would not fit.
 template <class ReplyType, std::size_t Capacity>
 constexpr bool append_head(const ReplyType& head, std::size_t size, BitBuffer<Capacity>& out) {
   if (out.capacity() - out.size() < idle_bits + head.delay_bits + head.ack_bits + 2 + size) return false;
@@ -307,15 +298,13 @@ constexpr bool append_head(const ReplyType& head, std::size_t size, BitBuffer<Ca
 
 }  // namespace detail
 
-/// Decodes a frame from samples that begin while SLO is idle (1) or in the ACK (0). Samples after the CRC are ignored.
-/// Errors: wrong_length (no samples), line_stuck (all samples alike), bad_framing (no start bit, or CDS is 1 where it
-/// must be 0), truncated (the frame is longer than the samples), bad_checksum (CRC, or the parity of the word).
+/// Decodes a frame from samples that begin while SLO is idle (1) or in the ACK (0). Errors: wrong_length, line_stuck,
+/// bad_framing, truncated, bad_checksum.
 [[nodiscard]] constexpr Result<Reply> decode(const Format& format, const BitView& samples, Cds cds = Cds::zero) {
   return detail::decode_by(Given<Format>{format, format.word}, samples, cds);
 }
 
-/// Decodes a frame whose format is known at compile time. The errors are those of `decode` with a format as an
-/// argument. The array `values` of the word is empty if the format has no fields with Meaning::value.
+/// Decodes a frame whose format is known at compile time; errors as for any format.
 template <const Format& format>
 [[nodiscard]] constexpr Result<ReplyTo<format>> decode(const BitView& samples, Cds cds = Cds::zero) {
   // Processors without registers of 64 bits have one way only, to save memory.
@@ -327,8 +316,8 @@ template <const Format& format>
   }
 }
 
-/// Appends idle bits, ACK, start bit, CDS, word and check to `out`; `reply.crc` is ignored. If bit 0 of `silent` is
-/// set, the process data are switched off: word and check are left out. Returns false if `out` is too small.
+/// Appends the frame of `reply`, with a computed CRC. Bit 0 of `silent`: without word and check. Returns false if `out`
+/// is too small.
 template <std::size_t Capacity>
 constexpr bool encode(const Format& format, const Reply& reply, BitBuffer<Capacity>& out, std::uint8_t silent = 0) {
   if (!detail::append_head(reply, data_bits(format), out)) return false;
@@ -336,7 +325,7 @@ constexpr bool encode(const Format& format, const Reply& reply, BitBuffer<Capaci
   return true;
 }
 
-/// Sets the word of a virtual encoder's reply from the state of its shaft and its alarms, and sets its life counter.
+/// Sets word and life counter of a virtual encoder's reply.
 constexpr void show(const Format& format, const ShaftState& state, std::uint32_t alarms, std::uint8_t life_counter,
                     Reply& reply) {
   reply.word = word_of(format.word, state, alarms);
@@ -375,8 +364,7 @@ template <const Format& format>
   return to_reading(contents, reply.word, format.scale);
 }
 
-/// Returns whether zeros, at least one, and nothing else follow the CDS bit, as when process data are switched off.
-/// Stores ACK, delay and CDS in `head`.
+/// Returns whether zeros alone follow the CDS bit, as without process data. Sets `head`.
 template <class ReplyType>
 [[nodiscard]] constexpr bool is_empty_frame(BitView samples, ReplyType& head) {
   std::size_t first = 0;
@@ -384,7 +372,7 @@ template <class ReplyType>
   return first < samples.size && !samples[first] && samples.end_of_run(first) == samples.size;
 }
 
-/// Returns whether the samples end within the frame, as when encoder or line need longer than expected.
+/// Returns whether the samples end within the frame.
 [[nodiscard]] constexpr bool ended_early(Error error, BitView samples) {
   if (error == Error::truncated) return true;
   return error == Error::bad_framing && samples.end_of_run(samples.end_of_run(0)) == samples.size;

@@ -68,8 +68,7 @@ TEST(BissFrame, DecodesAtEveryOffsetInSixtyFourSamples) {
 
 bool skips(const Format& format) { return format.word.find(Meaning::skip) != nullptr; }
 
-// Decodes noise, whole frames, cut frames and frames with flipped bits. The decoder of a format known at compile time
-// must give the same results as that of a format known at run time.
+// Expects that both decoders give the same results for noise and for whole and damaged frames.
 template <const Format& format>
 void agree(std::uint64_t seed) {
   sim::Random random(seed);
@@ -94,8 +93,7 @@ void agree(std::uint64_t seed) {
     ASSERT_EQ(known.error(), given.error());
     if (!given) continue;
     ++good;
-    // Encoding the fields of an accepted frame must give the same frame. Formats with skipped bits are not compared,
-    // because these bits are not stored.
+    // Skipped bits are not stored, so formats with such bits are not compared.
     Reply at_hand = *given;
     at_hand.delay_bits = 0;
     BitBuffer<512> again;
@@ -121,7 +119,7 @@ constexpr Format turns{.word = "multiturn:16 position:32 error:1! warning:1!"_wo
 constexpr Format behind{.word = "position:13 multiturn:51 warning:1 gray parity:1!"_word};  // longer than 64 bits
 constexpr Format values{.word = "position:20 temperature=value:8 error:1 skip:3 warning:1!"_word};
 constexpr Format checked{.word = "position:24 error:1! warning:1!"_word, .check = crc16};
-// Formats with the CRC 0x197 as RLS writes it, a CRC with a start value, a small CRC, and a long word.
+// Formats with other CRCs, and with a long word.
 constexpr Format other_crc{.word = "position:24 error:1! warning:1!"_word, .check = {8, 0x97}};
 constexpr Format started{.word = "position:24 error:1! warning:1!"_word, .check = {16, 0x90D9, 0x1234, false, false}};
 constexpr Format small_crc{.word = "position:8 error:1! warning:1!"_word, .check = {5, 0x05}};

@@ -11,24 +11,22 @@
 
 namespace absenc::biss {
 
-/// Longest extra delay of encoder and line, beyond the expected delay, for which a host that searches the frame clocks,
-/// if ProtocolOf::most_clocks suffice.
+/// Upper limit of the extra delay of encoder and line that a host searches.
 inline constexpr Time longest_delay = 80us;
 
-/// A conversation that reads positions and meanwhile carries control frames; dialog.hpp defines it.
+/// A conversation that reads positions and carries control frames; dialog.hpp defines it.
 template <class F>
 class ControlDialog;
 
 namespace detail {
-// Decodes a frame of any format. Argument-dependent lookup finds `decode`, so that formats can be declared later.
+// Argument-dependent lookup finds `decode`, so that formats can be declared later.
 template <class F>
 constexpr auto decoded(const F& format, const BitView& samples, Cds cds = Cds::zero) {
   return decode(format, samples, cds);
 }
 }  // namespace detail
 
-/// BiSS-C as the classes of author/ use it: types, times and decoding. F: Format, or a format with several words per
-/// frame.
+/// BiSS-C as the classes of author/ use it: types, times and decoding.
 template <class F>
 struct ProtocolOf {
   /// Frame layout and settings of one encoder, as the unit's options select them.
@@ -47,11 +45,11 @@ struct ProtocolOf {
   }
   /// Returns the number of clocks of a frame with the expected delay.
   static constexpr unsigned clocks(const F& format) { return biss::clocks(format, format.latency, format.period()); }
-  /// Returns the number of clocks of a frame with the longest delay that is searched, at most `most_clocks`.
+  /// Returns the number of clocks with the longest delay that is searched, at most `most_clocks`.
   static constexpr unsigned all_clocks(const F& format) {
     return std::min(most_clocks, biss::clocks(format, format.latency + longest_delay, format.period()));
   }
-  /// Decodes a frame with all checks; returns the first error if one fails. `AnyFormat`: F, or F compiled.
+  /// Decodes a frame with all checks. `AnyFormat`: F, or F compiled.
   template <class AnyFormat>
   static constexpr Result<Reply> decode(const AnyFormat& format, const BitView& samples) {
     return detail::decoded(format, samples);
@@ -62,7 +60,7 @@ struct ProtocolOf {
 /// BiSS-C with one position word.
 using Protocol = ProtocolOf<Format>;
 
-/// Returns the life counter of a reply, which must advance by one with each frame; -1 if the check has none.
+/// Returns the life counter of a reply, or -1 if the check has none.
 [[nodiscard]] constexpr int life_counter_of(const Format& format, const Reply& reply) {
   return format.check.life_counter ? reply.life_counter : -1;
 }
@@ -72,12 +70,10 @@ template <const Format& format>
   return format.check.life_counter ? reply.life_counter : -1;
 }
 
-/// Confirms frames that begin later than expected: two in a row must have about the same delay. A single late frame may
-/// have lost its start bit, which a CRC of 6 bits misses once in 64 times.
+/// Confirms a late frame by the delay of the next: a single one may have lost its start bit.
 class LateFrames {
  public:
-  /// Returns whether the delay differs by at most one clock from that of the call before. `head`: clocks between the
-  /// idle samples and the start bit.
+  /// Returns whether the delay differs by at most one clock from that of the call before.
   [[nodiscard]] bool is_again(unsigned head) {
     const unsigned before = std::exchange(seen_, head);
     return before != 0 && head + 1 - before <= 2;
@@ -87,8 +83,7 @@ class LateFrames {
   unsigned seen_ = 0;
 };
 
-/// Decides when to send the start sequence: once, if the first frame is stuck. After power on, an encoder may stay idle
-/// until it receives two pulses of MA.
+/// Decides to send the start sequence: once, if the first frame is stuck.
 class StartSequence {
  public:
   /// Processes the error of a frame and returns whether the start sequence must be sent next.
@@ -96,8 +91,7 @@ class StartSequence {
     given_ = std::exchange(first_, false) && error == Error::line_stuck;
     return given_;
   }
-  /// Returns whether the last transfer was the start sequence, so that the frame must be clocked again. Resets this
-  /// state.
+  /// Returns whether the last transfer was the start sequence, and resets this state.
   [[nodiscard]] bool was_given() { return std::exchange(given_, false); }
 
  private:
@@ -105,14 +99,12 @@ class StartSequence {
   bool given_ = false;
 };
 
-/// Reads one frame; if the frames have life counters, two frames whose counters must follow each other
-/// (sequence_mismatch). If `finds`, also searches a frame that is later than expected, and sends the start sequence if
-/// needed.
+/// Reads a position; if `finds`, also from a frame that is later than expected.
 template <class F, bool finds>
 class PositionReader : public author::ClockedHostOf<ProtocolOf<F>> {
   using Base = author::ClockedHostOf<ProtocolOf<F>>;
   using P = ProtocolOf<F>;
-  // greatest number of times that a conversation reads a frame again because the frame was late or cut
+  // greatest number of times that a late or cut frame is read again
   static constexpr unsigned most_late = 4;
 
  public:
@@ -128,7 +120,7 @@ class PositionReader : public author::ClockedHostOf<ProtocolOf<F>> {
     const Error error = this->take(samples);
     if constexpr (finds) {
       if (start_.is_due(error)) return this->clock(start_pulses);
-      // A line that stays idle may have a longer delay than expected: the host clocks once for the longest delay.
+      // A line that stays idle may have a longer delay than expected.
       if (error == Error::line_stuck && samples[0] && !second_ && !tried_longest_delay_) {
         tried_longest_delay_ = true;
         return this->clock(P::all_clocks(this->format()));
@@ -158,7 +150,7 @@ class PositionReader : public author::ClockedHostOf<ProtocolOf<F>> {
 };
 /// Reads the position from a line with a known delay; a drive polls with this conversation.
 using ReadPosition = PositionReader<Format, false>;
-/// Reads the position with a format that is known at compile time: `static constexpr Format format{...};`.
+/// Reads the position with a format that is known at compile time.
 template <const Format& format>
 class ReadKnownPosition final : public PositionReader<KnownFormat<format>, false> {
  public:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of the host's conversations, against the virtual encoder in virtual time or with given frames.
+// Tests of the host's conversations, with the virtual encoder or given frames.
 #include "absenc/protocol/biss/host.hpp"
 
 #include <gtest/gtest.h>
@@ -126,8 +126,7 @@ Error clock_out(Reader& read, std::span<const BitBuffer<128>> frames) {
   return read.error();
 }
 
-// Compares the reader of a known format with that of any format, on valid frames and with each single bit of the first
-// frame wrong.
+// Expects that the reader of a known format behaves like that of any format.
 template <const Format& format>
 void reads_as_any_format() {
   std::array<BitBuffer<128>, 2> good;
@@ -209,7 +208,7 @@ TEST(BissHost, AssumesLatencyOfTenMicroseconds) {
   expect_ten_microseconds<ChainFormat>();
 }
 
-// If FindPosition reads a stuck first frame, it pauses 40 us, sends two pulses, pauses 40 us, and clocks a frame again.
+// The host pauses 40 us before and after the two pulses.
 TEST(BissHost, SendsStartSequenceWhenFirstFrameIsStuck) {
   Format format = turns_19;
   format.start_sequence = true;
@@ -247,7 +246,7 @@ TEST(BissHost, SendsStartSequenceWhenFirstFrameIsStuck) {
   clocks.clear();
   FindPosition<Format> nobody(format);
   EXPECT_EQ(bench.run(nobody).error(), Error::line_stuck);
-  // The last transfer has clocks for the longest delay of the line, because the delay may be longer than expected.
+  // The last transfer is for the longest delay of the line.
   const std::size_t longest = ProtocolOf<Format>::all_clocks(format);
   EXPECT_EQ(clocks, (std::vector<std::size_t>{frame, start_pulses, frame, longest}));
 }
@@ -288,7 +287,7 @@ TEST(BissHost, ExplainsErrors) {
 
 const Format safety{.word = word_with_status({.position = 24}), .check = crc16};
 
-/// Reads two frames with these life counters, the second with bit `flip` wrong, and returns the error.
+/// Reads two frames with these life counters, the second with bit `flip` wrong.
 Error read_safety(std::uint8_t first, std::uint8_t second, std::size_t flip = ~std::size_t{0}) {
   ReadPosition read(safety);
   Time now{};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: a host that runs one procedure after the other against one encoder, in virtual time.
+// A host that runs one procedure after the other against one encoder, in virtual time.
 #pragma once
 
 #include <gtest/gtest.h>

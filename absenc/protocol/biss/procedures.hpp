@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Procedures that access the registers of a BiSS encoder or send it commands, one bit per frame, while positions are
-// read.
+// Procedures that access the registers of a BiSS encoder or send it commands.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +16,7 @@ using author::Outcome;
 using author::Part;
 using author::Procedure;
 
-/// Longest time that the document allows an encoder until its start bit; the host waits twice as long.
+/// Longest time until an encoder's start bit, by the document; the host waits twice as long.
 inline constexpr Time start_limit = 20ms;
 /// Greatest number of attempts of a control frame that may be repeated.
 inline constexpr unsigned control_attempts = 4;
@@ -29,8 +28,7 @@ inline constexpr std::string_view no_registers =
 inline constexpr std::string_view refused =
     "the encoder refuses this register: it does not have it, or it is read only";
 
-/// Exchanges the control frame that `master` has begun, until it ends or a position frame fails, and returns its error;
-/// busy if the encoder's start bit is too late.
+/// Exchanges the control frame that `master` has begun, and returns its error.
 template <class F>
 Part<Error> run_control_frame(ControlDialog<F>& dialog, ControlMaster& master) {
   Time waits_since{};
@@ -60,24 +58,18 @@ Part<Error> run_control_frame(ControlDialog<F>& dialog, ControlMaster& master) {
   return {.error = error, .detail = "the registers were not read"};
 }
 
-/// Returns whether repeating a control frame with this error may help: not after a refusal, a late start bit or a wrong
-/// argument.
+/// Returns whether repeating a control frame with this error may help.
 [[nodiscard]] constexpr bool is_repeatable(Error error) {
   return error != Error::request_rejected && error != Error::busy && error != Error::invalid_argument;
 }
 
-/// Returns whether a data byte of the control frame was late: the encoder delayed it, or a start bit was lost. The CRC
-/// of the position does not cover CDS; the bits after a lost start bit are shifted, which the four bits of a byte's CRC
-/// may miss.
+/// Returns whether a data byte was late: delayed by the encoder, or its start bit was lost.
 [[nodiscard]] constexpr bool was_late(const ControlFrame& frame) {
   const auto delays = frame.start_delay.view();
   return std::any_of(delays.begin(), delays.end(), [](std::uint16_t delay) { return delay != 0; });
 }
 
-/// Reads `count` registers, 64 at most, appends their values to `bytes` and returns the error. Makes up to
-/// `control_attempts` attempts if an error `is_repeatable`, or if bytes are late and not equal to those of a late
-/// attempt before (cross_check_failed). If P refuses the next register, a separate control frame reads it: some
-/// encoders send P = 1 after every register.
+/// Reads `count` registers, 64 at most, appends their values to `bytes` and returns the error.
 template <class F>
 Part<Error> read_registers(ControlDialog<F>& dialog, ControlMaster& master, ByteBuffer<control_most>& bytes,
                            unsigned first, std::size_t count) {
@@ -107,9 +99,7 @@ Part<Error> read_registers(ControlDialog<F>& dialog, ControlMaster& master, Byte
   co_return error;
 }
 
-/// Writes a register and reads it back, even after an error other than a refusal: the value in the register decides,
-/// not the encoder's answer. If the value differs or cannot be read, returns the error of the write; if that had none,
-/// cross_check_failed or the error of reading.
+/// Writes a register; unless that is refused, the value read back decides.
 template <class F>
 Part<Error> write_register(ControlDialog<F>& dialog, ControlMaster& master, unsigned address, std::uint8_t value) {
   const std::array<std::uint8_t, 1> bytes{value};
@@ -123,8 +113,7 @@ Part<Error> write_register(ControlDialog<F>& dialog, ControlMaster& master, unsi
   co_return error != Error::none ? error : Error::cross_check_failed;
 }
 
-/// Writes a register that the user's command is meant to change, and records that the encoder may have changed, or that
-/// it refused the write.
+/// Writes a register, and records whether the encoder may have changed.
 template <class F>
 Part<Error> change_register(ControlDialog<F>& dialog, ControlMaster& master, unsigned address, std::uint8_t value) {
   dialog.changes();
@@ -133,8 +122,7 @@ Part<Error> change_register(ControlDialog<F>& dialog, ControlMaster& master, uns
   co_return error;
 }
 
-/// Selects `bank` and returns the error. Writes nothing if `address` belongs to no bank, `bank` is selected already, or
-/// the bank select register cannot be read; that the encoder refuses to read it is no error if `bank` is 0.
+/// Selects `bank`, unless `address` belongs to no bank, and returns the error.
 template <class F>
 Part<Error> select_bank(ControlDialog<F>& dialog, ControlMaster& master, unsigned bank, unsigned address) {
   if (address >= registers::bank_size) co_return Error::none;
@@ -173,8 +161,7 @@ Procedure read_memory(ControlDialog<F>& dialog, ControlResults& found, Arguments
   co_return done;
 }
 
-/// Writes a register unless it has this value already: a register may wear out, and only its maker knows how fast.
-/// Arguments: address, value, bank, force (1: also writes an equal value, and a register that its maker defines).
+/// Writes a register; without force only if its value differs. Arguments: address, value, bank, force.
 template <class F>
 Procedure write_memory(ControlDialog<F>& dialog, ControlResults& found, Arguments arguments) {
   const auto address = static_cast<unsigned>(arguments[0]);
@@ -208,8 +195,7 @@ Procedure write_memory(ControlDialog<F>& dialog, ControlResults& found, Argument
   co_return done;
 }
 
-/// Reads the named register at `address`. A refusal means that the encoder lacks the register, which is reported as a
-/// result.
+/// Reads the named register at `address`; a refusal is a result: `missing`.
 template <class F>
 Procedure read_setting(ControlDialog<F>& dialog, ControlResults& found, unsigned address) {
   ControlMaster master;
@@ -238,8 +224,7 @@ Procedure write_bank(ControlDialog<F>& dialog, ControlResults& found, Arguments 
   co_return done;
 }
 
-/// Reads the two groups of registers that identify the encoder. Leaves out a group that the encoder refuses; error
-/// request_rejected if it refuses both.
+/// Reads the two groups of registers that identify the encoder; one of them may be refused.
 template <class F>
 Procedure read_info(ControlDialog<F>& dialog, ControlResults& found) {
   ControlMaster master;
@@ -272,9 +257,7 @@ Procedure read_info(ControlDialog<F>& dialog, ControlResults& found) {
   co_return done;
 }
 
-/// Sends a command to the slaves of a mask; 0: to all, without acknowledgement. At the end one more position frame is
-/// read, because the slaves take the last CDM bit when it begins. Position frames may lack process data before or after
-/// the command.
+/// Sends a command to the slaves of a mask; 0: to all. Reads one frame more, with which slaves take the last CDM bit.
 template <class F>
 Procedure send_command(ControlDialog<F>& dialog, ControlResults& found, Arguments arguments) {
   ControlMaster master;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of procedures: refused requests, delays, stop bits, commands, reading back, reported fields, accepted frames.
+// Tests of procedures that access registers or send commands.
 #include "absenc/protocol/biss/procedures.hpp"
 
 #include <gtest/gtest.h>
@@ -35,7 +35,7 @@ TEST(BissProcedures, RefusesImpossibleRegistersWithoutRequest) {
   EXPECT_EQ(one.ask<write_memory<Format>>({3, 7, 0, 0}).written, false);
 }
 
-// BiSS C Protocol Description rev D2: an encoder takes up to 20 ms for a start bit; the host waits twice as long.
+// BiSS C rev D2: an encoder takes up to 20 ms for a start bit; the host waits twice as long.
 TEST(BissProcedures, WaitsFortyMillisecondsForStartBit) {
   const auto asked = [](std::uint16_t delay_us, Error expected) {
     Format format = testing::bits_24;
@@ -47,8 +47,7 @@ TEST(BissProcedures, WaitsFortyMillisecondsForStartBit) {
   asked(42'000, Error::busy);
 }
 
-// Registers are read and written whatever P is: some encoders send P = 1 after each register. Registers of a bank that
-// does not exist are refused.
+// Some encoders send P = 1 after each register.
 TEST(BissProcedures, ReadsOnAfterStopBit) {
   for (const StopBit stop_bit : {StopBit::next, StopBit::zero, StopBit::one}) {
     Format format = testing::bits_24;
@@ -197,7 +196,7 @@ TEST(BissProcedures, AcceptsLateFrameWhenTheNextIsAsLate) {
   const Error none = Error::none;
   const Error late = Error::truncated;
   EXPECT_EQ(errors({10, 10, 9, 10, 10}), (Errors{none, none, none, none, none}));
-  // The first late frame had too few clocks, so the host compares the delays of the second and the third.
+  // The first late frame had too few clocks, so the second and third are compared.
   EXPECT_EQ(errors({10, 12, 12, 12, 14}), (Errors{none, late, late, none, late}));
 }
 

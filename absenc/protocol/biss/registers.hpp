@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Addresses and memory areas of the BiSS registers in the standard profile. Source: BiSS C Protocol Description rev D2.
+// Addresses and memory areas of BiSS registers. Source: BiSS C Protocol Description rev D2.
 #pragma once
 
 #include <array>
@@ -41,9 +41,7 @@ inline constexpr unsigned end = 0x80;           ///< First address beyond the re
 
 inline constexpr unsigned most_banks = 256;  ///< Greatest number of banks; an encoder may have fewer, or none.
 
-/// Memory areas for the memory commands: pages are banks, and addresses outside the banks are on page 0. A memory dump
-/// has only bank 0, which users may write; the other areas select a bank, identify the encoder or belong to the maker,
-/// and must not be copied to another encoder.
+/// Memory areas: pages are banks, and addresses outside the banks are on page 0.
 inline constexpr std::array<MemoryArea, 6> areas = [] {
   return std::array<MemoryArea, 6>{{
       {.page = 0, .first = 0, .count = bank_size, .meaning = "bank"},

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of positions and registers that are read from the same frames of a virtual encoder, in virtual time, with and
-// without faults. ABSENC_FRAMES sets the number of frames that `frames_wanted` returns.
+// Tests of positions and registers that are read from the same frames.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -41,7 +40,7 @@ std::uint32_t frames_wanted(std::uint32_t usual = some) {
   return text == nullptr ? usual : static_cast<std::uint32_t>(std::atoll(text));
 }
 
-// number of frames for the next host; global, because a procedure starts in the constructor of its host
+// number of frames for the next host; global, because a procedure starts in a constructor
 std::uint32_t limit = 0;
 
 /// Counters of a host's register accesses, and the register values that the host relies on.
@@ -157,8 +156,7 @@ void expect_all_of_the_bank(const HostRecord& record) {
   }
 }
 
-/// Returns the share of damaged frames that the decoder accepts with a wrong position and without an error bit, over
-/// random positions. `damage` changes the bytes of a frame.
+/// Returns the share of damaged frames that give a wrong position without an error.
 template <class Damage>
 double accepted_share(const Format& format, const Damage& damage) {
   constexpr unsigned frames = 400'000;
@@ -180,7 +178,7 @@ double accepted_share(const Format& format, const Damage& damage) {
   return static_cast<double>(taken) / frames;
 }
 
-// Damages frames as sim::FaultyDevice does: flips one to three bits, or leaves the last bytes undriven.
+// Damages frames as sim::FaultyDevice does.
 void corrupt(sim::Random& random, std::span<std::uint8_t> bytes) {
   std::set<std::uint64_t> bits;
   for (const std::uint64_t count = 1 + random.below(3); bits.size() < count;)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// BiSS Safety frames: a control position word and a safety position word of the same shaft, each with its own check;
-// layout, encoding, decoding and comparison. README.md draws the frame. Source: BiSS Safety concept.
+// BiSS Safety frames: a control word and a safety word of the same shaft. README.md draws them. Source: BiSS Safety
+// concept.
 #pragma once
 
 #include <algorithm>
@@ -73,16 +73,14 @@ struct SafetyReply {
 
 namespace detail {
 
-// SLO is low after the last word of a frame. Zeros alone are therefore not a word with a CRC, although a CRC that
-// begins with 0 and is not inverted is valid for them.
+// Zeros are no word, although a CRC may be valid for them: SLO is low after a frame.
 constexpr Error take_channel(const Channel& channel, BitView samples, std::size_t first, ChannelData& data) {
   const std::size_t end = first + data_bits(channel);
   if (channel.check.width != 0 && !samples[first] && samples.end_of_run(first) >= end) return Error::line_stuck;
   return take_data(Given<Channel>{channel, channel.word}, samples, first, data);
 }
 
-// Returns the upper bits of the position, with the turns above them if both words have turns: near zero, one count
-// changes the turns.
+// Includes turns, because near zero one count changes them.
 template <std::size_t size>
 constexpr std::uint64_t compared_bits(const Channel& channel, const WordWith<size>& word, unsigned bits,
                                       unsigned turns) {
@@ -92,16 +90,14 @@ constexpr std::uint64_t compared_bits(const Channel& channel, const WordWith<siz
 
 }  // namespace detail
 
-/// Returns whether both CRC polynomials are usable, and `compare_bits` is at least 1 and not above the bits of either
-/// position.
+/// Returns whether both polynomials and `compare_bits` are usable.
 [[nodiscard]] constexpr bool is_usable(const SafetyFormat& format) {
   if (!is_usable(format.cpw.check) || !is_usable(format.spw.check)) return false;
   return format.compare_bits >= 1 && format.compare_bits <= format.cpw.word.bits_of(Meaning::position) &&
          format.compare_bits <= format.spw.word.bits_of(Meaning::position);
 }
 
-/// Returns whether both words have the same position, and the same turns if both have turns, within one count of the
-/// compared bits.
+/// Returns whether the compared bits of both words, with common turns, differ by at most one.
 template <std::size_t size>
 [[nodiscard]] constexpr bool positions_agree(const SafetyFormat& format, const WordWith<size>& cpw,
                                              const WordWith<size>& spw) {
@@ -114,16 +110,14 @@ template <std::size_t size>
   return difference <= 2;
 }
 
-/// Returns whether the life counter of a frame follows `previous_life_counter`; true if that is unknown or the check
-/// has no life counter.
+/// Returns whether the life counter follows the previous one; true if either is unknown.
 [[nodiscard]] constexpr bool life_counter_follows(const SafetyFormat& format, unsigned life_counter) {
   if (!format.spw.check.life_counter || format.previous_life_counter < 0) return true;
   return life_counter == (static_cast<unsigned>(format.previous_life_counter + 1) & low_mask(life_counter_bits));
 }
 
-/// Decodes a frame of BiSS Safety. Errors: those of `decode` for one word, line_stuck also for a word and CRC of zeros
-/// alone, invalid_argument (`is_usable` is false), sequence_mismatch (the life counter does not follow
-/// `previous_life_counter`), cross_check_failed (the words differ by more than one count of the compared bits).
+/// Decodes a frame of BiSS Safety. Errors: those of a frame with one word, invalid_argument, sequence_mismatch,
+/// cross_check_failed.
 [[nodiscard]] constexpr Result<SafetyReply> decode(const SafetyFormat& format, BitView samples, Cds cds = Cds::zero) {
   if (!is_usable(format)) return Error::invalid_argument;
   SafetyReply reply;
@@ -137,8 +131,8 @@ template <std::size_t size>
   return reply;
 }
 
-/// Appends the frame of `reply` to `out`. `silent`: bit 0 is set if the SPW is not sent, bit 1 if the CPW is not
-/// sent. Returns false if `out` is too small.
+/// Appends the frame of `reply`; bit 0 of `silent`: without the SPW, bit 1: without the CPW. Returns false if `out` is
+/// too small.
 template <std::size_t Capacity>
 constexpr bool encode(const SafetyFormat& format, const SafetyReply& reply, BitBuffer<Capacity>& out,
                       std::uint8_t silent = 0) {

@@ -18,7 +18,7 @@ namespace {
 
 using namespace author;
 
-// Options of the unit as members. The members of Check are repeated here, because each of them is an option.
+// The members of Check are repeated here, because each of them is an option.
 struct Settings : WordSettings<Format>, TimeoutSettings {
   std::uint8_t crc_width = crc6.width;
   std::uint16_t crc_poly = crc6.poly;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// BiSS test frames with the document or log that each is from; "derived": made by the rules of the document.
+// BiSS test frames with their sources; "derived": made by the rules of the document.
 #pragma once
 
 #include <array>

@@ -94,8 +94,7 @@ TEST(BissWords, SafetyComparesPositionsAndLifeCounter) {
   EXPECT_EQ(error(0x123456, 0x1234, 1), Error::sequence_mismatch);
 }
 
-// Checks at several clocks that the host gives the clocks of an encoder that needs 10 us, but not those of one that
-// needs two periods more.
+// Expects enough clocks for an encoder that needs 10 us, but not for two periods more.
 template <class F>
 void expect_clocks_of_ten_microseconds() {
   for (const std::uint16_t khz : std::to_array<std::uint16_t>({100, 1'000, 4'400, 10'000})) {
@@ -112,7 +111,7 @@ void expect_clocks_of_ten_microseconds() {
   }
 }
 
-// After the frame of a single encoder SLO is low: identify must not take these zeros for another word.
+// SLO is low after a frame: identify must not take these zeros for another word.
 TEST(BissWords, RejectsZerosAfterFrameAsWord) {
   ChainFormat chain;
   chain.count = 2;

@@ -18,8 +18,7 @@ constexpr std::int64_t count = std::int64_t{1} << 13;  // size of one count of 1
 
 inline bool says(const std::string& text, const std::string& words) { return text.find(words) != std::string::npos; }
 
-/// A text that a test sends instead of the interface's reply, at the time `after` after the request or the previous
-/// text.
+/// A text that a test sends instead of the interface's reply.
 struct TextReply {
   std::string text;
   Time after = 1ms;
@@ -30,7 +29,7 @@ inline Tamper answering(char letter, const std::vector<TextReply>& answer) {
   return [=](char asked) { return asked == letter ? std::optional(answer) : std::nullopt; };
 }
 
-/// Forwards requests and replies of the virtual interface, but answers the commands for which `tamper` returns texts.
+/// The virtual interface, with commands that `tamper` may answer instead.
 class TamperedInterface final : public Machine<std::uint8_t> {
  public:
   explicit TamperedInterface(Device<std::uint8_t>& device) : device_(device) {}
@@ -106,8 +105,7 @@ struct Bench : author::testing::UnitBench<19> {
                     const OnEmit& on_emit = {}) {
     return UnitBench::run(name, arguments, on_emit);
   }
-  /// Runs a command while `tamper` makes replies. Afterwards `answering.log` has the received commands with their
-  /// times.
+  /// Runs a command while `tamper` makes replies; `answering.log` has the received commands.
   CommandResult run_tampered(const Tamper& tamper, std::string_view name,
                              const std::vector<std::int64_t>& arguments = {}) {
     answering.tamper = tamper;

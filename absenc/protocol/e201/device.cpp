@@ -44,8 +44,7 @@ void VirtualInterface::stopped(Time) {
   zero_ = 0;
 }
 
-// Returns the length of a request without its CR. It is unknown whether `M` and `B` need a CR, and a CR after any
-// other command does no harm.
+// Without CR, because it is unknown whether `M` and `B` need one.
 std::size_t VirtualInterface::request_size(Bytes begin) const {
   return begin[0] == letter::set_clock ? 2 : begin[0] == letter::set_width ? 3 : 1;
 }

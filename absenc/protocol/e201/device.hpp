@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual E201-9S interface with a BiSS or SSI encoder behind it: all commands, the encoder's supply and the MA
-// clock. It never streams: `1` returns one position.
+// A virtual E201-9S interface with a BiSS or SSI encoder behind it. It never streams: `1` returns one position.
 #pragma once
 
 #include "absenc/protocol/author/device.hpp"
@@ -12,7 +11,7 @@ namespace absenc::e201 {
 /// A virtual E201-9S interface with an encoder behind it.
 class VirtualInterface final : public author::Responder {
  public:
-  /// Creates an interface that is off until `power_on`. `shaft`, which moves the encoder, must outlive the interface.
+  /// Creates an interface that is off until `power_on`. `shaft` must outlive it.
   VirtualInterface(const Format& format, const Shaft& shaft);
 
   [[nodiscard]] MutableBytes memory() override { return {}; }

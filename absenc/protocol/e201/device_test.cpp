@@ -13,8 +13,7 @@ using testing::count;
 using testing::turn;
 
 TEST(E201Device, RepliesWithExample4) {
-  // The encoder sends 13 bits of ACK at 280 kHz (period 3571 ns): its latency of 46 us is longer than 12 periods and
-  // shorter than 13.
+  // At 280 kHz (period 3571 ns) a latency of 46 us gives 13 bits of ACK.
   Bench bench("singleturn_bits=19 latency_us=46");
   bench.shaft.start.position = 275087 * count;
   EXPECT_EQ(bench.raw("4"), "c0014328ff300000\r");
@@ -88,7 +87,7 @@ TEST(E201Device, AckBitsFollowClock) {
   }
 }
 
-// Checks that a reading takes longer than another command by 64 clocks and by the characters that its reply has more.
+// Checks that a reading takes 64 clocks longer than another command, apart from the reply.
 TEST(E201Device, ReadingTakes64Clocks) {
   Bench bench;
   bench.raw("M1");

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Commands of the RLS E201-9S USB interface, one character each, some with a number, and its ASCII replies. README.md
-// lists the commands with their sources.
+// Commands of the RLS E201-9S USB interface and its ASCII replies. README.md lists them with their sources.
 #pragma once
 
 #include <array>
@@ -58,7 +57,7 @@ inline constexpr std::size_t sample_bits = 64;  ///< Number of samples that the 
 /// Length of the reply to `4` in bytes: 16 hexadecimal digits and CR.
 inline constexpr std::size_t samples_length = 17;
 
-// ---- Times. No document gives any: the interface clocks 64 bits and replies as fast as USB does.
+// ---- Times. No document gives any.
 
 /// Settings of the virtual COM port; its baud rate has no effect on the interface.
 inline constexpr LineSettings line_settings{.rate = 115'200};
@@ -67,7 +66,7 @@ inline constexpr Time answer_limit = 50ms;  ///< Timeout of a reply; the 64 cloc
 inline constexpr Time gap_limit = 20ms;     ///< Timeout between two characters of a reply.
 inline constexpr Time reply_limit = 100ms;  ///< Longest duration of a reply, even if characters still arrive.
 inline constexpr Time silent_limit = 10ms;  ///< Timeout of a command that may have no reply.
-/// Time that is assumed after `n` until the encoder is ready, and after `f` until the supply is down.
+/// Time that is assumed to be enough after the encoder's supply is switched.
 inline constexpr Time supply_time = 200ms;
 
 /// Returns the period of MA at clock number 1 to 8.
@@ -85,7 +84,7 @@ enum class Kind : std::uint8_t { other, resolute };
 inline constexpr unsigned resolute_slowest = 4;  ///< Slowest clock number recommended for a Renishaw Resolute: 280 kHz.
 inline constexpr unsigned resolute_fastest = 5;  ///< Fastest clock number recommended for a Renishaw Resolute: 560 kHz.
 
-/// Layout of the encoder's frames and properties of the interface, as the unit's options select them.
+/// Layout of the encoder's frames and properties of the interface.
 struct Format {
   WordFormat word = biss::Format{}.word;               ///< Layout of the position word.
   Scale scale{};                                       ///< Whether the encoder is linear, and the length of a count.
@@ -104,7 +103,7 @@ struct Format {
   [[nodiscard]] constexpr ssi::Format ssi() const { return {.word = word, .after_word = after_word, .scale = scale}; }
 };
 
-/// Returns whether the position word is usable and fits into the 64 samples; for BiSS with the shortest ACK.
+/// Returns whether the position word is usable, and the shortest frame fits into 64 samples.
 [[nodiscard]] constexpr bool fits(const Format& format) {
   const bool is_biss = format.carries == Carries::biss;
   return is_usable(format.word) &&
@@ -118,10 +117,7 @@ struct Position {
   Word word{};            ///< Decoded fields of the position word.
 };
 
-/// Decodes a position from the 64 samples. Errors: invalid_argument (the word does not fit), line_stuck (all samples
-/// alike), bad_framing (the samples do not begin with 110, no start bit, CDS is 1), truncated (the frame is longer than
-/// the samples), bad_checksum; for SSI bad_framing (the line is not idle before the word) and the errors of
-/// ssi::decode_clocked_on.
+/// Decodes a position from the 64 samples, or returns the error of a failed check.
 [[nodiscard]] constexpr Result<Position> decode_position(const Format& format, std::uint64_t samples) {
   if (!fits(format)) return Error::invalid_argument;
   if (samples == 0 || samples == ~std::uint64_t{0}) return Error::line_stuck;
@@ -129,8 +125,7 @@ struct Position {
   store_big_endian(bytes, samples);
   const BitView bits{bytes, sample_bits};
   if (format.carries == Carries::ssi) {
-    // The first sample is taken before the first rising edge, which shifts out the MSB. The interface continues to
-    // clock after the word.
+    // The first sample is taken before the first rising edge, which shifts out the MSB.
     if (!bits[0]) return Error::bad_framing;
     const Result<Word> word = ssi::decode_clocked_on(format.ssi(), bits, 1);
     return word ? Result(Position{.word = *word}) : word.error();
@@ -158,8 +153,7 @@ struct Reply {
 
 inline constexpr unsigned widest = 64;  ///< Greatest width of a position in bits.
 
-/// Decodes the 64 samples in the reply to `4`. Errors: wrong_length (not 16 characters and CR), bad_framing (not
-/// hexadecimal).
+/// Decodes the 64 samples in the reply to `4`. Errors: wrong_length, bad_framing.
 [[nodiscard]] constexpr Result<std::uint64_t> decode_samples(Bytes reply) {
   if (reply.size() != samples_length || reply[samples_length - 1] != end_of_line) return Error::wrong_length;
   std::uint64_t samples = 0;
@@ -171,9 +165,7 @@ inline constexpr unsigned widest = 64;  ///< Greatest width of a position in bit
   return samples;
 }
 
-/// Decodes a reply that is a line of text. Errors: wrong_length (no complete line, a blank one, more than one, or one
-/// that is too long for `Text`), bad_framing (characters that are not printable, or no number that the command `asked`
-/// requires).
+/// Decodes a reply that is one line of text. Errors: wrong_length, bad_framing.
 [[nodiscard]] constexpr Result<Reply> decode_line(std::uint8_t asked, Bytes bytes) {
   const std::size_t end = end_of_first_line(bytes);
   const Bytes text = trimmed(bytes.first(end));
@@ -192,20 +184,18 @@ inline constexpr unsigned widest = 64;  ///< Greatest width of a position in bit
   return reply;
 }
 
-/// The protocol as the code in absenc/protocol/author uses it: frames, lengths and times. author/dialog.hpp and
-/// author/device.hpp explain the members.
+/// The protocol as author/dialog.hpp and author/device.hpp demand it.
 struct Protocol {
-  /// Layout of the encoder's frames and properties of the interface, as the unit's options select them.
+  /// Layout of the encoder's frames and properties of the interface.
   using Format = e201::Format;
   /// Type of commands to the interface.
   using Request = e201::Request;
   /// Type of the interface's replies.
   using Reply = e201::Reply;
-  /// Assumed length of the longest reply in bytes. No document gives it; the engine stores up to three times this
-  /// length.
+  /// Assumed length of the longest reply in bytes; no document gives it.
   static constexpr std::size_t longest_reply = 32;
 
-  /// Returns the host's timeouts: for a reply, between two of its characters, and for a line that is never silent.
+  /// Returns the host's timeouts.
   static constexpr author::HostTimes host_times(const Format&) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit, .patience = reply_limit};
   }
@@ -228,13 +218,12 @@ struct Protocol {
     if (is_clock || is_width) text.push_back(end_of_line);
     return text;
   }
-  /// Returns the length of the request that begins with `begin`, in bytes, with its CR if it has a number; 0 if that is
-  /// no request.
+  /// Returns the length of the request that begins with `begin`, in bytes; 0: it is no request.
   static constexpr std::size_t request_size(const Format&, Bytes begin) {
     if (!letter::is_in(letter::all, begin[0])) return 0;
     return begin[0] == letter::set_clock ? 3 : begin[0] == letter::set_width ? 4 : 1;
   }
-  /// Decodes a command, with or without its CR. Errors: unsupported (unknown letter, clock or width), wrong_length.
+  /// Decodes a command, with or without its CR. Errors: unsupported, wrong_length.
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) {
     const Bytes text = trimmed(bytes);
     if (text.empty()) return Error::wrong_length;
@@ -251,15 +240,14 @@ struct Protocol {
     if (digits != 0 && (number < 1 || number > most)) return Error::unsupported;
     return Request{text[0], is_clock ? number : 0, is_clock ? 0 : number};
   }
-  /// Returns the length of a reply in bytes, judged by its first bytes; 0 if they do not determine it.
+  /// Returns the length in bytes of the reply that begins with `reply`; 0: unknown.
   static constexpr std::size_t expected(const Format&, const Request& request, Bytes reply) {
     if (request.letter == letter::samples) return samples_length;
     return letter::is_in(letter::answered_by_a_line, request.letter) ? end_of_first_line(reply) : 0;
   }
-  /// Returns whether the host awaits no more bytes after a reply with this error: true unless its length is wrong.
+  /// Returns whether the host awaits no more bytes after a reply with this error.
   static constexpr bool is_whole(const Format&, Error error) { return error != Error::wrong_length; }
-  /// Decodes a reply. Errors: those of decode_samples and decode_position, those of decode_line, or unsupported (no
-  /// document describes the reply to this command).
+  /// Decodes a reply. Returns the error of a failed check, or unsupported.
   static constexpr Result<Reply> decode(const Format& format, const Request& request, Bytes bytes) {
     if (letter::is_in(letter::answered_by_a_line, request.letter)) return decode_line(request.letter, bytes);
     if (request.letter != letter::samples) return Error::unsupported;
@@ -273,8 +261,7 @@ struct Protocol {
     if (request.letter != letter::samples) return {};
     return to_reading(format.word, decode_position(format, reply.samples)->word, format.scale);
   }
-  /// Returns the time for which a position is reported: `sent_at`, the end of the request. The document does not say
-  /// when the encoder latches it.
+  /// Returns `sent_at`, which is assumed: the document does not say when the position is latched.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
 };
 

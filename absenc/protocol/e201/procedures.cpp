@@ -48,8 +48,7 @@ Procedure read(Dialog& dialog, InterfaceResults& found) {
   co_return done;
 }
 
-// The text of a reply does not show which command it answers. So that a repeated reply is not taken for the reply to
-// the next command, the procedure waits for silence after each reply.
+// The text of a reply does not show which command it answers, so silence must follow each.
 Procedure read_info(Dialog& dialog, InterfaceResults& found) {
   static constexpr auto letters = std::array{letter::version, letter::serial, letter::supply, letter::clock};
   for (const std::uint8_t asked : letters) {
@@ -65,8 +64,7 @@ Procedure read_info(Dialog& dialog, InterfaceResults& found) {
 
 namespace {
 
-// Sets the clock and reads it back. Returns none, the error of an exchange, or cross_check_failed (another clock is set
-// afterwards).
+// Sets the clock and reads it back; cross_check_failed: another clock is set afterwards.
 Part<Error> switch_clock(Dialog& dialog, unsigned clock) {
   const Result<Reply> told = co_await dialog.attempt({letter::set_clock, clock}).changes();
   if (!told) co_return told.error();
@@ -100,7 +98,7 @@ Procedure switch_supply(Dialog& dialog, InterfaceResults& found, bool on) {
 
 namespace {
 
-// Returns whether two positions from `?` are near each other. They include the turns, so the difference does not wrap.
+// Positions from `?` include the turns, so the difference does not wrap.
 bool is_near(const Dialog& dialog, std::int64_t counts, std::int64_t other) {
   const unsigned bits = dialog.format().word.bits_of(Meaning::position);
   const auto to = static_cast<std::uint64_t>(counts);
@@ -111,7 +109,7 @@ bool is_near(const Dialog& dialog, std::int64_t counts, std::int64_t other) {
 }  // namespace
 
 Procedure set_zero(Dialog& dialog, InterfaceResults& found) {
-  // `?` does not report errors of the encoder, so `4` is read too. Firmware before 1.16 does not answer it.
+  // `4` is read too, because `?` reports no errors; firmware before 1.16 does not answer it.
   const Result<Reply> samples = co_await dialog.attempt({letter::samples});
   if (samples) {
     const Reading look = Protocol::reading(dialog.format(), {letter::samples}, *samples);
@@ -152,15 +150,13 @@ unsigned InterfaceResults::recommended() const {
 
 namespace {
 
-// Returns error and explanation of the last exchange. Called at once, because more exchanges follow before the
-// procedure ends.
+// Called at once, because more exchanges follow before the procedure ends.
 Outcome failure(const Dialog& dialog, Error error) {
   const Explanation what = explain(dialog.format(), error, dialog.exchange().sent, dialog.reply());
   return {error, dialog.is_noisy() ? endless_noise.detail : what.detail,
           what.advice.empty() ? text_of(error).advice : what.advice};
 }
 
-// Reads frames at each clock. Ends early if the sweep is aborted, a clock cannot be set, or the line is never silent.
 Part<Outcome> try_clocks(Dialog& dialog, InterfaceResults& found) {
   Outcome bad = done;  // outcome of the last invalid frame
   if (dialog.is_aborted()) co_return done;
@@ -240,7 +236,7 @@ constexpr auto of_lines = std::to_array<ErrorExplanation>({
     {Error::bad_framing, {"this is no answer to that command", check_model}},
 });
 
-// Explains bad_framing of a position by the check of decode_samples or decode_position that failed.
+// Explains bad_framing of a position by the check that failed.
 Explanation explain_framing(const Format& format, Bytes reply) {
   const Result<std::uint64_t> samples = decode_samples(reply);
   if (!samples) return {"the interface answers with hexadecimal digits", check_model};

@@ -49,44 +49,36 @@ struct InterfaceResults {
     if (asked == letter::width) width = reply.number;
     if (asked == letter::decimal || asked == letter::hexadecimal) counts = reply.number;
   }
-  /// Stores `now` as the clock that is set, and the advice if the maker recommends another clock for this encoder.
+  /// Stores `now` as the clock that is set, and advice if it does not suit the encoder.
   constexpr void take_clock(const Format& format, std::int64_t now) {
     clock = now;
     if (format.kind == Kind::resolute && (now < resolute_slowest || now > resolute_fastest)) {
       advice = "280 or 560 kHz are recommended for Renishaw Resolute";
     }
   }
-  /// Returns the number of the middle clock of the longest run of clocks without an invalid frame; 0 if every clock had
-  /// one. Of equally long runs the first counts, and of two middle clocks the faster.
+  /// Returns the middle of the longest run of clocks, 1 to 8, with good frames only; 0: none.
   [[nodiscard]] unsigned recommended() const;
 };
 
-/// Reads a position with `4`. If the reply is missing or has a wrong length, the procedure may read the firmware
-/// version to find the cause, and send `4` once more. Error besides those of the exchanges: unsupported (firmware
-/// before 1.16).
+/// Reads a position with `4`. Error besides those of the exchanges: unsupported (firmware before 1.16).
 author::Procedure read(Dialog& dialog, InterfaceResults& found);
-/// Reads version, serial number, supply and clock. A missing or invalid reply is an error only if it is that of the
-/// version, or if the line is never silent.
+/// Reads version, serial number, supply and clock; all but the version may be missing.
 author::Procedure read_info(Dialog& dialog, InterfaceResults& found);
-/// Sets the clock with `M` and reads it back with `m`. Argument: 1 to 8, or kHz. Error besides those of the exchanges:
-/// cross_check_failed (the interface reports another clock afterwards).
+/// Sets the clock with `M` and reads it back with `m`. Argument: 1 to 8, or kHz. Errors: those of the exchanges, and
+/// cross_check_failed.
 author::Procedure set_clock(Dialog& dialog, InterfaceResults& found, Arguments arguments);
-/// Switches the encoder's supply with `n` or `f`, waits and reads its state with `e`. Error besides those of the
-/// exchanges: cross_check_failed (the voltage in the reply contradicts the command).
+/// Switches the encoder's supply, and reads its state. Errors: those of the exchanges, and cross_check_failed.
 author::Procedure switch_supply(Dialog& dialog, InterfaceResults& found, bool on);
-/// Sets the zero of `?` with `z`. Errors besides those of the exchanges: not_still (the encoder moves),
-/// invalid_argument (the encoder's position is invalid), cross_check_failed (`?` is not near 0 afterwards).
+/// Sets the zero of `?` with `z`. Errors: those of the exchanges, not_still, invalid_argument, cross_check_failed.
 author::Procedure set_zero(Dialog& dialog, InterfaceResults& found);
-/// Reads frames at each clock and emits the results after each clock. Restores the old clock at the end, also after an
-/// error and after `abort`.
+/// Reads frames at each clock, and emits the results after each; at the end sets the old clock.
 author::Procedure sweep_clocks(Dialog& dialog, InterfaceResults& found, Arguments arguments);
 
 /// Advice if the line is never silent or a reply has a wrong length: the interface may stream.
 inline constexpr std::string_view check_stream =
     "check that it is an E201-9S and does not stream (`absenc run ... stream-off` ends it)";
 
-/// Returns cause and advice for `error` of `reply` to `request`, empty if there are none for it. An empty request
-/// counts as `4`.
+/// Returns cause and advice for an error, empty if there are none. An empty request is `4`.
 [[nodiscard]] Explanation explain(const Format& format, Error error, Bytes request, Bytes reply);
 
 }  // namespace absenc::e201

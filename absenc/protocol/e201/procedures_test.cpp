@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of the unit's commands with the virtual E201-9S, and with interfaces that send other replies.
+// Tests of the unit's commands with the virtual E201-9S and with other replies.
 #include <gtest/gtest.h>
 
 #include "absenc/protocol/e201/bench_test.hpp"
@@ -105,8 +105,7 @@ TEST(E201Read, ExplainsEachError) {
   EXPECT_EQ(bench.run_tampered(once, "position").error, "none");
 }
 
-// Checks the host's timeouts, which no document gives: a reply that begins or goes on later, or never ends, is not
-// accepted.
+// No document gives these timeouts.
 TEST(E201Read, UsesReplyTimeouts) {
   Bench bench("singleturn_bits=19");
   const std::string good = "c0014328ff300000\r";
@@ -173,8 +172,7 @@ TEST(E201Set, ReadsClockBack) {
   EXPECT_EQ(bench.run_tampered(answering('m', {}), "set-clock", {2}).error, "timeout");
 }
 
-// Checks that the host waits 10 ms for the reply of a command that may have none, and 20 ms more for the end of a
-// reply.
+// The host waits 10 ms for an optional reply, and 20 ms more for its end.
 TEST(E201Set, WaitsBrieflyForOptionalReply) {
   Bench bench;
   const auto tell = [&](Time after) {
@@ -223,8 +221,7 @@ TEST(E201Zero, ReadsZeroBack) {
   EXPECT_EQ(bench.run("decimal").fields, (Fields{{"counts", 275086}}));
 }
 
-// Checks how far the encoder may move while the zero is set: by 0.02 degrees (29 counts of 19 bits), or by one count if
-// that is more, as with 12 bits.
+// The limit is 0.02 degrees (29 counts of 19 bits), or one count.
 TEST(E201Zero, RefusesMovingEncoder) {
   struct Case {
     std::string bits;
@@ -260,7 +257,7 @@ TEST(E201Zero, RefusesMovingEncoder) {
   }
 }
 
-// Checks that no zero is set while the encoder's error bit is set: `?` does not report that bit, so `4` is read before.
+// `?` does not report the encoder's error bit, so `4` is read before.
 TEST(E201Zero, RefusesInvalidPosition) {
   Bench bench;
   bench.device.raise_alarms(word_error);
@@ -270,8 +267,7 @@ TEST(E201Zero, RefusesInvalidPosition) {
   EXPECT_EQ(bench.answering.asked(), "4");
 }
 
-// Checks that no zero is set if `4` shows no valid word, as of an encoder without supply; but that it is set if `4` is
-// not answered, as by firmware before 1.16.
+// Firmware before 1.16 does not answer `4`, which must not prevent a zero.
 TEST(E201Zero, RefusesEncoderWithoutValidWord) {
   Bench bench;
   const CommandResult stuck = bench.run_tampered(answering('4', {{"0000000000000000\r"}}), "set-zero");

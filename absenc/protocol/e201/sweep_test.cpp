@@ -16,8 +16,7 @@ using testing::says;
 using testing::Tamper;
 using testing::TextReply;
 
-// Checks a sweep with 10 us of latency and 32 + 8 bits: at most 20 bits of ACK fit, so clocks 8 (45 bits of ACK) and 7
-// (22) are too fast.
+// At most 20 bits of ACK fit, so clocks 8 (45 bits of ACK) and 7 (22) are too fast.
 TEST(E201Sweep, CountsRecommendsAndRestores) {
   Bench bench("singleturn_bits=32");
   bench.raw("M7\r");
@@ -48,8 +47,7 @@ TEST(E201Sweep, CountsRecommendsAndRestores) {
 }
 
 TEST(E201Sweep, LineDelayMovesTheRecommendation) {
-  // The delay of 905 ns is about one period at 1100 kHz, two at 2200 kHz and four at 4400 kHz: these clocks are not
-  // stable.
+  // The delay of 905 ns is about a whole number of periods at 1100, 2200 and 4400 kHz.
   Bench bench("singleturn_bits=19 latency_us=0 line_delay_ns=905");
   const Fields fields = bench.run("clock-sweep", {20}).fields;
   EXPECT_LT(fields.at("valid_1100_khz"), 20);
@@ -130,7 +128,7 @@ TEST(E201Sweep, ReportLeftNamesClockThatWasSetLast) {
 
 TEST(E201Sweep, ReportsEachErrorAndRestoresClock) {
   struct Case {
-    char letter;  // the command whose `nth` request is answered with `answer`; if `always`, every later request too
+    char letter;  // the command whose `nth` request gets `answer`; `always`: every later one too
     int nth;
     bool always;
     std::vector<TextReply> answer;

@@ -41,7 +41,7 @@ using Text = ByteBuffer<64>;
 
 namespace detail {
 
-// Returns the number that the digits from index `at` on form, at most 9 of them, and moves `at` behind these digits.
+// Returns the number of at most 9 digits at index `at`, and moves `at` behind it.
 constexpr unsigned number_at(Bytes text, std::size_t& at) {
   unsigned number = 0;
   for (unsigned digits = 0; at < text.size() && is_digit(text[at]) && digits < 9; ++at, ++digits) {
@@ -68,7 +68,7 @@ struct Version {
   return version.major > 1 || (version.major == 1 && version.minor >= 16);
 }
 
-/// Returns the first two numbers in a text that are separated by a point; no value if the text has none.
+/// Returns the first two numbers in a text that are separated by a point.
 [[nodiscard]] constexpr std::optional<Version> find_version(Bytes text) {
   for (std::size_t at = 0; detail::skip_to_digit(text, at);) {
     const unsigned major = detail::number_at(text, at);
@@ -78,14 +78,14 @@ struct Version {
   return std::nullopt;
 }
 
-/// Returns the first whole number in a text, at most its first nine digits. Error: bad_framing (the text has no digit).
+/// Returns the first number in a text, at most nine digits of it. Error: bad_framing.
 [[nodiscard]] constexpr Result<std::int64_t> find_number(Bytes text) {
   std::size_t at = 0;
   if (!detail::skip_to_digit(text, at)) return Error::bad_framing;
   return detail::number_at(text, at);
 }
 
-/// Converts a clock number or a frequency in kHz to the clock number, 1 to 8; returns 0 for any other number.
+/// Converts a clock number or a frequency in kHz to the clock number, 1 to 8; 0: neither.
 [[nodiscard]] constexpr unsigned clock_of(std::int64_t number) {
   for (unsigned i = 0; i < clocks_khz.size(); ++i) {
     if (number == i + 1 || number == clocks_khz[i]) return i + 1;
@@ -114,8 +114,7 @@ struct Version {
   return static_cast<std::int64_t>(negative ? 0 - number : number);
 }
 
-/// Returns the first number that is followed by `symbol` (V or A), or by m and `symbol`, in mV or mA; no value if the
-/// text has none.
+/// Returns the first voltage (`symbol` V) or current (A) in a text, in mV or mA.
 [[nodiscard]] constexpr std::optional<unsigned> find_milli(Bytes text, std::uint8_t symbol) {
   for (std::size_t at = 0; detail::skip_to_digit(text, at);) {
     std::uint64_t milli = std::uint64_t{detail::number_at(text, at)} * 1000;

@@ -76,7 +76,7 @@ constexpr Format format_of(const Settings& given, const WordFormat* word) {
           .line_delay = Time(given.line_delay_ns)};
 }
 
-// The length of a word alone does not prove a Resolute, so the models of other encoders come first.
+// The length of a word does not prove a Resolute, so the models of others come first.
 constexpr auto resolute_models = std::array{
     ModelText{"rotary-26", "single-turn, 26 bits", 0,
               "singleturn_bits=26 multiturn_bits=0 position_bits=0 encoder=other"},
@@ -205,8 +205,7 @@ constexpr Finding<Format, InterfaceResults> found{.put = put_found, .put_left = 
 
 // ---- Commands
 
-// Returns whether positions can be read. A linear encoder needs its unit of length, so that its readings are not taken
-// for angles.
+// A linear encoder needs its unit of length, so that readings are not taken for angles.
 constexpr bool is_readable(const Format& format) { return fits(format) && absenc::is_usable(format.scale); }
 
 template <std::uint8_t one>
@@ -259,8 +258,7 @@ constexpr std::size_t size_of_reply(const Format&, Bytes begin) {
 }
 constexpr Result<Request> guess_request(const Format&, Bytes) { return Request{letter::samples}; }
 
-// Returns whether a wrong bit in a reply is detected. Bits after the CRC are ignored, upper and lower case digits are
-// the same, and neither SSI nor text has a checksum.
+// Bits after the CRC are ignored, and upper and lower case digits are the same.
 bool is_checked(const Options& values, Frame, Frame reply, std::size_t bit) {
   const Format f = format_by(values);
   const Result<std::uint64_t> samples = decode_samples(reply.bytes);

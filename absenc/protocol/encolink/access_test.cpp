@@ -16,7 +16,7 @@ using PowerOn = Bench::PowerOn;
 class EncolinkRegister : public testing::OnBothInterfaces {};
 INSTANTIATE_TEST_SUITE_P(Interfaces, EncolinkRegister, ::testing::Values(Interface::uart, Interface::spi));
 
-/// Returns a function that damages the replies whose frame number, counted from 0, is in `frames`.
+/// Returns a function that damages the replies whose number, from 0, is in `frames`.
 author::testing::Tamper damaging(std::vector<unsigned> frames) {
   return [=](unsigned nth, RawBytes& reply) {
     if (std::find(frames.begin(), frames.end(), nth) != frames.end()) reply[1] ^= 0x10;
@@ -52,7 +52,7 @@ TEST_P(EncolinkRegister, ReadsRegisterWithoutLosingPositions) {
     EXPECT_EQ(wrong, 0u);
     EXPECT_EQ(read.texts.at("register"), "order_number");
     EXPECT_EQ(read.numbers.at("length"), 20);
-    // Frames without an emitted position: the two of the identity, and the last one, which ends the procedure.
+    // No position is emitted in the two frames of the identity, nor in the last frame.
     EXPECT_EQ(read.emits, read.frames - 2 - 1);
     EXPECT_EQ(bench.first_violation(), "");
     const auto size = static_cast<std::int64_t>(bench.encoder.format().frame_bytes());
@@ -156,7 +156,7 @@ TEST_P(EncolinkRegister, StopsAfterTwoSecondsOfBusy) {
   EXPECT_LT(read.took, busy_limit + 10ms);
 }
 
-// Damages the third key byte, so that the encoder detects no access; or the address, so that the checksum is wrong.
+// A damaged key byte, so that no access is detected; a damaged address with a wrong checksum.
 TEST_P(EncolinkRegister, RepeatsAccessThatArrivedDamaged) {
   for (const auto& [right, wrong, error, words] :
        std::to_array<std::tuple<std::uint8_t, std::uint8_t, Error, std::string_view>>(
@@ -217,7 +217,7 @@ TEST_P(EncolinkRegister, ReportsUnpluggedEncoder) {
   EXPECT_FALSE(says(save.detail, "may have been executed")) << save.detail;
 }
 
-// The answer to the write is lost. Reading back shows that it was executed, so the procedure must not write again.
+// The answer to the write is lost, but reading back shows that it was executed.
 TEST_P(EncolinkRegister, ReadsBackBeforeRepeatingWrite) {
   Bench bench(testing::single, interface);
   bench.tampered.replies(damaging({22}));
@@ -231,7 +231,7 @@ TEST_P(EncolinkRegister, ReadsBackBeforeRepeatingWrite) {
   EXPECT_EQ(written, 1u);
 }
 
-// While the operation byte is replaced by an unknown one, channel 3 stays idle and the register keeps its value.
+// The unknown operation is ignored, so the register keeps its value.
 TEST_P(EncolinkRegister, RepeatsWriteThatWasNotExecuted) {
   for (const auto& [times, error] :
        std::to_array<std::pair<int, Error>>({{2, Error::none}, {3, Error::cross_check_failed}})) {
@@ -242,8 +242,7 @@ TEST_P(EncolinkRegister, RepeatsWriteThatWasNotExecuted) {
   }
 }
 
-// Frames 0 and 1 are for the identity, frame 2 resets the channels; cycles of 7 frames follow. The first idle cycle is
-// that during which the access ends.
+// Frames 0 and 1 are for the identity, frame 2 resets the channels; cycles of 7 frames follow.
 TEST_P(EncolinkRegister, AcceptsAnswerAfterEightIdleCycles) {
   for (const auto& [more, asked] : std::to_array<std::pair<unsigned, unsigned>>({{7, 1}, {8, 2}})) {
     Bench bench(testing::single, interface);
@@ -304,7 +303,7 @@ TEST(EncolinkAccess, RejectsAnswerWithoutReady) {
   EXPECT_EQ(read.detail, "channel 3 says neither idle nor busy nor ready");
 }
 
-// Two failures: the encoder's counter of calibrations does not change, or it reports that the ring is too eccentric.
+// The counter of calibrations does not change, or the ring is reported as too eccentric.
 TEST(EncolinkAccess, ReportsFailedAndEndlessSelfCalibration) {
   for (const auto& [says, error, words] : std::to_array<std::tuple<std::uint8_t, Error, std::string_view>>(
            {{calibration::out_of_range, Error::cross_check_failed, "too eccentric"},
@@ -369,7 +368,7 @@ TEST_P(EncolinkRegister, NeverRepeatsCommand) {
   EXPECT_EQ(bench.device.memory_version(), 1u);
 }
 
-// After a refusal, the encoder may still send data bytes: the next access must not begin among them.
+// After a refusal, the encoder may still send data bytes.
 author::Procedure read_twice(Dialog& dialog, ProcedureState& found) {
   const AccessOutcome refused = co_await attempt_read(dialog, found, 0x1234, 20);
   if (refused != AccessOutcome::refused) co_return found.why;

@@ -23,8 +23,7 @@ struct Bench : author::testing::UnitBench<20> {
       : UnitBench(interface == Interface::spi ? spi_unit : encolink::unit, settings) {
     shaft.put(7, 0x12345);
   }
-  /// Sends the requests one after the other and returns the replies. Pads each request with zeros to `size`, because on
-  /// SPI a reply has the length of its request.
+  /// Sends the requests one after the other, padded with zeros to `size`; returns the replies.
   std::vector<RawBytes> ask(std::vector<RawBytes> requests, std::size_t size = 0) {
     std::vector<RawBytes> replies;
     for (RawBytes& request : requests) {

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds the content of channels 2 and 3 in a capture: cycles of channel 2, of which each position frame carries one
-// byte, and register accesses, whose requests are in the `ra` bytes and whose answers are in the channel 3 bytes of the
-// cycles.
+// Finds cycles of channel 2 and register accesses of channel 3 in a capture.
 #pragma once
 
 #include <cstddef>
@@ -15,9 +13,7 @@
 
 namespace absenc::encolink {
 
-/// Combines captured frames to cycles of channel 2 and to register accesses. A cycle begins with the first position
-/// frame after a reset of the channels (AA, BB), or after a valid cycle. If the alignment is unknown, a cycle is found
-/// by its checksum and by its position, which equals that of the first frame of the cycle.
+/// Combines captured frames to cycles of channel 2 and to register accesses.
 class ChannelFollower final : public Follower {
  public:
   /// Creates a follower for encoders with this format.

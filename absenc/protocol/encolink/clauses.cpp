@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Requirements of the protocol's document on encoder and host, each with its paragraph, for conformance tests.
+// Requirements of the document on encoder and host, for conformance tests.
 #include <array>
 
 #include "absenc/protocol/encolink/unit.hpp"
@@ -77,7 +77,7 @@ constexpr auto spi_clauses = std::array{
            .shown_with = "resolution=20&multiturn_bits=0"},
 };
 
-// ---- Requests that break the clause `access`: a second register access before the first is answered
+// ---- Requests that break the clause `access`
 
 namespace script {
 constexpr std::chrono::milliseconds pause{1};

@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::string_view part_text = "MB080SLA20MENT00";  // part number, 16 characters; [8..9] are the resolution
 constexpr std::string_view access_rule = "register access before the last one was answered";
-// time from the last byte of a register access until its answer is ready; assumed, not in the document
+// time from a register access until its answer is ready; assumed
 constexpr Time access_time = 200us;
 
 struct Text {
@@ -19,7 +19,7 @@ struct Text {
 constexpr std::array<Text, 3> texts{
     {{serial_number, "AK2A0001"}, {serial_number_extended, "AK2A0001-0000001"}, {part_number, "MB080SLA20MENT00 SIM"}}};
 
-// Index, after those of the registers, of the turns that a preset subtracts from the shaft's turns.
+// Index in `values_` of the turns that a preset subtracts from the shaft's turns.
 constexpr std::size_t turns_taken = registers.size();
 // Values of `values_` at shipping: 0 unless stated here.
 constexpr auto at_shipping = [] {
@@ -30,7 +30,7 @@ constexpr auto at_shipping = [] {
   return values;
 }();
 
-// Indices of the values that the command `save` stores, in the order of their bytes in the memory.
+// Indices of the values that `save` stores, in the order of their bytes.
 constexpr std::array<std::size_t, 9> stored_registers{position_offset, multiturn_preset,      write_lock,
                                                       turns_taken,     position_filter,       position_filter_speed,
                                                       velocity_filter, velocity_filter_speed, calibration_range};
@@ -75,8 +75,7 @@ void VirtualEncoder::feed(const ByteEvent& event) {
 VirtualEncoder::Answer VirtualEncoder::respond(Bytes request, Time at, ByteBuffer<64>& reply) {
   const ReplyBytes frame = make_frame(at);
   reply.append(frame);
-  // A host with the vendor's library always reads as many bytes as the longest identity, for the identity and for the
-  // frame before it.
+  // Hosts with the vendor's library read 20 bytes for the identity and for the frame before it.
   const bool identifies = frame.size() == identity_bytes || request[0] == static_cast<std::uint8_t>(Config::identify);
   while (identifies && reply.size() < format_.identity_size && format_.identity_size > identity_bytes) {
     reply.push_back(0);
@@ -117,7 +116,7 @@ Identity VirtualEncoder::identity() const {
   return identity;
 }
 
-// Executes a request. The frame of this exchange was made before, so the effect is visible in the next frame.
+// The frame of this exchange was made before, so the effect is in the next frame.
 void VirtualEncoder::handle(Bytes request, Time at) {
   if (at < zeros_until_) return;
   const auto config = static_cast<Config>(request[0]);
@@ -167,8 +166,7 @@ void VirtualEncoder::ra_received(std::uint8_t byte, Time at) {
 
 // ---- State
 
-// Returns the shaft's position with the position offset added or subtracted, in 2^-32 revolution, as if the turn
-// counter had no limit.
+// Returns the offset position in 2^-32 revolution, as if the turn counter had no limit.
 std::int64_t VirtualEncoder::offset_position(Time now) const {
   const auto fraction = static_cast<std::int32_t>(format_.offset_fraction(offset()));
   const std::int64_t position = shaft_->at(now).position;

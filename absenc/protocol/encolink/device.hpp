@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual AksIM-2 on UART or SPI: its three channels, registers, write lock, busy times, and checks of the host's
-// timing.
+// A virtual AksIM-2 on UART or SPI, with registers and checks of the host's timing.
 #pragma once
 
 #include <array>
@@ -27,8 +26,7 @@ enum ConditionIndex : std::size_t { condition_temperature, condition_busy, condi
 /// A virtual AksIM-2 encoder.
 class VirtualEncoder final : public author::Responder {
  public:
-  /// Creates an encoder that is off until `power_on`. `shaft` must outlive it. Unknown members of `format` get their
-  /// values from virtual_format.
+  /// Creates an encoder that is off; unknown members of `format` are those of virtual_format. `shaft` must outlive it.
   VirtualEncoder(const Format& format, const Shaft& shaft);
 
   /// Processes an event of the port, such as received data or silence.
@@ -39,7 +37,7 @@ class VirtualEncoder final : public author::Responder {
   /// Switches the encoder on.
   void power_on(Time now, PowerOn kind) override;
   void set_condition(std::size_t index, std::int64_t value, Time) override { conditions_[index] = value; }
-  /// Returns the 31 bytes that the command `save` stores: offset, preset, lock, turns, filters, calibration range.
+  /// Returns the 31 bytes that the command `save` stores.
   [[nodiscard]] MutableBytes memory() override { return memory_; }
 
   /// Returns the format of the encoder.
@@ -82,8 +80,7 @@ class VirtualEncoder final : public author::Responder {
   Format format_;
   const Shaft* shaft_;
   std::array<std::int64_t, conditions.size()> conditions_{};
-  // Numbers of the registers, by index in the table, and behind them the turns that a preset subtracts from the shaft's
-  // turns. A register whose value is computed does not use its element.
+  // Numbers of the registers, by index in the table, and behind them `turns_taken`.
   std::array<std::uint32_t, registers.size() + 1> values_{};
   std::array<std::uint8_t, 31> memory_{};
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of the virtual AksIM-2 without the host code: its replies, their times, and its checks of the host.
+// Tests of the virtual AksIM-2 without the host code.
 #include "absenc/protocol/encolink/device.hpp"
 
 #include "absenc/core/hex.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fields of EncoLink frames and registers with name, unit and meaning, and the functions that report their values.
+// Fields of EncoLink frames and registers, and the functions that report their values.
 #pragma once
 
 #include <algorithm>
@@ -91,7 +91,7 @@ struct Values {
   Maybe<std::uint32_t> address{};  ///< Address of the accessed register.
   Maybe<std::size_t> length{};     ///< Number of bytes of the accessed register.
   Maybe<Bytes> data{};             ///< Bytes of the accessed register, most significant first.
-  /// Fewer than 8 bytes as a number; in an answer only if the table has no register with this address and length.
+  /// Fewer than 8 bytes as a number.
   Maybe<std::int64_t> value{};
 };
 
@@ -181,8 +181,7 @@ inline constexpr auto procedure_fields = author::fields_of<ProcedureValues>(
 /// All fields of the unit: those of frames, registers and procedures.
 inline constexpr auto fields = author::joined(frame_fields.infos, register_fields, procedure_fields.infos);
 
-/// Puts a position into `sink`, with the detailed status if it is known: the position of a cycle of channel 2 if
-/// `channel3` has a value, otherwise that of a position frame.
+/// Puts a position into `sink`, with the detailed status and channel 3 byte if they are known.
 constexpr void put_position(FieldSink& sink, const Format& format, const Position& position,
                             std::optional<std::uint16_t> detailed = {}, std::optional<std::uint8_t> channel3 = {}) {
   Values values{.position = position, .status = detailed, .channel3 = channel3};
@@ -199,7 +198,7 @@ constexpr void put_position(FieldSink& sink, const Format& format, const Positio
                     : wrapped_difference(load_big_endian(bytes), 0, bits);
 }
 
-/// Puts the value of register `index` of the table into `sink`; for calibration_status also the number of calibrations.
+/// Puts the value of register `index` of the table into `sink`.
 constexpr void put_value(FieldSink& sink, std::size_t index, Bytes bytes) {
   FieldValue shown{.info = &register_fields[index], .bytes = bytes};
   switch (registers[index].content) {
@@ -232,8 +231,7 @@ constexpr void put_register(FieldSink& sink, std::uint32_t address, Bytes data,
   if (in_table) put_value(sink, static_cast<std::size_t>(known - registers.data()), data);
 }
 
-/// Returns `format` with values for its unknown members, to decode a reply of an encoder whose identity is unknown: 22
-/// bits, and 16 bits of turns if the length of the reply, and in a position frame the checksum, shows turns.
+/// Returns `format` with assumed values for its unknown members, to decode `reply`.
 [[nodiscard]] constexpr Format assumed(const Format& format, Bytes reply) {
   Format known = format;
   if (known.resolution == 0) known.resolution = maximum_resolution;
@@ -254,7 +252,7 @@ constexpr BitRanges identity_bits(const FieldInfo& field) {
   return {};  // the resolution is two decimal digits, so its bits are not reported
 }
 
-// Returns the bits of a field of channel 1, which is one big-endian number with two active-low bits at its end.
+// Channel 1 is one big-endian number with two active-low bits at its end.
 constexpr BitRanges position_bits(const Format& format, const FieldInfo& field) {
   const std::size_t size = format.position_bytes();
   if (&field == frame_fields.of<of<&Values::position, &Position::singleturn>>()) {
@@ -272,8 +270,7 @@ constexpr BitRanges position_bits(const Format& format, const FieldInfo& field) 
 
 }  // namespace detail
 
-/// Returns the bits of a valid reply that hold `field`, which `decode` must report for this reply; empty if the field
-/// has no bits of its own.
+/// Returns the bits of a valid reply that hold `field`, a field that `decode` reports for it.
 [[nodiscard]] constexpr BitRanges bits_of(const Format& format, Bytes reply, const FieldInfo& field) {
   if (reply.size() == identity_bytes || reply.size() == padded_identity_bytes) return detail::identity_bits(field);
   const Format known = assumed(format, reply);
@@ -286,7 +283,7 @@ constexpr BitRanges position_bits(const Format& format, const FieldInfo& field) 
   return detail::position_bits(known, field);
 }
 
-/// Decodes a request whose reply is not known: two bytes, or all `ra` bytes of a register access.
+/// Decodes a request: two bytes, or all `ra` bytes of a register access.
 constexpr Error decode_request(Bytes request, FieldSink& sink) {
   if (request.size() == request_bytes) {
     if (!is_config(request[0])) return Error::unsupported;
@@ -314,9 +311,7 @@ constexpr Error decode_access_answer(Bytes request, Bytes reply, FieldSink& sink
   return Error::none;
 }
 
-/// Decodes a reply, or without one the request, into `sink` and returns the first error. If the request is a register
-/// access (all its `ra` bytes), the reply is the answer to it. Otherwise the length of the reply decides: position
-/// frame, channel 2 cycle or identity.
+/// Decodes a reply, or without one the request, into `sink` and returns the first error.
 constexpr Error decode(const Format& format, Bytes request, Bytes reply, FieldSink& sink) {
   if (reply.empty()) return decode_request(request, sink);
   if (is_access(request)) return decode_access_answer(request, reply, sink);

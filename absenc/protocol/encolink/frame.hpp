@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Encodes and decodes the EncoLink frames of RLS AksIM-2 encoders on UART and SPI: positions of channel 1, cycles of
-// channel 2 and the identity. README.md draws them; the register access bytes of channel 3 are in registers.hpp.
+// EncoLink frames of RLS AksIM-2 encoders: positions, cycles of channel 2 and the identity. README.md draws them.
 #pragma once
 
 #include <array>
@@ -30,8 +29,7 @@ inline constexpr LineSettings spi_settings{
 inline constexpr Time shortest_clock = 250ns;  ///< Shortest period of the SPI clock.
 inline constexpr Time spi_pause = 5us;         ///< Time t_p: shortest time that NCS stays high between two frames.
 
-/// Time from a request to the reply of the virtual encoder. The document gives no reply times; the host waits up to
-/// `answer_limit`.
+/// Time from a request to the reply of the virtual encoder; the document gives none.
 inline constexpr Time answer_time = 5us;
 inline constexpr Time answer_limit = 500us;  ///< Longest time that the host waits until a reply begins.
 inline constexpr Time gap_limit = 30us;      ///< Longest time that the host waits between two characters of a reply.
@@ -43,12 +41,12 @@ inline constexpr Time busy_limit = 2s;   ///< Longest time for which the host wa
 inline constexpr Time calibration_time = 1s;     ///< Duration of the virtual encoder's self-calibration.
 inline constexpr Time calibration_limit = 15s;   ///< Timeout of a self-calibration; the vendor allows the shaft 10 s.
 inline constexpr Time calibration_poll = 100ms;  ///< Time between two polls of a running self-calibration.
-/// Longest time that the host waits for the next result of a stream: a frame, or a loss of alignment.
+/// Longest time that the host waits for the next frame or error of a stream.
 inline constexpr Time listen_limit = 500ms;
 
 // ---- Frames
 
-/// Checksum of all frames: "Inverted CRC, 0x97 polynom", in normal notation x8 + x7 + x4 + x2 + x + 1.
+/// Checksum of all frames: "Inverted CRC, 0x97 polynom", x8 + x7 + x4 + x2 + x + 1.
 inline constexpr CrcParameters crc_parameters{8, 0x97, 0, false, false, 0xFF};
 
 /// Returns the checksum of `bytes`.
@@ -70,7 +68,7 @@ enum class Config : std::uint8_t {
 
 inline constexpr std::size_t request_bytes = 2;    ///< Number of bytes of a request: config and ra.
 inline constexpr std::size_t identity_bytes = 19;  ///< Number of bytes of an identity, checksum included.
-/// Number of bytes of an identity as the vendor's library reads it: one more than the identity has.
+/// Number of bytes of an identity as the vendor's library reads it.
 inline constexpr std::size_t padded_identity_bytes = 20;
 inline constexpr std::size_t reply_capacity = 20;       ///< Bytes of the longest reply, a padded identity.
 inline constexpr unsigned maximum_resolution = 22;      ///< Greatest number of bits of the position.
@@ -78,14 +76,11 @@ inline constexpr unsigned maximum_multiturn_bits = 16;  ///< Greatest number of 
 /// Bytes of one reply.
 using ReplyBytes = ByteBuffer<reply_capacity>;
 
-/// Interface of the encoder. On SPI, a frame is made when its transfer begins, before the request in the same transfer
-/// is received. On a UART, the reply follows the request.
+/// Interface of the encoder; an SPI frame is made before the request of its transfer.
 enum class Interface : std::uint8_t { uart, spi };
-/// Whether the encoder adds the position offset to the measured position or subtracts it. The register map does not
-/// state it.
+/// Sign with which the encoder adds the position offset; no document states it.
 enum class OffsetSign : std::uint8_t { add, subtract };
-/// Unit of the position offset. The register map does not state it; in the vendor's example the value FFFFFFFF is
-/// refused.
+/// Unit of the position offset; the register map does not state it.
 enum class OffsetUnit : std::uint8_t { counts, turn_fraction };
 /// Generation of the encoder, on which its registers depend.
 enum class Generation : std::uint8_t { aksim2, aksim4 };
@@ -122,8 +117,7 @@ struct Format {
   [[nodiscard]] constexpr std::uint32_t largest_offset() const {
     return static_cast<std::uint32_t>(low_mask(offset_unit == OffsetUnit::counts ? resolution : 32));
   }
-  /// Returns the position offset that makes the present position zero, if the encoder reports `singleturn` with
-  /// `offset`.
+  /// Returns the offset that makes the present position zero; `offset` is the present one.
   [[nodiscard]] constexpr std::uint32_t moved_offset(std::uint32_t offset, std::uint32_t singleturn) const {
     const std::uint32_t here = offset_unit == OffsetUnit::counts ? singleturn : singleturn << (32 - resolution);
     return (offset_sign == OffsetSign::add ? offset - here : offset + here) & largest_offset();
@@ -166,7 +160,7 @@ inline constexpr std::uint16_t signal_lost = 0x0020;          ///< The signal of
 inline constexpr std::uint16_t position_invalid = 0x0200;     ///< The position is invalid.
 inline constexpr std::uint16_t configuration_error = 0x0400;  ///< The stored configuration is damaged.
 inline constexpr std::uint16_t multiturn_mismatch = 0x8000;   ///< The turn counter contradicts the position.
-/// Mask of the bits that are warnings: amplitude low, high and nearly too high, near limits, temperature.
+/// Mask of the bits that are warnings.
 inline constexpr std::uint16_t warnings = 0x21D0;
 inline constexpr std::uint16_t errors = 0xDE2F;  ///< Mask of the bits that are errors: all bits but the warnings.
 static_assert((warnings ^ errors) == 0xFFFF);
@@ -198,8 +192,7 @@ struct Identity {
 
 namespace detail {
 
-// Returns the bytes of channel 1 as one big-endian number of turns, position, error and warning. `format` must be
-// known.
+// Returns the bytes of channel 1. `format` must be known.
 constexpr ReplyBytes position_bytes(const Format& format, const Position& position) {
   std::uint64_t number = std::uint64_t{position.singleturn} << (24 - format.resolution);
   if (!position.error) number |= 2;
@@ -212,8 +205,7 @@ constexpr ReplyBytes position_bytes(const Format& format, const Position& positi
   return frame;
 }
 
-// Decodes channel 1. Padding that is not zero means that the encoder has more bits of position or turns than `format`:
-// out_of_range.
+// Padding that is not zero means that the encoder has more bits than `format`.
 constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   const std::uint64_t number = load_big_endian(bytes.first(format.position_bytes()));
   const auto word = static_cast<std::uint32_t>(number & low_mask(24));
@@ -236,7 +228,7 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return frame;
 }
 
-/// Decodes a position frame. Errors in this order: wrong_length, bad_checksum, out_of_range. `format` must be known.
+/// Decodes a position frame of a known format. Errors: wrong_length, bad_checksum, out_of_range.
 [[nodiscard]] constexpr Result<Position> decode_position(const Format& format, Bytes bytes) {
   if (bytes.size() != format.frame_bytes()) return Error::wrong_length;
   if (!is_sealed(bytes.first(format.position_bytes() + 1))) return Error::bad_checksum;
@@ -255,7 +247,7 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return bytes;
 }
 
-/// Decodes a channel 2 cycle. Errors in this order: wrong_length, bad_checksum, out_of_range. `format` must be known.
+/// Decodes a channel 2 cycle of a known format. Errors: wrong_length, bad_checksum, out_of_range.
 [[nodiscard]] constexpr Result<Cycle> decode_cycle(const Format& format, Bytes bytes) {
   if (bytes.size() != format.cycle_bytes()) return Error::wrong_length;
   if (!is_sealed(bytes)) return Error::bad_checksum;
@@ -277,9 +269,7 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return bytes;
 }
 
-/// Decodes an identity. One more byte may follow it and is ignored. Errors in this order: wrong_length, bad_checksum,
-/// unexpected_reply (another protocol version or frame length), out_of_range (the resolution is not a number from 1 to
-/// 22).
+/// Decodes an identity; one more byte may follow. Errors: wrong_length, bad_checksum, unexpected_reply, out_of_range.
 [[nodiscard]] constexpr Result<Identity> decode_identity(Bytes bytes) {
   if (bytes.size() != identity_bytes && bytes.size() != padded_identity_bytes) return Error::wrong_length;
   if (!is_sealed(bytes.first(identity_bytes))) return Error::bad_checksum;
@@ -294,8 +284,7 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return identity;
 }
 
-/// Returns `format` with the resolution of `identity`. An identity reports whether the encoder counts turns, but not
-/// the number of bits of the turn counter: it becomes 16 or 0 if it is unknown in `format` or contradicts the identity.
+/// Returns `format`, changed where `identity` contradicts or completes it.
 [[nodiscard]] constexpr Format as_identified(const Format& format, const Identity& identity) {
   Format known = format;
   known.resolution = identity.resolution;
@@ -304,8 +293,7 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return known;
 }
 
-/// Returns `as_identified(format, identity)`. Error: unexpected_reply (a known member of `format` contradicts the
-/// identity: another resolution, or turns in only one of the two).
+/// Returns `format` completed by `identity`. Error: unexpected_reply (they contradict).
 [[nodiscard]] constexpr Result<Format> complete(const Format& format, const Identity& identity) {
   const Format known = as_identified(format, identity);
   const bool other_turns = format.multiturn_bits >= 0 && known.multiturn_bits != format.multiturn_bits;
@@ -313,25 +301,23 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return known;
 }
 
-/// Returns whether two positions have equal turns and counts. Channel 2 repeats the position of channel 1.
+/// Returns whether two positions have equal turns and counts.
 [[nodiscard]] constexpr bool same_place(const Position& a, const Position& b) {
   return a.singleturn == b.singleturn && a.multiturn == b.multiturn;
 }
 
-/// Returns whether turns and counts are zero: a real position, or the zeros that an encoder sends while it starts.
+/// Returns whether turns and counts are zero, as while the encoder starts.
 [[nodiscard]] constexpr bool is_all_zero(const Position& position) {
   return position.singleturn == 0 && position.multiturn == 0;
 }
 
-/// Returns the mask of the alarms that a position frame reports as clear: all errors if its error bit is clear, all
-/// warnings if its warning bit is clear. A set bit does not report which alarm raised it. Without channel 2 an encoder
-/// has no named alarms: 0.
+/// Returns the mask of the alarms that a position frame reports as clear.
 [[nodiscard]] constexpr std::uint32_t clear_by(const Format& format, const Position& position) {
   if (!format.has_ch2) return 0;
   return (position.error ? 0u : status::errors) | (position.warning ? 0u : status::warnings);
 }
 
-/// Converts a position to a reading. `detailed`: the status in the latest cycle of channel 2, if one was received.
+/// Converts a position to a reading. `detailed`: the status in the latest cycle of channel 2.
 [[nodiscard]] constexpr Reading to_reading(const Format& format, const Position& position,
                                            std::optional<std::uint16_t> detailed = {}) {
   const std::uint16_t alarms = detailed.value_or(0);
@@ -350,9 +336,7 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return reading;
 }
 
-/// Returns `now`, completed by the alarms of `before`, the completed reading before it (Unit::remembered). They are
-/// added only if the error and warning bits of `now` agree with them; otherwise the alarms behind a set bit stay
-/// unknown until the next cycle of channel 2.
+/// Returns `now` with the alarms of `before`, if its error and warning bits agree with them.
 [[nodiscard]] constexpr Reading remembered(const Reading& before, Reading now) {
   const std::uint32_t unknown = before.alarms_reported & ~now.alarms_reported;
   if (unknown == 0 || now.singleturn_bits == 0) return now;

@@ -61,8 +61,7 @@ TEST(EncolinkFrame, ReadingValidityFollowsStatus) {
   EXPECT_FALSE(to_reading(single, {}).multiturn_valid);
 }
 
-// A position frame reports the alarms of a kind only while its bit for that kind is clear; a cycle of channel 2 reports
-// all alarms.
+// A position frame reports alarms of a kind only while its bit for that kind is clear.
 TEST(EncolinkFrame, StatusBitsReportOnlyClearAlarms) {
   EXPECT_EQ(to_reading(multi, {}).status_reported, general::error | general::warning);
   EXPECT_EQ(to_reading(multi, {}).alarms_reported, 0xFFFFu);
@@ -75,8 +74,7 @@ TEST(EncolinkFrame, StatusBitsReportOnlyClearAlarms) {
   EXPECT_EQ(to_reading(alone, {}).status_reported, general::error | general::warning);
 }
 
-// A cycle reports which alarms are set; the status bits of a later frame only show whether an error or a warning is
-// set.
+// The status bits of a later frame only show whether an error or a warning is set.
 TEST(EncolinkFrame, RemembersAlarmsOfCycleWhileStatusBitsAgree) {
   constexpr Position bad{.singleturn = 5, .error = true};
   constexpr Position warned{.singleturn = 5, .warning = true};
@@ -86,8 +84,7 @@ TEST(EncolinkFrame, RemembersAlarmsOfCycleWhileStatusBitsAgree) {
   EXPECT_EQ(remembered(lost, to_reading(multi, bad)).alarms_reported, 0xFFFFu);
   EXPECT_EQ(remembered(hot, to_reading(multi, warned)).alarms, status::temperature);
   EXPECT_EQ(remembered(hot, to_reading(multi, warned)).alarms_reported, 0xFFFFu);
-  // A set bit does not say which alarm was raised: only the next cycle does. A clear bit says that all alarms of its
-  // kind are clear.
+  // A set bit does not say which alarm was raised.
   EXPECT_EQ(remembered(hot, to_reading(multi, bad)).alarms, 0u);
   EXPECT_EQ(remembered(hot, to_reading(multi, bad)).alarms_reported, status::warnings);
   EXPECT_EQ(remembered(lost, to_reading(multi, {.singleturn = 5})).alarms, 0u);

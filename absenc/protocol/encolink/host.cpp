@@ -14,8 +14,7 @@ std::array<std::uint8_t, request_bytes> Frames::encode(const Format&, const Requ
   return {static_cast<std::uint8_t>(config), request.ra};
 }
 
-// Returns 0 if only silence ends the reply: on a UART the frame before an identity may have an unknown length, and one
-// more byte may follow that frame or the identity.
+// On a UART only silence shows the end of an identity: one more byte may follow it.
 std::size_t Frames::expected(const Format& format, const Request& request, Bytes) {
   const bool identifies = request.ask == Ask::identify || request.ask == Ask::identity;
   if (!identifies) return format.frame_bytes();
@@ -58,8 +57,7 @@ void Channels::take(const author::HostOf<Frames>& host) {
     }
   }
   reading = to_reading(format, position, status);
-  // On SPI the encoder takes the position when NCS falls. For a UART the document does not state when: the end of the
-  // request is assumed.
+  // On SPI the position is of the time when NCS falls; for a UART the time is assumed.
   reading.latched = format.interface == Interface::spi ? host.begun_at() : host.sent_at();
   reading.received = host.received_at();
 }

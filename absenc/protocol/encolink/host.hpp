@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of EncoLink: requests for one frame, the channels that successive frames carry, and the conversation with
-// which a drive polls positions. procedures.hpp has the commands that take more frames.
+// Host side of EncoLink: requests for one frame, and what successive frames carry.
 #pragma once
 
 #include <array>
@@ -19,8 +18,7 @@ enum class Ask : std::uint8_t {
   identity,
 };
 
-/// Types and functions of the protocol that the classes in absenc/protocol/author use: frames, lengths and times.
-/// author/dialog.hpp lists the members that they require.
+/// The protocol as author/dialog.hpp demands it.
 struct Frames {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = encolink::Format;
@@ -29,13 +27,12 @@ struct Frames {
     Ask ask = Ask::position;  ///< Purpose of the request.
     std::uint8_t ra = 0;      ///< One byte of a register access.
   };
-  /// Type of replies; empty for the requests `identify` and `identity`. The identity is decoded from the bytes of the
-  /// reply.
+  /// Type of replies; empty for the requests `identify` and `identity`.
   using Reply = Position;
   /// Number of bytes of the longest reply, an identity; one more byte may follow it.
   static constexpr std::size_t longest_reply = identity_bytes;
 
-  /// Returns the host's timeouts for a reply and between its characters, and the silence before a request.
+  /// Returns the host's timeouts, and the silence before a request.
   static constexpr author::HostTimes host_times(const Format& format) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit, .silence = pause(format)};
   }
@@ -45,18 +42,15 @@ struct Frames {
   static std::array<std::uint8_t, request_bytes> encode(const Format&, const Request& request);
   /// Returns the length of the reply to `request` in bytes; 0 if only silence ends the reply.
   static std::size_t expected(const Format& format, const Request& request, Bytes);
-  /// Decodes a reply, except that to `identify`, whose content is ignored. Errors: line_stuck (SPI: all bytes are 00,
-  /// or all are FF), and those of decode_position or of decode_identity.
+  /// Decodes a reply; the content of one to `identify` is ignored.
   static Result<Position> decode(const Format& format, const Request& request, Bytes reply);
-  /// Returns whether an invalid reply is complete: on SPI, where a transfer has a fixed length. On a UART more bytes
-  /// may follow.
+  /// Returns whether an invalid reply is complete, as on SPI, where a transfer has a fixed length.
   static bool is_whole(const Format& format, Error) { return format.interface == Interface::spi; }
-  /// Returns the shortest time between two frames; the host also keeps it between two conversations.
+  /// Returns the shortest time between two frames.
   static constexpr Time pause(const Format& format) { return format.interface == Interface::spi ? spi_pause : Time{}; }
 };
 
-/// The content of successive frames: the position, and cycles of channel 2. Each frame carries one byte of a cycle. The
-/// alignment to a cycle is known from a reset of the channels until a frame is lost or a cycle has an error.
+/// The content of successive frames: the position, and cycles of channel 2, one byte per frame.
 struct Channels {
   Reading reading{};                      ///< Reading from the last valid frame; empty before the first.
   std::optional<std::uint16_t> status{};  ///< Detailed status in the last valid cycle; no value before it.
@@ -67,8 +61,7 @@ struct Channels {
   /// Whether all bytes of the last cycle were 0, as while the encoder starts.
   bool silent = false;
 
-  /// Processes the valid frame that `host` has received. A valid cycle whose position differs from that of its first
-  /// frame ends with cross_check_failed. A cycle with an error ends the alignment.
+  /// Processes the valid frame that `host` has received; a cycle with an error ends the alignment.
   void take(const author::HostOf<Frames>& host);
 
  private:
@@ -76,10 +69,7 @@ struct Channels {
   Position first_{};
 };
 
-/// Reads one frame. If the position is invalid, near a limit or all zero (as while the encoder starts), and `format`
-/// has channel 2, reads a cycle of channel 2 and takes the alarms from it. If both channels are zero, the reading is
-/// not `ready`. After any other error of the cycle the alarms stay unknown. Reads unknown members from the identity
-/// first.
+/// Reads a position and, where needed, the identity before it and the alarms behind it.
 class ReadPosition : public author::HostOf<Frames> {
  public:
   /// Creates a conversation that reads an encoder of this format.

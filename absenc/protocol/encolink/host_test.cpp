@@ -302,8 +302,7 @@ TEST_P(EncolinkHost, ZerosWithWrongChannel2AreReady) {
   }
 }
 
-// At 10 000 rpm a position of 20 bits advances by about 175 counts per microsecond, so `latched` must be the time at
-// which the encoder took the position.
+// At 10 000 rpm a position of 20 bits advances by about 175 counts per microsecond.
 TEST_P(EncolinkHost, LatchedIsTimeOfPosition) {
   for (const std::string_view told : {testing::multi, std::string_view("")}) {
     Bench bench(testing::multi, interface);
@@ -366,7 +365,7 @@ TEST(EncolinkListen, LatchedIsTimeOfPosition) {
   EXPECT_EQ(compared, 9u);
 }
 
-// README, listen: with `stream_rate` set, `position` sends nothing; commands other than it and `listen` are refused.
+// With `stream_rate` set, `position` sends nothing, and other commands but `listen` are refused.
 TEST(EncolinkListen, SendsNothingToStreamingEncoder) {
   Bench bench(streaming);
   std::size_t sent = 0;

@@ -23,12 +23,12 @@ void Listen::end(Error error, std::string_view detail) {
 
 ByteStep Listen::next(Time now) {
   if (!done_ && find()) {
-    // the time that the caller takes to process the emitted frame does not count towards the timeout
+    // the time that the caller takes for the emitted frame does not count
     deadline_ = Time{};
     return {.kind = ByteStep::Kind::emit};
   }
   if (deadline_ == Time{}) deadline_ = now + listen_limit;
-  // Bytes that form no frames do not extend the deadline, so the deadline is checked even while bytes arrive.
+  // Bytes that form no frames do not extend the deadline.
   if (!done_ && now >= deadline_) {
     frame_.clear();
     if (!received_anything_) {
@@ -75,8 +75,7 @@ bool Listen::find() {
     const Result<Position> position = decode_position(format_, first);
     const bool good = position && (in_step_ || decode_position(format_, waiting().subspan(size, size)));
     if (good) {
-      // Two valid frames establish alignment. The older frame is dropped, because the time at which it began is
-      // unknown.
+      // The older frame is dropped, because the time at which it began is unknown.
       if (!std::exchange(in_step_, true)) begin_ += size;
       discarded_.found();
       const Bytes frame = waiting().first(size);
@@ -103,8 +102,7 @@ void Listen::take(Bytes frame, const Position& position) {
   frame_.clear();
   frame_.append(frame);
   reading_ = to_reading(format_, position_);
-  // The document does not state when the encoder takes the position: the begin of the frame is assumed. That time is
-  // counted back from `received_at_`, when the last received byte ended.
+  // Assumed: the encoder takes the position at the begin of the frame, which no document states.
   reading_.latched = received_at_ - uart_settings.character() * static_cast<std::int64_t>(waiting().size());
   reading_.received = received_at_;
 }

@@ -12,15 +12,10 @@
 
 namespace absenc::encolink {
 
-/// Receives the frames of a streaming encoder and sends nothing. Finds frames by their checksums: frame alignment is
-/// accepted after two valid frames in a row. Emits each valid frame from the second of these two on, and each loss of
-/// alignment with its error. Ends when nothing was emitted for `listen_limit`.
+/// Receives the frames of a streaming encoder, which it finds by their checksums; sends nothing.
 class Listen final : public Conversation<std::uint8_t> {
  public:
-  /// Creates a conversation that receives an encoder of this format, which must be known, because it sends no
-  /// requests for the identity. Errors: invalid_argument (the format is not known), timeout (nothing more is received),
-  /// bad_framing (a damaged character), or wrong_length, bad_checksum or out_of_range (a damaged frame of the stream,
-  /// or no two valid frames in a row).
+  /// Creates a conversation that receives an encoder of this format, which must be known.
   explicit Listen(const Format& format);
 
   /// Processes an event of the port, such as received data or silence.
@@ -34,8 +29,7 @@ class Listen final : public Conversation<std::uint8_t> {
     return error_ == Error::none && !frame_.empty() ? &reading_ : nullptr;
   }
   void report(FieldSink& sink) const override;
-  /// Returns the bytes of the last frame, valid or damaged; without such a frame, the received bytes that are not
-  /// examined yet.
+  /// Returns the bytes of the last frame, valid or damaged; without one, unexamined bytes.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const override {
     return {{}, frame_.empty() ? waiting() : frame_.view(), received_at_, received_at_};
   }

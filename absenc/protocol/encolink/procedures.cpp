@@ -15,7 +15,7 @@ namespace {
 
 constexpr unsigned frame_attempts = 3;
 constexpr unsigned cycle_attempts = 3;
-// greatest number of attempts of a register access: an access takes many frames, and all of them must be valid
+// greatest number of attempts of a register access, which takes many valid frames
 constexpr unsigned access_attempts = 5;
 constexpr unsigned write_attempts = 3;
 // number of idle cycles allowed between the last byte of an access and its answer
@@ -29,7 +29,7 @@ constexpr std::string_view size_needed = "this address is not in the table of re
 
 // ---- Frames
 
-// Requests one frame and returns its error. A lost or damaged frame ends the alignment of channel 2.
+// Requests one frame and returns its error; a lost frame ends the alignment of channel 2.
 Part<Error> ask_frame(Dialog& dialog, ProcedureState& found, Frames::Request request) {
   if (found.emits && found.is_new) dialog.emit();
   found.is_new = false;
@@ -56,8 +56,7 @@ Outcome stopped(const ProcedureState& found, Error error) {
   return {error, in_access ? "the encoder stopped answering during a register access" : std::string_view{}};
 }
 
-// Reads the identity, which also resets the channels. If `trusted`, the identity overrides the options; otherwise a
-// contradiction between identity and options is an error. Stops the procedure if no identity arrives.
+// Reads the identity; if `trusted`, it overrides the options, otherwise it must agree with them.
 Part<Identity> identify(Dialog& dialog, ProcedureState& found, bool trusted) {
   for (;;) {
     Error error = co_await ask_frame(dialog, found, {Ask::identify});
@@ -74,8 +73,7 @@ Part<Identity> identify(Dialog& dialog, ProcedureState& found, bool trusted) {
   co_return identity;
 }
 
-// Reads the next valid frame; requests it with `ask` if channel 2 is not aligned. Stops the procedure if no valid frame
-// arrives.
+// Reads the next valid frame, requested with `ask` if channel 2 is not aligned.
 Part<bool> next_frame(Dialog& dialog, ProcedureState& found, Ask ask = Ask::position) {
   if (!dialog.format().known()) co_await identify(dialog, found, false);
   for (;;) {
@@ -106,8 +104,7 @@ Part<Error> send(Dialog& dialog, ProcedureState& found) {
   co_return Error::none;
 }
 
-// Requests frames until a cycle of channel 2 ends or a frame is lost. After a valid cycle, `found.channel3` is its
-// channel 3 byte.
+// Requests frames until a cycle of channel 2 ends or a frame is lost.
 Part<Error> receive(Dialog& dialog, ProcedureState& found) {
   do {
     const Error error = co_await ask_frame(dialog, found, {});
@@ -116,8 +113,7 @@ Part<Error> receive(Dialog& dialog, ProcedureState& found) {
   co_return Error::none;
 }
 
-// Ends an attempt of a register access that got no valid answer. `again` stays false for a write that the encoder may
-// have executed.
+// Ends an attempt without a valid answer; a write that may have been executed is not repeated.
 AccessOutcome lost(ProcedureState& found, Error error, std::string_view detail = {}) {
   if (found.ended.value_or(Error::none) != Error::none) {
     detail = *found.ended == Error::cross_check_failed ? channels_disagree : channel2_damaged;
@@ -161,15 +157,14 @@ Part<AccessOutcome> try_to_execute(Dialog& dialog, ProcedureState& found) {
   co_return found.end(AccessOutcome::good, done);
 }
 
-// Executes the present register access in up to five attempts. Reads an unknown identity first, because registers of an
-// AksIM-4 must not be accessed.
+// Reads the identity first, because registers of an AksIM-4 must not be accessed.
 Part<AccessOutcome> execute(Dialog& dialog, ProcedureState& found) {
   if (!dialog.format().has_ch2) co_await dialog.stop({Error::unsupported, no_channel2});
   if (found.protocol_version == 0) co_await identify(dialog, found, false);
   if (found.protocol_version == version::aksim4) co_await dialog.stop({Error::unsupported, not_described});
   for (unsigned left = access_attempts - 1;; --left) {
     const AccessOutcome access_outcome = co_await try_to_execute(dialog, found);
-    // The encoder may send more bytes of the answer, so the channels must be reset before the next access.
+    // The encoder may send more bytes of the answer, so the channels must be reset.
     if (access_outcome != AccessOutcome::good) found.in_step = false;
     if (is_lost(dialog, found)) co_return found.end(AccessOutcome::gone, stopped(found, found.why.error));
     if (!found.again || left == 0) co_return access_outcome;
@@ -202,14 +197,13 @@ Part<bool> read(Dialog& dialog, ProcedureState& found, RegisterIndex index) {
   return read(dialog, found, registers[index].address, registers[index].size);
 }
 
-// Records that the encoder rejected a write, unless an earlier write of the procedure has changed the encoder.
+// Records that the encoder rejected a write, unless an earlier write has changed it.
 void note_refusal(Dialog& dialog, const ProcedureState& found, AccessOutcome access_outcome) {
   if (access_outcome == AccessOutcome::refused && found.why.error == Error::request_rejected && !found.changed)
     dialog.refused();
 }
 
-// Writes a register and reads it back, even if the answer to the write is lost. A write that the encoder may have
-// executed is repeated only if reading back shows another value.
+// A write that may have been executed is repeated only if reading back shows another value.
 Part<bool> write(Dialog& dialog, ProcedureState& found, std::uint32_t address, std::uint16_t size,
                  std::uint64_t value) {
   constexpr std::string_view in_the_middle =
@@ -257,7 +251,7 @@ bool is_near(const Dialog& dialog, std::uint32_t singleturn,
   return author::is_near(dialog.last().singleturn, singleturn, dialog.format().resolution, millidegrees);
 }
 
-// Stops the procedure if the zero must not be set now. A frame and a cycle of channel 2 must have been read before.
+// Stops the procedure if the zero must not be set now.
 Part<bool> may_set_zero(Dialog& dialog, ProcedureState& found) {
   const Reading first = to_reading(dialog.format(), dialog.last(), found.status);
   const Time first_at = dialog.received_at();
@@ -396,7 +390,7 @@ Procedure preset_multiturn(Dialog& dialog, ProcedureState& found, Arguments argu
   co_return done;
 }
 
-// The self-calibration has ended when its counter has changed, or when it reports a failure that was not set before it.
+// It has ended when its counter changes or a new failure is reported.
 Procedure self_calibrate(Dialog& dialog, ProcedureState& found) {
   co_await read(dialog, found, calibration_status);
   const std::uint8_t before = found.data[0];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Procedures of EncoLink and their state. Positions continue during register accesses, and a procedure can emit them.
+// Procedures of EncoLink; positions continue during register accesses.
 #pragma once
 
 #include <cstdint>
@@ -19,12 +19,11 @@ using Dialog = author::DialogOf<Frames>;
 enum class AccessOutcome : std::uint8_t {
   good,     ///< The encoder executed the access.
   refused,  ///< The encoder refused the access, or was busy with it for longer than `busy_limit`.
-  lost,     ///< Frames arrive, but no valid answer; `was_sent` tells whether the encoder may have executed the access.
+  lost,     ///< Frames arrive, but no valid answer; the access may have been executed.
   gone,     ///< No valid frames arrive; `was_sent` tells whether the encoder may have executed the access.
 };
 
-/// State of a procedure together with its results. If it has neither `identity` nor `address`, the position is
-/// reported.
+/// State of a procedure together with its results.
 struct ProcedureState : Channels {
   /// Value of a register of the table.
   struct Value {
@@ -72,13 +71,10 @@ struct ProcedureState : Channels {
   }
 };
 
-/// Reads `size` bytes at `address` by a register access, in up to five attempts. Returns how the last attempt ended.
-/// Stops the procedure without channel 2, for an AksIM-4, and if the identity cannot be read or contradicts the
-/// options.
+/// Reads `size` bytes at `address`, in up to five attempts. Returns how the last one ended.
 author::Part<AccessOutcome> attempt_read(Dialog& dialog, ProcedureState& found, std::uint32_t address,
                                          std::uint16_t size);
-/// Writes `value` as `size` bytes to `address` like `attempt_read`, but repeats no write that the encoder may have
-/// executed.
+/// Writes `value` as `size` bytes to `address`; repeats no write that may have been executed.
 author::Part<AccessOutcome> attempt_write(Dialog& dialog, ProcedureState& found, std::uint32_t address,
                                           std::uint16_t size, std::uint64_t value);
 
@@ -86,45 +82,29 @@ author::Part<AccessOutcome> attempt_write(Dialog& dialog, ProcedureState& found,
 author::Procedure read_alarms(Dialog& dialog, ProcedureState& found);
 /// Reads the identity of the encoder.
 author::Procedure read_identity(Dialog& dialog, ProcedureState& found);
-/// Reads the identity and every register that has `in_info`. Leaves out registers that the encoder rejects. Reads no
-/// register from an AksIM-4 or without channel 2.
+/// Reads the identity and every register that has `in_info`, as far as the encoder permits.
 author::Procedure read_info(Dialog& dialog, ProcedureState& found);
 
-/// Reads register `index` of the table. Errors of this and the following procedures: request_rejected (the detail
-/// explains the encoder's status), busy, timeout, cross_check_failed (channels 1 and 2 have different positions),
-/// unexpected_reply (an invalid byte of channel 3, or an identity that contradicts the options), unsupported (no
-/// channel 2, or the registers of an AksIM-4), or the error of a frame.
+/// Reads register `index` of the table.
 author::Procedure read_register(Dialog& dialog, ProcedureState& found, std::size_t index);
-/// Reads a register. Arguments: address, length (0: from the table). Error besides those of `read_register`:
-/// invalid_argument (the length is unknown).
+/// Reads a register. Arguments: address, length (0: from the table).
 author::Procedure read_memory(Dialog& dialog, ProcedureState& found, Arguments arguments);
 
-/// Writes register `index` of the table. Errors: those of `read_register`, invalid_argument (the value does not fit),
-/// and cross_check_failed (reading the register back gave another value).
+/// Writes register `index` of the table, and reads it back.
 author::Procedure write_register(Dialog& dialog, ProcedureState& found, std::size_t index, Arguments arguments);
-/// Writes a register. Arguments: address, value, size (0: from the table). Error besides those of `write_register`:
-/// invalid_argument (the size is unknown or above 8, the value does not fit, or the address is that of the command
-/// register).
+/// Writes a register, and reads it back. Arguments: address, value, size (0: from the table).
 author::Procedure write_memory(Dialog& dialog, ProcedureState& found, Arguments arguments);
-/// Writes `command` to the command register. Only the status in the encoder's answer shows that the encoder executed
-/// the command, so a write that it may have executed is not repeated.
+/// Writes `command` to the command register; a write that may have been executed is not repeated.
 author::Procedure send_command(Dialog& dialog, ProcedureState& found, std::uint8_t command);
 
-/// Makes the present position the zero of the turn, by the position offset. Argument: 1 to save the offset. Errors
-/// besides those of `write_register`: invalid_argument (the position is invalid), not_still (the shaft turns),
-/// cross_check_failed (the position is not zero afterwards; the old offset is restored).
+/// Makes the present position the zero of the turn. Argument: 1 to save the position offset.
 author::Procedure zero(Dialog& dialog, ProcedureState& found, Arguments arguments);
-/// Sets the turn counter. Arguments: turns, 1 to save them. Errors besides those of `write_register`: unsupported (the
-/// encoder has no turn counter), invalid_argument (the turn counter has too few bits), cross_check_failed (the turns
-/// are not those of the argument afterwards).
+/// Sets the turn counter. Arguments: turns, 1 to save them.
 author::Procedure preset_multiturn(Dialog& dialog, ProcedureState& found, Arguments arguments);
-/// Starts the self-calibration and polls its status while the user turns the shaft; emits each status that is not the
-/// result. Errors besides those of `read_register`: cross_check_failed (the self-calibration failed; the detail states
-/// why), timeout (the self-calibration does not end).
+/// Starts the self-calibration, and emits its status while the user turns the shaft.
 author::Procedure self_calibrate(Dialog& dialog, ProcedureState& found);
 
-/// Returns the number of bytes of the register at `address`: `wanted`; if that is 0, the size in the table; if the
-/// table lacks the register, 0.
+/// Returns `wanted`; if that is 0, the size of the register in the table, 0 if it has none.
 [[nodiscard]] std::uint16_t register_size(std::uint32_t address, std::int64_t wanted);
 
 }  // namespace absenc::encolink

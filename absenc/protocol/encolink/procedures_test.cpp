@@ -30,7 +30,7 @@ TEST_P(EncolinkProcedure, ZeroSurvivesPowerOffWhenSaved) {
   EXPECT_EQ(bench.device.memory_version(), 1u);
   bench.restart(PowerOn::skip);
   EXPECT_EQ(bench.run("position").reading->singleturn, 0x10000u);
-  // The command `reset` sets the offset to 0, but does not store it, so the stored offset returns at power on.
+  // `reset` does not store the offset 0, so the stored offset returns at power on.
   ASSERT_EQ(bench.run("reset").error, Error::none);
   EXPECT_EQ(bench.run("position").reading->singleturn, 0x22345u);
   bench.restart(PowerOn::skip);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Channel 3 of EncoLink: the table of AksIM-2 registers, and the bytes of a register access, of which each request
-// carries one.
+// Channel 3 of EncoLink: the registers of an AksIM-2, and the bytes of a register access.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +16,7 @@
 
 namespace absenc::encolink {
 
-/// Values of the channel 3 byte of a cycle: the state of the encoder, or the first byte of its answer.
+/// Values of the channel 3 byte that show the state of the encoder.
 namespace channel3 {
 inline constexpr std::uint8_t idle = 0x33;  ///< The encoder executes no register access.
 inline constexpr std::uint8_t busy = 0x66;  ///< The encoder is executing a register access.
@@ -40,7 +39,7 @@ enum class AccessStatus : std::uint8_t {
   write_checksum = 0xF9,
 };
 
-/// Returns whether the status means that the encoder received a damaged request, so that a repetition helps.
+/// Returns whether the encoder received a damaged request, so that a repetition may help.
 [[nodiscard]] constexpr bool is_damaged(AccessStatus status) {
   return status == AccessStatus::read_checksum || status == AccessStatus::read_checksum_too ||
          status == AccessStatus::write_checksum;
@@ -105,8 +104,7 @@ enum RegisterIndex : std::size_t {
   serial_number_extended,
 };
 
-/// Table of the registers. Addresses and sizes are from rls-encolink 1.0.1, product_aksim2_map.h. Some registers
-/// overlap; each is accessed as a whole. The vendor does not state which registers can be written: README.md lists the
+/// Table of the registers. Addresses and sizes are from rls-encolink 1.0.1, product_aksim2_map.h. README.md lists the
 /// assumptions.
 inline constexpr auto registers = [] {
   using enum Access;
@@ -178,7 +176,7 @@ struct RegisterRequest {
   ByteBuffer<access_capacity> data{};     ///< Bytes to write, `length` in number; empty for a read.
 };
 
-/// First bytes of every register access, in their order; the encoder recognises an access by them.
+/// First bytes of every register access, by which the encoder recognises it.
 inline constexpr std::array<std::uint8_t, 5> access_keys{0x00, 0xCD, 0xEF, 0x89, 0xAB};
 /// Number of bytes before the data: keys, operation, length and address.
 inline constexpr std::size_t access_header = access_keys.size() + 1 + 2 + 4;
@@ -212,16 +210,14 @@ using AccessBytes = ByteBuffer<access_header + access_capacity + 1>;
   return bytes;
 }
 
-/// Returns whether `request` has bytes other than zero after its first two, as the `ra` bytes of a register access
-/// have. On SPI, zeros are clocked after a request of two bytes.
+/// Returns whether `request` has more than two bytes, apart from the zeros that SPI clocks.
 [[nodiscard]] constexpr bool is_access(Bytes request) {
   if (request.size() <= request_bytes) return false;
   const Bytes behind = request.subspan(request_bytes);
   return std::any_of(behind.begin(), behind.end(), [](std::uint8_t byte) { return byte != 0; });
 }
 
-/// Decodes the `ra` bytes of a register access. Errors: bad_framing (wrong keys), unsupported (unknown operation),
-/// wrong_length, bad_checksum.
+/// Decodes the `ra` bytes of a register access. Errors: bad_framing, unsupported, wrong_length, bad_checksum.
 [[nodiscard]] constexpr Result<RegisterRequest> decode_access(Bytes bytes) {
   for (std::size_t i = 0; i < access_keys.size(); ++i) {
     if (i == bytes.size()) return Error::wrong_length;
@@ -241,9 +237,8 @@ using AccessBytes = ByteBuffer<access_header + access_capacity + 1>;
   return request;
 }
 
-/// Decodes the encoder's answer to a register access, one byte per cycle, beginning with `channel3::read_ready` or
-/// `write_ready`: the status, then the data of a register that was read, which is returned. Errors: wrong_length,
-/// unexpected_reply, request_rejected.
+/// Decodes the answer to a register access, and returns the data that was read. Errors: wrong_length, unexpected_reply,
+/// request_rejected.
 [[nodiscard]] constexpr Result<Bytes> decode_answer(const RegisterRequest& request, Bytes answer) {
   if (answer.size() < 2) return Error::wrong_length;
   const bool reads = request.operation == RegisterRequest::Operation::read;

@@ -57,7 +57,7 @@ constexpr auto options = author::OptionsOf{
 
 // ---- Requests
 
-/// Content of a request: its first byte, or a register access whose bytes are sent one by one as `ra`.
+/// Content of a request: its first byte, or all `ra` bytes of a register access.
 struct Request {
   Config config = Config::position;
   std::optional<RegisterRequest> access{};
@@ -141,12 +141,10 @@ constexpr std::size_t reply_size(const Format& format, Bytes begin) {
   return 0;
 }
 
-// Returns whether the checks cover `bit` of a reply. The channel 2 byte is outside the checksum of a position frame,
-// and a byte that follows an identity is outside the checksum of the identity.
+// Outside the checksum are the channel 2 byte, and a byte that follows an identity.
 bool is_checked(const Options& values, Frame request, Frame reply, std::size_t bit) {
   const Format format = assumed(options.format(values), reply.bytes);
-  // The checksums are in the cycles that carried the answer to a register access, so only the first two bytes of the
-  // answer (ready, status) are checked here.
+  // The checksums of an access are in its cycles: only its ready and status are checked here.
   if (is_access(request.bytes)) return bit / 8 < 2;
   if (reply.bytes.size() == padded_identity_bytes) return bit / 8 < identity_bytes;
   return !format.has_ch2 || reply.bytes.size() != format.frame_bytes() || bit / 8 != format.frame_bytes() - 1;
@@ -200,7 +198,7 @@ Explanation explain_host(const Host& host) {
       return {};
   }
 }
-/// Returns the cause of an error of a captured frame, or of a register access with all its bytes; empty if unknown.
+/// Returns the cause of an error of a captured frame or register access; empty if unknown.
 constexpr Explanation explain(const Format&, Error error, Bytes request, Bytes reply) {
   if (is_access(request)) {
     if (error != Error::request_rejected || reply.size() < 2) return {};
@@ -313,7 +311,7 @@ constexpr auto commands_of_unit = std::array{
 constexpr std::size_t option_resolution = options.find("resolution");
 constexpr std::size_t option_multiturn_bits = options.find("multiturn_bits");
 
-// Evidence for the format of captured frames: the identity, or without one the length of most frames.
+// Evidence for the format: the identity, or the lengths of position frames.
 struct FormatEvidence {
   std::optional<Identity> identity{};
   std::size_t identity_at = 0;         // index of the capture with the identity
@@ -342,8 +340,7 @@ FormatEvidence collect_evidence(const Format& format, std::span<const Capture> c
   return evidence;
 }
 
-// Takes the resolution from an identity. Takes whether there are turns from the identity or, without one, from the
-// length of most position frames: in one of 250 frames with turns, a shorter part has a valid checksum too.
+// A shorter part of a frame with turns may have a valid checksum too.
 bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sink) {
   const FormatEvidence evidence = collect_evidence(options.format(values), captures);
   constexpr std::string_view open = "these frames do not tell";
@@ -392,7 +389,7 @@ constexpr Format format_of(const Options& values) {
   made.interface = interface;
   return made;
 }
-// Returns the numbers of bits of position and turns; unknown members get the values of the virtual encoder.
+// Unknown members get the values of the virtual encoder.
 constexpr Resolution resolution_of(const Format& format) {
   return {format.resolution != 0 ? format.resolution : virtual_format.resolution,
           static_cast<unsigned>(format.multiturn_bits >= 0 ? format.multiturn_bits : virtual_format.multiturn_bits)};

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// EncoLink test frames with their source. The unit decodes each frame at compile time: a wrong vector is a compile
-// error.
+// EncoLink test frames with their source, checked at compile time.
 #pragma once
 
 #include <array>
@@ -76,7 +75,7 @@ inline constexpr std::array uart{
                "bad_checksum"},
 };
 
-// SPI carries the same frames as the UART, so three vectors are enough: positions with and without turns, and a cycle.
+// SPI carries the same frames as the UART, so three vectors are enough.
 inline constexpr std::array spi{
     VectorText{"encolink-spi-001", "ST res 19 pos 275096", derived, "resolution=19 multiturn_bits=0", ask, "8653036200",
                "singleturn=275096 error=0 warning=0 channel2=0"},

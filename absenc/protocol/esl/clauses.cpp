@@ -11,8 +11,7 @@ namespace {
 // ---- Requests that no host sends
 
 namespace request {
-// Writes a command frame with this control field into `request`, with its CRC if requests have one. Returns its length,
-// or buffer_too_small.
+// Writes a command frame with this control field, and returns its length.
 inline Result<std::size_t> seal(const Profile& profile, std::uint8_t field, MutableBytes request) {
   const std::size_t size = request_length(profile, DataId::position);
   if (request.size() < size) return Error::buffer_too_small;
@@ -26,7 +25,7 @@ inline Result<std::size_t> wrong_parity(const Options& values, MutableBytes requ
   const std::uint8_t good = control_field(profile, profile.address, DataId::position);
   return seal(profile, static_cast<std::uint8_t>(good ^ 0x80U), request);
 }
-// Writes a request with ID 3, which Table 3 does not list, and with the right parity; returns its length.
+// Table 3 does not list ID 3.
 inline Result<std::size_t> unknown_id(const Options& values, MutableBytes request) {
   const Profile profile = options.format(values);
   return seal(profile, control_field(profile, profile.address, DataId{3}), request);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual QS35 encoder (ESL) with two channels. It records the rules that its host breaks. Several such encoders can
-// share a line.
+// A virtual QS35 encoder (ESL) with two channels, which records the rules that its host breaks.
 #pragma once
 
 #include <array>
@@ -12,8 +11,7 @@
 
 namespace absenc::esl {
 
-/// Indexes of `conditions`: the virtual encoder's environment, and faults inside it. The CRCs of a faulty channel stay
-/// right.
+/// Indexes of `conditions`; the CRCs of a faulty channel stay right.
 namespace condition {
 /// Index of a condition in `conditions`.
 enum Index : std::size_t {
@@ -23,7 +21,7 @@ enum Index : std::size_t {
   lissajous,
   id_d_clears_singleturn,
   redundant_offset,
-  ch1_stuck,  ///< first of the conditions of one channel; for each, the index of channel 2 follows that of channel 1
+  ch1_stuck,  ///< first condition of a single channel; channel 2 follows channel 1
   ch2_stuck,
   ch1_sequence,
   ch2_sequence,
@@ -101,7 +99,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     latches_ |= static_cast<std::uint8_t>(bits & ~unsigned{alarms::voltage});
     forced_ |= static_cast<std::uint8_t>(bits & alarms::voltage);
   }
-  /// Ends the alarms `bits` that were raised or latched. Alarms that a condition causes stay while it lasts.
+  /// Ends raised or latched alarms; those that a condition causes stay while it lasts.
   void lower_alarms(std::uint32_t bits) override {
     latches_ &= static_cast<std::uint8_t>(~bits);
     forced_ &= static_cast<std::uint8_t>(~bits);
@@ -120,8 +118,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     reply.temperature = static_cast<std::int8_t>(value_of(condition::temperature));
     return reply;
   }
-  /// Switches the encoder on at `now`. It answers at once; with PowerOn::real SF reports `ready` only after the
-  /// start-up time.
+  /// Switches the encoder on; with PowerOn::real, SF reports `ready` only after the start-up time.
   void power_on(Time now, PowerOn kind) override {
     ready_at_ = kind == PowerOn::real ? now + start_up : now;
     Responder::power_on(now, kind);
@@ -130,10 +127,10 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
  private:
   // Speed in 1/1000 rpm above which the alarm overspeed is raised (Table 8).
   static constexpr std::int32_t overspeed_above = 10'000'000;
-  // Supply voltage in mV below which the alarm under_voltage is raised; typical value of the document.
+  // Supply voltage in mV below which the alarm under_voltage is raised.
   static constexpr std::int32_t under_voltage_below = 2900;
   static constexpr std::int32_t over_voltage_above = 3700;
-  // Greatest speed in 1/1000 rpm at which the shaft counts as at rest, because a servo at rest trembles.
+  // Greatest speed in 1/1000 rpm at which the shaft counts as at rest.
   static constexpr std::int32_t standing_still = 1'000;
   // Temperature in degC above which SF warns; assumed, because the document states no limit.
   static constexpr std::int32_t warning_above = 105;
@@ -143,8 +140,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   static constexpr std::int32_t magnitude(std::int32_t value) { return value < 0 ? -value : value; }
   static constexpr std::uint32_t counts_of(std::int64_t position) { return static_cast<std::uint32_t>(position) >> 8; }
 
-  // Offsets in `memory_`, after the bytes of EEPROM and MTP: the zeros of both channels (4 bytes each, little endian),
-  // and the turns that are subtracted from those of the shaft (8 bytes).
+  // Offsets in `memory_` of the zeros of both channels (4 bytes each) and of the turns (8 bytes).
   static constexpr std::size_t zero_at = stored_bytes;
   static constexpr std::size_t turns_at = zero_at + 8;
 
@@ -155,7 +151,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   [[nodiscard]] bool has_wrong_checksum(Bytes request) const {
     return request.size() > 1 && !has_checksum8(profile_, request);
   }
-  // Returns whether the last bytes of `heard`, after its first byte, are a complete request for this encoder.
+  // Returns whether `heard` ends with a complete request for this encoder, after its first byte.
   [[nodiscard]] bool contains_own_request(Bytes heard) const {
     for (std::size_t begin = 1; begin < heard.size(); ++begin) {
       const Bytes rest = heard.subspan(begin);
@@ -164,9 +160,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     }
     return false;
   }
-  // A wrong parity bit is ignored here, because the reply may report it. After a wrong CRC, and within the first bytes
-  // of a request for another address, the search for a request continues: "Else, it will continue to search for the
-  // next available logic of low state."
+  // A wrong parity bit is ignored here, because the reply may report it.
   [[nodiscard]] std::size_t request_size(Bytes begin) const override {
     const std::optional<DataId> id = data_id(begin[0]);
     if (!id) return 0;
@@ -207,14 +201,11 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   void refuse(Time at, ByteBuffer<64>& reply) override {
     report_bad_request(refused_field_, status::stop_error, at, reply);
   }
-  // Returns whether the encoder replies to a request with a wrong parity or stop bit, as `bad_request` chooses: Table 5
-  // demands a report in SF, the overview demands silence. A memory request gets no such reply, because memory replies
-  // have no SF.
+  // Table 5 demands a report in SF, the overview demands silence; memory replies have no SF.
   [[nodiscard]] bool is_reported(std::uint8_t field) const {
     return profile_.bad_request == BadRequest::report && !is_memory_access(*data_id(field));
   }
-  // Makes the reply that reports a wrong request in SF, and echoes its CF as received. Returns Answer::for_others if
-  // the encoder sends no such reply.
+  // Makes the reply that reports a wrong request in SF, with its CF as received.
   Answer report_bad_request(std::uint8_t field, std::uint8_t status_bit, Time at, ByteBuffer<64>& reply) {
     if (!is_reported(field)) return Answer::for_others;
     const DataId id = *data_id(field);
@@ -228,7 +219,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     resets_.forget();
     encoder_ids_ = 0;
   }
-  // Counts a request for the rules and the sequence counters. Returns whether it completes a reset at standstill.
+  // Counts a request, and returns whether it completes a reset at standstill.
   bool count(DataId id, Time at) {
     encoder_ids_ = id == DataId::encoder_id ? encoder_ids_ + 1 : 0;
     if (id == DataId::encoder_id) {
@@ -245,8 +236,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   bool stands(Time at) {
     return expect(magnitude(shaft_->at(at).speed_millirpm) <= standing_still, "reset while the shaft turns", at);
   }
-  // Executes a memory request and returns the reply. Returns nothing with several encoders on the line, and for a
-  // request for which `exists` is false, because the document defines no answer to it.
+  // Executes a memory request and returns the reply, if the document defines one.
   std::optional<Reply> access_memory(const Request& request, Time at) {
     if (!expect(profile_.bus != sharing_yes, "memory access with several encoders on the line", at))
       return std::nullopt;
@@ -291,13 +281,13 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     const std::size_t at = channel == Channel::one ? zero_at : zero_at + 4;
     return static_cast<std::uint32_t>(load_little_endian(Bytes(memory_).subspan(at, 4)));
   }
-  // Returns the position within the turn that a channel measures; each channel has a zero of its own.
+  // Each channel has a zero of its own.
   [[nodiscard]] std::uint32_t singleturn(Channel channel, Time now) const {
     const std::int32_t stuck = value_of(condition::ch1_stuck, channel);
     const std::uint32_t seen = counts_of(shaft_->at(now).position) - zero(channel);
     return (stuck >= 0 ? static_cast<std::uint32_t>(stuck) : seen) & 0xFFFFFF;
   }
-  // Returns the turns of the shaft since the zero of channel 1, so that they change where the position wraps.
+  // Counts from the zero of channel 1, so that turns change where the position wraps.
   [[nodiscard]] std::uint64_t shaft_turns(Time now) const {
     return static_cast<std::uint64_t>((shaft_->at(now).position - (std::int64_t{zero(Channel::one)} << 8)) >> 32);
   }
@@ -353,7 +343,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     turns_cleared_ = false;
     forget_rows();
   }
-  // Returns the value of a condition. For channel 2 `index` is that of channel 1's condition, which precedes it.
+  // `index` is that of channel 1's condition; that of channel 2 follows it.
   [[nodiscard]] std::int32_t value_of(std::size_t index, Channel channel = Channel::one) const {
     return condition_[index + (channel == Channel::two ? 1 : 0)];
   }

@@ -38,8 +38,7 @@ TEST(EslDevice, AnswersTwoMicrosecondsAfterTheRequest) {
   EXPECT_EQ(host.reply.size(), 18u);
 }
 
-// The sequence counters count IDs 1 and 2, but not IDs 9 and A, unless the profile states that every request is
-// counted.
+// IDs 9 and A are counted only if the profile states that every request is counted.
 TEST(EslDevice, SequenceCounters) {
   Bench bench;
   EXPECT_EQ(bench.read(DataId::position).one.sequence, 1);
@@ -68,8 +67,7 @@ TEST(EslDevice, AnswersOnlyItsOwnValidRequests) {
   EXPECT_EQ(bench.encoder.answer_count(), 1u);
 }
 
-// After bytes that are no request the encoder searches for the next start bit: "Else, it will continue to search for
-// the next available logic of low state."
+// "Else, it will continue to search for the next available logic of low state."
 TEST(EslDevice, FindsRequestAfterOtherBytes) {
   for (const Wire& before : {wire(hex<"AB7B">), wire(hex<"AB">), wire(hex<"FF">), wire(hex<"FF10">), wire(hex<"18">),
                              wire(hex<"0874">), wire(hex<"08">), wire(hex<"ABFF">), wire(hex<"70">)}) {
@@ -128,7 +126,7 @@ struct Alone {
 };
 constexpr auto waits = Step<std::uint8_t>::Kind::wait;
 
-// The second of three received characters is damaged: the answer follows the end of the frame set.
+// The answer follows the end of the frame set, whose second character is damaged.
 TEST(EslDevice, ReportsWrongStopBitAfterTheRequest) {
   Alone alone;
   alone.feed(Alone::LinkEvent::received, 1us, {control_field({}, 0, DataId::position)});
@@ -348,7 +346,7 @@ TEST(EslDevice, AlarmsAreClearedAsInTable8) {
   }
 }
 
-// Table 8: "perform MT counter reset and all error clear". A counter reset before the error occurred does not help.
+// Table 8: "perform MT counter reset and all error clear".
 TEST(EslDevice, ClearsMultiturnErrorOnlyAfterItsTurnReset) {
   Bench bench;
   reset(bench, DataId::reset_multiturn);
@@ -440,7 +438,7 @@ TEST(EslDevice, FaultsStayInTheirChannel) {
   EXPECT_EQ(reply.redundant, 0u);
 }
 
-// A damaged request is answered only if it is for this encoder; one without any valid character never is.
+// A damaged request is answered only if its valid begin is for this encoder.
 TEST(EslDevice, IgnoresDamagedRequestForAnotherEncoder) {
   using Kind = Event<std::uint8_t>::Kind;
   for (const auto& [begun, is_answered] :

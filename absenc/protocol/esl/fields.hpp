@@ -47,7 +47,7 @@ inline constexpr std::array<FlagInfo, 8> alarm_flags{{
      "check that no more than 5 V are at the connector; it clears with the voltage, or the encoder is damaged"},
 }};
 
-/// Values of the fields of a frame, or of a procedure's result. A member without a value is not reported.
+/// Values of the fields of a frame, or of a procedure's result.
 struct Shown {
   constexpr Shown() = default;
   /// Constructs the values of a request.
@@ -87,14 +87,13 @@ struct Shown {
   std::optional<bool> led_error{};                 ///< Whether the LED current is out of range.
   std::optional<bool> lissajous_error{};           ///< Whether the signals of the disc are out of range.
   std::optional<std::uint32_t> safe_singleturn{};  ///< Safe position within the turn, in counts.
-  /// Page that a procedure leaves selected: the page from before is unknown, or was not seen to be selected again.
+  /// Page that a procedure leaves selected, if it may not be the page from before.
   std::optional<std::uint8_t> page_left{};
   bool has_turns = true;  ///< false: the turns (ABM) of the reply are not shown
 };
 
 namespace detail {
-// Returns the member of the reply that `part` carries in this channel; nothing without a reply, or if this channel of
-// the reply does not have the part.
+// Returns the member of the reply that `part` carries in this channel, if it does.
 template <Channel channel, unsigned part, auto member>
 constexpr auto in(const Shown& all) {
   const Reply reply = all.reply.value_or(Reply{});
@@ -109,7 +108,7 @@ constexpr auto in(const Shown& all) {
 constexpr std::optional<std::uint16_t> turns_in(const Shown& all) {
   return all.has_turns ? in<Channel::one, part::multiturn, &Reply::multiturn>(all) : std::nullopt;
 }
-// Returns ENID, shifted right by `shift` and masked with `mask`. ENID is the same in both channels.
+// Returns some bits of ENID, which is the same in both channels.
 template <unsigned shift, unsigned mask>
 constexpr std::optional<unsigned> of_encoder_id(const Shown& all) {
   const auto id = in<Channel::one, part::encoder_id, &ChannelReply::encoder_id>(all);
@@ -167,13 +166,12 @@ inline constexpr auto fields = [] {
 }();
 
 namespace detail {
-// Returns the bits of a reply that carry `field` in one part of a channel; none if this part does not. `here`: index of
-// the part's first byte.
+// Returns the bits of a reply that carry `field` in one part, whose first byte is `here`.
 template <Channel channel, unsigned id>
 constexpr BitRanges place_in_part(const Profile& profile, std::size_t here, const FieldInfo& field) {
   using author::bits_of;
   const auto is = [&field](const FieldInfo* one) { return one == &field; };
-  // Returns the bits of the redundant position RS: its lowest bit is in the second byte, the others are in the first.
+  // The lowest bit of RS is in the second byte, the others are in the first.
   const auto redundant = [here](RedundantBit low) {
     BitRanges ranges = bits_of(here + 1, low == RedundantBit::b7 ? 7 : 0, 1);
     ranges.push_back({8 * here, 8});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames of the QS35's ESL protocol (RS-485, 10 Mbps, 8N1, LSB first): their parts and how they are encoded. reply.hpp
-// decodes them. Table numbers are those of the ESL Protocol Specification, rev 1.5; README.md draws the frames.
+// Frames of the QS35's ESL protocol, which README.md draws. Table numbers are those of the ESL Protocol Specification,
+// rev 1.5.
 #pragma once
 
 #include <array>
@@ -17,14 +17,13 @@
 
 namespace absenc::esl {
 
-/// Bits of SF, the status field of a channel, in the order of the document (Table 5). The option `status_order` gives
-/// their order on the wire.
+/// Bits of SF, the status field of a channel, in the order of the document (Table 5).
 namespace status {
 /// Status bit: the request was received with a wrong parity bit and not executed.
 inline constexpr std::uint8_t parity_error = 0x01;
 /// Status bit: the request was received with a wrong stop bit and not executed.
 inline constexpr std::uint8_t stop_error = 0x02;
-/// Status bit: an error of single-turn position, memory, voltage or LED: the position is not safe.
+/// Status bit: an error of single-turn position, memory, voltage or LED.
 inline constexpr std::uint8_t safety_error = 0x04;
 inline constexpr std::uint8_t non_safety_error = 0x08;  ///< status bit: an error of turns, Lissajous signals or speed
 inline constexpr std::uint8_t temperature_warning = 0x10;  ///< status bit: the encoder is too warm
@@ -64,7 +63,7 @@ using RequestBytes = ByteBuffer<request_capacity>;
 /// Bytes of a reply.
 using ReplyBytes = ByteBuffer<reply_capacity>;
 
-// ---- Checksums. The document prints the polynomials in Koopman notation: 16'hAC9A is normal 5935, 8'h97 is 2F.
+// ---- Checksums. The document has Koopman notation: 16'hAC9A is normal 5935, 8'h97 is 2F.
 
 /// One of the two channels of the encoder, which measure the position independently.
 enum class Channel : std::uint8_t { one, two };
@@ -82,8 +81,7 @@ inline constexpr CrcParameters crc8_msb{8, 0x2F, 0, false, false, 0};
 [[nodiscard]] constexpr std::uint16_t initial_value(Channel channel) { return channel == Channel::two ? 0xFFFF : 0; }
 
 namespace detail {
-// Returns the 16-bit CRC of `bytes`, taken as 16-bit words; one 00 byte is appended to an odd number of bytes.
-// `swapped`: the second byte of each word enters the CRC first.
+// Returns the 16-bit CRC of 16-bit words; `swapped`: the second byte of each enters it first.
 template <CrcParameters parameters>
 constexpr std::uint16_t crc_of_pairs(Channel channel, Bytes bytes, bool swapped) {
   Crc<parameters, CrcTable::nibble> crc(initial_value(channel));
@@ -116,15 +114,14 @@ constexpr std::uint16_t crc_of_pairs(Channel channel, Bytes bytes, bool swapped)
 
 // ---- Tables 3 and 12 as data: the command ids, and the parts of each channel of their replies
 
-/// Data ID: code of a request's kind, with the values of Table 3; ID 6 is in Tables 6 and 12 only.
+/// Data ID: code of a request's kind (Table 3; ID 6 is in Tables 6 and 12 only).
 enum class DataId : std::uint8_t {
   position = 1,          ///< Position and turns, with both channels; the reply can make a safe position.
   singleturn = 2,        ///< Position within the turn, with both channels; the reply can make a safe position.
   position_short = 4,    ///< Position and turns of channel 1 alone; the reply cannot make a safe position.
   singleturn_short = 5,  ///< Position within the turn of channel 1 alone; the reply cannot make a safe position.
   calibration = 6,       ///< Position within the turn of each channel; the reply cannot make a safe position.
-  /// Data ID that must never be sent eight times in a row: that is "dynamic addressing", which the document does not
-  /// describe.
+  /// Never to be sent eight times in a row: that is "dynamic addressing", which is not described.
   encoder_id = 8,
   temperature = 9,
   alarms = 0xA,
@@ -135,7 +132,7 @@ enum class DataId : std::uint8_t {
   write_memory = 0xF,
 };
 
-/// The values that a channel of a reply can carry between CF and CRC, one bit each, so that they form sets.
+/// Parts that a channel of a reply can carry between CF and CRC, one bit each.
 namespace part {
 inline constexpr unsigned status = 0x0001;       ///< Part: status (SF).
 inline constexpr unsigned alarms = 0x0002;       ///< Part: alarms (ALM).
@@ -146,7 +143,7 @@ inline constexpr unsigned temperature = 0x0020;  ///< Part: temperature (TEMP).
 inline constexpr unsigned sequence = 0x0040;     ///< Part: sequence counter of channel 1 (SC1).
 /// Part: sequence counter of channel 2 in a byte of its own, 0 and SC2.
 inline constexpr unsigned zero_sequence = 0x0080;
-/// Part: redundant position and sequence counter of channel 2 in two bytes, RS0, then RS1 with SC2.
+/// Part: redundant position and sequence counter of channel 2 in two bytes.
 inline constexpr unsigned redundant_sequence = 0x0100;
 /// Part: redundant position in two bytes, RS0 and RS1, in replies to ID C.
 inline constexpr unsigned redundant_alone = 0x0200;
@@ -187,8 +184,8 @@ using WireOrder =
                  WirePart<part::memory_address, 1>, WirePart<part::value, 1>>;
 }  // namespace detail
 
-/// Calls `visit(part, byte)` for each part in the set `parts`, in the order of the wire. `part` is a WirePart, and
-/// `byte` the index of its first byte; `control_field`: index of CF. Returns the index after the last part.
+/// Calls `visit(part, byte)` for each part, in the order of the wire; `byte` is the index of its first byte. Returns
+/// the index after the last part.
 template <class Visit>
 constexpr std::size_t walk_parts(unsigned parts, std::size_t control_field, const Visit& visit) {
   return detail::WireOrder::walk(parts, control_field + 1, visit);
@@ -197,7 +194,7 @@ constexpr std::size_t walk_parts(unsigned parts, std::size_t control_field, cons
 /// Layout of the replies to one data ID: the parts and lengths of each channel.
 struct Layout {
   constexpr Layout() = default;
-  /// Constructs a layout from the length of each channel's CRC in bytes and the parts of each channel.
+  /// Constructs a layout from the CRC length in bytes and the parts of each channel.
   constexpr Layout(std::uint8_t crc, unsigned parts_one, unsigned parts_two = 0)
       : one(static_cast<std::uint16_t>(parts_one)),
         two(static_cast<std::uint16_t>(parts_two)),
@@ -248,7 +245,7 @@ inline constexpr std::array<Layout, 16> layouts = [] {
 /// Returns the layout of replies to this data ID.
 [[nodiscard]] constexpr const Layout& layout_of(DataId id) { return detail::layouts[static_cast<std::size_t>(id)]; }
 
-/// Returns the data ID in a control field, whatever its parity; nothing for an ID that the tables do not list.
+/// Returns the data ID in a control field, whatever its parity; nothing for an unlisted ID.
 [[nodiscard]] constexpr std::optional<DataId> data_id(std::uint8_t field) {
   const std::uint8_t id = (field >> 3) & 0xF;
   if (detail::layouts[id].length_one == 0) return std::nullopt;
@@ -259,7 +256,7 @@ inline constexpr std::array<Layout, 16> layouts = [] {
 [[nodiscard]] constexpr bool is_memory_access(DataId id) {
   return id == DataId::read_memory || id == DataId::write_memory;
 }
-/// Returns whether eight requests with this data ID reset something: the zero, alarms, or the turns.
+/// Returns whether eight requests with this data ID reset something.
 [[nodiscard]] constexpr bool is_reset(DataId id) {
   return id == DataId::zero || id == DataId::clear_alarms || id == DataId::reset_multiturn;
 }
@@ -267,12 +264,11 @@ inline constexpr std::array<Layout, 16> layouts = [] {
 [[nodiscard]] constexpr bool is_safety_position(DataId id) {
   return id == DataId::position || id == DataId::singleturn;
 }
-/// Returns the data ID whose reply has the position of both channels and, if the encoder counts turns, the turns.
+/// Returns the data ID of a position with both channels, and turns if the encoder counts them.
 [[nodiscard]] constexpr DataId position_id(const Profile& profile) {
   return profile.turns ? DataId::position : DataId::singleturn;
 }
-/// Returns whether replies to this data ID carry the sequence counter. With sequence_step=safety the counter counts
-/// exactly these replies.
+/// Returns whether replies to this data ID carry the sequence counter.
 [[nodiscard]] constexpr bool has_sequence(DataId id) { return layout_of(id).crc_bytes == 2; }
 
 /// Returns the length in bytes of replies to this data ID, with both channels.
@@ -286,15 +282,13 @@ inline constexpr std::array<Layout, 16> layouts = [] {
   return profile.request_crc ? 2 : 1;
 }
 
-/// Returns CF, the control field of a request: encoder address, data ID, and a parity bit that makes the number of ones
-/// odd among the bits that `parity_scope` covers and itself.
+/// Returns CF, the control field of a request: encoder address, data ID and odd parity.
 [[nodiscard]] constexpr std::uint8_t control_field(const Profile& profile, unsigned address, DataId data) {
   const auto id = static_cast<unsigned>(data);
   const unsigned covered = profile.parity_scope == ParityScope::all ? address << 4 | id : id;
   return static_cast<std::uint8_t>((address & 7) | id << 3 | (odd_parity(covered) ? 0 : 0x80));
 }
-/// Returns ENID, the encoder id of this profile: b7 a safety encoder, b6..5 number of bytes of the turns, b4..0 number
-/// of bits of the position within the turn.
+/// Returns ENID: b7 a safety encoder, b6..5 bytes of the turns, b4..0 bits of the position.
 [[nodiscard]] constexpr std::uint8_t encoder_id(const Profile& profile) {
   constexpr unsigned safety = 0x80;
   const unsigned turn_bytes = profile.turns ? multiturn_bits / 8 : 0;
@@ -319,8 +313,7 @@ struct ChannelReply {
   std::uint8_t encoder_id = 0;  ///< Encoder id (ENID).
 };
 
-/// A reply. In a decoded one, members that its data ID does not carry are 0, and `two.status` is status::channel_2 if
-/// there is no channel 2.
+/// A reply; in a decoded one, members that its data ID does not carry have their initial values.
 struct Reply {
   DataId id = DataId::position;                   ///< Data ID of the reply.
   std::uint8_t encoder_address = 0;               ///< Address of the encoder on the line (EAD), 0 to 7.
@@ -341,8 +334,7 @@ struct Reply {
 
 namespace detail {
 
-// Converts SF from the order of the document to that of the wire. In T-format order b0..3 are information (DD), b4..5
-// errors of the encoder (EA), and b6..7 communication errors (CA).
+// In T-format order b0..3 are information, b4..5 encoder errors, b6..7 communication errors.
 [[nodiscard]] constexpr std::uint8_t status_to_wire(const Profile& profile, std::uint8_t value) {
   if (profile.status_order == FieldOrder::document) return value;
   return static_cast<std::uint8_t>(value >> 4 | (value & 0x0C) << 2 | (value & 0x03) << 6);
@@ -352,8 +344,7 @@ namespace detail {
   return static_cast<std::uint8_t>(value << 4 | (value >> 2 & 0x0C) | value >> 6);
 }
 
-// Rotates a byte to the left by one bit if `at_b0`, so that its b7 is sent as b0. Such bytes are {busy, ADF}, {RS1,
-// SC2}, {0, SC2}, and RS1 alone.
+// Rotates a byte to the left by one bit if `at_b0`, so that its b7 is sent as b0.
 [[nodiscard]] constexpr std::uint8_t to_wire(bool at_b0, unsigned byte) {
   return std::rotl(static_cast<std::uint8_t>(byte), at_b0 ? 1 : 0);
 }
@@ -381,7 +372,7 @@ namespace detail {
 template <unsigned id>
 constexpr std::uint32_t part_to_wire(const Profile& profile, const Reply& reply, const ChannelReply& channel) {
   const unsigned counter = channel.sequence & 0x7Fu;
-  // Returns the two bytes of the redundant position RS: its upper bits, then its lowest bit RS1 with SC2.
+  // Returns the upper bits of RS, then its lowest bit RS1 with SC2.
   const auto redundant = [&reply](RedundantBit order, unsigned sequence) {
     const unsigned second = to_wire(order == RedundantBit::b0, (reply.redundant & 1u) << 7 | sequence);
     return reply.redundant >> 1 | second << 8;
@@ -435,8 +426,7 @@ constexpr void encode_channel(const Profile& profile, const Reply& reply, std::u
 
 }  // namespace detail
 
-/// Returns the bytes of a reply with the control field `field`, which echoes that of the request, even a wrong parity
-/// bit.
+/// Returns the bytes of a reply; `field` echoes the control field of the request.
 [[nodiscard]] constexpr ReplyBytes encode_reply(const Profile& profile, const Reply& reply, std::uint8_t field) {
   ReplyBytes bytes;
   detail::encode_channel(profile, reply, field, Channel::one, bytes);

@@ -24,8 +24,7 @@ constexpr std::array all_ids{DataId::position,         DataId::singleturn,      
 
 constexpr std::array<std::uint8_t, 9> check_input{'1', '2', '3', '4', '5', '6', '7', '8', '9'};
 
-// Returns one profile for each combination of the options that the document leaves open, except sequence_step, which
-// does not change frames.
+// Returns each combination of the open options but sequence_step, which changes no frame.
 std::vector<Profile> all_profiles() {
   std::vector<Profile> profiles{Profile{}};
   for (std::size_t option = 0; option < open_options; ++option) {
@@ -98,8 +97,7 @@ TEST(EslFrame, EveryFieldWithEitherParityScope) {
   }
 }
 
-// Bits of SF in both orders (Table 5). T-format order from b0 up: information (DD), errors of the encoder (EA),
-// communication errors (CA).
+// Bits of SF in both orders (Table 5).
 TEST(EslFrame, StatusBitsInBothOrders) {
   const Profile tformat{.status_order = FieldOrder::tformat};
   const std::array<std::pair<std::uint8_t, std::uint8_t>, 8> places{{{status::temperature_warning, 0x01},
@@ -181,7 +179,7 @@ TEST(EslFrame, EveryCheckHasItsSentence) {
   }
 }
 
-// Checks which part of a reading each alarm bit makes invalid, and the status bits of readiness and of errors.
+// Checks which part of a reading each alarm bit or status bit makes invalid.
 TEST(EslFrame, ValidityOfEachPart) {
   Reply reply = sample(DataId::position);
   reply.one = {.status = status::ready};
@@ -229,8 +227,7 @@ TEST(EslFrame, RepliesReportTheFlagsThatTheyCarry) {
   }
 }
 
-// With led_or_lissajous_error, a non-safety error in SF means the Lissajous signals (Table 5), and the position stays
-// valid; a safety error makes it invalid.
+// Table 5: with led_or_lissajous_error, a non-safety error means the Lissajous signals.
 TEST(EslFrame, LedAndLissajousErrorsCountForEveryId) {
   for (const auto& [error, validity] :
        {std::pair{status::safety_error, Validity::invalid}, std::pair{status::non_safety_error, Validity::valid}}) {
@@ -244,8 +241,7 @@ TEST(EslFrame, LedAndLissajousErrorsCountForEveryId) {
       EXPECT_NE(to_reading(reply).multiturn_validity(), Validity::invalid) << static_cast<int>(id);
     }
   }
-  // The position is invalid if the alarm bit is in the other channel than the non-safety error, or if LED and
-  // Lissajous errors are raised at once.
+  // The alarm is in another channel than the non-safety error; LED and Lissajous errors at once.
   Reply reply = sample(DataId::position);
   reply.one = {.status = status::ready | status::non_safety_error};
   reply.two = {.status = status::channel_2 | status::ready, .alarms = alarms::led_or_lissajous_error};

@@ -12,8 +12,7 @@ using author::Procedure;
 
 namespace {
 
-// Greatest number of times that a request is sent until its reply is valid, where a procedure repeats it. Resets, ID 8
-// and writes of a byte are not repeated after an invalid reply.
+// Greatest number of times that a request is sent until its reply is valid.
 constexpr unsigned attempts = 3;
 constexpr unsigned safe_attempts = 6;
 
@@ -25,7 +24,7 @@ void show_last(const Dialog& dialog, ProcedureResult& found) {
   found.reading = dialog.last_reading();
 }
 
-// Appends a description of an ENID: "24 bits and turns", or "20 bits and no turns, not a safety encoder".
+// Appends a description of an ENID: "24 bits and turns".
 void describe(Sentence& words, std::uint8_t id) {
   const std::array<char, 2> bits{static_cast<char>('0' + (id & 0x1F) / 10), static_cast<char>('0' + (id & 0x1F) % 10)};
   words.add({bits.data(), bits.size()}).add(" bits and ").add((id >> 5 & 3) != 0 ? "turns" : "no turns");
@@ -75,7 +74,7 @@ Procedure read_safely(Dialog& dialog, SafePositionResult& found) {
 
 namespace {
 
-// Appends the names of the alarms that remain after an ID C, and advice for most of them (Table 8). Returns the text.
+// Appends the names of the alarms that remain after an ID C, and advice (Table 8).
 std::string_view what_remains(Sentence& words, unsigned remaining) {
   constexpr unsigned until_power_off =
       alarms::led_or_lissajous_error | alarms::overspeed | alarms::memory_error | alarms::singleturn_error;
@@ -89,7 +88,7 @@ std::string_view what_remains(Sentence& words, unsigned remaining) {
   return words.view();
 }
 
-// Returns how the reply `now` contradicts a reset with the data ID `id`; empty if it shows what the reset demands.
+// Returns how the reply `now` contradicts a reset; empty if it does not.
 Explanation failed_part(Sentence& words, DataId id, const Reply& before, const Reply& now) {
   const unsigned remaining = now.one.alarms | now.two.alarms;
   if (id == DataId::clear_alarms) {
@@ -141,9 +140,7 @@ constexpr Time busy_limit = 2 * page_time;
 
 constexpr std::string_view unknown_area = "Table 11 lists no such page and address; nothing was sent";
 
-// Repeats a memory request while the memory is busy, within `busy_limit`, and returns the reply or the error.
-// `after_busy`: the reply must follow a busy one, because the temporary register may hold a byte that another host
-// requested.
+// `after_busy`: the temporary register may hold a byte that another host requested.
 author::Part<Result<Reply>> when_ready(Dialog& dialog, const Request& request, bool after_busy = false) {
   const bool writes = request.id == DataId::write_memory && !selects_page(request);
   return author::until_ready<Protocol>(dialog, request,
@@ -159,8 +156,7 @@ author::Outcome failure(Error error, std::string_view words, Time hold) {
   return {error, words, {}, hold};
 }
 
-// Selects a page, waits until it is ready, and returns it. Otherwise the procedure ends; `words` is the detail of the
-// error, unless the memory stays busy, which has a detail of its own.
+// Selects a page, waits until it is ready, and returns it.
 author::Part<std::uint8_t> turn_to(Dialog& dialog, std::uint8_t page, std::string_view words) {
   const Request request{DataId::write_memory, dialog.format().address, page_select_address, page};
   const Result<Reply> reply = co_await when_ready(dialog, request);
@@ -243,9 +239,7 @@ Procedure select_page(Dialog& dialog, ProcedureResult& found, Arguments argument
 
 namespace {
 
-// Finds in SF whether the LED or the Lissajous signals raise led_or_lissajous_error, and stores it in `found`. Returns
-// whether SF decides it for at least one of the two. A bit of SF that another raised alarm sets too is ambiguous,
-// unless the other bit is clear.
+// Finds in SF whether LED or Lissajous signals raise led_or_lissajous_error, if SF decides it.
 bool find_cause_in_status(ProcedureResult& found, const Reply& reply) {
   constexpr unsigned other_safety = alarms::unsafe & ~unsigned{alarms::led_or_lissajous_error};
   constexpr unsigned other_non_safety = alarms::turns_wrong | alarms::overspeed;
@@ -283,8 +277,7 @@ Procedure read_error_info(Dialog& dialog, ProcedureResult& found) {
   if (known && before->value == register_page) co_return done;
   found.page_left = register_page;
   if (!known) co_return done;
-  // The result is complete. The return to the page from before must be verified, because the page stays selected for
-  // the next user of the encoder.
+  // The page stays selected for the next user of the encoder, so it must be verified.
   const Request restore{DataId::write_memory, dialog.format().address, page_select_address, before->value};
   const Result<Reply> restored = co_await when_ready(dialog, restore);
   if (restored.error() == Error::busy) co_return failure(Error::busy, {}, page_time);

@@ -41,7 +41,7 @@ TEST(EslHost, Id8IsNeverSentEightTimesInARow) {
   ASSERT_EQ(bench.violations(), 1u);  // the virtual encoder reports the broken rule
 }
 
-// "If there is no Start Bit after the End Bit of the last frame": at least one bit is between two frame sets.
+// At least one bit is between two frame sets.
 TEST(EslHost, EachRequestBeginsTwoBitsAfterTheReplyBeforeInEveryConversation) {
   const std::vector<std::pair<const char*, std::vector<std::int64_t>>> commands{{"position", {}},
                                                                                 {"position", {}},
@@ -125,7 +125,7 @@ TEST(EslHost, TurnsFromSingleTurnEncoderAreAnError) {
 
 // ---- Safe positions
 
-// The first safe position takes two exchanges, which show that the sequence counter moves; each later one takes one.
+// The first safe position takes two exchanges; each later one takes one.
 TEST(EslHost, SafePositionsFollowEachOther) {
   Bench bench;
   const testing::Talk made(unit, testing::options_of({}), "safe-position");
@@ -159,7 +159,7 @@ TEST(EslHost, DetectsStoppedSequenceCounter) {
   EXPECT_EQ((*made).reading(), nullptr);
 }
 
-// Host and encoder use the same profile: each value of each option that the document leaves open, at address 5.
+// Each value of each option that the document leaves open, at address 5.
 TEST(EslHost, HostAndEncoderAgreeInEveryProfile) {
   for (std::size_t option = 0; option < open_options; ++option) {
     for (std::size_t value = 0; value < options.infos[option].choices.size(); ++value) {

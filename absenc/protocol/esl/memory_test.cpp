@@ -70,8 +70,7 @@ TEST(EslMemory, RestoresThePageBefore) {
     EXPECT_EQ(bench.raw(Request{DataId::read_memory, 0, page_select_address})[2], before);
     EXPECT_EQ(bench.violations(), 0u);
   }
-  // The encoder does not report the selected page (requested three times), or does not report at the end that the page
-  // from before is selected again.
+  // The selected page is not reported, at the begin or at the end.
   for (const auto& [first, last] : {std::pair{1u, 3u}, std::pair{5u, 5u}}) {
     Bench bench({}, [first = first, last = last](unsigned index, Wire& reply) {
       if (index < first || index > last) return;
@@ -183,8 +182,7 @@ TEST(EslMemory, DistinguishesLedAndLissajous) {
   }
 }
 
-// SF shows the cause of led_or_lissajous_error if only one of its two error bits is set, or no other raised alarm sets
-// the bit.
+// SF is ambiguous if both error bits are set and another raised alarm sets one of them.
 TEST(EslMemory, DistinguishesLedAndLissajousOnABusByStatus) {
   constexpr int open = -1;
   struct Row {

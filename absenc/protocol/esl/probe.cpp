@@ -23,8 +23,7 @@ constexpr std::size_t combinations = [] {
   return product;
 }();
 
-// Returns profile number `number` of all combinations of the open options except sequence_step, which has its value of
-// `base`; number 0 has the defaults of these options.
+// Returns combination `number` of the open options but sequence_step; number 0: the defaults.
 Profile nth_profile(const Profile& base, std::size_t number) {
   Profile profile = base;
   for (std::size_t i = 0; i < open_options; ++i) {
@@ -63,8 +62,7 @@ SentRequest request_in(const Profile& profile, const Capture& capture) {
           .accepted = good || capture.request.empty()};
 }
 
-// Returns the check of a captured exchange that fails under this profile; `passed` if the profile explains it. An
-// encoder answers only requests that it accepts, and reports a wrong parity bit only if there is one.
+// An encoder answers only requests that it accepts.
 Check explain(const Profile& profile, const Capture& capture) {
   if (capture.reply.empty()) return Check::passed;
   const SentRequest asked = request_in(profile, capture);
@@ -82,14 +80,12 @@ Check explain(const Profile& profile, const Capture& capture) {
   return check == Check::passed && !is_memory_access(asked.request.id) ? Check::request_not_accepted : check;
 }
 
-// How far a profile explains the captures: index of the first capture that it does not explain, and the check that
-// failed.
+// How far a profile explains the captures: the first that it does not, and the failed check.
 struct Progress {
   std::size_t capture = 0;
   Check failed = Check::passed;
 
-  // Returns how much of the failed capture is explained. A profile under which the encoder would not have answered
-  // explains least.
+  // A profile under which the encoder would not have answered explains least.
   [[nodiscard]] int rank() const { return failed == Check::request_not_accepted ? 0 : static_cast<int>(failed); }
   [[nodiscard]] bool fits() const { return failed == Check::passed; }
   [[nodiscard]] bool better_than(const Progress& other) const {
@@ -107,13 +103,11 @@ Progress progress_of(const Profile& profile, std::span<const Capture> captures) 
   return {};
 }
 
-// For each value of an option: how far the best profile with this value explains the captures. Reached has a
-// ReachedByValue for each option that the document leaves open.
+// For each value of an option: how far the best profile with this value explains the captures.
 using ReachedByValue = std::array<Progress, most_choices>;
 using Reached = std::array<ReachedByValue, open_options>;
 
-// Compares each value of the option sequence_step with the counters in the replies, which `best` decodes: stores in
-// `values` which ones fit, and the first fitting value in `best`.
+// Stores in `values` which values of sequence_step fit, and the first fitting one in `best`.
 void judge_sequence(Profile& best, std::span<const Capture> captures, ReachedByValue& values) {
   values.fill({});
   bool known = false;
@@ -181,7 +175,7 @@ bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sin
       if (progress.better_than(so_far)) so_far = progress;
     }
   }
-  // The option sequence_step does not change single frames, so sequences of replies must decide it.
+  // sequence_step does not change single frames, so sequences of replies must decide it.
   auto& sequence = reached[option_sequence_step];
   sequence.fill(sequence[static_cast<std::size_t>(best.sequence_step)]);
   if (any) judge_sequence(best, captures, sequence);
@@ -192,8 +186,7 @@ bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sin
 
 namespace {
 
-// Returns whether the encoder reports a parity error that the other parity_scope explains, because it gives another
-// parity bit.
+// Returns whether the other parity_scope explains a parity error that the encoder reports.
 bool parity_is_it(const Profile& profile, const Capture& capture) {
   const SentRequest asked = request_in(profile, capture);
   Reply reply;

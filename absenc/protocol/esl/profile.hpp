@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Options of ESL: the properties that the QS35 document leaves open, address, turns and line of an encoder, how
-// strictly it is checked, and the reaction of a virtual encoder to faulty requests. README.md states how hardware shows
-// the open properties; probe.hpp finds most of them in captured frames.
+// Options of ESL. README.md states how hardware shows the properties that the document leaves open.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +15,7 @@ namespace absenc::esl {
 enum class CrcBitOrder : std::uint8_t {
   lsb,  ///< bits enter the CRC byte by byte, LSB first, as on the wire
   msb,  ///< bits enter the CRC byte by byte, MSB first
-  /// 16-bit words, whose low byte is first on the wire, enter the CRC MSB first; an 8-bit CRC is computed as with msb.
+  /// 16-bit words enter the CRC MSB first; an 8-bit CRC is computed as with msb.
   word,
 };
 /// Order of the two bytes of a 16-bit CRC on the wire.
@@ -34,17 +32,16 @@ enum class SequenceStep : std::uint8_t {
   safety,   ///< the counter counts the replies to IDs 1, 2, 8 and B
   request,  ///< the counter counts all requests
 };
-/// Bits that the parity bit of CF covers: only the data ID (command), or the encoder address too (all).
+/// Bits that the parity bit of CF covers: the data ID, or (all) the encoder address too.
 enum class ParityScope : std::uint8_t { command, all };
 /// Order of the bits in SF or ADF: that of the QS35 document, or that of Tamagawa's T-format.
 enum class FieldOrder : std::uint8_t { document, tformat };
 /// Number of bits of the redundant position in replies to ID 6.
 enum class Id6Redundant : std::uint8_t { bits_16, bits_9 };
-/// Reaction of the virtual encoder to a wrong parity or stop bit in a request that is no memory access: it reports the
-/// error in SF, or is silent.
+/// Reaction of the virtual encoder to a wrong parity or stop bit in a request.
 enum class BadRequest : std::uint8_t { report, silent };
 
-/// Properties of an encoder, and how its replies are checked. The members are the options of ESL.
+/// Properties of an encoder, and how its replies are checked: the options of ESL.
 struct Profile {
   CrcBitOrder crc_bit_order = CrcBitOrder::lsb;       ///< Order in which bits enter the CRCs.
   CrcByteOrder crc16_byte_order = CrcByteOrder::low;  ///< Order of the bytes of 16-bit CRCs.
@@ -63,8 +60,7 @@ struct Profile {
   /// Whether other encoders share the line; if so, memory cannot be accessed (Figure 18).
   Sharing bus = sharing_automatic;
   bool require_forced_test = false;  ///< whether a safe position requires forced_test_passed in both channels
-  /// Largest permitted difference between the redundant position RS and the top 9 bits of the position ABS, in 1/512
-  /// turn, 0 to 255.
+  /// Largest permitted difference between RS and the top 9 bits of ABS, in 1/512 turn, 0 to 255.
   std::uint8_t redundant_tolerance = 1;
   /// Reaction of the virtual encoder to a request with a wrong parity or stop bit.
   BadRequest bad_request = BadRequest::report;
@@ -84,14 +80,14 @@ inline constexpr Names<2> bad_request{"report", "silent"};
 }  // namespace choices
 
 namespace detail {
-// Returns the declaration of an option for a property that the document leaves open and that captured frames can show.
+// Declares an option that the document leaves open and that captured frames can show.
 template <auto member, class... Choices>
 constexpr auto open_option(std::string_view name, std::string_view meaning, const Choices&... choices) {
   return author::probeable(author::option<member>(name, meaning, choices...));
 }
 }  // namespace detail
 
-/// Table of the options of ESL. Those that `probe` finds come first (test EslProbe.OpenOptionsAreFirst).
+/// Table of the options of ESL; those that `probe` finds come first.
 inline constexpr auto options = author::OptionsOf{
     detail::open_option<&Profile::crc_bit_order>(
         "crc_bit_order", "which bit of a byte enters the CRC first; word: 16-bit words, MSB first",

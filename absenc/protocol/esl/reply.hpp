@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decodes ESL requests and replies: all checks in their order, with their texts; the reading of a valid reply; and
-// Protocol, the functions that the templates of absenc/protocol/author require.
+// Decodes and checks ESL requests and replies; Protocol is what absenc/protocol/author requires.
 #pragma once
 
 #include <array>
@@ -16,8 +15,7 @@
 
 namespace absenc::esl {
 
-/// The first check of a reply that failed. `passed` comes first, then the checks of every frame, then those of a safe
-/// position and of a probe.
+/// The first check of a reply that failed; `passed`: none did.
 enum class Check : std::uint8_t {
   passed,
   // Checks of every frame
@@ -52,7 +50,7 @@ enum class Check : std::uint8_t {
   sequence_unknown,
   sequence_still,
   sequence_jumped,
-  // Reported by `probe` (probe.hpp) only: an encoder of this profile would not have answered the request
+  // Reported by `probe` (probe.hpp) only
   request_not_accepted,
 };
 
@@ -101,7 +99,7 @@ inline constexpr std::array<CheckText, 32> check_texts{{
 }};
 static_assert(check_texts.size() == static_cast<std::size_t>(Check::request_not_accepted) + 1);
 
-/// Error of each check, in the order of Check. It is apart from the texts, so that firmware does not link them.
+/// Error of each check, apart from the texts, so that firmware does not link them.
 inline constexpr std::array<Error, check_texts.size()> check_errors = [] {
   std::array<Error, check_texts.size()> errors{};
   for (std::size_t i = 0; i < errors.size(); ++i) errors[i] = check_texts[i].error;
@@ -114,8 +112,7 @@ inline constexpr std::array<Error, check_texts.size()> check_errors = [] {
 [[nodiscard]] constexpr Error error_of(Check check) { return check_errors[static_cast<std::size_t>(check)]; }
 
 namespace detail {
-// Returns the content of a request with this data ID, or of the request that a reply echoes, without checking it.
-// Memory address, value and `busy` (the busy bit) are taken from memory accesses of at least three bytes.
+// Returns the content of a request, or of one that a reply echoes, without checking it.
 constexpr Request split_request(const Profile& profile, DataId id, Bytes bytes, bool& busy) {
   Request request{id, address_of(bytes[0])};
   if (!is_memory_access(id) || bytes.size() < 3) return request;
@@ -132,8 +129,7 @@ constexpr Request split_request(const Profile& profile, DataId id, Bytes bytes, 
   return checksum8(profile.crc_bit_order, bytes.first(bytes.size() - 1)) == bytes.back();
 }
 
-/// Decodes a request. Errors: wrong_length; unsupported (unknown ID); bad_checksum (parity or CRC); out_of_range (the
-/// busy bit is set, which is 0 in requests).
+/// Decodes a request. Errors: wrong_length, unsupported, bad_checksum, out_of_range.
 [[nodiscard]] constexpr Result<Request> decode_request(const Profile& profile, Bytes bytes) {
   if (bytes.empty()) return Error::wrong_length;
   const std::optional<DataId> id = data_id(bytes[0]);
@@ -148,8 +144,7 @@ constexpr Request split_request(const Profile& profile, DataId id, Bytes bytes, 
 
 namespace detail {
 
-// Decodes the redundant position RS from two bytes into `reply`. Its lowest bit is in the second byte, whose other
-// seven bits are returned.
+// Decodes RS from two bytes; returns the other seven bits of the second one.
 constexpr std::uint8_t split_redundant(RedundantBit order, Bytes bytes, Reply& reply) {
   const std::uint8_t second = from_wire(order == RedundantBit::b0, bytes[1]);
   reply.redundant = static_cast<std::uint16_t>(bytes[0] << 1 | second >> 7);
@@ -252,8 +247,7 @@ constexpr Check check_content(const Profile& profile, const Layout& layout, cons
 }  // namespace detail
 
 namespace detail {
-// Checks and decodes a reply. `asked`: control field of the request, even if its parity bit is wrong. Returns the first
-// check that failed.
+// `asked`: control field of the request, even if its parity bit is wrong.
 constexpr Check check_reply_to(const Profile& profile, const Request& request, std::uint8_t asked, Bytes bytes,
                                Reply& reply) {
   const Layout& layout = layout_of(request.id);
@@ -276,16 +270,13 @@ constexpr Check check_reply_to(const Profile& profile, const Request& request, s
 }
 }  // namespace detail
 
-/// Checks length, checksums and content of a reply, in this order. Returns the first check that failed. `reply` gets
-/// the content once the checksums are right; use it only if the result is `passed`. A busy memory reply passes.
+/// Checks and decodes a reply. Returns the first check that failed; use `reply` only if it is `passed`.
 [[nodiscard]] constexpr Check check_reply(const Profile& profile, const Request& request, Bytes bytes, Reply& reply) {
   const std::uint8_t asked = control_field(profile, request.encoder_address, request.id);
   return detail::check_reply_to(profile, request, asked, bytes, reply);
 }
 
-/// Returns the refusal (parity_reported or stop_reported) in a reply to a request whose parity bit alone is wrong;
-/// `passed` if the request or the reply is something else. If `request` is empty, the control field of the reply gives
-/// it.
+/// Returns the refusal in a reply to a request whose parity bit alone is wrong, else `passed`.
 [[nodiscard]] constexpr Check check_refusal(const Profile& profile, Bytes request, Bytes bytes) {
   if (bytes.empty()) return Check::passed;
   const Bytes sent = request.empty() ? bytes : request;
@@ -309,8 +300,7 @@ constexpr Check check_reply_to(const Profile& profile, const Request& request, s
 }
 
 namespace detail {
-// Returns the alarms of a channel that make the position within the turn unsafe. If SF reports a non-safety error
-// alone, led_or_lissajous_error is a Lissajous error (Table 5), which does not make it unsafe.
+// A non-safety error alone in SF means the Lissajous signals (Table 5), which are not unsafe.
 constexpr unsigned unsafe_alarms(const ChannelReply& channel) {
   constexpr std::uint8_t errors = status::safety_error | status::non_safety_error;
   const bool lissajous = (channel.status & errors) == status::non_safety_error;
@@ -318,9 +308,8 @@ constexpr unsigned unsafe_alarms(const ChannelReply& channel) {
 }
 }  // namespace detail
 
-/// Returns the position and turns of a valid reply to `id` with their validity; in status and alarms the flags of
-/// channel 2 are above those of channel 1. Without alarms in the reply SF alone decides; it does not show whether a
-/// non-safety error concerns the turns. This is not a safe position (safety.hpp).
+/// Returns the position and turns of a valid reply to `id`; not a safe position (safety.hpp). In status and alarms the
+/// flags of channel 2 are above those of channel 1.
 [[nodiscard]] constexpr Reading to_reading(DataId id, const Reply& reply) {
   const Layout& layout = layout_of(id);
   const std::uint8_t second = layout.has_two() ? reply.two.status : reply.one.status;
@@ -349,7 +338,7 @@ constexpr unsigned unsafe_alarms(const ChannelReply& channel) {
   }
   return reading;
 }
-/// Returns the position and turns of a valid reply like to_reading(id, reply), with the data ID that the reply carries.
+/// Returns the position and turns of a valid reply, by the data ID that it carries.
 [[nodiscard]] constexpr Reading to_reading(const Reply& reply) { return to_reading(reply.id, reply); }
 
 // ---- Protocol, for author's engine
@@ -359,8 +348,7 @@ constexpr unsigned unsafe_alarms(const ChannelReply& channel) {
   return request.id == DataId::write_memory && request.memory_address == page_select_address;
 }
 
-/// The requests of a reset (Table 4). 40 us are typical, from start to start; a slow line takes longer. The virtual
-/// encoder accepts a little less.
+/// The requests of a reset (Table 4); 40 us are typical, from start to start.
 inline constexpr author::InARow reset_row{
     .requests = reset_requests,
     .interval = reset_interval,
@@ -384,14 +372,12 @@ struct Protocol {
   static constexpr author::HostTimes host_times(const Profile&) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit, .pause = request_pause};
   }
-  /// Returns how a request is sent. After a memory request without a good reply the encoder may be busy, so a
-  /// repetition, or the next request, must wait.
+  /// Returns how a request is sent; after memory requests the encoder may be busy.
   static constexpr author::Manner manner(const Profile&, const Request& request) {
     const Time busy = selects_page(request) ? page_time : is_memory_access(request.id) ? eeprom_read_pause : Time{};
     return {.pause = busy, .hold = busy};
   }
-  /// Returns the length in bytes of the request that begins with the bytes `begin`; 0 if no request with right parity
-  /// does.
+  /// Returns the length in bytes of the request that begins with `begin`; 0: wrong parity or ID.
   static constexpr std::size_t request_size(const Profile& profile, Bytes begin) {
     const std::optional<DataId> id = data_id(begin[0]);
     if (!id || begin[0] != control_field(profile, address_of(begin[0]), *id)) return 0;
@@ -412,7 +398,7 @@ struct Protocol {
     if (!profile.turns) reading.multiturn_valid = false;
     return reading;
   }
-  /// Returns the length in bytes of the reply to `request`, which does not depend on the received bytes.
+  /// Returns the length in bytes of the reply to `request`.
   static constexpr std::size_t expected(const Profile& profile, const Request& request, Bytes) {
     return reply_size(profile, request);
   }
@@ -421,8 +407,7 @@ struct Protocol {
   static constexpr auto latched = latch_time;  ///< returns the typical time of the latch
 };
 
-/// Conversation that reads a position with a profile and a request that are constants: `static constexpr Profile
-/// profile{...};` and `static constexpr Request request{...};`.
+/// Conversation that reads a position with a constant profile and request.
 template <const Profile& profile, const Request& request>
 using ReadKnownPosition = author::ReadKnownPosition<Protocol, profile, request>;
 

@@ -39,8 +39,6 @@ TEST(EslReset, Resets) {
   EXPECT_EQ(bench.read().multiturn, 0u);
 }
 
-// A reset takes 10 ms between the positions, 40 us from start to start of the eight requests, and then 7 ms for the
-// EEPROM, or 40 us after clear-alarms.
 TEST(EslReset, ResetKeepsItsTimes) {
   for (const auto& [command, id, last] :
        {std::tuple{"zero", DataId::zero, Time(7ms)}, std::tuple{"reset-multiturn", DataId::reset_multiturn, Time(7ms)},
@@ -121,7 +119,7 @@ TEST(EslReset, SendsNoResetToTurningOrStartingEncoder) {
   EXPECT_TRUE(zero.says("not ready"));
 }
 
-// A zero set while the position is invalid would be wrong for ever, because it is in the EEPROM.
+// A zero survives power off, so none may be set at an invalid position.
 TEST(EslReset, SendsNoZeroAtInvalidPosition) {
   Bench bench;
   bench.shaft.put(7, 1'000'000);
@@ -133,8 +131,7 @@ TEST(EslReset, SendsNoZeroAtInvalidPosition) {
   EXPECT_EQ(bench.encoder.memory_version(), 0u);
 }
 
-// If no position is repeated, replies 0 and 1 are positions, 2 to 9 answer the reset, 10 is the verification, and 11
-// and 12 are its repetitions.
+// Without repetitions, replies 2 to 9 answer the reset and reply 10 verifies it.
 TEST(EslReset, LostReplyStopsAResetUnlessItIsTheLast) {
   struct Row {
     unsigned first;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Safe positions: those that passed every check of SafetyMonitor, which judges replies to IDs 1 and 2. This is not a
-// certified safety function: README.md lists what the checks cannot detect.
+// Safe positions. This is not a certified safety function (README.md).
 #pragma once
 
 #include <optional>
@@ -11,12 +10,10 @@ namespace absenc::esl {
 
 class SafetyMonitor;
 
-/// A position that passed all checks of a SafetyMonitor; only that class constructs it. It has no turns, because only
-/// channel 1 has them.
+/// A position within the turn that passed all checks of a SafetyMonitor.
 class SafePosition {
  public:
-  /// Returns the position within the turn in counts, 0 to 2^24 - 1. Channel 2 confirms the top 9 bits, within the
-  /// profile's tolerance.
+  /// Returns the position within the turn in counts, 0 to 2^24 - 1. The lowest 15 bits come from channel 1 alone.
   [[nodiscard]] constexpr std::uint32_t singleturn() const { return singleturn_; }
   /// Returns the address of the encoder on its line, 0 to 7.
   [[nodiscard]] constexpr std::uint8_t encoder_address() const { return encoder_address_; }
@@ -39,25 +36,21 @@ struct SafetyVerdict {
   Check failed = Check::passed;            ///< First check that failed; Check::passed: none.
 };
 
-/// Decides from the bytes of consecutive replies of one encoder which positions are safe.
+/// Decides from consecutive replies of one encoder which positions are safe.
 ///
-/// The sequence counter proves something only when compared with an earlier reply. After the start, and after any
-/// error, the first valid reply therefore gives no safe position, and the next request must have the other of IDs 1 and
-/// 2 (`next_id`): a line that delivers each reply one cycle late is then detected by the wrong echo.
+/// The first good reply after the start or an error gives no safe position.
 class SafetyMonitor {
  public:
   /// Constructs a monitor for an encoder of this profile.
   constexpr explicit SafetyMonitor(const Profile& profile) : profile_(profile) {}
 
-  /// Returns the data ID that the next request must have: `wanted` once the monitor trusts the line, until then IDs 1
-  /// and 2 in turn.
+  /// Returns the data ID for the next request; ignores `wanted` while the monitor does not trust the line.
   [[nodiscard]] constexpr DataId next_id(DataId wanted = DataId::position) const {
     if (trust_ == Trust::full) return wanted;
     return last_id_ == DataId::position ? DataId::singleturn : DataId::position;
   }
 
-  /// Checks the reply `bytes` to `request`, and returns a safe position or the check that failed. `sent_at`: end of the
-  /// request, from which the time of the position follows.
+  /// Judges the reply `bytes` to `request`, which ended at `sent_at`.
   constexpr SafetyVerdict judge(const Request& request, Bytes bytes, Time sent_at) {
     Reply reply;
     Check check = check_reply(profile_, request, bytes, reply);
@@ -78,8 +71,7 @@ class SafetyMonitor {
     last_id_ = request.id;
   }
 
-  /// Notes that this encoder answered a request with another data ID than 1 and 2, which may have moved its sequence
-  /// counter.
+  /// Notes that the encoder answered a request with `id` that is not judged.
   constexpr void other_exchange(DataId id) {
     if (profile_.sequence_step == SequenceStep::request || has_sequence(id)) ++step_;
   }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of SafetyMonitor and a campaign of faults against it, which prints how many positions were accepted. README.md
-// states which faults the checks cannot detect.
+// Tests of SafetyMonitor, and a campaign of faults against it.
 #include "absenc/protocol/esl/safety.hpp"
 
 #include <gtest/gtest.h>
@@ -31,8 +30,7 @@ void print(const char* kind, unsigned tried, unsigned accepted) {
   std::printf("%-58s %7u tried %6u accepted\n", kind, tried, accepted);
 }
 
-/// An encoder with its monitor and without a line: it gives its replies as bytes. The shaft stays where the test puts
-/// it.
+/// An encoder with its monitor and without a line; the shaft stays where the test puts it.
 class Monitored {
  public:
   explicit Monitored(const Profile& profile = {}) : profile_(profile), encoder(profile, shaft), monitor(profile) {
@@ -145,8 +143,7 @@ TEST(EslSafety, OtherRepliesAreCountedAsTheProfileSays) {
 
 // ---- The campaign
 
-// Returns the number of accepted replies while the condition `index` has the value `value`; raises `off` to their
-// largest error if that is greater.
+// Returns the number of accepted replies; raises `off` to their largest error.
 unsigned accepted_with(condition::Index index, std::int64_t value, unsigned exchanges, std::int64_t& off) {
   Monitored pair;
   pair.trust();
@@ -172,8 +169,6 @@ TEST(EslSafetyCampaign, StuckCountersAndPositionsOfOneChannel) {
     unsigned accepted = 0;
     for (unsigned value = 0; value < 256; value += 17)
       accepted += accepted_with(of_it(condition::ch1_sequence), value, each, off);
-    // The other channel's counter equals the stuck one once in 128 replies: that reply is valid, but the monitor's
-    // trust is lost.
     print("stuck sequence counter", 16 * each, accepted);
     EXPECT_EQ(accepted, 0u);
     unsigned tried = 0;
@@ -199,7 +194,7 @@ TEST(EslSafetyCampaign, StuckCountersAndPositionsOfOneChannel) {
   EXPECT_EQ(accepted, 0u);
 }
 
-// A byte of a reply to ID 1, and which of its bits the checks detect if they are stuck before the CRC is computed.
+// A byte of a reply to ID 1; `seen`: bits that the checks detect when they are stuck.
 struct StuckField {
   const char* name;
   std::size_t byte;
@@ -212,7 +207,7 @@ constexpr std::array<StuckField, 14> stuck_fields{{
     {"SF1", 1, seen_status},
     {"ALM1", 2, alarms::unsafe},
     {"ABS0", 3, 0},  // undetected: these bits are below the resolution of channel 2
-    {"ABS1", 4, 0},  // the top bit of this byte is the lowest of RS, and undetected because it is within the tolerance
+    {"ABS1", 4, 0},  // undetected: below the resolution of channel 2, or within the tolerance
     {"ABS2", 5, 0xFF},
     {"ABM0", 6, 0},  // undetected: turns are no part of a safe position
     {"ABM1", 7, 0},
@@ -323,7 +318,6 @@ TEST(EslSafetyCampaign, SmallErrorsAndSwapsOfAnId1Reply) {
   EXPECT_EQ(cut, 0u);
 }
 
-// Faults that deliver old replies: the last reply again, an older reply once, and every reply one cycle late.
 TEST(EslSafetyCampaign, ReplaysAndDelays) {
   for (const SequenceStep step : {SequenceStep::change, SequenceStep::safety}) {
     std::printf("sequence_step=%s:\n", step == SequenceStep::change ? "change" : "safety");
@@ -354,7 +348,7 @@ TEST(EslSafetyCampaign, ReplaysAndDelays) {
     print(step == SequenceStep::change ? "an older reply once (cannot be seen)" : "an older reply once", 990, older);
     EXPECT_EQ(older, step == SequenceStep::change ? 990u : 0u);
 
-    // From one cycle on, every reply is delivered one cycle late, so the first of these cycles has no reply.
+    // Every reply is delivered one cycle late, so the first cycle has none.
     unsigned late = 0;
     pair.trust();
     Wire held = pair.reply_to(pair.monitor.next_id());
@@ -370,7 +364,7 @@ TEST(EslSafetyCampaign, ReplaysAndDelays) {
   }
 }
 
-// Random bytes of the right length pass both CRCs once in 2^32 times, so none of these replies may be accepted.
+// Random bytes pass both CRCs about once in 2^32 times.
 TEST(EslSafetyCampaign, NoiseOfTheRightLength) {
   sim::Random random(1);
   Monitored pair;
@@ -387,8 +381,6 @@ TEST(EslSafetyCampaign, NoiseOfTheRightLength) {
   EXPECT_EQ(accepted, 0u);
 }
 
-// A line with every kind of fault of replies: each position that the command reports as safe is the shaft's, and no
-// unsafe one is reported.
 TEST(EslSafetyCampaign, SafePositionsOverABadLine) {
   const sim::FaultRates rates = sim::testing::damaged_replies(0.1);
   sim::Random random(1);

@@ -36,12 +36,10 @@ inline constexpr Time page_time = 18ms;  ///< time that the memory is busy after
 inline constexpr Time answer_limit = 20us;
 /// Longest time between two characters of a reply, as a host waits for it.
 inline constexpr Time gap_limit = 3 * line_settings.character();
-/// Pause of the host between a reply and its next request. The document states none: a missing start bit ends a frame
-/// set, so one bit would be enough.
+/// Pause of the host between a reply and its next request. The document states none.
 inline constexpr Time request_pause = line_settings.bits(2);
 
-/// Returns the time taken as the latch of the position in a reply to a request that ended at `sent_at`: the typical
-/// 4.3 us (`position_time`) after the end of CF, which one CRC byte follows if requests have a CRC.
+/// Returns the typical latch time of a position whose request ended at `sent_at` (Figure 2).
 [[nodiscard]] constexpr Time latch_time(const Profile& profile, Time sent_at) {
   return sent_at - (profile.request_crc ? line_settings.character() : Time{}) + position_time;
 }
@@ -58,17 +56,14 @@ inline constexpr std::uint8_t error_info_led = 0x02;  ///< bit of the error info
 /// Bit of the error information: the Lissajous signals are out of range.
 inline constexpr std::uint8_t error_info_lissajous = 0x08;
 
-/// Permitted numbers of writes (notes 6 and 7 of Table 11); the document does not state whether per byte or in total.
-/// They also distinguish how bytes are accessed: EEPROM by two read requests and a write of 6 ms, MTP alike (assumed),
-/// registers, which are lost at power off, at once.
+/// Permitted numbers of writes (notes 6 and 7 of Table 11); 0: no limit.
 namespace life {
 inline constexpr std::uint32_t eeprom = 1'000'000;  ///< permitted writes of the EEPROM
 inline constexpr std::uint32_t mtp = 100'000;       ///< permitted writes of the MTP memory
 inline constexpr std::uint32_t registers = 0;       ///< registers have no limit: 0
 }  // namespace life
 
-/// Areas of the memory as in Table 11, in the order of pages. The document gives the user area 512 bytes but one page
-/// of 127, so pages 1 to 3 are assumed. Writing later pages can spoil the encoder.
+/// Areas of the memory as in Table 11. Pages 1 to 3 of the user area are assumed.
 inline constexpr std::array<MemoryArea, 12> memory_map = [] {
   const auto area = [](unsigned page, unsigned first, unsigned last, std::uint32_t life, std::string_view meaning) {
     return MemoryArea{.page = page,
@@ -104,14 +99,13 @@ inline constexpr std::size_t stored_bytes = author::size_of(memory_map, is_store
 /// Number of bytes of the areas with registers.
 inline constexpr std::size_t register_bytes = author::size_of(memory_map, is_register);
 
-/// Returns the memory area of the byte at `address` of `page`; null if Table 11 does not list the byte.
+/// Returns the memory area of the byte at `address` of `page`; null if it is in none.
 [[nodiscard]] constexpr const MemoryArea* find_area(unsigned page, unsigned address) {
   return author::find_area(memory_map, page, address);
 }
 /// Returns whether Table 11 lists the memory page `page`.
 [[nodiscard]] constexpr bool is_page(unsigned page) { return author::has_page(memory_map, page); }
-/// Returns whether the byte at `address` of `page` is read and written at once: a register, or the address that selects
-/// pages. Other bytes are read through the temporary register, and writing them makes the memory busy.
+/// Returns whether the byte is a register or the one that selects pages.
 [[nodiscard]] constexpr bool is_immediate(unsigned page, unsigned address) {
   const MemoryArea* const area = find_area(page, address);
   return address == page_select_address || (area != nullptr && is_register(*area));

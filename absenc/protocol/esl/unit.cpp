@@ -28,7 +28,7 @@ constexpr std::array<Argument, 1> page_arguments{{{"page", "0 to 6, 8 or 14", 0,
 
 constexpr std::uint8_t byte_of(std::int64_t argument) { return static_cast<std::uint8_t>(argument); }
 
-// ---- Commands: the one request that does the work; procedures send more (page select, repetitions)
+// ---- Requests of the commands
 
 template <DataId data>
 constexpr Request ask(const Profile& profile, Arguments) {
@@ -60,8 +60,7 @@ constexpr std::string_view no_turns(const Profile& profile) {
 
 // ---- Errors
 
-// Returns the request of an exchange. If `request` is empty, the control field of the reply gives it; address and value
-// of a memory access are those of the reply.
+// Returns the request of an exchange; without `request`, the one that the reply suggests.
 constexpr Result<Request> request_behind(const Profile& profile, Bytes request, Bytes reply) {
   if (!request.empty()) return decode_request(profile, request);
   const auto id = data_id(reply[0]);
@@ -70,8 +69,7 @@ constexpr Result<Request> request_behind(const Profile& profile, Bytes request, 
   return detail::split_request(profile, *id, reply, busy);
 }
 
-// Returns the refusal in the reply to a request with a wrong parity bit; otherwise the failed check of a reply that
-// gave `error`, or `passed` if no check of the reply gives this error.
+// Returns the check of the reply that explains `error`, or `passed`.
 Check check_of(const Profile& profile, Error error, Bytes request, Bytes reply) {
   if (reply.empty()) return Check::passed;
   if (const Check refusal = check_refusal(profile, request, reply); refusal != Check::passed) return refusal;
@@ -112,7 +110,7 @@ void put_nodes(FieldSink& sink, const Profile&, const Nodes& nodes) {
     if (reply) sink.put_reading(to_reading(*reply));
   }
 }
-// Writes an explanation of the failed last exchange of `host`, and the changes of options that `find_change` finds.
+// Writes an explanation of the last exchange, if there is one.
 void tell(Sentence& words, const HostOf<Protocol>& host) {
   const Profile& profile = host.format();
   const Bytes request = host.exchange().sent;
@@ -218,8 +216,7 @@ BitRanges bits_in(const Options& values, Frame, Frame reply, const FieldInfo& fi
 constexpr std::size_t size_of_reply(const Profile& profile, Bytes begin) {
   return Protocol::request_size(profile, begin) == 0 ? 0 : reply_length(*data_id(begin[0]));
 }
-// Returns the refusal with which the encoder answers a request with a wrong parity bit; otherwise `error`, the error of
-// the request.
+// Returns the refusal that the reply states, or otherwise `error`.
 constexpr Error answer_to_bad(const Profile& profile, Bytes request, Error error, Bytes reply) {
   const Check refusal = check_refusal(profile, request, reply);
   return refusal == Check::passed ? error : error_of(refusal);

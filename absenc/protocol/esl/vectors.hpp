@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Test vectors of ESL: frames with their sources and decoded fields. Each is decoded at compile time, so a wrong vector
-// does not compile.
+// Test vectors of ESL; each is decoded at compile time.
 #pragma once
 
 #include <array>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Modbus RTU frames: address, function, data, CRC; and explanations of a server's refusals. Sources: MODBUS over Serial
-// Line V1.02 (S), MODBUS Application Protocol V1.1b3 (A).
+// Modbus RTU frames. Sources: MODBUS over Serial Line V1.02 (S), MODBUS Application Protocol V1.1b3 (A).
 #pragma once
 
 #include <array>
@@ -32,11 +31,10 @@ inline constexpr std::uint16_t most_registers = 125;
 /// Bit of the function code that marks a refusal; functions of the standard are below it.
 inline constexpr std::uint8_t refusal_bit = 0x80;
 
-/// Byte order of a received CRC, or `wrong`. Two equal bytes are reported as `low_first`, the order of Modbus.
+/// Byte order of a received CRC; `wrong`: the CRC does not match.
 enum class CrcOrder : std::uint8_t { low_first, high_first, wrong };
 
-/// Returns the byte order in which the last two bytes of a frame are its CRC; `wrong` if they are not, or if the frame
-/// is shorter than `shortest_frame`.
+/// Returns the byte order in which the last two bytes of a frame are its CRC, or `wrong`.
 [[nodiscard]] constexpr CrcOrder crc_order(Bytes frame) {
   if (frame.size() < shortest_frame) return CrcOrder::wrong;
   const Bytes crc = frame.last(crc_size);
@@ -54,7 +52,7 @@ constexpr void append_crc(ByteBuffer<Capacity>& frame, CrcOrder order = CrcOrder
   frame.push_back(static_cast<std::uint8_t>(low_first ? crc >> 8 : crc));
 }
 
-/// Codes with which the virtual servers refuse a request (A 7); `none`: the request is not refused.
+/// Codes with which the virtual servers refuse a request (A 7); `none`: not refused.
 enum class Exception : std::uint8_t {
   none = 0,
   illegal_function = 1,
@@ -62,7 +60,7 @@ enum class Exception : std::uint8_t {
   illegal_data_value = 3,
 };
 
-/// Returns the code in a refusal of `function`; no value if the frame is not a refusal. Does not check the CRC.
+/// Returns the code in a refusal of `function`; no value for another frame. Ignores the CRC.
 [[nodiscard]] constexpr std::optional<std::uint8_t> refusal_code(Bytes frame, std::uint8_t function) {
   if (frame.size() != shortest_frame + 1 || frame[1] != (function | refusal_bit)) return std::nullopt;
   return frame[2];

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of a client with the times of timing.hpp and a server on one line in virtual time: silence, damage, change of
-// the rate.
+// Tests of a Modbus client and server on one line in virtual time.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -20,8 +19,7 @@ using Wire = std::vector<std::uint8_t>;
 constexpr LineSettings line_settings{.rate = 19'200};
 const Time character = line_settings.character();
 
-/// A server at address 7: answers with two fixed bytes, but refuses function 04, and changes its rate after function
-/// 41.
+/// A server at address 7. It refuses function 04, and function 41 changes its rate.
 class ToyServer final : public Server {
  public:
   ToyServer() : Server(line_settings) {}
@@ -214,7 +212,7 @@ TEST(ModbusLine, ServerReportsRequestThatComesTooSoon) {
   EXPECT_TRUE(says(bench.broken_rule(), "3.5 characters"));
 }
 
-// If a server was scheduled late, it does not know whether the client waited long enough, so it reports no broken rule.
+// A server that was scheduled late does not know how long the client waited.
 TEST(ModbusLine, LateServerReportsNoMissingSilence) {
   using Kind = Event<std::uint8_t>::Kind;
   for (const auto& [late, rules] : {std::pair(Time(1ms), 1u), {Time(50ms), 0u}}) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fuzz test: sends any bytes with pauses to a server, which must answer only after a pause and with a right CRC.
+// Fuzz test of a Modbus server: sends any bytes with pauses.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -34,7 +34,7 @@ class Echoing final : public Server {
   }
 };
 
-// Feeds the input to a server. Bytes 0xF0 to 0xFF after an odd byte, and the end of the input, are pauses.
+// Feeds the input, of which some bytes stand for pauses, to a server.
 void ask_server(Bytes input) {
   Echoing server;
   server.power_on(Time{}, Device<std::uint8_t>::PowerOn::skip);

@@ -7,7 +7,7 @@ namespace {
 
 // Time between the silence that ends a request and the reply; the standard states none.
 constexpr Time answer_time = 200us;
-// Delay after which a request counts as ended late: the client may have timed out and sent the next request.
+// Delay after which a request counts as late: the client may have timed out.
 constexpr Time late = 20ms;
 constexpr std::string_view turn_rule = "something was sent during the encoder's transmission";
 
@@ -40,7 +40,7 @@ ByteStep Server::next(Time) {
   }
   ByteStep step{.at = never};
   if (!frame_.empty() || damaged_) step.gap = frame_silence(line_);
-  // Until its last two bytes are its CRC, the frame is not complete, so at least one more byte is expected.
+  // A frame that does not end with its CRC is not complete.
   if (!frame_.empty() && crc_order(frame_) != CrcOrder::low_first) step.expect = 1;
   return step;
 }
@@ -90,8 +90,7 @@ void Server::receive(const ByteEvent& event) {
 }
 
 void Server::frame_ended(Time at) {
-  // A real line reports the silence in time; a pseudo-terminal reports it when this program is scheduled, which may be
-  // late.
+  // On a pseudo-terminal the silence may be reported late.
   ended_late_ = at - quiet_since_ > frame_silence(line_) + late;
   if (!damaged_ && crc_order(frame_) == CrcOrder::low_first) {
     reply_.clear();

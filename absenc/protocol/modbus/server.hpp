@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Server side of a Modbus RTU line, for virtual encoders: finds frames by silence, replies in time, and checks the
-// client's timing. A subclass decodes the frames.
+// Server side of a Modbus RTU line, for virtual encoders. A subclass decodes the frames.
 #pragma once
 
 #include <cstdint>
@@ -38,17 +37,17 @@ class Server : public Device<std::uint8_t> {
 
   /// Called at power on; the subclass calls `set_rate` if the rate may have changed.
   virtual void started() = 0;
-  /// Called for a frame with a valid CRC and any address; `body` is the frame without its CRC. The subclass appends the
-  /// reply without its CRC, or nothing. It must call `check_line_rules` if the frame is for this server.
+  /// Called for a frame with a valid CRC and any address. `body` and `reply` are without CRC; an empty `reply` is not
+  /// sent.
   virtual void request(Bytes body, Time at, FrameBytes& reply) = 0;
 
   /// Sets that the baud rate changes to `rate` as soon as nothing is transmitted.
   void set_rate(std::uint32_t rate);
   /// Records whether the host kept `rule` of the document; returns `satisfied`.
   bool expect(bool satisfied, std::string_view rule, Time at) { return rules_.expect(satisfied, rule, at); }
-  /// Checks the timing of the frame that is being handled. Frames for other servers need not be checked.
+  /// Checks the timing of the frame that is being handled. Call it for frames to this server.
   void check_line_rules(Time at);
-  /// Announces that other servers may answer the present request at the same time, so that a collision breaks no rule.
+  /// Announces that other servers may answer the present request, so a collision breaks no rule.
   void expect_collision() { expects_collision_ = true; }
   /// Sets the byte order of the CRC in the present reply; without a call it is low_first.
   void set_crc_order(CrcOrder order) { crc_order_ = order; }

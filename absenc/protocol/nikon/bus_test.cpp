@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of virtual encoders of Nikon's A-format on one line: replies in turn, requests of several frames, resets,
-// EEPROM, identification and addresses.
+// Tests of virtual encoders of Nikon's A-format on one line.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -22,7 +21,7 @@ struct Standing final : Shaft {
   std::int64_t position = 0;
 };
 
-// A host that sends bytes at given times, in frames of two, and stores the bytes that it receives with their times.
+// A host that sends bytes at given times, and stores those that it receives.
 struct RawHost final : Machine<std::uint8_t> {
   void begin(Wire bytes, Time when) {
     received.clear();
@@ -53,7 +52,7 @@ struct RawHost final : Machine<std::uint8_t> {
   bool sending = false;
 };
 
-// A line with the encoders of these addresses, whose shafts stand at 2^20 counts times the address plus one.
+// A line with the encoders of these addresses, each at another position.
 struct Bus {
   explicit Bus(const std::vector<unsigned>& addresses, Format format = {})
       : line(LinkKind::half_duplex, format.line()) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The demands of the A-format's sources on encoders and hosts. Paragraphs are those of README.md.
+// The A-format's demands on encoders and hosts; paragraphs are those of README.md.
 #include <array>
 
 #include "absenc/protocol/nikon/format.hpp"

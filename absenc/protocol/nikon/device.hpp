@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual encoder of Nikon's A-format: position and turns, alarms, EEPROM, identification, and its turn among the
-// encoders of a line.
+// A virtual encoder of Nikon's A-format.
 #pragma once
 
 #include <array>
@@ -16,8 +15,7 @@ namespace absenc::nikon {
 /// Conditions of the virtual encoder's environment that users can set.
 inline constexpr auto conditions = std::array{Condition{"temperature", "degC", "of the encoder", 0, 125, 35}};
 
-/// Returns the demands on the requests of a reset to an encoder of this format. The virtual encoder measures from the
-/// end of its reply to the end of the next request, which has one frame.
+/// Returns the demands on the requests of a reset to an encoder of this format.
 [[nodiscard]] constexpr author::InARow reset_row(const Format& format) {
   return {.requests = 8,
           .interval = frame_pause,
@@ -26,8 +24,7 @@ inline constexpr auto conditions = std::array{Condition{"temperature", "degC", "
           .interval_rule = "reset sent less than 10 us after the reply before"};
 }
 
-/// A virtual encoder. Its memory has the words of the EEPROM, then the zero, the turns that are subtracted from those
-/// of the shaft, the identification, and the address.
+/// A virtual encoder with a memory of EEPROM words, zero, turns, identification and address.
 class VirtualEncoder final : public author::Responder {
  public:
   /// Constructs an encoder that is off until `power_on`. `shaft` must outlive it.
@@ -85,7 +82,7 @@ class VirtualEncoder final : public author::Responder {
 
   // ---- Data of replies
 
-  // Returns ES, whose bits no source explains: this encoder sets bit 0 with any bit of the alarms.
+  // Returns ES, whose bits no source explains.
   [[nodiscard]] std::uint8_t status(Time at) const { return alarms_at(at) != 0 ? 1 : 0; }
   [[nodiscard]] std::uint64_t data_for(const Request& request, Time at) {
     const std::uint64_t counts = position(at);
@@ -182,8 +179,7 @@ class VirtualEncoder final : public author::Responder {
     if (address == temperature_address) return static_cast<std::uint16_t>(quarters());
     return static_cast<std::uint16_t>(address < user_words ? load(2 * std::size_t{address}, 2) : 0);
   }
-  // Returns the word that was fetched by the request before, with its address, and begins to fetch or write another.
-  // A write fetches the word that it has written.
+  // Returns the word that was fetched last, with its address.
   [[nodiscard]] std::uint64_t access_memory(const Request& request, Time at) {
     const bool ready = is_ready(at);
     if (ready && fetching_) fetched_ = {*fetching_, word(*fetching_)};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names, units and meanings of all values in a frame of Nikon's A-format, in words for the operator.
+// Names, units and meanings of the values in frames of Nikon's A-format.
 #pragma once
 
 #include <array>
@@ -32,7 +32,7 @@ inline constexpr std::array<FlagInfo, 11> alarm_flags{{
      "stop the servo system at once; then `absenc clear-alarms`"},
 }};
 
-/// Values of the fields of a frame, or of a procedure's result. A member without a value is not in the frame.
+/// Values of the fields of a frame, or of a procedure's result.
 struct Values {
   std::optional<std::uint8_t> encoder_address{};  ///< Address of the encoder (EA).
   std::optional<std::uint8_t> command{};          ///< Command code (CC).
@@ -106,8 +106,7 @@ inline constexpr auto fields = [] {
   return all;
 }
 
-/// Returns the bits of a valid reply of one encoder to a request with this code that carry `field`; none if the field
-/// has no fixed place, or its bits are sent from the highest on.
+/// Returns the bits of a valid reply of one encoder that carry `field`; may be none.
 [[nodiscard]] constexpr BitRanges place_of(const Format& format, Code code, const FieldInfo& field) {
   using author::bits_of;
   const Code one = single(code);

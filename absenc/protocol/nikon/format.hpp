@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Constants of Nikon's A-format: command codes, alarms, times, memory; and Format, the differences between encoders.
-// README.md names the sources.
+// Constants of Nikon's A-format, and Format. README.md names the sources.
 #pragma once
 
 #include <array>
@@ -93,7 +92,7 @@ inline constexpr std::uint16_t position_lost = over_speed | singleturn_error | p
 inline constexpr std::uint16_t turns_lost = multiturn_error | over_speed | ps_error | busy;
 }  // namespace alarm
 
-/// Order in which the bits of an EEPROM word, and of the identification, are sent. Sources differ.
+/// Order of the bits of EEPROM words and of the identification on the wire. Sources differ.
 enum class BitOrder : std::uint8_t { low_first, high_first };
 
 /// Properties of the encoder that its frames depend on.
@@ -110,7 +109,7 @@ struct Format {
   [[nodiscard]] constexpr Resolution resolution() const { return {singleturn_bits, multiturn_bits}; }
 };
 
-/// Returns whether all encoders of the line answer a request with this code, one after the other.
+/// Returns whether all encoders of the line answer a request with this code, in turn.
 [[nodiscard]] constexpr bool is_for_all(Code code) {
   return (code >= Code::all_positions && code <= Code::all_alarms) || code == Code::all_short_positions ||
          code == Code::all_with_alarms || code == Code::all_with_temperature;
@@ -121,8 +120,7 @@ struct Format {
   const auto number = static_cast<std::uint8_t>(code);
   return static_cast<Code>(code <= Code::all_alarms ? number - 4 : number - 1);
 }
-/// Returns whether the address of a request with this code is not that of the encoder that answers it: the encoder is
-/// the only one of the line, or is found by its identification.
+/// Returns whether the address in a request with this code does not select the encoder.
 [[nodiscard]] constexpr bool is_for_any_address(Code code) {
   return code == Code::set_address || code == Code::read_only_identity || code == Code::write_only_identity ||
          code == Code::assign_address;
@@ -141,7 +139,7 @@ struct Format {
 [[nodiscard]] constexpr bool is_memory_access(Code code) {
   return code == Code::read_memory || code == Code::write_memory;
 }
-/// Returns whether a request with this code writes the EEPROM or the identification, or sets an address.
+/// Returns whether requests with this code carry a value: a word or an identification.
 [[nodiscard]] constexpr bool is_write(Code code) { return code == Code::write_memory || sends_identity(code); }
 
 /// Returns the code with this number; nothing for 23 to 26 and 31, which no source lists.
@@ -159,7 +157,7 @@ inline constexpr unsigned short_bits = 17;
   if (one == Code::short_position) return short_bits;
   return one == Code::position || one == Code::with_alarms || one == Code::with_temperature ? 40 : 24;
 }
-/// Returns the length in bytes of the reply of one encoder: IF and two data frames, three for 40 bits, one for 17.
+/// Returns the length in bytes of the reply of one encoder.
 [[nodiscard]] constexpr std::size_t reply_length(Code code) {
   return single(code) == Code::short_position ? 4 : 3 + data_bits(code) / 8;
 }
@@ -169,8 +167,7 @@ inline constexpr unsigned short_bits = 17;
   return is_write(code) ? 4 : 1;
 }
 
-/// Returns the time of the slot of one encoder if all encoders of a line answer in turn: its reply, and the pause
-/// before the next one, 3 us at 2.5 Mbit/s, 2 us at 4 and 6.67, and 1.5 us above.
+/// Returns the time of one encoder's slot, if all encoders of a line answer in turn.
 [[nodiscard]] constexpr Time slot(const Format& format, Code code) {
   const Time pause = format.rate == 0 ? Time(3us) : format.rate < 3 ? Time(2us) : Time(1500ns);
   return format.line().byte_time() * static_cast<int>(reply_length(code)) + pause;

@@ -54,7 +54,7 @@ namespace detail {
 inline constexpr unsigned request_sync = 2;  // 010
 inline constexpr unsigned reply_sync = 4;    // 001
 
-// Returns the CRC-3 (x^3 + x + 1, start 0) of the ten bits behind the sync code of a request frame.
+// Returns the CRC-3 (x^3 + x + 1, start 0) of the ten bits behind the sync code.
 [[nodiscard]] constexpr unsigned crc3(unsigned frame) {
   unsigned crc = 0;
   for (unsigned i = 3; i < 13; ++i) {
@@ -63,7 +63,7 @@ inline constexpr unsigned reply_sync = 4;    // 001
   }
   return crc;
 }
-// Returns a request frame: sync code, frame code, eight bits, and the CRC, whose highest bit is sent first.
+// Returns a request frame. The highest bit of its CRC is sent first.
 [[nodiscard]] constexpr unsigned request_frame(unsigned frame_code, unsigned bits) {
   const unsigned frame = request_sync | frame_code << 3 | bits << 5;
   return frame | static_cast<unsigned>(reflect(crc3(frame), 3)) << 13;
@@ -83,8 +83,7 @@ constexpr void push_frame(auto& bytes, unsigned frame) {
 
 }  // namespace detail
 
-/// Returns the word of the EEPROM, or the identification, of a request or reply with this code, whose bits are sent as
-/// `sent`; or the reverse.
+/// Converts a word or an identification to the order of its bits on the wire, or back.
 [[nodiscard]] constexpr std::uint32_t in_bit_order(const Format& format, Code code, std::uint32_t sent) {
   const unsigned bits = is_memory_access(code) ? 16 : 24;
   const auto value = static_cast<std::uint32_t>(sent & low_mask(bits));
@@ -93,8 +92,7 @@ constexpr void push_frame(auto& bytes, unsigned frame) {
 
 /// Parameters of the CRC-8 of replies: x^8 + x^4 + x^3 + x^2 + 1, start 0.
 inline constexpr CrcParameters crc_parameters{8, 0x1D, 0, true, true, 0};
-/// Returns the CRC-8 of the bits of a reply in the order of the wire, as the byte at its end: the highest bit of the
-/// CRC is sent first, so it is the lowest bit of that byte.
+/// Returns the CRC-8 of the bytes of a reply, as the byte that follows them.
 [[nodiscard]] constexpr std::uint8_t checksum(Bytes bytes) { return Crc<crc_parameters, CrcTable::nibble>::of(bytes); }
 
 /// Returns the bytes of a request.
@@ -109,8 +107,7 @@ inline constexpr CrcParameters crc_parameters{8, 0x1D, 0, true, true, 0};
   return bytes;
 }
 
-/// Decodes a request. Errors: wrong_length; bad_framing (sync or frame code); bad_checksum; unsupported (a command code
-/// that no source lists).
+/// Decodes a request. Errors: wrong_length, bad_framing, bad_checksum, unsupported.
 [[nodiscard]] constexpr Result<Request> decode_request(const Format& format, Bytes bytes) {
   if (bytes.size() < frame_bytes || bytes.size() % frame_bytes != 0) return Error::wrong_length;
   for (std::size_t i = 0; i < bytes.size() / frame_bytes; ++i) {
@@ -141,8 +138,7 @@ inline constexpr CrcParameters crc_parameters{8, 0x1D, 0, true, true, 0};
   return request;
 }
 
-/// Decodes a request, or two requests of a capture of which the second one reads the alarms of the same encoder.
-/// Errors: those of `decode_request`.
+/// Decodes a request, also one followed by a request for the alarms. Errors: as `decode_request`.
 [[nodiscard]] constexpr Result<Request> decode_captured(const Format& format, Bytes bytes) {
   const Result<Request> whole = decode_request(format, bytes);
   if (whole || bytes.size() != 2 * frame_bytes) return whole;
@@ -195,7 +191,6 @@ namespace detail {
   if ((info >> 6 & 31) != static_cast<unsigned>(code)) return Error::unexpected_reply;
   return (info >> 11 & 1) == 0 ? Error::none : Error::unexpected_reply;
 }
-// Checks that bits that the sources draw as 0 are 0, and that the position has no bits above the turns.
 [[nodiscard]] constexpr Error check_range(const Format& format, Code code, std::uint64_t data) {
   const unsigned all_bits = format.singleturn_bits + format.multiturn_bits;
   const auto bits_above = [&](std::uint64_t value, unsigned bits) {
@@ -212,8 +207,8 @@ namespace detail {
 
 }  // namespace detail
 
-/// Checks a reply, or the replies of several encoders, in this order: length, checksum, first bits, code, fixed bits,
-/// address, range. Returns the decoded replies, or the error of the first failed check.
+/// Checks and decodes a reply, or those of several encoders. Errors: wrong_length, bad_checksum, bad_framing,
+/// unexpected_reply, out_of_range.
 [[nodiscard]] constexpr Result<Reply> decode_replies(const Format& format, const Request& request, Bytes bytes) {
   const std::size_t size = reply_length(request.code);
   const bool all = is_for_all(request.code);
@@ -240,9 +235,7 @@ namespace detail {
   return reply;
 }
 
-/// Checks and decodes the reply to a request, as `decode_replies`. With `with_status` one reply has to be followed by
-/// that to the request for the alarms of this encoder, which the member `alarms_read` then has; error otherwise:
-/// unexpected_reply.
+/// Checks and decodes the reply to a request, also with `with_status`. Errors: as `decode_replies`.
 [[nodiscard]] constexpr Result<Reply> decode_reply(const Format& format, const Request& request, Bytes bytes) {
   if (!request.with_status) return decode_replies(format, request, bytes);
   constexpr std::size_t alarms_size = reply_length(Code::alarms);
@@ -257,9 +250,8 @@ namespace detail {
   return reply;
 }
 
-/// Returns the length of the reply of one encoder that begins with the bytes `begin`, or how many bytes are needed to
-/// know it; 0: no reply does. The reply to CC 21 and 22 has bits of the position where others have their code: it is
-/// recognized only by bits that no other reply has.
+/// Returns the likely length of the reply that begins with `begin`, or the number of bytes needed to tell; 0: no reply
+/// does.
 [[nodiscard]] constexpr std::size_t reply_size(Bytes begin) {
   if (begin.size() < frame_bytes) return frame_bytes;
   const unsigned info = detail::frame_at(begin, 0);
@@ -268,8 +260,7 @@ namespace detail {
   const bool is_short = !code || (info >> 11 & 1) != 0;
   return reply_length(is_short ? Code::short_position : *code);
 }
-/// Returns the request that a reply of one encoder shows: its code, or CC 21 for a short reply, and the address.
-/// Errors: wrong_length; unexpected_reply (a command code that no source lists).
+/// Returns the request that a reply of one encoder suggests. Errors: wrong_length, unexpected_reply.
 [[nodiscard]] constexpr Result<Request> request_of_reply(Bytes reply) {
   if (reply.size() < reply_length(Code::short_position)) return Error::wrong_length;
   Request request{.code = Code::short_position, .address = detail::address_in(reply)};

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of the frames of Nikon's A-format: printed checksums, requests of several frames, replies of several encoders,
-// readings.
+// Tests of the frames of Nikon's A-format.
 #include "absenc/protocol/nikon/frame.hpp"
 
 #include <gtest/gtest.h>
@@ -31,8 +30,7 @@ TEST(NikonFrame, CodesAreThoseThatSourcesList) {
   for (const unsigned number : {23u, 26u, 31u, 32u, 63u}) EXPECT_FALSE(code_of(number)) << number;
 }
 
-// The checksums that hpm_sdk's README prints for replies with MT 8888: the value of the register, whose highest bit is
-// sent first.
+// Checksums that hpm_sdk's README prints; the highest bit is sent first.
 TEST(NikonFrame, ChecksumsAreThoseThatAnotherVendorPrints) {
   for (const auto& [singleturn, printed] :
        {std::pair{0xFFFA6u, 0x7Au}, std::pair{0xFFFA7u, 0x59u}, std::pair{0xFFFA8u, 0xCAu}, std::pair{0xFFFA9u, 0xE9u},

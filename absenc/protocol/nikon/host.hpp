@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Conversation that reads the position of an encoder with Nikon's A-format, without port, clock, heap or texts, for
-// drives that read ten thousand times a second.
+// Reads the position of an encoder with Nikon's A-format, without port, clock, heap or texts.
 #pragma once
 
 #include <new>
@@ -9,9 +8,7 @@
 
 namespace absenc::nikon {
 
-/// Conversation that sends one request, and reads the alarms with a second one (CC 3) if the reply has a position or
-/// turns, no alarms, and a status other than 0. If several encoders answer, their alarms are not read. Nothing is
-/// repeated.
+/// Conversation that sends a request, and then may send one for the alarms (CC 3).
 class ReadPosition : public author::HostOf<Protocol> {
  public:
   /// Reads from an encoder of this format with `request`.
@@ -26,7 +23,7 @@ class ReadPosition : public author::HostOf<Protocol> {
   [[nodiscard]] const Reading* reading() const final { return has_reading_ ? &reading_ : nullptr; }
   /// Returns the request for the position, also after the one for the alarms.
   [[nodiscard]] const Request& request() const { return position_request_; }
-  /// Returns the valid reply to `request`, completed by the alarms that a second reply has reported.
+  /// Returns the valid reply to `request`.
   [[nodiscard]] const Reply& last() const { return reply_; }
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of readings by ReadPosition and by commands, with a virtual encoder of Nikon's A-format in virtual time.
+// Tests of readings with a virtual encoder of Nikon's A-format in virtual time.
 #include "absenc/protocol/nikon/host.hpp"
 
 #include <gtest/gtest.h>

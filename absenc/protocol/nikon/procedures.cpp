@@ -64,9 +64,7 @@ Procedure reset(Dialog& dialog, ProcedureResult& found, Code code) {
 
 namespace {
 
-// Returns a word of the EEPROM. The first reply has the word that was requested before; the second one, after the time
-// that fetching takes, has this word. The second request fetches again, so the procedure waits before it goes on.
-// `step` is the detail of an error.
+// Returns a word of the EEPROM: the second reply has the word that the first request fetched.
 Part<std::uint16_t> fetch(Dialog& dialog, std::uint8_t word, std::string_view step) {
   const Request request{.code = Code::read_memory, .address = dialog.format().address, .word = word};
   co_await dialog.ask(request).or_say(step);
@@ -157,8 +155,7 @@ namespace {
 
 constexpr std::string_view other_there = "another encoder has the new address";
 
-// Reads the identification at the address `wanted` after the request for it, and ends the procedure if no encoder
-// answers there, or another one than that with the identification `identity`.
+// Reads the identification at `wanted`; ends the procedure if it is not `identity`.
 Part<bool> find_at(Dialog& dialog, ProcedureResult& found, std::uint8_t wanted, std::uint32_t identity) {
   co_await dialog.rest(memory_write_time);
   const Reply reply =

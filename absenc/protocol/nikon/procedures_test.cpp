@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of commands with several steps, with a virtual encoder of Nikon's A-format in virtual time.
+// Tests of commands of several requests, with a virtual encoder of Nikon's A-format.
 #include <gtest/gtest.h>
 
 #include <vector>
@@ -15,7 +15,7 @@ using testing::Numbers;
 using testing::wire;
 using testing::Wire;
 
-// Returns a function that replaces the replies from number `from` on, and before number `to`, by `reply`.
+// Returns a function that replaces the replies `from` to `to` - 1 by `reply`.
 testing::Tamper replace(unsigned from, unsigned to, Wire reply) {
   return [=](unsigned index, Wire& bytes) {
     if (index >= from && index < to) bytes = reply;
@@ -91,7 +91,7 @@ TEST(NikonProcedures, ResetsThatFailSayWhy) {
   }
 }
 
-// Checks that a reset waits until the encoder has stored it, and that nothing is sent after a lost reply.
+// A reset waits until the encoder has stored it; after a lost reply nothing is sent.
 TEST(NikonProcedures, ResetEndsWithItsRow) {
   Bench bench;
   const auto good = bench.run("clear-alarms");

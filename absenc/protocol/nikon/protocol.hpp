@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The reading of a valid reply, and the Protocol of the A-format: the functions that the engine, procedures and virtual
-// encoders of absenc/protocol/author require.
+// Readings of the A-format, and its functions for the templates of absenc/protocol/author.
 #pragma once
 
 #include <cstddef>
@@ -21,7 +20,7 @@ namespace absenc::nikon {
   if (one == Code::with_alarms) return static_cast<std::uint16_t>(data >> 24 & alarm::all);
   return std::nullopt;
 }
-/// Returns the position within the turn in the data of a reply to this code; nothing if it does not carry all bits.
+/// Returns the position within the turn in the data of a reply; nothing if bits are missing.
 [[nodiscard]] constexpr std::optional<std::uint64_t> singleturn_in(const Format& format, Code code,
                                                                    std::uint64_t data) {
   const Code one = single(code);
@@ -30,7 +29,7 @@ namespace absenc::nikon {
   if (one != Code::position && !is_part && !is_whole_short) return std::nullopt;
   return data & low_mask(format.singleturn_bits);
 }
-/// Returns the turns in the data of a reply to this code; nothing if it does not carry all of their bits.
+/// Returns the turns in the data of a reply to this code, or nothing.
 [[nodiscard]] constexpr std::optional<std::uint64_t> multiturn_in(const Format& format, Code code, std::uint64_t data) {
   const Code one = single(code);
   if (format.multiturn_bits == 0 || (one != Code::position && one != Code::upper)) return std::nullopt;
@@ -46,8 +45,7 @@ constexpr void judge(Reading& reading, std::uint32_t alarms) {
   reading.multiturn_valid = reading.multiturn_bits != 0 && (alarms & alarm::turns_lost) == 0;
 }
 
-/// Returns the reading of one encoder's reply. A status of 0 is taken to report that no alarm is raised. With another
-/// status, a reply without alarms reports none of them, and not whether the position is valid.
+/// Returns the reading of one encoder's reply; without alarms in it, status 0 is taken to mean none.
 [[nodiscard]] constexpr Reading to_reading(const Format& format, Code code, const OneReply& reply) {
   Reading reading;
   if (const auto singleturn = singleturn_in(format, code, reply.data)) {
@@ -68,15 +66,13 @@ constexpr void judge(Reading& reading, std::uint32_t alarms) {
   return reading;
 }
 
-/// Returns the reading `now` completed by alarms that `before` knew, as Unit::remembered: they explain a status that is
-/// not 0.
+/// Returns `now` completed by alarms that `before` knew, as Unit::remembered.
 [[nodiscard]] constexpr Reading remembered(const Reading& before, Reading now) {
   if (now.alarms_reported == 0 && before.alarms != 0) judge(now, before.alarms);
   return now;
 }
 
-/// The functions of the A-format that the engine and virtual encoders of absenc/protocol/author require (dialog.hpp,
-/// device.hpp).
+/// Functions of the A-format for the engine and virtual encoders of absenc/protocol/author.
 struct Protocol {
   /// Format of the encoder: the values of its options.
   using Format = nikon::Format;
@@ -87,13 +83,11 @@ struct Protocol {
   /// Greatest length of the replies to one request in bytes.
   static constexpr std::size_t longest_reply = encoder_count * longest_one;
 
-  /// Returns the time limits of a host. The gap limit covers encoders that are missing between two others. The pause
-  /// before a request is one of silence: a reply that is sent twice ends within it at the higher rates.
+  /// Returns the time limits of a host. The gap limit covers encoders that are missing between others.
   static constexpr author::HostTimes host_times(const Format& format) {
     return {.answer_limit = answer_limit, .gap_limit = 8 * slot(format, Code::position), .silence = frame_pause};
   }
-  /// Returns how a request is sent: requests that change the encoder are never repeated; silence ends the replies of
-  /// several encoders.
+  /// Returns how a request is sent: its repetitions and pauses, and how its reply ends.
   static constexpr author::Manner manner(const Format&, const Request& request) {
     const bool changes = is_reset(request.code) || is_write(request.code);
     const bool fetches = request.code == Code::read_memory;
@@ -110,7 +104,7 @@ struct Protocol {
   static constexpr RequestBytes encode(const Format& format, const Request& request) {
     return encode_request(format, request);
   }
-  /// Returns the length in bytes of the request that begins with the bytes `begin`; 0 if no request does.
+  /// Returns the length of the request that begins with `begin`, or how many bytes tell it; 0: none.
   static constexpr std::size_t request_size(const Format&, Bytes begin) {
     if (begin.size() < frame_bytes) return frame_bytes;
     const unsigned first = detail::frame_at(begin, 0);
@@ -118,7 +112,7 @@ struct Protocol {
     if (!code || first != detail::request_frame(0, first >> 5 & 0xFF)) return 0;
     return frames_of(*code) * frame_bytes;
   }
-  /// Returns the length in bytes of the reply to `request`; 0: only silence ends the replies of several encoders.
+  /// Returns the length in bytes of the reply to `request`; 0: only silence ends it.
   static constexpr std::size_t expected(const Format&, const Request& request, Bytes) {
     return is_for_all(request.code) ? 0 : reply_length(request.code);
   }
@@ -126,7 +120,7 @@ struct Protocol {
   static constexpr Result<Request> decode_request(const Format& format, Bytes bytes) {
     return decode_captured(format, bytes);
   }
-  /// Checks and decodes the bytes of a reply; returns the reply or the error of the first failed check.
+  /// Checks and decodes the bytes of a reply.
   static constexpr auto decode = decode_reply;
   /// Returns false: after an error more bytes may follow, so the host waits for silence.
   static constexpr bool is_whole(const Format&, Error) { return false; }
@@ -136,7 +130,7 @@ struct Protocol {
     if (reply.alarms_read) judge(reading, *reply.alarms_read);
     return reading;
   }
-  /// Returns the end of the request, because no source states when the encoder latches the position.
+  /// Returns the end of the request: no source states when the encoder latches.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
   /// Returns the times of a virtual encoder, and the rule on pauses within a request.
   static constexpr author::DeviceTimes device_times(const Format& format) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Combines, in a capture, a reply whose status is not 0 with the reply to the next request, if that reads the alarms.
+// Combines, in a capture, a position whose status is not 0 with the alarms read after it.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +10,7 @@
 
 namespace absenc::nikon {
 
-/// Composes the exchanges of a host that reads the alarms (CC 3) because the status of a position is not 0. The alarms
-/// belong to the position before them, of the only encoder that has answered.
+/// Composes the exchanges of a host that reads the alarms after a status other than 0.
 class StatusFollower final : public Follower {
  public:
   /// Creates a follower for encoders with this format.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of captures of Nikon's A-format in which a host reads the alarms because the status of a position is not 0.
+// Tests of captures of Nikon's A-format in which a host reads the alarms after a position.
 #include "absenc/protocol/nikon/status_follower.hpp"
 
 #include <gtest/gtest.h>

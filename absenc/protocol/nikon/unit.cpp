@@ -59,7 +59,7 @@ constexpr std::array<Argument, 1> address_arguments{{encoder_address}};
 constexpr std::array<Argument, 1> identity_arguments{{identification}};
 constexpr std::array<Argument, 2> assign_arguments{{encoder_address, identification}};
 
-// Requests of several encoders have the highest address, as those of TI's driver when it looks for encoders.
+// Requests to all encoders have the highest address, as in TI's driver.
 template <Code code>
 constexpr Request ask_for(const Format& format, Arguments = {}) {
   return {.code = code, .address = is_for_all(code) ? std::uint8_t{encoder_count - 1} : format.address};
@@ -170,13 +170,12 @@ BitRanges bits_in(const Options& values, Frame request, Frame reply, const Field
   const Format format = options.format(values);
   const Result<Request> asked =
       request.bytes.empty() ? request_of_reply(reply.bytes) : decode_request(format, request.bytes);
-  // The replies of several encoders have each field several times, and so have those to two requests.
+  // Several replies have each field several times.
   if (!asked || reply.bytes.size() != reply_length(asked->code)) return {};
   return place_of(format, asked->code, field);
 }
 
-// Returns the bits of the temperature that this exchange reports as the word 0xF9, in the order of the wire, the first
-// bit lowest; nothing if it reports another word, or none.
+// Returns the bits that an exchange reports as the word 0xF9, the first bit of the wire lowest.
 std::optional<std::uint64_t> temperature_word(const Capture& capture) {
   const Result<Request> request =
       capture.request.empty() ? request_of_reply(capture.reply) : decode_request({}, capture.request);
@@ -186,8 +185,7 @@ std::optional<std::uint64_t> temperature_word(const Capture& capture) {
   if (!reply || reply->data >> 16 != temperature_address) return std::nullopt;
   return reply->data & 0xFFFF;
 }
-// The word 0xF9 shows the order of the bits: it has the temperature in its lower 10 bits, and zeros above. A word that
-// is 0 shows nothing.
+// The word 0xF9, a temperature of 10 bits, can show the order of the bits.
 bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sink) {
   const std::size_t option = options.find("bit_order");
   std::array<std::optional<std::size_t>, order_names.size()> against{};  // the capture that contradicts each order

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Test vectors of Nikon's A-format, which the compiler decodes: frames of vendors' examples, and frames made from the
-// drawings of README.md.
+// Test vectors of Nikon's A-format: vendors' examples, and frames made from README.md.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Requirements of the protocol's document on encoder and host, each with its paragraph, for conformance tests.
+// Requirements of the document on encoder and host, for conformance tests.
 #include <array>
 
 #include "absenc/protocol/raa38/unit.hpp"
@@ -139,8 +139,7 @@ constexpr auto direction_often = std::array{HostStep{milliseconds(20), "set-dire
 constexpr auto zero_often = std::array{HostStep{milliseconds(20), "zero", {}, 12}};
 
 constexpr auto two_at_once = std::array{HostStep{{}, "bc aa b1 bc aa b1"}};
-// The reply begins 20 ms after the request (`acquisition_us`); a second request within that time breaks the rule
-// `turn`.
+// The reply begins 20 ms after the request (`acquisition_us`).
 constexpr auto soon_again = std::array{HostStep{{}, "position"}, HostStep{milliseconds(5), "position"}};
 
 constexpr HostStep enter{milliseconds(1), "7e5:0401000000000000"};
@@ -186,7 +185,7 @@ constexpr std::array<HostClause, 7> modbus_host_clauses{{
      .breaks = {script::direction_often, script::zero_often}},
 }};
 
-/// Requirements that a host on a serial line must fulfil. Only in bus mode do bytes request a position.
+/// Requirements of the document that a host on a serial line must fulfil.
 constexpr std::array<HostClause, 4> serial_host_clauses{{
     {"asks", "3.1.5 (1)", "requests are as drawn", HostDemand::asks},
     {"silence", "3.1.5 (1)", "after no reply it asks again", HostDemand::after_silence},

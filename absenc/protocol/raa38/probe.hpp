@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Judges which values of an option fit captured frames: a value is impossible if one frame contradicts it.
+// Judges which values of an option fit captured frames.
 #pragma once
 
 #include <optional>
@@ -10,9 +10,8 @@
 namespace absenc::raa38 {
 
 /// Puts each value of an option from `first` to `last` with its evidence into `sink`. `contradiction(value, i)` returns
-/// why capture i contradicts the value, or an empty text. Returns false if no value is possible. Otherwise sets `value`
-/// to the first possible value and returns true; a `value` that is possible itself is left unchanged, because the
-/// position of a shaft at standstill fits many numbers of bits.
+/// why capture i contradicts the value, or an empty text. Sets `value` to the first possible one unless it is possible
+/// itself; returns false if none is.
 template <class Contradiction>
 bool judge_option(EvidenceSink& sink, std::size_t option, std::int64_t first, std::int64_t last, std::size_t captures,
                   std::int64_t& value, std::string_view agrees, Contradiction&& contradiction) {

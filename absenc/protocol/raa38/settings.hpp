@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Settings that a virtual RAA38S6 stores over power off, for lines with commands that change them, and the number of
-// writes to its memory.
+// Settings that a virtual RAA38S6 stores over power off, and the number of their writes.
 #pragma once
 
 #include <algorithm>
@@ -48,7 +47,7 @@ class Settings {
     const std::uint32_t up = counts(at) - load(zero_at);
     return static_cast<std::uint32_t>((counts_down() ? 0u - up : up) & low_mask(bits_));
   }
-  /// Writes a setting at index `at` and counts the write. Returns false if the memory had this value already.
+  /// Writes a setting at index `at`. Returns false if the memory had this value already.
   bool write(std::size_t at, Bytes value) {
     const MutableBytes kept = MutableBytes(memory_).subspan(at, value.size());
     const bool changes = !std::equal(value.begin(), value.end(), kept.begin());

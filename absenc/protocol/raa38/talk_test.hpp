@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: encoders and a host on one line in virtual time, and the results of the host's conversations.
+// For tests: encoders and a host on one line in virtual time.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -67,7 +67,7 @@ template <class Item>
          << text_of(end.error).name << ": " << end.words << ": " << end.fields;
 }
 
-/// A line with one or more encoders and a host. `options_of(format)` must return the unit's options for a format.
+/// A line with encoders and a host; `options_of(format)` must return the unit's options.
 template <class Item, class Encoder, class Format, const Unit& unit>
 struct Bench {
   Bench(const Format& own, LinkKind kind, const LineSettings& settings) : format(own), line(kind, settings) {}
@@ -123,8 +123,7 @@ struct Bench {
   Time took{};
 };
 
-/// Returns how long a conversation continues after its first request if another sender never pauses from then on;
-/// `never` if the conversation does not end.
+/// Returns how long a conversation lasts from its first request on if noise never stops.
 inline Time time_with_noise(Conversation<std::uint8_t>& conversation) {
   using Kind = Step<std::uint8_t>::Kind;
   constexpr std::uint8_t noise = 0x55;

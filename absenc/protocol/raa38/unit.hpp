@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The RAA38S6 as units for the list of units, one for each of its three protocols here, and their clauses.
+// The three units of the RAA38S6, one for each protocol, and their clauses.
 #pragma once
 
 #include "absenc/protocol/clause.hpp"

@@ -29,8 +29,7 @@ class CompiledFormat {
   }
 
  private:
-  // Decodes long words, readings with bits after the word or of a wrong length, and words whose
-  // parity or padding is wrong.
+  // Decodes readings for which `word_` is not enough.
   [[nodiscard, gnu::noinline]] constexpr Result<Word> decode_otherwise(const BitView& bits) const {
     return ssi::decode(format_, bits);
   }

@@ -21,7 +21,7 @@ void VirtualEncoder::selected(Time at, Time period, bool, author::DrivenBits& bi
     latched_ = word_of(format_.word, shaft_->at(at), raised());
     shifted_ = 0;
   }
-  // After the last clock the line is low for the monoflop time; it stays high if the bits after the word are ones.
+  // After the last clock the line is low for the monoflop time, unless ones follow the word.
   if (format_.after_word != AfterWord::one) hold_low(monoflop());
   BitBuffer<WordFormat::maximum_bits> coded;
   encode_whole(format_, latched_, coded);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// SSI words, MSB first: encoding, decoding, the few checks that are possible, and times. README.md draws the frame.
+// SSI words, MSB first: encoding, decoding and times. README.md draws the frame.
 #pragma once
 
 #include <cstddef>
@@ -19,8 +19,7 @@ using namespace std::chrono_literals;
 inline constexpr LineSettings line_settings{.rate = 200'000, .spi_mode = 3, .idle_clocks = 1};
 inline constexpr Time pause_margin = 10us;  ///< Time that the host adds to the pause between two words.
 
-/// Bits that the encoder sends if the clock continues after the word: the word again, zeros, ones, or a zero and the
-/// word again.
+/// Bits that the encoder sends if the clock continues after the word.
 enum class AfterWord : std::uint8_t {
   repeat,
   zero,
@@ -35,25 +34,22 @@ struct Format {
   using Compiled = CompiledFormat;           ///< The format compiled (compiled_format.hpp), to decode many words.
   WordFormat word = "position:12"_word;      ///< Layout of the position word: its fields in the order of the line.
   AfterWord after_word = AfterWord::repeat;  ///< What the encoder sends after its word.
-  /// Number of clocks after the word, whose bits are compared with `after_word`. With `repeat` and as many as the word
-  /// has bits, the word is read twice.
+  /// Number of clocks after the word, whose bits are compared with `after_word`.
   unsigned extra_clocks = 0;
   Scale scale{};  ///< Whether the encoder is linear, and the length of a count.
   /// Whether the last bit is a parity bit that the encoder inverts if its position is wrong.
   bool error_parity = false;
   bool padded = false;  ///< Whether skipped bits of the word must be zero.
-  /// Highest speed of the shaft between two words that the host reads to confirm the position; 0: reads one word.
+  /// Highest speed of the shaft between two words that confirm the position; 0: reads one word.
   std::uint32_t confirm_rpm = 0;
   // ---- Values that vary by product (RAA38S6 3.5, note)
-  /// Longest pause of the clock after which the old word may still continue (monoflop time Tm of the encoder). The host
-  /// pauses for this time and `pause_margin`.
+  /// Longest pause of the clock after which the old word may still continue (monoflop time Tm).
   Time pause = 50us;
   std::uint32_t clock_khz = 200;  ///< Clock rate in kHz.
-  /// Monoflop time Tm of the virtual encoder, at most `pause`; 0: equal to `pause`. Data sheets of usual encoders state
-  /// 9 to 41 us, that of the RAA38S6 500 us.
+  /// Monoflop time Tm of the virtual encoder, at most `pause`; 0: equal to `pause`.
   Time monoflop = 20us;
   std::uint32_t slowest_khz = 100;  ///< Slowest clock that the virtual encoder allows, in kHz.
-  /// Fastest clock that the virtual encoder allows, in kHz. The document's Tcs, more than 4 us, is its period.
+  /// Fastest clock that the virtual encoder allows, in kHz; its period is the document's Tcs.
   std::uint32_t fastest_khz = 250;
 };
 
@@ -62,8 +58,7 @@ inline constexpr std::size_t frame_capacity = 2 * WordFormat::maximum_bits;  ///
 /// Returns the number of clocks of one reading: the word and the extra clocks.
 [[nodiscard]] constexpr unsigned clocks(const Format& format) { return format.word.bits() + format.extra_clocks; }
 
-/// Returns bit `index` (from 0) of an endless clock sequence: the word, then the bits after it. The word begins at
-/// `first`.
+/// Returns bit `index` (from 0) of an endless clock sequence whose word begins at `first`.
 [[nodiscard]] constexpr bool bit_after_word(const Format& format, BitView word, std::size_t index,
                                             std::size_t first = 0) {
   const std::size_t bits = format.word.bits();
@@ -82,7 +77,7 @@ namespace detail {
   const std::size_t both = 2 * word + (format.after_word == AfterWord::separated ? 1 : 0);
   const bool twice = format.extra_clocks == 0 && bits.size == both;
   if (bits.size == clocks(format) || twice) return Error::none;
-  // The length is wrong. If a bit above the width of a word is set, the bits as one number exceed any position.
+  // A number with a bit above the width of the word exceeds any position.
   for (std::size_t i = 0; i + word < bits.size; ++i) {
     if (bits[i]) return Error::out_of_range;
   }
@@ -130,30 +125,25 @@ constexpr Result<typename Source::Word> decode_by(const Source& source, BitView 
 
 }  // namespace detail
 
-/// Decodes the word in `bits` from `first` on; all further bits must be those that the encoder sends after a word.
-/// Errors: wrong_length (too few bits), line_stuck (all bits alike although the bits after the word must differ),
-/// bad_checksum (parity), out_of_range (a skipped bit that must be zero is one), cross_check_failed (wrong bits after
-/// the word).
+/// Decodes the word in `bits` from `first` on, and checks the bits after it. Errors: wrong_length, line_stuck,
+/// bad_checksum, out_of_range, cross_check_failed.
 [[nodiscard]] constexpr Result<Word> decode_clocked_on(const Format& format, BitView bits, std::size_t first = 0) {
   return detail::decode_clocked_on(Given<Format>{format, format.word}, bits, first);
 }
 
-/// Decodes a reading of `clocks(format)` bits, or the word twice if the format has no extra clocks. Errors:
-/// wrong_length, out_of_range (too many clocks, and their bits as one number exceed any position), and those of
-/// decode_clocked_on.
+/// Decodes a reading: the word and `extra_clocks` bits or, without extra clocks, possibly the word twice. Errors: those
+/// of decode_clocked_on.
 [[nodiscard]] constexpr Result<Word> decode(const Format& format, BitView bits) {
   return detail::decode_by(Given<Format>{format, format.word}, bits);
 }
 
-/// Decodes a word whose format is known at compile time. The array `values` of the result is empty if the format has no
-/// fields with Meaning::value.
+/// Decodes a word whose format is known at compile time.
 template <const Format& format>
 [[nodiscard]] constexpr Result<typename Known<format>::Word> decode(BitView bits) {
   return detail::decode_by(Known<format>{}, bits);
 }
 
-/// Appends the encoded `word` to `out`, which must be empty; with `error_parity`, an error inverts the parity bit.
-/// Returns false if the capacity of `out` is too small.
+/// Appends the encoded `word` to `out`, which must be empty. Returns false if `out` is too small.
 template <std::size_t Capacity>
 constexpr bool encode_whole(const Format& format, const Word& word, BitBuffer<Capacity>& out) {
   BitBuffer<Capacity> right;
@@ -165,7 +155,7 @@ constexpr bool encode_whole(const Format& format, const Word& word, BitBuffer<Ca
   return true;
 }
 
-/// Appends the word and the bits after it to `out`, `count` bits in all. Returns false if `out` is too small.
+/// Appends `count` bits of the word and those after it. Returns false if `out` is too small.
 template <std::size_t Capacity>
 constexpr bool encode(const Format& format, const Word& word, std::size_t count, BitBuffer<Capacity>& out) {
   BitBuffer<WordFormat::maximum_bits> coded;
@@ -177,8 +167,7 @@ constexpr bool encode(const Format& format, const Word& word, std::size_t count,
 /// Whether a word has an error bit, and the level of the bit that reports an error.
 enum class ErrorBit : std::uint8_t { none, active_high, active_low };
 
-/// Returns the tree format, in which turns and position meet at a fixed clock: zeros fill up the turns to `turns` bits
-/// and the position to `steps` bits. Returns an empty format if either is too long.
+/// Returns the tree format: `turns` bits and then `steps` bits, filled up with zeros; may be empty.
 [[nodiscard]] constexpr WordFormat tree_format(const PositionBits& bits, unsigned turns, unsigned steps) {
   WordFormat word;
   const auto fill = [&word](unsigned count) {
@@ -192,15 +181,14 @@ enum class ErrorBit : std::uint8_t { none, active_high, active_low };
   return word;
 }
 
-/// Returns the format `word` with the further bits that are chosen: an error bit, and a parity bit over all bits before
-/// it. `gray`: the counts are Gray-coded.
+/// Returns the format `word` with the chosen error bit and parity bit. `gray`: Gray-coded counts.
 [[nodiscard]] constexpr WordFormat word_with(WordFormat word, bool gray, ErrorBit error, Parity parity) {
   if (gray) word.set_gray();
   if (error != ErrorBit::none) word.add({"error", Meaning::error, 1, error == ErrorBit::active_low});
   if (parity != Parity::none) word.add({"parity", Meaning::parity, 1, parity == Parity::odd});
   return word;
 }
-/// Returns the format of a word with the counts of `bits` and, if they are chosen, an error bit and a parity bit.
+/// Returns the format of a word with the counts of `bits`, and the chosen further bits.
 [[nodiscard]] constexpr WordFormat word_with(const PositionBits& bits, bool gray, ErrorBit error, Parity parity) {
   return word_with(word_format(bits), gray, error, parity);
 }

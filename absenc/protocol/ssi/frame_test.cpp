@@ -18,8 +18,7 @@ BitBuffer<256> bits(std::string_view text) {
 
 Result<Word> decode(const Format& format, std::string_view text) { return ssi::decode(format, bits(text).view()); }
 
-// Checks that fewer than 12 clocks of 12 bits give no position. Paragraph 3.5: 8 of them, converted with the formula
-// for 12, are at most 22.4121 degrees.
+// Paragraph 3.5: 8 clocks, converted with the formula for 12, are at most 22.4121 degrees.
 TEST(SsiFrame, RejectsTooFewClocks) {
   EXPECT_NEAR(degrees(255, 12), 22.4121, 0.0001);
   for (std::size_t size = 0; size < 12; ++size) {
@@ -27,8 +26,7 @@ TEST(SsiFrame, RejectsTooFewClocks) {
   }
 }
 
-// Checks the error of 14 clocks of 12 bits: out_of_range if their number exceeds any position (paragraph 3.5: it can be
-// thousands of degrees), otherwise wrong_length.
+// Paragraph 3.5: with too many clocks the position can be thousands of degrees.
 TEST(SsiFrame, RejectsTooManyClocks) {
   for (std::uint64_t position = 0; position < 4096; ++position) {
     BitBuffer<64> read;
@@ -51,7 +49,6 @@ TEST(SsiFrame, ReadingTwiceDetectsAnyWrongBit) {
   EXPECT_EQ(decode(format, text.substr(0, 12)).error(), Error::wrong_length);
 }
 
-// A host that assumes one bit too few or too many detects this by the bits after the word, unless all bits are alike.
 TEST(SsiFrame, ExtraClocksDetectWrongNumberOfBits) {
   unsigned missed = 0;
   for (std::uint64_t position = 0; position < 4096; ++position) {
@@ -86,8 +83,6 @@ TEST(SsiFrame, EncodeFailsWithoutRoom) {
   EXPECT_EQ(room.size(), 64u);
 }
 
-// Decodes valid and damaged words, and words of wrong lengths: a format known at compile time must give the same
-// results as one known at run time.
 template <const Format& format>
 void agree() {
   sim::Random random(1);

@@ -9,7 +9,7 @@
 
 namespace absenc::ssi {
 
-/// The protocol, as author layers use it: word, clocks and times. The port is set to the clock rate already.
+/// The protocol, as author layers use it: word, clocks and times.
 struct Protocol {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = ssi::Format;
@@ -25,7 +25,7 @@ struct Protocol {
   }
   /// Returns the number of clocks of one reading.
   static constexpr unsigned clocks(const Format& format) { return ssi::clocks(format); }
-  /// Decodes a reply with all checks; returns the first error if one fails. `AnyFormat`: Format or Format::Compiled.
+  /// Decodes a reply with all checks. `AnyFormat`: Format or Format::Compiled.
   template <class AnyFormat>
   static constexpr Result<Word> decode(const AnyFormat& format, const BitView& bits) {
     return ssi::decode(format, bits);
@@ -38,8 +38,7 @@ struct Protocol {
   }
 };
 
-/// Returns whether a shaft with at most `confirm_rpm` can have moved from the word `before` to the word `after` within
-/// the time `between`, in either direction.
+/// Returns whether a shaft with at most `confirm_rpm` can have moved from `before` to `after`.
 [[nodiscard]] constexpr bool can_follow(const Format& format, const Word& before, const Word& after, Time between) {
   const unsigned bits = format.word.bits_of(Meaning::position);
   const unsigned turns = format.word.bits_of(Meaning::multiturn);
@@ -47,7 +46,7 @@ struct Protocol {
   const std::uint64_t difference =
       ((after.multiturn << bits | after.position) - (before.multiturn << bits | before.position));
   const std::uint64_t counts = std::min(difference & mask, (~difference + 1) & mask);
-  // Distance in 2^-32 of a turn: at 60 rpm, one turn per second, the shaft moves 4295 per microsecond.
+  // Distance in 2^-32 of a turn: at 60 rpm the shaft moves 4295 per microsecond.
   const auto distance = static_cast<std::uint64_t>(between.count()) / 1000 * format.confirm_rpm / 60 * 4295 + 1;
   const std::uint64_t reach = bits >= 32 ? distance << (bits - 32) : distance >> (32 - bits);
   return counts <= reach + 1;
@@ -56,7 +55,7 @@ struct Protocol {
 /// Reads one word, and after it the number of bits that `format.extra_clocks` states.
 using ReadPosition = author::ReadClocked<Protocol>;
 
-/// Reads two words and reports the second. Further error: cross_check_failed (the shaft cannot have moved that far).
+/// Reads two words and reports the second. Further error: cross_check_failed.
 class ConfirmPosition : public author::ClockedHostOf<Protocol> {
  public:
   /// Creates a conversation that reads an encoder of this format twice.

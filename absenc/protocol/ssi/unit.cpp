@@ -16,7 +16,7 @@ namespace {
 
 using namespace author;
 
-// Values of the option `parity`; its value `error` is an even parity that is inverted if the position is wrong.
+// Values of the option `parity`; `error`: even, and inverted if the position is wrong.
 enum class WordParity : std::uint8_t { none, odd, even, error };
 
 struct Settings : WordSettings<Format> {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// SSI test words with the document that each is from; "derived": made by the rules of the document.
+// SSI test words with their sources; "derived": made by the rules of the document.
 #pragma once
 
 #include <array>

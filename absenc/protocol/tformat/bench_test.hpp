@@ -29,8 +29,7 @@ struct RawHost final : sim::testing::RawHost {
   explicit RawHost(Wire request, Time at = {}) : sim::testing::RawHost(std::move(request), 100us, 12us, at) {}
 };
 
-/// Returns a fault that replaces the replies from number `from` on, and before number `to`, by refusals with the status
-/// `alarm`.
+/// Returns a fault that replaces the replies `from` to `to` - 1 by refusals.
 inline Tamper refuse(unsigned from, unsigned to, std::uint8_t alarm) {
   return [=](unsigned index, Wire& reply) {
     if (index >= from && index < to) reply = wire(Reply{.status = alarm, .encoder_id = 0x11});
@@ -54,7 +53,6 @@ struct Bench : author::testing::UnitBench<17> {
   VirtualEncoder& encoder = static_cast<VirtualEncoder&>(device);
 };
 
-/// Sends `times` requests of a reset, with a pause of 40 us after each exchange, and checks that each is answered.
 inline void reset(Bench& bench, DataId id, unsigned times = reset_requests) {
   for (unsigned i = 0; i < times; ++i) {
     EXPECT_EQ(bench.raw({control_field(id)}).size(), 6u);

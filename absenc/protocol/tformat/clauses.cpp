@@ -8,8 +8,7 @@
 namespace absenc::tformat {
 namespace {
 
-/// Alarms that a reset must clear (mask of ALMC). Over-heat is left out, because it returns as long as the encoder is
-/// hot.
+/// Alarms that a reset must clear; over-heat returns as long as the encoder is hot.
 constexpr std::int64_t latched_alarms = alarms::latched & ~alarms::over_heat;
 
 constexpr std::array<std::int64_t, 1> first_byte{0};   // address of the user's EEPROM

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual Smart-Abs encoder (T-format): answers as paragraphs 6 to 10 of the specification state, and records the
-// rules that its host breaks.
+// A virtual Smart-Abs encoder (T-format, paragraphs 6 to 10 of the specification).
 #pragma once
 
 #include <array>
@@ -63,8 +62,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     if (is_on(now)) update(now);
     if (off_) watch_battery();
   }
-  /// Returns position, turns, encoder id, status and alarms at `now` as a reply to data ID 3. Does not update the
-  /// alarms that change with time: each request does.
+  /// Returns the reply to data ID 3 at `now`; does not update the alarms that change with time.
   [[nodiscard]] Reply everything(Time now) const {
     const std::uint64_t mask = low_mask(format_.singleturn_bits);
     const std::uint8_t almc = alarms_now();
@@ -87,9 +85,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     } else {
       counter_lap_ = lap(now);
     }
-    // If the battery failed while the power was off, nothing counted the turns, even if a battery is connected again.
-    // Over_speed and counter_overflow are indefinite then; this encoder clears them. Over_heat does not need the
-    // battery (6.5).
+    // If the battery failed while the power was off, nothing counted the turns (6.5).
     if (battery_lost_) {
       latches_ = static_cast<std::uint8_t>((latches_ & alarms::over_heat) | alarms::battery_error);
       set_turns(0, now);
@@ -114,25 +110,23 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   }
 
  private:
-  // Typical voltages in mV at or below which battery_error (while the power is off) and battery_alarm are raised (5.4,
-  // 6.5).
+  // Typical voltages in mV of battery_error and battery_alarm (5.4, 6.5).
   static constexpr std::int32_t battery_error_voltage = 2750;
   static constexpr std::int32_t battery_alarm_voltage = 3100;
   // Speed in 1/1000 rpm at or above which switching on sets full_absolute_status (5.4.1).
   static constexpr std::int32_t full_absolute_speed = 100'000;
-  // Greatest speed in 1/1000 rpm of a shaft that counts as standing still: a servo at rest trembles.
+  // Greatest speed in 1/1000 rpm of a shaft that counts as standing still.
   static constexpr std::int32_t standing_still = 1'000;
   // Greatest speed in 1/1000 rpm that the turn counter follows without power (5.4.2).
   static constexpr std::int32_t power_off_speed = 6'000'000;
-  // Greatest acceleration in rad/s^2 that the turn counter follows without power; the second value holds for the time
-  // `power_off_timer` after power off.
+  // Accelerations in rad/s^2 that the turn counter follows without power, later and at first.
   static constexpr std::int32_t power_off_acceleration = 4'000;
   static constexpr std::int32_t power_off_timer_acceleration = 80'000;
   static constexpr Time power_off_timer = 5s;
 
   static constexpr std::int32_t magnitude(std::int32_t value) { return value < 0 ? -value : value; }
 
-  // Layout of the stored memory: the user's pages, the over-heat threshold, the zero position (4 bytes, little endian).
+  // The stored memory ends with the zero position (4 bytes, little endian).
   static constexpr std::size_t threshold_at =
       author::offset_of(memory_areas, service_page, overheat_address, is_stored);
   static constexpr std::size_t zero_at = stored_bytes;
@@ -148,9 +142,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     reply.append(encode_reply(*made).view());
     return Answer::sent;
   }
-  // Returns whether a flawed request gets a refusal when the line is silent, and stores the communication alarms of the
-  // refusal. Undamaged bytes that begin without the sync code get none: the encoder searches for a request at the next
-  // byte (8.1). The length of a refused frame is unknown, so a missing start bit ends the frame (8.2, 9.2).
+  // Returns whether a flawed request gets a refusal, and notes its communication alarms.
   bool is_refused(Flaw flaw, Bytes heard) override {
     if (flaw == Flaw::unknown && !has_sync_code(heard[0])) return false;
     if (flaw == Flaw::unknown && heard[0] != control_field(heard[0] >> 3)) refused_status_ |= status::parity_error;
@@ -228,7 +220,6 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   }
   // Returns the turns as if the counter had no end.
   [[nodiscard]] std::int64_t turns(Time now) const { return (counts(now) >> format_.singleturn_bits) - turn_offset_; }
-  // Returns whether there is a turn counter, which can overflow or miss a turn; single-turn encoders have none.
   [[nodiscard]] bool counts_turns() const { return format_.multiturn_bits != 0; }
   // Returns how often the turn counter has overflowed.
   [[nodiscard]] std::int64_t lap(Time now) const { return turns(now) >> format_.multiturn_bits; }
@@ -242,12 +233,11 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     if (battery_now() <= battery_alarm_voltage) bits |= alarms::battery_alarm;
     return static_cast<std::uint8_t>(bits);
   }
-  // Updates state that changes with time: the pending zero, full_absolute_status, counter_overflow and over_heat.
   void update(Time now) {
     if (zero_pending_ && now >= written_at()) write_zero();
     if (magnitude(shaft_->at(now).speed_millirpm) < full_absolute_speed) full_absolute_ = false;
 
-    // A whole lap of the counter between two updates is not detected if it is undone before the second one.
+    // A lap that is undone before the next update is not detected.
     const std::int64_t lap_now = lap(now);
     if (lap_now != counter_lap_ && counts_turns()) latches_ |= alarms::counter_overflow;
     counter_lap_ = lap_now;
@@ -268,12 +258,11 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
 
   [[nodiscard]] std::int64_t battery_now() const { return format_.battery ? conditions_[battery_voltage] : 0; }
   [[nodiscard]] bool has_battery() const { return battery_now() > battery_error_voltage; }
-  // Notes whether the battery has failed while the power is off: even a short failure is reported afterwards (6.5).
+  // Even a short failure while the power is off is reported afterwards (6.5).
   void watch_battery() { battery_lost_ = battery_lost_ || !has_battery(); }
 
   void started(Time at) override { full_absolute_ = magnitude(shaft_->at(at).speed_millirpm) >= full_absolute_speed; }
-  // Raises over_speed if speed or acceleration of the shaft exceeded its limit while only the battery supplied the turn
-  // counter (5.4.2). Checks them every 10 ms; in a pause of more than 100 s less often, at about 10 000 points.
+  // Raises over_speed if a sample of the shaft exceeded a limit without power (5.4.2).
   void count_on_battery(Time from, Time now) {
     if (!counts_turns()) return;
     const Time step = std::max(Time(10ms), (now - from) / 10'000);

@@ -77,7 +77,7 @@ TEST(TformatDevice, BatteryFlags) {
   EXPECT_EQ(bench.everything().alarms, 0);
 }
 
-// Checks the limits of battery_alarm and battery_error in 6.5: "3.1 V or less", "2.75 V or less".
+// Limits in 6.5: "3.1 V or less", "2.75 V or less".
 TEST(TformatDevice, BatteryLimitsBelongToTheFlags) {
   for (const auto& [millivolts, alarm, error] : {std::tuple(3101, false, false),
                                                  {3100, true, false},
@@ -113,8 +113,7 @@ TEST(TformatDevice, ReportsBatteryFailureWhileOff) {
   EXPECT_EQ(bench.everything().alarms, 0);
 }
 
-// Checks that over_heat, but not over_speed and counter_overflow, survives power off without a battery: for over_heat
-// 6.5 states the same with and without a battery, the other two are "indefinite".
+// For over_heat 6.5 states the same with and without a battery.
 TEST(TformatDevice, OverHeatIsLatchedWithoutABattery) {
   Bench bench;
   bench.condition(battery_voltage, 0);
@@ -165,8 +164,7 @@ TEST(TformatDevice, OverSpeedArisesWhileTheBatteryCounts) {
   EXPECT_EQ(reply.multiturn, (bench.shaft.at(bench.line.now()).position >> 32) - 1);  // the counter misses one turn
 }
 
-// Checks that an acceleration that raises over_speed 5.1 s after power off does not 4.8 s after it: for the first five
-// seconds the counter follows a faster jolt (5.4.2).
+// For the first five seconds after power off the counter follows a faster jolt (5.4.2).
 TEST(TformatDevice, AccelerationLimitFallsFiveSecondsAfterPowerOff) {
   struct Jolt final : Shaft {
     [[nodiscard]] ShaftState at(Time time) const override {

@@ -68,8 +68,6 @@ TEST(TformatDevice, AnswersAbnormalRequestsLikeId3) {
   EXPECT_EQ(memory_read(bench, 5), wire(Reply{.id = DataId::read_memory, .address = 5, .value = 35}));
 }
 
-// Checks that ID D with a wrong parity bit is refused once, when its frame has ended; so are a request with an
-// unknown data ID, and one with the busy bit and one byte too many.
 TEST(TformatDevice, AnswersRefusedFrameAfterItsEnd) {
   Bench bench;
   testing::RawHost host({0x6A, 0x05, 0xEF});
@@ -256,16 +254,14 @@ TEST(TformatDevice, RequestDuringTransmissionIsAViolation) {
   Bench longer;
   longer.raw({0x1A, 0xEA, 0x05, 0xEF});
   EXPECT_EQ(longer.violations(), 1u);
-  // If all bytes arrive together, as on a pseudo-terminal, those behind the first request count as two requests, not as
-  // four bytes.
+  // The bytes behind the first request count as two requests, not as four bytes.
   testing::TestShaft shaft;
   VirtualEncoder encoder({}, shaft);
   encoder.power_on(Time{}, PowerOn::skip);
   const Wire all{0x1A, 0xEA, 0x05, 0xEF, 0x1A};
   encoder.feed({.kind = Event<std::uint8_t>::Kind::received, .at = 1us, .items = all});
   EXPECT_EQ(encoder.violation_count(), 2u);
-  // If the emulator was delayed, the reply to the first request might have been sent before the others arrived. A host
-  // repeats a request only after its timeout, at least a millisecond each time.
+  // After a delay the reply might have been sent before the other requests arrived.
   for (const auto& [late, rules] : {std::pair(20us, 2u), {900us, 2u}, {1500us, 1u}, {3ms, 0u}}) {
     VirtualEncoder delayed({}, shaft);
     delayed.power_on(Time{}, PowerOn::skip);
@@ -274,8 +270,6 @@ TEST(TformatDevice, RequestDuringTransmissionIsAViolation) {
   }
 }
 
-// Checks the violations of a host that sends requests without a pause in two writes: the second arrives while the first
-// is answered, or afterwards.
 TEST(TformatDevice, DetectsRequestsWithoutPauseInAnyPieces) {
   testing::TestShaft shaft;
   const Wire one{0x1A};
@@ -293,8 +287,6 @@ TEST(TformatDevice, DetectsRequestsWithoutPauseInAnyPieces) {
   }
 }
 
-// Checks that a host that never waits for replies is detected even if the emulator reports a long delay with each
-// reception.
 TEST(TformatDevice, HostThatNeverWaitsIsNotExcused) {
   testing::TestShaft shaft;
   VirtualEncoder encoder({}, shaft);
@@ -318,7 +310,7 @@ TEST(TformatDevice, HostThatNeverWaitsIsNotExcused) {
   EXPECT_EQ(ask(thrice), 4u);
 }
 
-// Checks that some broken rules do not count as violations, but are reported to the watcher of rules (9.1, 10).
+// Some broken rules are no violations, but the watcher of rules hears of them (9.1, 10).
 TEST(TformatDevice, ReportsRulesThatAreNoViolations) {
   using Rules = std::vector<std::string>;
   const std::string again = "what was refused as busy was not asked for again";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names, units and meanings of the values in T-format frames and of results, in words for the operator.
+// Names, units and meanings of the values in T-format frames and results.
 #pragma once
 
 #include <array>
@@ -24,8 +24,7 @@ inline constexpr std::array<FlagInfo, 8> status_flags{{
     {"delimiter_error", "the encoder received the request with a wrong stop bit", "send the same request again"},
 }};
 
-/// Descriptions of the bits of ALMC, the alarms in a reply to data ID 3 (6.5), from bit 0 on. For an encoder
-/// declared to have no battery, its battery alarms are not reported.
+/// Descriptions of the bits of ALMC, the alarms in a reply to data ID 3 (6.5), from bit 0 on.
 inline constexpr std::array<FlagInfo, 8> alarm_flags{{
     {"over_speed", "the shaft turned faster than the counter follows while the power was off: turns may be wrong",
      "return to the origin, then `absenc reset-multiturn` or `absenc clear-alarms`"},
@@ -45,7 +44,7 @@ inline constexpr std::array<FlagInfo, 8> alarm_flags{{
      "replace the battery with the encoder switched on; without a battery set battery=false", true},
 }};
 
-/// Values of the fields of a frame, or of a procedure's result. Only members with a value are reported.
+/// Values of the fields of a frame, or of a procedure's result.
 struct Values {
   std::optional<DataId> data_id{};                   ///< Data ID of the request or reply.
   std::optional<std::uint8_t> control_field{};       ///< First byte of the request (CF): sync code, data ID, parity.
@@ -102,8 +101,7 @@ inline constexpr auto fields = [] {
   return all;
 }
 
-/// Returns the values of the fields of a reply. Without a battery the turns are invalid and left out; so are the
-/// battery's alarms, which are no fault then.
+/// Returns the values of the fields of a reply. Without a battery, turns and battery alarms are left out.
 [[nodiscard]] constexpr Values values_of(const Format& format, const Reply& reply) {
   if (is_memory_access(reply.id)) {
     return {.data_id = reply.id, .address = reply.address, .busy = reply.busy, .value = reply.value};
@@ -117,8 +115,7 @@ inline constexpr auto fields = [] {
   return all;
 }
 
-/// Returns the bits of a valid reply that carry `field` (Figures of 6.3), which the reply must contain; none if the
-/// field has no fixed place.
+/// Returns the bits of a valid reply that carry `field` (figures of 6.3); may be none.
 [[nodiscard]] constexpr BitRanges place_of(const Format& format, Bytes reply, const FieldInfo& field) {
   const DataId id = data_id(reply[0]).value_or(DataId::everything);
   const bool everything = id == DataId::everything;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Constants of Tamagawa's T-format (RS-485, 2.5 Mbps, 8N1, LSB first): times, memory map, status and alarm bits; and
-// Format, the options of an encoder. Paragraph numbers are those of the TS5700N8500 specification.
+// Constants of Tamagawa's T-format, and Format. Paragraphs are those of the TS5700N8500 specification.
 #pragma once
 
 #include <array>
@@ -29,7 +28,7 @@ inline constexpr Time start_up_with_battery = 1s;
 /// Time after power on without a battery until requests are accepted (5.4).
 inline constexpr Time start_up_without_battery = 1500ms;
 
-/// Longest time that a host waits for the begin of a reply. The document states only the typical answer time.
+/// Longest time that a host waits for the begin of a reply.
 inline constexpr Time answer_limit = 100us;
 /// Longest time between two characters of a reply, as a host waits for it.
 inline constexpr Time gap_limit = 3 * line_settings.character();
@@ -43,11 +42,10 @@ inline constexpr std::uint8_t overheat_address = 4;   ///< address of the over-h
 inline constexpr std::uint8_t temperature_address = 5;  ///< address of the temperature on the service page (7.3)
 /// Byte of the over-heat threshold at shipping: enabled, 90 degC.
 inline constexpr std::uint8_t overheat_at_shipping = 0xDA;
-/// Byte of an over-heat threshold of 0 degC. 7.4 forbids it: the threshold is 1 degC or more, or off with a byte below
-/// 0x80 (7.2.2).
+/// Byte of an over-heat threshold of 0 degC, which 7.4 forbids.
 inline constexpr std::uint8_t overheat_at_zero = 0x80;
 
-/// Areas of the memory that users can access, in order of pages. The address that selects the page belongs to none.
+/// Areas of the memory that users can access; the address that selects the page is in none.
 inline constexpr std::array<MemoryArea, user_pages + 2> memory_areas = [] {
   std::array<MemoryArea, user_pages + 2> areas{};
   for (std::uint8_t page = 0; page < user_pages; ++page) {
@@ -57,12 +55,12 @@ inline constexpr std::array<MemoryArea, user_pages + 2> memory_areas = [] {
   areas[user_pages + 1] = {service_page, temperature_address, 1, "temperature", false, false};
   return areas;
 }();
-/// Returns whether the bytes of an area are stored in the EEPROM; the temperature is measured instead.
+/// Returns whether the EEPROM stores the bytes of an area.
 [[nodiscard]] constexpr bool is_stored(const MemoryArea& area) { return area.writable; }
 /// Number of bytes in the areas that the EEPROM stores.
 inline constexpr std::size_t stored_bytes = author::size_of(memory_areas, is_stored);
 
-/// Returns the memory area of the byte at `address` of `page`; null if users cannot access the byte.
+/// Returns the memory area of the byte at `address` of `page`; null if it is in none.
 [[nodiscard]] constexpr const MemoryArea* find_area(unsigned page, unsigned address) {
   return author::find_area(memory_areas, page, address);
 }
@@ -114,25 +112,24 @@ inline constexpr std::uint8_t battery_alarm = 0x80;  ///< alarm: the battery is 
 inline constexpr std::uint8_t shown_in_status = over_heat | multiturn_error | battery_error | battery_alarm;
 /// Mask of the alarms that make the turns invalid.
 inline constexpr std::uint8_t turns_lost = over_speed | multiturn_error | battery_error;
-/// Mask of the alarms that stay until a reset; of them, multiturn_error ends with power off as well (6.5).
+/// Mask of the latched alarms (6.5).
 inline constexpr std::uint8_t latched = over_speed | counter_overflow | over_heat | multiturn_error | battery_error;
-/// Mask of the battery's alarms, which are no fault of an encoder without a battery (2 (1), 6.5).
+/// Mask of the battery's alarms (2 (1), 6.5).
 inline constexpr std::uint8_t without_battery = battery_error | battery_alarm;
 }  // namespace alarms
 
-/// Properties of an encoder model that its frames depend on, and how strictly replies are checked. Its members are the
-/// options of the unit.
+/// Properties of an encoder model that its frames depend on; the options of the unit.
 struct Format {
   unsigned singleturn_bits = 17;  ///< bits of the position within the turn, 1 to 24
   unsigned multiturn_bits = 16;   ///< bits of the turns, 0 to 24; 0: single-turn encoder
   int encoder_id = -1;            ///< ENID that a reply with an ENID must carry, 0 to 255; -1: any
-  /// Whether replies must also pass the checks that an encoder that deviates from the specification fails.
+  /// False: skips some checks, for encoders that deviate from the specification.
   bool strict = true;
   bool battery = true;  ///< whether a battery is connected; without one the turns are invalid (2 (1))
 
   /// Returns the settings of the RS-485 line.
   [[nodiscard]] static constexpr LineSettings line() { return line_settings; }
-  /// Returns the number of bits of the turns; 0 without a battery, because the turns are invalid then.
+  /// Returns the number of bits of the turns; 0 without a battery.
   [[nodiscard]] constexpr unsigned turns_bits() const { return battery ? multiturn_bits : 0; }
   /// Returns the numbers of bits of position and turns.
   [[nodiscard]] constexpr Resolution resolution() const { return {singleturn_bits, turns_bits()}; }

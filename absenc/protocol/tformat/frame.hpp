@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames of the T-format: encoding, decoding, checks, and the reading of a valid reply. Paragraph numbers are those of
-// the TS5700N8500 specification; README.md draws the frames.
+// Frames and readings of the T-format; README.md draws the frames. Paragraphs: TS5700N8500 specification.
 #pragma once
 
 #include <algorithm>
@@ -32,8 +31,7 @@ using RequestBytes = ByteBuffer<request_capacity>;
 /// Bytes of a reply.
 using ReplyBytes = ByteBuffer<reply_capacity>;
 
-/// Parameters of the CRC (6.3.4). Its polynomial X^8 + 1 makes it the exclusive OR of all bytes, so `checksum` needs
-/// neither a table nor an order of the bytes.
+/// Parameters of the CRC (6.3.4), which is the exclusive OR of all bytes.
 inline constexpr CrcParameters crc_parameters{8, 0x01, 0, true, true, 0};
 
 /// Returns the CRC of `bytes` (6.3.4); 0 if `bytes` is a frame with its right CRC.
@@ -42,10 +40,9 @@ inline constexpr CrcParameters crc_parameters{8, 0x01, 0, true, true, 0};
                      [](std::uint8_t one, std::uint8_t other) -> std::uint8_t { return one ^ other; });
 }
 
-/// Returns CF, the control field of a request: sync code 010, the data ID, and its even parity (6.3.1).
+/// Returns CF, the control field: sync code 010, the data ID, and its even parity (6.3.1).
 [[nodiscard]] constexpr std::uint8_t control_field(std::uint8_t id) {
-  // Bit N is set if the data ID N has an odd number of ones: a table, because a small core needs many steps to compute
-  // a parity.
+  // Bit N is set if the data ID N has an odd number of ones.
   constexpr unsigned odd_parities = 0x6996;
   return static_cast<std::uint8_t>(0x02u | (id & 0xFu) << 3 | (odd_parities >> (id & 0xF) & 1) << 7);
 }
@@ -59,8 +56,7 @@ inline constexpr CrcParameters crc_parameters{8, 0x01, 0, true, true, 0};
 [[nodiscard]] constexpr bool is_memory_access(DataId id) {
   return id == DataId::read_memory || id == DataId::write_memory;
 }
-/// The requests of a reset (10). The document does not state from where to where 40 us are measured: the host measures
-/// them from the end of the reply, so that they are 40 us or more in any case.
+/// The requests of a reset (10); where the 40 us begin and end is not stated.
 inline constexpr author::InARow reset_row{
     .requests = reset_requests,
     .interval = reset_interval,
@@ -68,7 +64,7 @@ inline constexpr author::InARow reset_row{
     .number_rule = "reset not sent ten times in a row",
     .interval_rule = "reset sent too fast: less than 40 us after the one before",
 };
-/// Returns whether ten requests with this data ID clear the alarms, set the zero, or reset the turns.
+/// Returns whether ten requests with this data ID are a reset (10).
 [[nodiscard]] constexpr bool is_reset(DataId id) {
   return id == DataId::clear_alarms || id == DataId::zero || id == DataId::reset_multiturn;
 }
@@ -99,8 +95,7 @@ inline constexpr std::array<Lengths, 16> lengths = [] {
   return detail::lengths[static_cast<std::size_t>(id)].reply;
 }
 
-/// Returns the data ID in a control field, whose sync code and parity are not checked; nothing for an ID that Table 1
-/// does not list.
+/// Returns the data ID in an unchecked control field; nothing for an ID that Table 1 lacks.
 [[nodiscard]] constexpr std::optional<DataId> data_id(std::uint8_t field) {
   const auto id = static_cast<DataId>((field >> 3) & 0xF);
   return request_length(id) != 0 ? std::optional(id) : std::nullopt;
@@ -118,8 +113,7 @@ struct Request {
   return request.id == DataId::write_memory && request.address == page_select_address;
 }
 
-/// A reply. `decode_reply` leaves the members 0 that the data ID does not carry. The order of the members makes the
-/// struct four words long.
+/// A reply; `decode_reply` leaves members 0 that its data ID does not carry.
 struct Reply {
   DataId id = DataId::everything;  ///< Data ID of the reply.
   std::uint8_t status = 0;         ///< Status field (SF): bits of the namespace `status`.
@@ -143,8 +137,7 @@ struct Reply {
   return bytes;
 }
 
-/// Decodes a request. Errors: wrong_length; bad_framing (sync code); bad_checksum (parity of the data ID, or CRC);
-/// unsupported (an ID that Table 1 does not list); out_of_range (the busy bit is set, which is 0 in requests).
+/// Decodes a request. Errors: wrong_length, bad_framing, bad_checksum, unsupported, out_of_range.
 [[nodiscard]] constexpr Result<Request> decode_request(Bytes bytes) {
   if (bytes.empty()) return Error::wrong_length;
   if (!has_sync_code(bytes[0])) return Error::bad_framing;
@@ -185,8 +178,7 @@ struct Reply {
   return bytes;
 }
 
-/// Returns the bits of SF that the alarms `almc` set (6.3.2): counting_error and `alarm`. The alarms over_speed,
-/// full_absolute_status and counter_overflow do not show in SF.
+/// Returns the bits of SF that the alarms `almc` set (6.3.2).
 [[nodiscard]] constexpr std::uint8_t status_for(std::uint8_t almc) {
   return static_cast<std::uint8_t>(((almc & alarms::counting_error) != 0 ? status::counting_error : 0) |
                                    ((almc & alarms::shown_in_status) != 0 ? status::alarm : 0));
@@ -240,8 +232,7 @@ namespace detail {
 
 }  // namespace detail
 
-/// Returns whether a reply begins like a reply to data ID 3, although `asked` is another ID: in this manner the encoder
-/// answers requests that it cannot accept (8.4, 9.4).
+/// Returns whether a reply to another ID than 3 begins like a refusal (8.4, 9.4).
 [[nodiscard]] constexpr bool begins_rejection(DataId asked, Bytes reply) {
   return asked != DataId::everything && !reply.empty() && reply[0] == control_field(DataId::everything);
 }
@@ -262,9 +253,8 @@ constexpr Error check_reply(const Format& format, const Request& request, const 
 
 }  // namespace detail
 
-/// Checks and decodes a reply to `request`. Errors: wrong_length; bad_checksum; request_rejected; unexpected_reply
-/// (control field, memory address or value, fixed bits, ENID); out_of_range; cross_check_failed (SF against ALMC). The
-/// valid reply of a busy memory is no error: its member `busy` is set.
+/// Checks and decodes a reply to `request`. Errors: wrong_length, bad_checksum, request_rejected, unexpected_reply,
+/// out_of_range, cross_check_failed. A busy memory is no error.
 [[nodiscard]] constexpr Result<Reply> decode_reply(const Format& format, const Request& request, Bytes bytes) {
   Error error = detail::check_frame(request, bytes);
   if (error != Error::none) return error;
@@ -274,13 +264,12 @@ constexpr Error check_reply(const Format& format, const Request& request, const 
   return reply;
 }
 
-/// Returns the bits of ALMC that are no faults of this encoder: the battery's alarms if no battery is connected,
-/// otherwise none.
+/// Returns the bits of ALMC that are no faults of this encoder.
 [[nodiscard]] constexpr unsigned expected_alarms(const Format& format) {
   return format.battery ? 0u : alarms::without_battery;
 }
 
-/// Alarms (bits of ALMC) whose state is known from earlier replies. SF alone does not report every alarm.
+/// Alarms (bits of ALMC) whose state is known from earlier replies.
 struct KnownAlarms {
   std::uint8_t reported = 0;  ///< Mask of the alarms whose state is known.
   std::uint8_t raised = 0;    ///< Alarms that are known to be raised.
@@ -289,10 +278,7 @@ struct KnownAlarms {
   [[nodiscard]] static constexpr KnownAlarms all(std::uint8_t almc) { return {0xFF, almc}; }
 };
 
-/// Returns the known alarms after a reply that carries SF and no ALMC. SF has one bit for counting_error, and one for
-/// the four alarms of `shown_in_status`. If that one bit is 0, all four are clear. If it is 1 and none of the four was
-/// known to be raised, all four become unknown. `sf_reported`: valid bits of SF; without the bit `alarm` the known
-/// state of the four stays.
+/// Returns the known alarms after a reply that carries SF and no ALMC. `sf_reported`: valid bits of SF.
 [[nodiscard]] constexpr KnownAlarms known_after(KnownAlarms before, std::uint8_t sf, unsigned sf_reported) {
   constexpr unsigned together = alarms::shown_in_status;
   unsigned reported = before.reported | alarms::counting_error;
@@ -311,8 +297,6 @@ struct KnownAlarms {
 
 namespace detail {
 
-// Sets the alarms in `reading`, and which parts of its position and turns are valid. With a counting error no bit of
-// the position is valid, otherwise the top 5 bits, and further bits only if full_absolute_status is known to be clear.
 constexpr void judge(Reading& reading, const KnownAlarms& known) {
   reading.alarms = known.raised;
   reading.alarms_reported = known.reported;
@@ -330,8 +314,7 @@ constexpr void judge(Reading& reading, const KnownAlarms& known) {
   reading.multiturn_known = reading.multiturn_bits == 0 || all_reported || lost;
 }
 
-// Returns SF as a reading shows it. Without a battery the encoder always sets the bit `alarm`: here it is computed from
-// the other alarms of ALMC, or cleared in a reply without ALMC.
+// Returns SF as a reading shows it. Without a battery the encoder always sets the bit `alarm`.
 [[nodiscard]] constexpr std::uint8_t status_of(const Format& format, bool has_alarms, const Reply& reply) {
   if (format.battery) return reply.status;
   const bool other = has_alarms && (reply.alarms & alarms::shown_in_status & ~expected_alarms(format)) != 0;
@@ -343,9 +326,8 @@ constexpr unsigned reported_status(const Format& format, bool has_alarms) {
 
 }  // namespace detail
 
-/// Returns the position and turns of a valid reply to `id`, with their validity. A reply to ID 3 carries ALMC, so that
-/// its validity is known. For other replies `known_alarms` is the last ALMC since power on; without it at most the top
-/// 5 bits of the position are valid, and the turns are not.
+/// Returns the position and turns of a valid reply to `id`, with their validity. `known_alarms`: the last ALMC since
+/// power on.
 [[nodiscard]] constexpr Reading to_reading(const Format& format, DataId id, const Reply& reply,
                                            std::optional<std::uint8_t> known_alarms = std::nullopt) {
   const bool has_all = id == DataId::everything;
@@ -366,7 +348,7 @@ constexpr unsigned reported_status(const Format& format, bool has_alarms) {
   reading.alarms_reported &= ~expected_alarms(format);
   return reading;
 }
-/// Returns the position and turns of a valid reply, with their validity, for the data ID that `reply` contains.
+/// Returns the position and turns of a valid reply, with their validity.
 [[nodiscard]] constexpr Reading to_reading(const Format& format, const Reply& reply,
                                            std::optional<std::uint8_t> known_alarms = std::nullopt) {
   return to_reading(format, reply.id, reply, known_alarms);
@@ -396,23 +378,20 @@ struct Protocol {
   static constexpr author::HostTimes host_times(const Format&) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit};
   }
-  /// Returns how a request is repeated: reads and page selects up to two times, resets and writes never. A page change
-  /// without a valid reply may still be in progress, and must not be disturbed.
+  /// Returns how a request is repeated. A page change without a valid reply may still be in progress.
   static constexpr author::Manner manner(const Format&, const Request& request) {
     if (selects_page(request)) return {.repeats = 2, .pause = memory_time, .hold = memory_time};
     return {.repeats = request.id == DataId::write_memory || is_reset(request.id) ? 0u : 2u};
   }
   /// Returns the bytes of a request.
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
-  /// Returns the length of the reply in bytes, as its first bytes `so_far` show it: a refusal has the length of a reply
-  /// to ID 3.
+  /// Returns the length of the reply in bytes, as far as its first bytes `so_far` show it.
   static constexpr std::size_t expected(const Format&, const Request& request, Bytes so_far) {
     return reply_length(begins_rejection(request.id, so_far) ? DataId::everything : request.id);
   }
-  /// Checks and decodes the bytes of a reply; returns the reply or the error of the first failed check.
+  /// Checks and decodes the bytes of a reply.
   static constexpr auto decode = decode_reply;
-  /// Returns whether no bytes can follow a reply with this error: true for a refusal, after which the request may be
-  /// repeated at once. After any other error more bytes may follow, and sending while the encoder sends can destroy its
+  /// Returns whether no bytes can follow a reply with this error. Sending while the encoder sends can destroy its
   /// driver (11).
   static constexpr bool is_whole(const Format&, Error error) { return error == Error::request_rejected; }
   /// Returns the position and turns of a valid reply.
@@ -420,13 +399,12 @@ struct Protocol {
     // The ID of the request is used, because it may be known at compile time.
     return to_reading(format, request.id, reply);
   }
-  /// Returns the time for which a position is reported: the end of the request, because the document does not say when
-  /// the encoder latches it.
+  /// Returns the end of the request: the document does not say when the encoder latches.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
 
   /// Decodes a request. Returns it, or the error of the first failed check.
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return tformat::decode_request(bytes); }
-  /// Returns the length in bytes of the request with the control field `begin[0]`; 0 if no request has this field.
+  /// Returns the length in bytes of the request that begins with `begin[0]`; 0 if none does.
   static constexpr std::size_t request_size(const Format&, Bytes begin) {
     const std::optional<DataId> id = data_id(begin[0]);
     return id && begin[0] == control_field(*id) ? request_length(*id) : 0;

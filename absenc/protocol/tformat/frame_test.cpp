@@ -46,8 +46,6 @@ TEST(TformatFrame, EveryControlFieldIsJudged) {
   }
 }
 
-// Counts the two-bit errors of an 11-byte reply that pass: those that X^8 + 1 does not detect, then those that also
-// pass the fixed bits, ENID and the ranges, then those that also pass the comparison of SF and ALMC.
 TEST(TformatFrame, TwoBitErrorsThatPassEachLevelOfChecks) {
   const Format format{.encoder_id = 0x11};
   const ReplyBytes good = encode_reply({.singleturn = 0x12345, .multiturn = 0x1234, .encoder_id = 0x11});
@@ -88,7 +86,7 @@ TEST(TformatFrame, RefusalDiffersFromWrongLength) {
   EXPECT_EQ(decode_reply({}, {DataId::singleturn}, damaged).error(), Error::bad_checksum);
 }
 
-// Checks replies to a write request: address, value, and value of a busy encoder (Table 5, 9.1).
+// Replies to a write request (Table 5, 9.1).
 TEST(TformatFrame, MemoryReplyMatchesItsRequest) {
   const Request write{DataId::write_memory, 5, 7};
   const auto answered = [&write](std::uint8_t address, bool busy, std::uint8_t value, bool strict = true) {
@@ -147,7 +145,7 @@ TEST(TformatFrame, PartialRepliesLeaveValidityUnknown) {
   EXPECT_EQ(to_reading({}, alarmed, 0).multiturn_validity(), Validity::unknown);
 }
 
-// Checks that an alarm that a reply to ID 3 has reported explains the bit of SF that stands for it and three others.
+// A known alarm explains the bit of SF that stands for it and three others.
 TEST(TformatFrame, KnownAlarmExplainsStatus) {
   const Reply turns{.id = DataId::multiturn, .status = status::alarm, .multiturn = 5};
   for (const std::uint8_t harmless : {alarms::over_heat, alarms::battery_alarm}) {
@@ -158,7 +156,7 @@ TEST(TformatFrame, KnownAlarmExplainsStatus) {
   EXPECT_EQ(to_reading({}, turns, alarms::battery_error).multiturn_validity(), Validity::invalid);
 }
 
-// Checks which alarms SF reports: it has a bit for counting_error, and one bit for four other alarms (6.3.2).
+// SF has a bit for counting_error, and one bit for four other alarms (6.3.2).
 TEST(TformatFrame, StatusReportsPartOfTheAlarms) {
   constexpr std::uint8_t in_status = alarms::counting_error | alarms::shown_in_status;
   struct Row {
@@ -182,8 +180,7 @@ TEST(TformatFrame, StatusReportsPartOfTheAlarms) {
   EXPECT_EQ(to_reading({}, {.id = DataId::read_memory}).status_reported, 0u);
 }
 
-// Checks an encoder without a battery: ALMC reports all alarms but the battery's; in a reply without ALMC, the bit
-// `alarm` of SF reports none of its four alarms, because it is always set (2 (1)).
+// Without a battery the bit `alarm` of SF is always set (2 (1)).
 TEST(TformatFrame, WithoutBatteryStatusLeavesFourAlarmsUnknown) {
   constexpr Format format{.battery = false};
   const auto whole = [&](std::uint8_t more) {

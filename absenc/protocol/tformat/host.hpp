@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Conversations that read positions of T-format encoders, without port, clock, heap or texts, for drives that read ten
-// thousand times a second. link/step.hpp shows how to run them; procedures with several steps are in unit.cpp.
+// Conversations that read positions of T-format encoders, without port, clock, heap or texts.
 #pragma once
 
 #include <optional>
@@ -10,10 +9,8 @@
 
 namespace absenc::tformat {
 
-/// Conversation that reads with one of the data IDs 0 to 3. A reply to ID 3 carries everything. SF in other replies
-/// hides over_speed, full_absolute_status and counter_overflow. So without `known_alarms` (the ALMC of a reply to ID 3
-/// since power on) a request with ID 3 precedes IDs 0 and 1; and an alarm that newly appears in the SF of their
-/// replies is followed by a request with ID 3, whose reply is the result. Nothing is repeated.
+/// Conversation that reads with one of the data IDs 0 to 3; IDs 0 and 1 may need a request with ID 3 too.
+/// `known_alarms`: ALMC of a reply to ID 3 since power on.
 class ReadPosition : public author::HostOf<Protocol> {
  public:
   /// Reads from an encoder of this format with a request of data ID `id`.
@@ -60,7 +57,7 @@ class ReadPosition : public author::HostOf<Protocol> {
 
 /// Request with data ID 3: position, turns, encoder id and alarms.
 inline constexpr Request everything{DataId::everything};
-/// Conversation that reads with data ID 3 and a format that is a constant: `static constexpr Format format{...};`.
+/// Conversation that reads with data ID 3 and a format that is known at compile time.
 template <const Format& format>
 using ReadKnownPosition = author::ReadKnownPosition<Protocol, format, everything>;
 

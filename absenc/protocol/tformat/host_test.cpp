@@ -101,8 +101,6 @@ TEST(TformatHost, TimeoutIsNotRepeated) {
 
 // ---- Refusals (6.3.2)
 
-// Checks that the explanation of a refusal names ca0 and ca1, if they are raised, and what to try; otherwise that there
-// was no communication alarm.
 TEST(TformatHost, ExplainsRefusals) {
   struct Row {
     std::uint8_t alarm;
@@ -129,8 +127,7 @@ TEST(TformatHost, ExplainsRefusals) {
   EXPECT_TRUE(reset.says("; one of the requests in a row")) << reset.detail;
 }
 
-// Checks the errors of replies without a request and of replies to an invalid request (8.4, 9.4), as captures have
-// them.
+// Captures have replies without a request, and replies to invalid requests (8.4, 9.4).
 TEST(TformatHost, GuessesRequestsAndRefusesInvalidOnes) {
   const Bench bench;
   const auto error = [&bench](const Wire& request, const Wire& reply) {

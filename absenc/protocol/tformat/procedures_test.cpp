@@ -110,8 +110,7 @@ TEST(TformatProcedures, WritesMemoryOnlyIfItDiffersAndReadsItBack) {
   EXPECT_EQ(bench.violations(), 0u);
 }
 
-// Checks that 0x80 is refused as threshold, but 0x81, 0xFF, 0x00 and 0x7F are not: bit 7 enables the threshold, from
-// 1 degC on, and every byte with bit 7 clear is "off" (7.2.4, 7.4).
+// Bit 7 enables the threshold, from 1 degC on; with bit 7 clear it is off (7.2.4, 7.4).
 TEST(TformatProcedures, RefusesOverHeatThresholdOfZeroDegrees) {
   Bench bench;
   const auto zero = bench.run("memory-write", {overheat_address, 0x80, service_page});
@@ -140,8 +139,7 @@ TEST(TformatProcedures, RefusesClosedMemoryBeforeSending) {
   EXPECT_EQ(bench.encoder.answer_count(), 0u);
 }
 
-// Checks memory-write with a changed or lost reply to one or more of its requests, which are: page select, read, write,
-// page select, read.
+// Without faults, the requests are page select, read, write, page select, read.
 TEST(TformatProcedures, VerifiesWritesByReadingBackAndNeverRepeatsThem) {
   struct Row {
     const char* what;
@@ -186,7 +184,6 @@ TEST(TformatProcedures, VerifiesWritesByReadingBackAndNeverRepeatsThem) {
   }
 }
 
-// Checks that a busy encoder is waited for up to 36 ms: a read is repeated each millisecond, a page select after 18 ms.
 TEST(TformatProcedures, WaitsForABusyEncoder) {
   const auto busy = [](unsigned from, unsigned to) {
     return [=](unsigned index, Wire& reply) {
@@ -267,7 +264,6 @@ TEST(TformatProcedures, SendsNoForbiddenReset) {
   }
 }
 
-// Checks that battery=false removes the battery alarms and the turns from readings and lets clear-alarms run.
 TEST(TformatProcedures, EncoderWithoutBatteryIsDeclared) {
   Bench bench;
   bench.shaft.put(7, 1000);
@@ -293,8 +289,7 @@ TEST(TformatProcedures, EncoderWithoutBatteryIsDeclared) {
   EXPECT_EQ(bench.everything().alarms, alarms::battery_alarm);
 }
 
-// Checks which states in the verification make a reset fail. Replies 0 and 1 are positions, 2 to 11 answer the reset,
-// 12 is the verification.
+// Replies 0 and 1 are positions, 2 to 11 answer the reset, 12 is the verification.
 TEST(TformatProcedures, DetectsResetThatFailed) {
   struct Row {
     std::string_view name;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The commands of T-format encoders, their procedures with several steps, and the declaration of the unit.
+// Commands and procedures of T-format encoders, and the declaration of the unit.
 #include "absenc/protocol/tformat/unit.hpp"
 
 #include <array>
@@ -30,8 +30,7 @@ struct ProcedureResult : Values {
 
 // ---- Resets (10)
 
-// Returns why a reset with the data ID `id` must not be sent after the replies `first` and `second`; no error: it may
-// be sent.
+// Returns why a reset must not be sent after these replies; no error: it may be sent.
 Outcome objection(const Format& format, DataId id, const Reply& first, const Reply& second) {
   const Reading before = to_reading(format, first);
   const Reading now = to_reading(format, second);
@@ -53,7 +52,7 @@ Outcome objection(const Format& format, DataId id, const Reply& first, const Rep
   return {};
 }
 
-// Returns what the reset with the data ID `id` failed to do, as the reply `now` shows; empty if it did everything.
+// Returns what the reset failed to do, as the reply `now` shows; empty if nothing.
 Explanation failed_part(DataId id, const Reply& now, unsigned bits) {
   if (id == DataId::zero) {
     if (is_near(now.singleturn, 0, bits, zero_tolerance_millidegrees)) return {};
@@ -71,8 +70,7 @@ Explanation failed_part(DataId id, const Reply& now, unsigned bits) {
   return {};
 }
 
-// Resets by data ID 7 (latched alarms), 8 (single-turn zero here) or C (turns and latched alarms): checks that the
-// shaft stands still and that no alarm forbids the reset, sends ten requests, and verifies the result.
+// Resets by data ID 7 (latched alarms), 8 (single-turn zero) or C (turns and latched alarms).
 Procedure reset(Dialog& dialog, ProcedureResult& found, DataId id) {
   const Reply first = co_await dialog.ask({DataId::everything});
   const Reply second = co_await dialog.ask({DataId::everything}).after(between_looks);
@@ -80,8 +78,7 @@ Procedure reset(Dialog& dialog, ProcedureResult& found, DataId id) {
   if (why_not.error != Error::none) co_return why_not;
 
   co_await send_in_a_row(dialog, {id}, reset_row);
-  // Only ID 8 writes the EEPROM, which takes longer. The result is read again, because the tenth reply still shows the
-  // old alarms.
+  // The tenth reply still shows the old alarms, so the result is read again.
   const Reply now = co_await dialog.ask({DataId::everything})
                         .after(id == DataId::zero ? memory_time : reset_interval)
                         .or_say("all ten requests were sent, but whether the encoder obeyed could not be read");
@@ -99,8 +96,7 @@ constexpr Time busy_pause = 1ms;              // pause between two requests to a
 
 constexpr std::uint8_t byte(std::int64_t argument) { return static_cast<std::uint8_t>(argument); }
 
-// Repeats a memory request until the encoder executes it, and returns the reply; or the error, `busy` after
-// `busy_limit`. The longer pause after a page select keeps the page change undisturbed.
+// Repeats a memory request while the encoder is busy, up to `busy_limit`.
 Part<Result<Reply>> when_ready(Dialog& dialog, const Request& request) {
   return until_ready<Protocol>(dialog, request,
                                {.limit = busy_limit,
@@ -115,8 +111,7 @@ Outcome failure(const Dialog& dialog, Error error, std::string_view step) {
           Protocol::manner(dialog.format(), dialog.request()).hold};
 }
 
-// Executes a memory request and returns the value in the reply. Without a valid reply, or if the encoder stays busy too
-// long, the procedure ends; `step` is the detail of every error but busy.
+// Executes a memory request and returns the value in the reply; ends the procedure on an error.
 Part<std::uint8_t> execute(Dialog& dialog, Request request, std::string_view step) {
   const Result<Reply> reply = co_await when_ready(dialog, request);
   if (!reply) co_await dialog.stop(failure(dialog, reply.error(), step));
@@ -151,9 +146,7 @@ Procedure read_memory(Dialog& dialog, ProcedureResult& found, Arguments argument
   co_return done;
 }
 
-// Writes a byte on the selected page: reads it, writes it if it differs (100 000 writes are permitted in total), waits,
-// selects the page again so that the EEPROM itself is read, and compares. Returns whether the byte was written; a
-// failure ends the procedure.
+// Writes a byte on the selected page if it differs, and verifies it in the EEPROM.
 Part<bool> write_byte(Dialog& dialog, ProcedureResult& found, std::uint8_t address, std::uint8_t value) {
   const Request look{DataId::read_memory, address};
   const std::uint8_t before = co_await execute(dialog, look, "nothing was written");
@@ -203,8 +196,7 @@ Procedure write_memory(Dialog& dialog, ProcedureResult& found, Arguments argumen
 
 // ---- The service page (7.2, 7.3); the page before it is selected again if it is known
 
-// Selects the service page, and returns the page that was selected before; nothing if it is unknown. The document shows
-// the page as the content of address 127, but does not state that it can be read, so the encoder may refuse.
+// Selects the service page, and returns the page that was selected before, if it is known.
 Part<std::optional<std::uint8_t>> open_service_page(Dialog& dialog, ProcedureResult& found, std::string_view step) {
   const Result<Reply> before = co_await when_ready(dialog, {DataId::read_memory, page_select_address});
   found.page_left = service_page;
@@ -212,8 +204,7 @@ Part<std::optional<std::uint8_t>> open_service_page(Dialog& dialog, ProcedureRes
   co_return before&& is_page(before->value) ? std::optional(before->value) : std::nullopt;
 }
 
-// Selects the page `before` again, and returns whether it is selected. If that fails, the result of the procedure is
-// still valid. Reading the page back shows what the next user of the encoder finds.
+// Selects the page `before` again, and returns whether that is known to have succeeded.
 Part<bool> restore(Dialog& dialog, ProcedureResult& found, std::optional<std::uint8_t> before) {
   if (!before) co_return false;
   if (*before != service_page) {
@@ -259,7 +250,7 @@ Procedure write_threshold(Dialog& dialog, ProcedureResult& found, Arguments argu
   co_return done;
 }
 
-// ---- Refusals: the communication alarms of SF (6.3.2), or other requests that are answered like data ID 3 (8.4, 9.4)
+// ---- Refusals (6.3.2, 8.4, 9.4)
 
 constexpr Explanation explain_refusal(Bytes reply) {
   constexpr std::array<std::string_view, 4> found{
@@ -389,8 +380,7 @@ constexpr std::size_t size_of_reply(const Format&, Bytes begin) {
   const std::optional<DataId> of = data_id(begin[0]);
   return of && begin[0] == control_field(*of) ? reply_length(*of) : 0;
 }
-/// Returns the request that a reply shows: its control field has the data ID; a memory access whose reply has the right
-/// length also has the reply's address and value. Error: unexpected_reply (unknown ID).
+/// Returns the request that a reply shows. Error: unexpected_reply.
 constexpr Result<Request> guess_request(const Format&, Bytes reply) {
   const std::optional<DataId> asked = data_id(reply[0]);
   if (!asked) return Error::unexpected_reply;
@@ -401,8 +391,7 @@ constexpr Result<Request> guess_request(const Format&, Bytes reply) {
   }
   return request;
 }
-/// Returns request_rejected if the encoder answered an invalid request like data ID 3 (8.4, 9.4), otherwise `error`,
-/// the error of the request.
+/// Returns request_rejected if the reply is a refusal (8.4, 9.4), otherwise `error`.
 constexpr Error answer_to_bad(const Format&, Bytes, Error error, Bytes reply) {
   const bool refused = reply.size() == reply_length(DataId::everything) && checksum(reply) == 0 &&
                        reply[0] == control_field(DataId::everything);
@@ -434,8 +423,7 @@ constexpr Declaration<Protocol, VirtualEncoder> declaration{
     .alarms = fields.of<&Values::alarms>(),
     .memory = memory_areas,
     .conditions = conditions,
-    // In the document a pause of any length ends a frame; some encoders tolerate a pause that is shorter than their own
-    // answer time.
+    // In the document a pause of any length ends a frame; some encoders tolerate a short one.
     .timing = {.pause_bits = 5, .turnaround = answer_time, .turnaround_limit = answer_limit},
 };
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Test vectors of the T-format: frames with their sources and their decoded fields or error. Each is decoded at compile
-// time, so a wrong vector does not compile.
+// Test vectors of the T-format; each is decoded at compile time.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Main script of the page: selects the view (overview or one encoder) from the address, and passes the events of the server to it.
+// Main script of the page: selects the view, overview or one encoder, from the address.
 import {askToken} from "./dialog.js";
 import {setText} from "./dom.js";
 import {EncoderPage} from "./encoder.js";
@@ -20,7 +20,7 @@ let view;
 let events;
 let shown;  // name of the encoder that is shown; null: all encoders
 
-/** Shows that no events arrive. `refused`: the server responds but refuses the stream; `why` is its reason. */
+/** Shows that no events arrive. `refused`: whether the server refused the stream. */
 function lose(why, refused = false) {
   if (connection.hidden && !refused) notifyLoss(why);
   connection.hidden = false;
@@ -29,7 +29,7 @@ function lose(why, refused = false) {
   view.lose(refused ? why : undefined);
 }
 
-// Shows an error, and also the token button, because the server may require a token for reading.
+// The token button is shown because the server may require a token for reading.
 function explain(why, refused) {
   lose(why, refused);
   tokenButton.hidden = false;
@@ -56,7 +56,6 @@ function take(event, data) {
   view.take(event, data);
 }
 
-// Returns the decoded text of an address; a text with invalid percent-encoding is returned unchanged.
 function decoded(text) {
   try {
     return decodeURIComponent(text);
@@ -65,7 +64,7 @@ function decoded(text) {
   }
 }
 
-/** Returns encoder, tab, range and unit, as far as the fragment of the address has them: a view can be shared. */
+/** Returns the values of the fragment: encoder, tab, range, unit. */
 function place() {
   const values = new URLSearchParams();
   for (const part of location.hash.slice(1).split("&")) {

@@ -12,7 +12,7 @@ const yes = document.getElementById("dialog-yes");
 const no = document.getElementById("dialog-no");
 const WRITING_MS = 300;  // delay in milliseconds after a key press before the encoder is polled
 
-/** Shows a dialog with `nodes`. `agree` returns "" to close it, else an error text. Resolves to true after consent. */
+/** `agree` returns "" or an error text. Resolves to whether the user agreed. */
 function ask(words, button, nodes, agree) {
   title.textContent = words;
   body.replaceChildren(...nodes);
@@ -55,7 +55,7 @@ export async function askToken() {
   await ask("Token", "Use it", [tokenLabel(input)], () => tryToken(input.value.trim()));
 }
 
-/** Asks for consent to acknowledge an alarm, and for a token if this tab has none. Returns whether the user agreed. */
+/** Resolves to whether the user agreed. */
 export async function askAcknowledge(name, alarm) {
   const {name: who} = await tokenInfo();
   const token = tokenField();
@@ -64,10 +64,7 @@ export async function askAcknowledge(name, alarm) {
   return ask(`Acknowledge ${plain(alarm)}: ${name}`, "Acknowledge", nodes, async () => (who === null ? tryToken(token.value.trim()) : ""));
 }
 
-/**
- * Asks for the arguments of `command` and for consent. `now(values)` returns the current value, "" to show none;
- * `then(values)` returns the value after the command. Returns the arguments, or null without consent.
- */
+/** Resolves to the arguments, or null without consent. `now`, `then`: value before and after. */
 export async function askCommand(name, command, now, then) {
   const {name: who} = await tokenInfo();
   const fields = command.arguments.map((argument) => element("input", {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Functions that create elements, drawings and tables of the page. Texts from the server are inserted as text, never as markup.
+// Creates elements, drawings and tables of the page. Texts are never inserted as markup.
 
 /** Creates an element: element("p", {class: "why"}, "text", child). */
 export function element(name, attributes = {}, ...children) {
@@ -22,7 +22,7 @@ export function setText(node, text) {
   }
 }
 
-/** The next three functions write only a changed value, because each write makes the browser compute styles again. */
+/** The next three functions write only changes: a write makes the browser compute styles again. */
 export function setClass(node, name) {
   if (node.className !== name) node.className = name;
 }
@@ -33,7 +33,6 @@ export function setHidden(node, on) {
   if (node.hasAttribute("hidden") !== on) node.toggleAttribute("hidden", on);
 }
 
-/** Replaces the children only if they differ, and keeps the focus on the region with the same label. */
 export function setChildren(node, ...children) {
   const made = element("div", {}, ...children);
   if (node.innerHTML === made.innerHTML) return;
@@ -78,7 +77,7 @@ export function dial() {
   };
 }
 
-/** Creates a scale for linear encoders. `move` sets the mark, from 0 to 1 of the length; null hides it. */
+/** Creates a scale for linear encoders. `move` takes a share of the length, 0 to 1, or null. */
 export function scale() {
   const filled = element("span", {class: "filled"});
   const mark = element("span", {class: "mark"});
@@ -108,7 +107,7 @@ export function spark() {
   const node = drawing("svg", {viewBox: "0 0 600 100", preserveAspectRatio: "none", class: "spark", "aria-hidden": "true"}, gap, line);
   return {
     node,
-    /** `points`: [seconds, value]; `least`: smallest range of the y axis; `live`: false marks the time after the last point. */
+    /** `points`: [seconds, value]; `least`: smallest range of the y axis. */
     draw(points, now, least, live) {
       const last = points.at(-1)?.[0] ?? now;
       const end = live ? now : Math.min(now, last + SPARK_LOST_S);

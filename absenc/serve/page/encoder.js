@@ -159,7 +159,6 @@ export class EncoderPage {
     return key in RANGES && this.hasHistory ? key : "live";
   }
 
-  /** Shows the buttons for range and unit, and restarts the plot if these or the selection have changed. */
   showChoices() {
     const all = quantities(this.encoder);
     const possible = Object.entries(all).filter(([, quantity]) => !quantity.past || this.range !== "live");
@@ -183,7 +182,6 @@ export class EncoderPage {
     return document.querySelector(`.one ${selector}`);
   }
 
-  /** Loads the last 20 seconds of points from the server; for a lost encoder these are from before the loss. */
   async seed() {
     try {
       const {status, body} = await request(pathOf(this.name, "points"));
@@ -221,7 +219,7 @@ export class EncoderPage {
     if (scaled) this.scale.move(encoder.position_mm === null ? null : encoder.position_mm / encoder.length_mm, `${numberText(encoder.length_mm)} mm`);
     const counts = encoder.counts === null ? [] : [`${numberText(encoder.counts)} ${encoder.counts_in_all === null ? "counts" : `of ${numberText(encoder.counts_in_all)} counts`}`];
     showParts(this.below, [...belowFigure(encoder, state.at_ms), ...counts]);
-    // No command can reach the encoder while its port is missing, lost or used by an examination (AWAY).
+    // In these states no command can reach the encoder.
     for (const button of this.commands.querySelectorAll("[data-command]")) button.disabled = AWAY.includes(encoder.state);
     this.showWrong();
     this.showChoices();
@@ -436,7 +434,7 @@ export class EncoderPage {
     return alarms || (this.encoder.alarms === null ? "alarms not reported" : "no alarms");
   }
 
-  /** Returns the current value that the command would change; "" if there is none. Reads settings and memory bytes. */
+  /** Resolves to a text; "" if there is no value. */
   async now(command, values) {
     if (command.verb === "zero") {
       const {text, unit} = figure(this.encoder);

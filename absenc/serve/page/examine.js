@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Panels for examination, settings and memory of an encoder. Each panel reads when its button is pressed, and shows the time of reading.
+// Panels for examination, settings and memory of an encoder.
 import {element, setText, table, terms} from "./dom.js";
 import {pathOf, request} from "./server.js";
 import {fieldName, plain, sentence, valueText, forPeople} from "./words.js";

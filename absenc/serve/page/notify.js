@@ -36,7 +36,6 @@ function showNotification(title, body, tag, hash) {
   };
 }
 
-/** Notifies about an alarm or a loss; the title names the encoder, and the alarm or the kind of loss. */
 export function notify({kind, encoder, text}) {
   if (!KINDS.includes(kind)) return;
   const [name, ...rest] = kind === "alarm" ? text.split(": ") : [eventKind(kind)[1], text];

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Overview page: a card for each encoder, by default faulty ones first, with filter and counts in the bar.
+// Overview page: a card for each encoder, with filter and counts in the bar.
 import {breakable, dial, element, rich, scale, setClass, setHidden, setText, spark, toggleClass} from "./dom.js";
 import {request} from "./server.js";
 import {GROUPS, GROUP_WORDS, MORE_WORDS, SHAPES, belowFigure, condition, figure, numberText, faultLines} from "./words.js";
 
 const MANY = 30;           // number of encoders above which the cards are small
 const FEW = 3;
-// Minimum time per encoder between two redraws, in milliseconds, so that the load stays constant with many encoders.
+// With many encoders: shortest time per encoder between two redraws, in milliseconds.
 const DRAW_MS = 5;
 const ORDER_MS = 2000;     // minimum time between two automatic reorderings of the cards, in milliseconds
 const MINUTE_S = 60;
@@ -37,7 +37,7 @@ export function figureNode() {
   };
 }
 
-/** Selects position (1) or speed (2) for the small plot: speed if a rotary encoder moved by more than two turns. */
+/** Returns 1 for position, 2 for speed. */
 export function sparkColumn(points, linear) {
   if (linear) return 1;
   const places = points.map((row) => row[1]).filter((place) => place !== null);
@@ -120,7 +120,6 @@ class Card {
     const text = JSON.stringify(shown);
     if (text === this.shownWords) return;
     this.shownWords = text;
-    // A text without a title is reduced to its first sentence; the page of the encoder shows all of it.
     const first = (words) => /^.*?[.!?](?= [A-Z]|$)/.exec(words)?.[0] ?? words;
     this.words.replaceChildren(...shown.map(([kind, strong, words]) => element("p", {class: kind}, element("strong", {}, strong), element("span", {class: "more"}, strong && words ? " " : "", ...rich(strong ? words : first(words))))));
   }
@@ -198,7 +197,7 @@ export class Overview {
     card.seed(seconds);
   }
 
-  /** Shows a state of the server. With many encoders the page is redrawn less often than states arrive: less load. */
+  /** With many encoders, not every state is drawn. */
   show(state) {
     const wait = state.encoders.length > MANY && this.cards.size > 0 ? this.drawn + DRAW_MS * state.encoders.length - performance.now() : 0;
     clearTimeout(this.later);
@@ -266,7 +265,7 @@ export class Overview {
     this.noMatch.toggleAttribute("hidden", shown.length > 0 || cards.length === 0);
     const nodes = shown.map((card) => card.node);
     if (nodes.length === this.list.childElementCount && nodes.every((node, i) => node === this.list.children[i])) return;
-    // The card with the focus is not moved, because a moved node loses the focus; the other cards are placed around it.
+    // The focused card is not moved, because a moved node loses the focus.
     const kept = nodes.find((node) => node.contains(document.activeElement));
     for (const node of [...this.list.children]) {
       if (node !== kept) node.remove();
@@ -275,7 +274,7 @@ export class Overview {
     this.list.append(...nodes.slice(kept ? nodes.indexOf(kept) + 1 : 0));
   }
 
-  /** Marks all encoders as unknown after the connection is lost, so that no old value is shown as current. */
+  /** No old value may be shown as current. */
   lose() {
     clearTimeout(this.later);
     for (const card of this.cards.values()) {

@@ -4,11 +4,11 @@
 import {eventKind, plain, clock} from "./words.js";
 
 const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-// Scales a size in pixels, given for the usual font size of 16 pixels, to the font size of the page.
+// `pixels`: size for a font of 16 pixels.
 const scaled = (pixels) => pixels * parseFloat(getComputedStyle(document.documentElement).fontSize) / 16;
 const NONE = [NaN, NaN, NaN];
 
-/** Returns the quantities that can be plotted: unit, value of [position, speed], smallest range; `past`: history only. */
+/** `past`: only from the history. */
 export function quantities(encoder) {
   if (encoder.linear) {
     return {
@@ -44,8 +44,6 @@ function gridLines(quantity) {
   };
 }
 
-// Kinds of events that are drawn as marks. A label that would overlap others is omitted; the history tab lists events
-// of all kinds.
 const MARKED = ["alarm", "lost", "ended", "restarted"];
 export const isMarked = (event) => MARKED.includes(event.kind);
 export const markText = (event) => (event.kind === "alarm" ? plain(event.text.split(":")[0]) : eventKind(event.kind)[1]);
@@ -108,7 +106,7 @@ export class Trace {
     canvas.restore();
   }
 
-  /** Draws rows of [at_ms, least, mean, greatest]; null values are a gap. `window`: [from, to] in ms. */
+  /** Draws rows of [at_ms, least, mean, greatest]. `window`: [from, to] in ms. */
   draw(rows, window, {marks = [], lostAt = null} = {}) {
     this.marks = marks;
     this.lostAt = lostAt;
@@ -117,8 +115,7 @@ export class Trace {
     let low = Infinity;
     let high = -Infinity;
     let before = null;
-    // Positions are drawn within one turn if no row covers half a turn or more and, for multi-turn encoders, no step
-    // between rows does.
+    // Positions are drawn within one turn if the rows are dense enough for that.
     const fits = within && rows.every((row, i) => row[2] === null ||
       (row[3] - row[1] < turn / 2 && (i === 0 || rows[i - 1][2] === null || this.quantity.wraps || Math.abs(row[2] - rows[i - 1][2]) < turn / 2)));
     for (const [at, ...values] of rows) {

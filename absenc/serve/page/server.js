@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Requests to the server, with the token, and the event stream of the server, which reports a lost connection within
-// `PATIENCE` ms.
+// Requests to the server, with the token, and the event stream of the server.
 
 let token = sessionStorage.getItem("token") ?? "";
 
@@ -15,7 +14,7 @@ const headers = () => (token === "" ? {} : {Authorization: `Bearer ${token}`});
 /** Returns the API path of an encoder, or of one of its parts. */
 export const pathOf = (name, part = "") => `api/encoders/${encodeURIComponent(name)}${part && `/${part}`}`;
 
-/** Sends a request and returns {status, body} with the parsed JSON body, also for an error status. */
+/** Returns {status, body} with the parsed JSON body. */
 export async function request(path, values = {}, method = "GET") {
   const query = new URLSearchParams();
   for (const [name, value] of Object.entries(values)) {
@@ -25,10 +24,7 @@ export async function request(path, values = {}, method = "GET") {
   return {status: answer.status, body: await answer.json()};
 }
 
-/**
- * Returns {tokens, name}: whether the server has tokens, and the name of this tab's token. Forgets a token that the
- * server does not accept.
- */
+/** Returns {tokens, name}: whether the server has tokens, and the name of this tab's token. */
 export async function tokenInfo() {
   const {status, body} = await request("api/token");
   if (status === 200) return body;
@@ -66,10 +62,7 @@ export async function download(path, values, name) {
 const PATIENCE = 1500;
 const PAUSE = 500;
 
-/**
- * The server's event stream. It is opened again when it ends, or when nothing arrives for `PATIENCE` ms. This class
- * parses server-sent events itself, because EventSource cannot send a token.
- */
+/** The server's event stream. EventSource is not used, because it cannot send a token. */
 export class Events {
   constructor(trace, {onEvent, onLost}) {
     this.trace = trace;

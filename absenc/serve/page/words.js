@@ -31,11 +31,11 @@ export function clock(at_ms) {
   return `${at.toLocaleDateString("en-GB", {day: "numeric", month: "short", year: "numeric"})}, ${time}`;
 }
 
-/** Converts names to words: "battery_alarm" to "battery alarm", "ch1_status" to "channel 1 status". */
+/** Converts names to words: "ch1_status" to "channel 1 status". */
 export const plain = (name) => name.replace(/[_-]/g, " ").replace(/\bch(?=\d)/, "channel ");
 /** Converts texts of the API for people: "degC" to "°C", "over_heat" to "over heat". */
 export const forPeople = (text) => text.replace(/\bdegC\b/g, "°C").replace(/\b[a-z0-9]+(_[a-z0-9]+)+\b/g, plain);
-/** Removes the unit from a field name, "temperature_c" to "temperature", because the value shows it. */
+/** Removes the unit from the name of a field: "temperature_c" to "temperature". */
 export const fieldName = (field) => plain(field.replace(/_(c|mv|ma|v|us|ms|s|hz|khz|deg|mm|rpm)$/, ""));
 /** Converts a value for people: "80 degC" to "80 °C"; null becomes `missing`. */
 export const valueText = (value, missing = "INVALID") => (value === null ? missing : forPeople(value).replace(/ deg$/, "°").replace(/ us$/, " µs").replace(/ revolutions$/, " turns"));
@@ -44,8 +44,7 @@ export const sentence = (text) => {
   return /[.!?]$/.test(whole) ? whole : whole + ".";
 };
 
-/** Returns the large figure as {text, unit, width}; `width` is the number of characters of the greatest value, so that
- *  the layout is stable. */
+/** Returns the large figure as {text, unit, width}; `width` does not depend on the value. */
 export function figure(encoder) {
   const whole = encoder.length_mm === null ? 6 : numberText(encoder.length_mm).length;
   const width = encoder.linear ? whole + 5 : 7;
@@ -69,8 +68,7 @@ export function lastText(last) {
   return last.position_mm !== null ? `${numberText(last.position_mm, 4)} mm` : "";
 }
 
-/** Returns the texts below the large figure. `isSmall`: a card with room for turns and speed only; the page of the
- *  encoder shows the rest. */
+/** `isSmall`: for a small card. */
 export function belowFigure(encoder, now, isSmall = false) {
   if (encoder.state !== "live") {
     if (encoder.last_reading === null) return ["no reading yet"];
@@ -101,8 +99,7 @@ export const SHAPES = {bad: "▲", warn: "◆", good: "●", plain: "○"};
 
 /** Groups of encoders in display order, faulty ones first. */
 export const GROUPS = ["unknown", "lost", "alarm", "errors", "waiting", "live", "good"];
-/** Returns {group, kind, word} for the state and alarms of an encoder; `kind` selects color and shape. With alarms it
- *  also has `isSeen`: whether all are acknowledged. */
+/** Returns {group, kind, word} for an encoder, and perhaps `isSeen`: all alarms are acknowledged. */
 export function condition(encoder) {
   const age = encoder.state === "unknown" ? "" : ` ${duration(encoder.age_s)}`;
   if (encoder.state in GONE) return {group: encoder.state === "unknown" ? "unknown" : "lost", kind: "bad", word: GONE[encoder.state] + age};
@@ -126,7 +123,7 @@ export const GROUP_WORDS = {
 /** Text after the number, on wide screens only. */
 export const MORE_WORDS = {live: ", alarms not reported"};
 
-/** Returns [kind, bold text, text] for each line about a fault, or about alarms that are not reported. */
+/** Returns lines [kind, bold text, text]. */
 export function faultLines(encoder) {
   const list = [];
   for (const alarm of encoder.alarms ?? []) {
@@ -148,7 +145,7 @@ export function fieldText(value, missing = "INVALID") {
   return Array.isArray(value) ? value.map(plain).join(", ") || "none" : String(value);
 }
 
-/** Severity and text of kinds of events; other kinds have the severity "plain" and their own name. */
+/** Severity and text of kinds of events; other kinds are "plain". */
 const EVENT_KINDS = {
   alarm: ["bad", "alarm raised"], alarm_over: ["good", "alarm over"], acknowledged: ["plain", "acknowledged"], lost: ["bad", "lost"],
   failing: ["warn", "replies fail"], back: ["good", "back"], restarted: ["warn", "position restarted"], ended: ["bad", "stopped"],

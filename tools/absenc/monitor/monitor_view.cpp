@@ -51,8 +51,7 @@ double unit_um(const MonitoredEncoder& shown) {
   return uri.unit->resolution(uri.options).unit_um;
 }
 
-// Returns `value` as text with `decimals` decimals, or fewer if the text would be wider than `width` characters; a
-// value that is too wide even without decimals is written with an exponent.
+// Returns `value` as text, in at most `width` characters where possible.
 std::string short_text(double value, int decimals, std::size_t width = 9) {
   while (decimals > 0 && fmt::formatted_size("{:.{}f}", value, decimals) > width) --decimals;
   std::string text = fmt::format("{:.{}f}", value, decimals);
@@ -81,8 +80,7 @@ std::string speed_text(const Snapshot& snapshot) {
   return text.size() <= 9 ? text : short_text(snapshot.last.speed, 1);
 }
 
-// Returns speed and unit as "12.0 +/- 0.3 rpm", with `sign` before the uncertainty ("+/-" for the screen, which only
-// draws ASCII); "- rpm" without a live speed.
+// Returns speed and unit as "12.0 +/- 0.3 rpm", or as "- rpm" without a speed.
 std::string measured_speed_text(const Snapshot& snapshot, std::string_view sign) {
   const Sample& last = snapshot.last;
   const std::string value =
@@ -90,8 +88,7 @@ std::string measured_speed_text(const Snapshot& snapshot, std::string_view sign)
   return fmt::format("{} {}", value, speed_unit(last.reading));
 }
 
-// Returns whether an alarm of the encoder is raised. Unless the reading reports all alarms, a raised status flag that
-// has an advice counts as an alarm.
+// Returns whether an alarm is raised, or a status flag that may stand for one.
 bool has_alarm(const MonitoredEncoder& shown) {
   const Unit& unit = *shown.watch->uri().unit;
   const Reading& reading = shown.snapshot.last.reading;
@@ -122,7 +119,6 @@ std::vector<std::string> names_in(const View& view, int width) {
   return short_names(names, static_cast<std::size_t>(std::max(width, 8)));
 }
 
-// Returns the width of the column of names, 8 to 40: the part of the screen's width that the other columns leave.
 int name_width(const Screen& screen) { return std::clamp(screen.columns() - values_width - 13, 8, 40); }
 
 void draw_list_line(Screen& screen, int row, const MonitoredEncoder& shown, const std::string& name, bool selected) {
@@ -150,8 +146,7 @@ std::array<std::string_view, 2> units_of(const View& view) {
   return {"mm", "mm/s"};
 }
 
-// Draws the list of encoders from the screen's row `row` on, with its heading; if not all fit, those around the
-// selected encoder. Returns the row after the list.
+// Draws encoders from `row` on, at least the selected one. Returns the row after the list.
 int draw_list(Screen& screen, int row, const View& view) {
   const std::size_t most = std::max<std::size_t>(1, static_cast<std::size_t>(screen.rows() - 14));
   const std::size_t count = std::min(view.encoders.size(), most);
@@ -173,8 +168,7 @@ int draw_list(Screen& screen, int row, const View& view) {
 
 // ---- One encoder
 
-// Returns the upper end of the bar that shows the position, as text: "360" degrees, or a linear encoder's whole range
-// in mm.
+// Returns the upper end of the bar that shows the position: "360", or a range in mm.
 std::string range_text(const MonitoredEncoder& shown) {
   const EncoderAddress& uri = shown.watch->uri();
   const Resolution resolution = uri.unit->resolution(uri.options);
@@ -200,7 +194,7 @@ void draw_position(Screen& screen, int row, const MonitoredEncoder& shown) {
   const Snapshot& snapshot = shown.snapshot;
   const Unit& unit = *shown.watch->uri().unit;
   if (is_live(snapshot)) {
-    // The flags of an encoder with two channels do not fit into this line: they are drawn among the fields below.
+    // The flags of an encoder with two channels do not fit here: they are among the fields.
     const bool has_room = unit.second_status == nullptr && unit.second_alarms == nullptr;
     const Reading& reading = snapshot.last.reading;
     const Doubt doubt = doubt_of(snapshot.last);
@@ -242,7 +236,7 @@ std::string statistics_line(const Snapshot& snapshot) {
                      to_text(snapshot.percentile_99), to_text(snapshot.longest));
 }
 
-// Draws `text`, wrapped at the edge of the screen, in the rows before `end`; returns the row behind the last one.
+// Draws `text`, wrapped, in the rows before `end`. Returns the row behind the last one.
 int draw_words(Screen& screen, int row, int end, std::string_view text, Style style) {
   constexpr int indent = 2;
   const auto width = static_cast<std::size_t>(screen.columns() - indent);
@@ -272,8 +266,7 @@ int draw_alarms(Screen& screen, int row, int end, const MonitoredEncoder& shown)
   return row;
 }
 
-// Draws the last reply's fields in columns; a long field takes several columns. Draws nothing into the last three rows
-// before `end`, which the section below needs. Returns the row after the fields.
+// Draws the last reply's fields in columns. Returns the row after the fields.
 int draw_fields(Screen& screen, int row, int end, const Snapshot& snapshot) {
   if (!is_live(snapshot)) return row;
   constexpr int between = 3;
@@ -306,7 +299,7 @@ void draw_trace(Screen& screen, int row, int end, const Snapshot& snapshot) {
   }
 }
 
-// Draws the encoder's last bad exchanges with their sent and received bytes; attempts that were repeated count too.
+// Draws the encoder's last bad exchanges, also those that were repeated.
 void draw_errors(Screen& screen, int row, int end, const MonitoredEncoder& shown) {
   if (shown.snapshot.bad.empty()) return screen.put(row, 2, "no exchange has failed");
   for (const BadExchangeText& bad : shown.snapshot.bad) {
@@ -359,8 +352,7 @@ void draw_help(Screen& screen, int row, int end) {
       Style::plain);
 }
 
-// Returns the question to the user, followed by the selected encoder's short name. If both do not fit into `columns`,
-// the question is cut, not the name.
+// Returns the question to the user, followed by the selected encoder's short name.
 std::string question_in(const View& view, int columns) {
   const std::string name = names_in(view, columns - static_cast<int>(view.question.size()) - 5)[view.selected];
   const std::string who = fmt::format("  ({})", name);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Draws the screen of `absenc monitor`: the list of all encoders and the details of the selected one.
+// Draws the screen of `absenc monitor`.
 #pragma once
 
 #include <span>
@@ -28,11 +28,10 @@ struct View {
 inline constexpr int least_rows = 16;
 inline constexpr int least_columns = 64;
 
-/// Draws the whole screen of `view`; on a screen smaller than the minimum, only a message that it is too small.
+/// Draws the whole screen of `view`, or a message that the screen is too small.
 void draw(Screen& screen, const View& view);
 
-/// Returns one line "elbow: 123.456 deg ..." for output without a screen. A reading that is not live is never printed
-/// as a value.
+/// Returns one line "elbow: 123.456 deg ..."; it has no value of a reading that is not live.
 [[nodiscard]] std::string to_line(const MonitoredEncoder& shown);
 [[nodiscard]] Json to_json(const MonitoredEncoder& shown);
 

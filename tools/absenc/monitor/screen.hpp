@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Draws text on a terminal and reads its keys. Only screen.cpp includes ncurses, because its header defines many
-// macros.
+// Draws text on a terminal and reads its keys. Only screen.cpp may include ncurses.
 #pragma once
 
 #include <cstdint>
@@ -30,7 +29,7 @@ enum class KeyPress : std::uint8_t {
 
 class Screen {
  public:
-  /// Takes over the terminal of standard input and output. Returns null if it cannot be used as a screen.
+  /// Takes over the terminal. Returns null if it cannot be used as a screen.
   [[nodiscard]] static std::unique_ptr<Screen> open();
   /// Restores the terminal to its state before `open`.
   ~Screen();
@@ -41,14 +40,13 @@ class Screen {
   [[nodiscard]] int columns() const;
 
   void clear();
-  /// Draws `text`; cuts it at the right edge of the screen and draws '?' for control characters and bytes that are not
-  /// ASCII.
+  /// Draws `text`, cut at the right edge, with '?' for all but printable ASCII.
   void put(int row, int column, std::string_view text, Style style = Style::plain);
   /// Draws `text` from the left edge on, and gives the whole row the style `style`.
   void fill(int row, std::string_view text, Style style);
   void show();
 
-  /// Returns the next key that the user presses; waits at most `limit` and then returns KeyPress::none.
+  /// Waits at most `limit` for the next key; returns KeyPress::none without one.
   [[nodiscard]] KeyPress key(Time limit);
 
  private:

@@ -26,16 +26,15 @@ using namespace std::chrono_literals;
 
 constexpr std::size_t most_lines = 200;
 constexpr Time between_summaries = 100ms;
-// Shortest time between two traced good readings; a reading with changed alarms, and a failure, are traced at once.
+// Shortest time between two traced good readings with the same alarms.
 constexpr Time between_lines = 200ms;
 
-// Converts a time of os::now, which reads the steady clock, for functions of the standard library.
+// Converts a time of os::now for functions of the standard library.
 std::chrono::steady_clock::time_point to_time_point(Time time) {
   return std::chrono::steady_clock::time_point(std::chrono::duration_cast<std::chrono::steady_clock::duration>(time));
 }
 
-/// Collects the last reply's fields that the printed line of the reading leaves out, except those that repeat the
-/// request.
+/// Collects fields of the last reply that the line of the reading leaves out.
 class OtherFields final : public FieldSink {
  public:
   explicit OtherFields(const Unit& unit) : unit_(&unit) {}

@@ -43,32 +43,29 @@ struct Snapshot {
   Time median{};               // median of the latencies from request to reply
   Time percentile_99{};
   Time longest{};
-  // Lines of text about the last readings and events, the newest last; empty unless details were asked for.
+  // Lines of text about the last readings and events, the newest last; only with details.
   std::vector<std::string> trace{};
   std::vector<BadExchangeText> bad{};  // last bad exchanges, the newest first; empty unless details were asked for
-  // "name value" of the fields of a recent reply that the line of the reading lacks; empty unless details were asked
-  // for.
+  // "name value" of the fields that the line of the reading lacks; only with details.
   std::vector<std::string> fields{};
 };
 
 [[nodiscard]] std::string_view name_of(Snapshot::State state);
 
-/// Watches one encoder in a thread of its own, because its port blocks. The screen gets copies, so that it never waits
-/// for a line.
+/// Watches one encoder in a thread of its own, because its port blocks.
 class Watch {
  public:
-  /// `name` is the encoder's name or address as the user wrote it. The first reading is `offset` after the start;
-  /// `rate` is in readings per second.
+  /// The first reading is `offset` after the start; `rate` is in readings per second.
   Watch(std::string name, const EncoderAddress& uri, double rate, Time offset);
   Watch(const Watch&) = delete;
   Watch& operator=(const Watch&) = delete;
 
-  /// Ends the thread and waits for its end; a running command is not aborted. The destructor does the same.
+  /// Ends the thread and waits for it; a running command is not aborted.
   void stop();
 
   [[nodiscard]] Snapshot snapshot(bool details) const;
   void pause(bool paused);
-  /// Lets the thread run a command without arguments between two readings; Snapshot::notice then contains its result.
+  /// Lets the thread run a command without arguments; Snapshot::notice gets its result.
   void run(const Command& command);
   /// Sets Snapshot::notice to `text`.
   void notify(std::string text);

@@ -28,8 +28,7 @@ using Kind = Annotation::Kind;
 
 constexpr std::size_t enough_to_print = 1 << 16;
 
-// Returns the fields of a frame as text "data_id=3 singleturn=74565". An invalid value is "singleturn=INVALID(74565)",
-// a value whose validity no reply reports is "singleturn=unknown(74565)".
+// Returns the fields of a frame as text "data_id=3 singleturn=INVALID(74565)".
 std::string field_words(const capture::Contents& contents) {
   std::string words;
   for (const FieldValue& field : contents.fields) {
@@ -44,8 +43,7 @@ std::string field_words(const capture::Contents& contents) {
   return words;
 }
 
-// Positions of the CSV columns: ColumnPosition counts from the first column, Behind from the first column after those
-// of the reading.
+// Positions of the CSV columns; Behind counts from the column after those of the reading.
 enum ColumnPosition : std::size_t { at_time, at_kind, at_request, at_reply, at_turnaround, at_reading };
 enum Behind : std::size_t { at_fields, at_error, at_message, behind_all };
 

@@ -25,8 +25,7 @@ enum class MarkAlarms : std::uint8_t { no, yes };
 /// Returns whether the annotated reply reports a raised alarm.
 [[nodiscard]] bool raises_alarm(const capture::Annotation& annotation);
 
-/// Prints annotations to standard output. Collects lines until they fill 64 KiB or the caller calls `flush`, as for
-/// live input after each piece of it.
+/// Prints annotations to standard output; `flush` prints those that are still buffered.
 class AnnotationPrinter final : public capture::AnnotationSink {
  public:
   AnnotationPrinter(const Unit& unit, const Options& options, const TickClock& clock, AnnotationFormat format,
@@ -47,7 +46,7 @@ class AnnotationPrinter final : public capture::AnnotationSink {
   AnnotationFormat format_;
   ShowBits bits_;
   MarkAlarms marks_;
-  // The members `time_format_` to `row_` are used only for CSV; `kept_` buffers lines of every format.
+  // The members `time_format_` to `row_` are used only for CSV.
   std::string time_format_;
   ReadingColumns reading_;
   std::vector<Column> columns_;

@@ -16,20 +16,17 @@ namespace absenc::tool {
 /// Returns bit ranges as text, the most significant range first: "16-32", "7", "24-31 16-23".
 [[nodiscard]] std::string ranges_text(const BitRanges& ranges);
 
-/// The bits that each field of a good reply occupies, in the order of the fields. Fields whose bits the unit does not
-/// declare are missing.
+/// The bits of each field of a good reply; fields without declared bits are missing.
 class FieldPlaces {
  public:
   FieldPlaces(const Unit& unit, const Options& options, const Frame& request, const Frame& reply,
               const capture::Contents& contents);
 
-  /// Returns the fields with their bits as "singleturn 16-32, multiturn 48-63"; "" if no field has declared bits.
+  /// Returns the fields with their bits as "singleturn 16-32, multiturn 48-63".
   [[nodiscard]] std::string text() const;
-  /// Returns the fields with their bits as {"singleturn":[{"first":16,"count":17}]}, the least significant range of a
-  /// field first; an inverted range has "inverted":true.
+  /// Returns {"singleturn":[{"first":16,"count":17}]}, the least significant range first.
   [[nodiscard]] Json json() const;
-  /// Inserts a third column into `rows`, whose first two are name and value: the bits of the field with that name; ""
-  /// if not declared.
+  /// Inserts the bits of the field that the first column of `rows` names as third column.
   void add_to(std::vector<std::vector<std::string>>& rows) const;
 
  private:

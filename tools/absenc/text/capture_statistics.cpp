@@ -71,8 +71,7 @@ void CaptureStatistics::put(const Annotation& annotation) {
   }
   if (annotation.error != Error::none) return put_error(annotation);
   error_run_.count = 0;
-  // A composed frame repeats a position that was added with the first exchange that carried a byte of it, so it is not
-  // added again.
+  // A composed frame repeats a position that was added before.
   if (annotation.contents.reading != nullptr && !annotation.composed)
     trace_.add(annotation.begin, *annotation.contents.reading);
 }

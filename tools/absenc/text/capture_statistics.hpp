@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Statistics of a capture: counts, errors, response times, movement of the position. The memory use does not grow with
-// the capture.
+// Statistics of a capture: counts, errors, response times, movement of the position.
 #pragma once
 
 #include <array>
@@ -38,8 +37,7 @@ class TimeHistogram {
     const auto quarter = static_cast<unsigned>(top >= 2 ? value >> (top - 2) & 3 : value << (2 - top) & 3);
     ++counts_[4 * top + quarter];
   }
-  /// Returns the bins between the shortest and the longest duration; neighbouring bins are joined so that at most
-  /// `most` remain. Returns nothing without durations.
+  /// Returns at most `most` bins, from the shortest to the longest duration.
   [[nodiscard]] std::vector<Bar> bars(std::size_t most) const;
 
  private:
@@ -64,7 +62,7 @@ class CaptureStatistics final : public capture::AnnotationSink {
   static constexpr std::size_t most_kept = 8;
   static constexpr std::size_t error_kinds = error_texts.size();
 
-  // A copy of an annotation with an error; of long requests and replies only the beginning is stored.
+  // A copy of an annotation with an error; long requests and replies are cut.
   struct StoredError {
     capture::Annotation annotation{};
     ByteBuffer<32> request{};

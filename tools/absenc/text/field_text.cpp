@@ -34,8 +34,7 @@ void JsonFields::put_reading(const Reading& reading) {
 
 namespace {
 
-// Returns the flag's meaning, followed by the user's action if there is one. With `beside_alarms`, leaves out the
-// action of a flag that summarises alarms.
+// Returns the flag's meaning and the user's action, if any (action_of).
 std::string in_words(const FlagInfo& flag, bool beside_alarms) {
   const std::string_view action = action_of(flag, beside_alarms);
   return action.empty() ? std::string(flag.meaning) : fmt::format("{}: {}", flag.meaning, action);
@@ -52,8 +51,7 @@ void FieldTable::put(const FieldValue& value) {
   if (info.kind == FieldInfo::Kind::flags) put_flags(info, static_cast<std::uint64_t>(value.number));
 }
 
-// Makes a row for each set flag of `field`. A status flag may tell the user to read the alarms; as soon as the table
-// shows set alarms, this advice is removed from the flag's row.
+// Makes a row for each set flag. Rows of alarms replace the advice to read the alarms.
 void FieldTable::put_flags(const FieldInfo& field, std::uint64_t bits) {
   const auto sums_up = [](const FlagInfo& flag) { return flag.action == read_the_alarms; };
   if (bits != 0 && std::none_of(field.flags.begin(), field.flags.end(), sums_up)) {

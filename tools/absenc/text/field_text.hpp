@@ -18,8 +18,7 @@ using namespace client;
 /// Returns the options of a unit as {"singleturn_bits":17,...}.
 [[nodiscard]] Json options_to_json(const Unit& unit, const Options& options);
 
-/// Puts decoded fields into a JSON object. A value of a reading that is invalid or of unknown validity has a further
-/// key such as `singleturn_valid` behind it: false, or null if no reply reports the validity.
+/// Puts decoded fields into a JSON object; doubtful ones get a key such as `singleturn_valid`.
 struct JsonFields final : FieldSink {
   void put(const FieldValue& value) override;
   void put_reading(const Reading& reading) override;
@@ -33,12 +32,10 @@ struct JsonFields final : FieldSink {
   std::vector<ValidatedField> judged_;
 };
 
-/// Returns rows for the function `table`, one for each column of `row`: name, value with unit, and meaning; after a
-/// column of flags, one row for each flag that is set.
+/// Returns rows for `table`: name, value with unit, and meaning; one more for each set flag.
 [[nodiscard]] std::vector<std::vector<std::string>> to_table(const Row& row);
 
-/// Makes a row for each decoded field: name, value with unit, and meaning; after a field of flags, one row for each
-/// flag that is set.
+/// Makes rows of decoded fields: name, value with unit, and meaning; one more for each set flag.
 struct FieldTable final : FieldSink {
   void put(const FieldValue& value) override;
   void put_reading(const Reading& reading) override;

@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::size_t most_shown = 8;
 
-// Returns the probability 10^`log10` as "1 in 16384" or "1 in 10^9"; "as likely" if it is nearly 1.
+// Returns the probability 10^`log10` as "1 in 16384", "1 in 10^9" or "as likely".
 std::string chance_text(double log10) {
   if (log10 > -0.05) return "as likely";
   if (log10 > -6) return fmt::format("1 in {:.0f}", std::pow(10, -log10));
@@ -58,7 +58,7 @@ void show_table(std::span<const Candidate> candidates) {
   print_line(table(rows));
 }
 
-// Prints the identity that each candidate reported, as "1 says: serial_number 12, device_id 41 62" for candidate 1.
+// Prints the identity of each candidate, as "1 says: serial_number 12, device_id 41 62".
 void show_identities(std::span<const Candidate> candidates) {
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     const Answer& identity = candidates[i].identity;
@@ -75,7 +75,7 @@ bool same_encoder(const Candidate& one, const Candidate& other) {
   return one.unit != other.unit || one.encoder == other.encoder || one.encoder.empty() || other.encoder.empty();
 }
 
-// Returns the likeliest found candidate, and the likeliest of its protocol with each other address.
+// Returns the likeliest found candidate, and those of its protocol with other addresses.
 std::vector<const Candidate*> encoders(std::span<const Candidate> candidates) {
   std::vector<const Candidate*> all;
   for (const Candidate& one : candidates) {

@@ -17,14 +17,12 @@ using namespace client;
 /// Returns the reason why a search found nothing, judged by the received bytes, and what to try.
 [[nodiscard]] std::string advice_for(const LineFindings& findings, const LineSearch& search);
 
-/// Returns the command line that reads a candidate: absenc read "tformat:/dev/ttyUSB0?model=23-bit".
+/// Returns the command that reads a candidate: absenc read "tformat:/dev/ttyUSB0?model=23-bit".
 [[nodiscard]] std::string read_command(const Candidate& candidate, std::string_view place);
-/// Returns the command line that decodes frames of a candidate: absenc decode tformat --option model=23-bit.
+/// Returns the command that decodes a candidate: absenc decode tformat --option model=23-bit.
 [[nodiscard]] std::string decode_command(const Candidate& candidate);
 
-/// Prints the candidates of a search: as JSON all, each with its next command, which `command` returns; as text the
-/// likeliest eight, and the next command for each encoder that was found. Returns the verb's exit status, which is
-/// exit_good only if chance cannot explain the first candidate.
+/// Prints candidates of a search. Returns exit_good only if chance cannot explain the first.
 int show_candidates(std::span<const Candidate> candidates, const std::function<std::string(const Candidate&)>& command,
                     bool json);
 

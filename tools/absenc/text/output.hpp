@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes data to standard output and messages to standard error, and detects at once if standard output cannot be
-// written.
+// Writes data to standard output and messages to standard error.
 #pragma once
 
 #include <span>
@@ -12,8 +11,7 @@
 
 namespace absenc::tool {
 
-/// Writes `text` to standard output, unbuffered, and a line end unless `text` ends with one. Throws OutputClosed if
-/// nobody reads standard output, Failure if it cannot be written.
+/// Writes `text` to standard output, with a line end. Throws OutputClosed, Failure.
 void print_line(std::string_view text);
 
 /// Writes "absenc: <text>" and a line end to standard error.
@@ -23,7 +21,7 @@ void print_note(std::string_view text);
 /// Writes `text` without a line end to standard error.
 void print_prompt(std::string_view text);
 
-/// Returns whether standard input and standard error are terminals, so that the user can be asked.
+/// Returns whether standard input and standard error are terminals.
 [[nodiscard]] bool can_ask();
 
 /// Returns rows of cells as lines of text with aligned columns, without trailing spaces.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shows the progress of long work on the last line of the terminal; shows nothing if standard error is no terminal.
+// Shows the progress of long work on the last line of the terminal, if there is one.
 #pragma once
 
 #include <string_view>

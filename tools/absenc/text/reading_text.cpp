@@ -20,13 +20,12 @@ using namespace client;
 
 namespace {
 
-// Returns the number of decimals of degrees with which neighbouring counts of `bits` bits look different.
+// Returns the decimals of degrees with which neighbouring counts of `bits` bits differ.
 int decimals(unsigned bits) {
   return std::max(0, static_cast<int>(std::ceil(std::log10(std::ldexp(1.0, static_cast<int>(bits)) / 360))));
 }
 
-// Returns the number of decimals of millimetres that positions of an encoder need whose count is `unit_um` micrometres,
-// at most 9: options allow six decimals of a micrometre.
+// Returns the decimals of millimetres for a count of `unit_um` micrometres, at most 9.
 int linear_decimals(double unit_um) {
   int decimals = 9;
   for (auto nanometres_e3 = std::llround(unit_um * 1e6); decimals > 0 && nanometres_e3 % 10 == 0; --decimals) {
@@ -72,8 +71,6 @@ std::string turns_text(const Reading& reading, Doubt doubt) {
   return fmt::format("{:>{}} turns", reading.turns(), digits(reading.multiturn_bits));
 }
 
-// Returns the flags for the line of a reading: the alarms alone if the reply reports all of them, otherwise status and
-// alarms. For an encoder with two channels, status and alarms of both.
 std::vector<Flags> flags_in_line(const Unit& unit, const Reading& reading) {
   if (unit.second_status != nullptr || unit.second_alarms != nullptr) return flags_of(unit, reading);
   const std::vector<Flags> alarms = alarms_of(unit, reading);
@@ -81,8 +78,7 @@ std::vector<Flags> flags_in_line(const Unit& unit, const Reading& reading) {
   return flags_of(unit, reading);
 }
 
-// Returns whether status and alarms of both channels are reported completely and no set flag requires an action: one
-// text then serves both channels, otherwise the line lists the flags of each.
+// Returns whether two channels report all flags and no set flag requires an action.
 bool both_channels_are_well(const Unit& unit, const Reading& reading) {
   if (unit.second_status == nullptr || unit.second_alarms == nullptr || !reading.ready) return false;
   const std::vector<Flags> all = flags_of(unit, reading);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Prints a reading as text. An invalid value never looks like a good number, and unreported alarms never look like
-// "no alarms".
+// Prints a reading as text. An invalid value must not look like a good number.
 #pragma once
 
 #include <cstdint>
@@ -22,37 +21,29 @@ using namespace client;
 /// Reason why the validity of a position is unknown.
 enum class Doubt : std::uint8_t {
   none,
-  // No second reading confirmed the position. With `none`, the validity is unknown because no reply reports it.
+  // No second reading confirmed the position.
   unconfirmed,
 };
 [[nodiscard]] inline Doubt doubt_of(const Sample& sample) { return sample.doubtful ? Doubt::unconfirmed : Doubt::none; }
 
-/// Returns a reading as one line: " 204.800 deg   74565 counts   4660 turns   alarms: over_heat"; for a linear encoder
-/// "  78.96355 mm      78963.55 um   1579271 counts   no alarms". If some alarms are not reported, also the status:
-/// "position unknown (43981)   status: alarm   alarms not reported".
+/// Returns a reading as one line: " 204.800 deg   74565 counts   4660 turns   alarms: over_heat".
 [[nodiscard]] std::string reading_text(const Unit& unit, const Reading& reading, Doubt doubt = Doubt::none);
 
 /// Returns position and turns, the first part of the line that `reading_text` returns.
 [[nodiscard]] std::string place_text(const Reading& reading, Doubt doubt = Doubt::none);
 
-/// Returns flags as text, such as "no alarms", "alarms: over_heat", "alarms not reported" or "alarms: counting_error
-/// (not reported: over_speed)"; for flags of a status "status clear" or "status: alarm". Unreported flags are named if
-/// they are at most four, and not all flags.
+/// Returns flags as text, such as "no alarms", "alarms: over_heat" or "alarms not reported".
 [[nodiscard]] std::string flags_text(const Unit& unit, const Flags& flags);
 
-/// Returns one line for each set flag, with its meaning and what the user should do; "" if no flag is set. With
-/// `beside_alarms`, a flag that summarises alarms has no advice.
+/// Returns one line for each set flag, with its meaning and advice; "" if no flag is set.
 [[nodiscard]] std::string flags_in_words(const Flags& flags, bool beside_alarms = false);
-/// Returns the raised alarms in words. With two channels, the channel's name stands before its alarms; if both raise
-/// the same alarms, these are listed once.
+/// Returns the raised alarms in words.
 [[nodiscard]] std::string alarms_in_words(const Unit& unit, const Reading& reading);
 
-/// Sets the keys singleturn_valid and multiturn_valid if the reading has these parts, and "alarms", of all channels
-/// together, if the unit has alarms. null means that no reply reports the value; for the alarms, that none is raised
-/// and not all are reported.
+/// Sets the keys of validity and of alarms; null means unknown.
 void set_state(Json& json, const Unit& unit, const Reading& reading);
 
-/// Returns millimetres as text "0.125", with no more decimals than one count of `unit_um` micrometres has.
+/// Returns millimetres as text "0.125"; a count of `unit_um` micrometres limits the decimals.
 [[nodiscard]] std::string millimetres_text(double millimetres, double unit_um);
 
 }  // namespace absenc::tool

@@ -32,8 +32,6 @@ bool reports_all(const std::vector<Flags>& all) {
   return std::all_of(all.begin(), all.end(), [](const Flags& flags) { return flags.is_complete(); });
 }
 
-// Prints the alarms and the set status flags of a reading. Status flags that are clear or not reported are printed only
-// if some alarms are not reported, or if the unit has none.
 void show_alarms(const Unit& unit, const Reading& reading) {
   const auto show = [&](const Flags& flags, bool also_clear) {
     const std::string words = flags_in_words(flags, true);

@@ -67,7 +67,7 @@ struct Percentile {
 };
 constexpr std::array<Percentile, 4> percentiles{{{"50", 0.5}, {"90", 0.9}, {"99", 0.99}, {"99.9", 0.999}}};
 
-// Returns the fraction of the time in which characters were on the line; 0 for a line without a rate or characters.
+// Returns the fraction of the time in which characters were on the line; 0 if unknown.
 double line_share(const Connection& encoder, const Measurement& measurement) {
   const LineSettings& line = encoder.uri().line;
   const LinkKind link = encoder.unit().link;

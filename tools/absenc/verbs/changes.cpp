@@ -15,7 +15,7 @@ namespace absenc::tool {
 
 namespace {
 
-// Returns whether the journal's entry belongs to `encoder`, an address with or without its settings.
+// Returns whether the entry belongs to `encoder`, an address with or without settings.
 bool is_of(const JournalEntry& entry, std::string_view encoder) {
   const std::string_view written = entry.encoder;
   return written == encoder || written.substr(0, written.find('?')) == encoder;

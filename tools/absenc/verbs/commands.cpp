@@ -13,8 +13,7 @@ namespace absenc::tool {
 
 namespace {
 
-// Returns the end of an error text: a sentence that names the unit's commands of Verb::run whose names contain `word`,
-// such as "set-zero" for "zero"; "" without such commands.
+// Returns a sentence about the commands of Verb::run whose names contain `word`, or "".
 std::string related(const Unit& unit, std::string_view word) {
   std::string names;
   for (const Command& command : unit.commands) {

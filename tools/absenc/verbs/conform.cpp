@@ -28,8 +28,6 @@ std::string without_end(std::string text) {
   return text;
 }
 
-// Prints the verdict as JSON, TAP or text, and writes it to the file of --junit, as the user's options choose; returns
-// the exit status.
 int tell_verdict(const Invocation& invocation, const Conformance& conformance) {
   if (invocation.has("--junit")) {
     const std::string path(invocation.text("--junit"));
@@ -77,8 +75,7 @@ int run_conform(const Invocation& invocation) {
   return tell_verdict(invocation, conformance);
 }
 
-/// Serves a host through an SPI controller while the host is tested. The class is part of the command, so that the
-/// library does not need libfuse.
+/// Serves a host through an SPI controller. It is here because the library has no libfuse.
 class SpidevStage final : public HostStage {
  public:
   SpidevStage(const EncoderAddress& address, const std::string& name)

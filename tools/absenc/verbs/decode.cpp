@@ -148,8 +148,7 @@ int decode_capture(const Invocation& invocation, const Unit& unit, const Options
   return damaged || statistics.errors() != 0 ? exit_failed : exit_good;
 }
 
-// Identifies the protocol of a capture that the user gave without a protocol, and prints how to decode it. Returns
-// exit_usage also if a protocol was found.
+// Identifies the protocol of a capture. Returns exit_usage even if one was found.
 int identify_instead(std::string_view file) {
   print_message(fmt::format("the protocol is missing before {}: it is looked for", file));
   Invocation search;

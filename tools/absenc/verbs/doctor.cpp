@@ -25,9 +25,7 @@ std::string finding_text(const Finding& one) {
                      one.action);
 }
 
-// Identifies the encoder on a port that the user gave without a protocol, and returns the address of the likeliest
-// encoder. Throws Failure if there is no candidate, or if chance may explain the likeliest one; throws UsageError,
-// os::Interrupted.
+// Returns the address of the likeliest encoder on a port; throws if chance may explain it.
 std::string identified(const std::string& port, Progress& progress) {
   LineSearch search = parse_search(port);
   search.limit = std::chrono::seconds(60);

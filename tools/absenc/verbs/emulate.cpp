@@ -148,8 +148,7 @@ struct EmulationRun {
     if (keeps_memory) file.load(line.first().memory());
   }
 
-  /// Calls `serve(machine)`, which runs the encoders and returns notes about the line. Then prints counts and notes.
-  /// Returns the exit status.
+  /// Calls `serve(machine)`, which returns notes about the line. Returns the exit status.
   template <class Serve>
   int run(const Serve& serve) {
     const Time start = os::now();
@@ -239,8 +238,7 @@ int emulate_bytes(const Unit& unit, const Options& options, const Invocation& in
   });
 }
 
-// Emulates the encoder behind an slcan adapter, which is a pseudo-terminal and, with --tcp, a TCP port too; returns
-// notes about the line.
+// Emulates the encoder behind an slcan adapter. Returns notes about the line.
 Notes serve_adapter(Machine<CanFrame>& machine, const LineSettings& line, const Invocation& invocation, Time end) {
   const auto bytes = std::make_shared<os::EmulatorPort>(std::string(invocation.text("--pty")), tcp_port(invocation));
   bytes->set_end(end);

@@ -28,8 +28,7 @@ std::vector<std::string> reply_settings(std::span<const std::string> texts) {
   return settings;
 }
 
-// Returns the reply of a virtual encoder, with the settings of `invocation`, to the last request of the command. Throws
-// UsageError if it sends no reply.
+// Returns a virtual encoder's reply to the last request of the command. Throws UsageError.
 std::string reply_of(const Invocation& invocation, const Unit& unit, const Command& command, Arguments arguments) {
   std::vector<std::string> settings = reply_settings(invocation.texts("--reply"));
   for (const std::string& option : invocation.texts("--option")) settings.push_back(option);
@@ -40,8 +39,7 @@ std::string reply_of(const Invocation& invocation, const Unit& unit, const Comma
                                text_of(answered.error).description, text_of(answered.error).advice));
 }
 
-// Prints the encoded request of a command, with --reply the reply in place of it; as JSON both. On CAN and clocked
-// links Unit::encode writes text, which is parsed here.
+// On CAN and clocked links Unit::encode writes text, which is parsed here.
 int run_encode(const Invocation& invocation) {
   const Unit& unit = require_unit(invocation.text("protocol"));
   const Options options = require_options(unit, invocation.text("--model"), invocation.texts("--option"));

@@ -140,14 +140,13 @@ int identify_capture(const Invocation& invocation) {
   return status;
 }
 
-// Returns whether `where` names a capture: a file, or a folder, which may be the export of a logic analyser.
+// Returns whether `where` names a file, or a folder such as a logic analyser's export.
 bool is_capture(std::string_view where) {
   std::error_code error;
   return std::filesystem::is_regular_file(where, error) || std::filesystem::is_directory(where, error);
 }
 
-// Throws Failure for the name of a missing file that has an extension; it would otherwise be taken for a port. CAN
-// interfaces have names like can0, ports of this computer are below /dev.
+// Throws Failure for a name that looks like that of a missing file, not of a port.
 void refuse_missing_file(std::string_view where) {
   const std::filesystem::path path(where);
   std::error_code error;

@@ -28,8 +28,6 @@ namespace {
 
 using Rows = std::vector<std::vector<std::string>>;
 
-// Returns the range of turns as text, as the encoder counts them. Most encoders count unsigned: turning backwards from
-// 0, they continue at their greatest number.
 std::string turns_text(const Resolution& resolution) {
   const std::int64_t count = std::int64_t{1} << resolution.multiturn_bits;
   const std::int64_t least = resolution.multiturn_signed ? -count / 2 : 0;
@@ -85,7 +83,7 @@ Json identity_json(const EncoderAddress& uri, const Resolution& resolution) {
       .set("options", options_to_json(unit, uri.options));
 }
 
-/// Collects the fields that `info` shows without --all: identity, address and rate of the encoder, and temperature.
+/// Collects the fields that `info` shows without --all, such as the identity.
 class CardRows final : public FieldSink {
  public:
   explicit CardRows(const Command& command) : command_(command) {}
@@ -107,10 +105,10 @@ class CardRows final : public FieldSink {
   const Command& command_;
 };
 
-/// Reads identity, settings and state of the encoder, and collects them as rows of text and as JSON.
+/// Reads identity, settings and state of the encoder, as rows of text and as JSON.
 class Survey {
  public:
-  /// `all`: collect every field and setting as rows; otherwise only those of CardRows. Both include the position.
+  /// `all`: collect every field and setting as rows.
   Survey(const EncoderAddress& uri, bool all)
       : encoder_(open_connection(uri)), resolution_(uri.unit->resolution(uri.options)), all_(all) {}
 
@@ -164,7 +162,7 @@ class Survey {
     if (is_doubtful) add_line("  no two readings in a row agree as well as the fastest shaft allows");
   }
 
-  /// Returns the resolution of the encoder's first reading; before it, the resolution according to the options.
+  /// Returns the resolution of the first reading; before it, that of the options.
   [[nodiscard]] const Resolution& resolution() const { return resolution_; }
 
   Json answers = Json::object();
@@ -174,7 +172,7 @@ class Survey {
   std::vector<Trouble> troubles;  // first failure with each kind of error
 
  private:
-  // Adds those of the rows that are not in the table yet: several commands may report the same value.
+  // Adds the rows that are not there yet: several commands may report the same value.
   void add_new(Rows more) {
     for (std::vector<std::string>& row : more) {
       if (std::find(rows.begin(), rows.end(), row) == rows.end()) rows.push_back(std::move(row));

@@ -49,8 +49,7 @@ std::string section(std::string_view heading, Rows rows) {
 std::string line_of_model(const Unit& unit, const Model& model) {
   Options options;
   static_cast<void>(resolve_options(unit, model.name, {},
-                                    // Resolving the options cannot fail: the unit itself has this model, and no further
-                                    // options are given.
+                                    // Resolving cannot fail: the unit itself has this model.
                                     options));
   return line_of(unit.link, line_settings(unit, options));
 }
@@ -340,8 +339,7 @@ Json name_json(std::string_view name, const EncoderAddress& uri) {
       .set("options", options_to_json(*uri.unit, uri.options));
 }
 
-// Prints the named encoders of absenc.toml. Parses all their addresses first, so that nothing is printed if one is
-// wrong.
+// Parses all addresses first, so that nothing is printed if one is wrong.
 int list_names(bool json) {
   const NamedEncoders names = require_names("the names are those of absenc.toml");
   Rows rows{{"NAME", "ENCODER", "MODEL"}};

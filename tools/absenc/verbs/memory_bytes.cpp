@@ -44,9 +44,7 @@ std::string hex_dump(const Unit& unit, const MemoryImage& image) {
   return table(rows);
 }
 
-// Returns the address of a register that the user gave by name or address; any address is accepted. Throws UsageError
-// for a name that the unit's table does not contain, or that of a register which cannot be read or, `for_writing`,
-// written.
+// Returns the address of a register that the user gave by name or address. Throws UsageError.
 std::int64_t register_address(const Invocation& invocation, const Unit& unit, bool for_writing) {
   const std::string_view written = invocation.text("address");
   const Result<std::int64_t> number = parse_number(written);

@@ -29,7 +29,7 @@ Json addresses_json(const MemoryImage& image) {
   });
 }
 
-// Returns the smallest number of writes that a byte of `image` endures, in words; "" if no number is known.
+// Returns the fewest writes that a byte of `image` endures, in words; "" if unknown.
 std::string write_life(const Unit& unit, const MemoryImage& image) {
   const MemoryArea* least = nullptr;
   for (const auto& [at, value] : image) {
@@ -41,7 +41,7 @@ std::string write_life(const Unit& unit, const MemoryImage& image) {
   return least == nullptr ? "" : life_of(*least);
 }
 
-// Runs `work` and shows its progress as "DOING n of m bytes" or words. Nothing else may be printed meanwhile.
+// Runs `work` and shows its progress; nothing else may be printed meanwhile.
 template <class Work>
 void with_progress(const Unit& unit, std::string_view doing, const Work& work) {
   Progress progress;

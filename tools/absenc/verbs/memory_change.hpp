@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes bytes to an encoder's memory: shows the differences, asks, writes them and reads them back.
+// Shows and makes changes of an encoder's memory.
 #pragma once
 
 #include "absenc/client/memory.hpp"
@@ -16,18 +16,14 @@ using namespace client;
   return invocation.has("--force") ? MemoryAccess::force : MemoryAccess::write;
 }
 
-/// Writes the bytes of `wanted` that differ from the encoder's, as the options --yes, --json and --dry-run state;
-/// returns the exit status. If writing ends early, it prints which bytes were written, which were not, and which may
-/// have been. All addresses of `wanted` must be writable. Throws UsageError if it must ask without a terminal, and the
-/// exceptions of `open_encoder`.
+/// Writes `wanted` as the options state. All its addresses must be writable. Returns the exit status.
 int change_memory(const Invocation& invocation, const EncoderAddress& uri, const MemoryImage& wanted,
                   MemoryAccess access);
 
-/// Reads and returns the encoder's bytes at the addresses of `image`, and shows the progress on a terminal.
+/// Reads the encoder's bytes at the addresses of `image`, and shows the progress.
 [[nodiscard]] MemoryImage read_memory(Memory& memory, const MemoryImage& image);
 
-/// Returns a table of differing bytes with the columns WHERE, ENCODER (the bytes `found`) and `wanted_name` (the bytes
-/// `differing`), with one row for up to 8 consecutive bytes.
+/// Returns a table of differing bytes: their places, the bytes `found` and `differing`.
 [[nodiscard]] std::string difference_table(const Unit& unit, std::string_view wanted_name, const MemoryImage& differing,
                                            const MemoryImage& found);
 [[nodiscard]] Json differences_json(const MemoryImage& differing, const MemoryImage& found);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The verbs `memory dump`, `memory load` and `memory verify`, between an encoder's memory and a file.
+// The verbs `memory dump`, `memory load` and `memory verify`.
 #include <fmt/format.h>
 
 #include <array>

@@ -179,7 +179,7 @@ Watches make_watches(const Invocation& invocation, double rate) {
   require_different(uris, names);
   Watches watches;
   for (std::size_t i = 0; i < uris.size(); ++i) {
-    // The first readings are spread over the period, so that the encoders are not read at the same time.
+    // Spreads the first readings, so that the encoders are not read at the same time.
     const double share = rate > 0 ? static_cast<double>(i) / (rate * static_cast<double>(uris.size())) : 0;
     const Time offset(static_cast<std::int64_t>(1e9 * share));
     watches.push_back(std::make_unique<Watch>(names[i], uris[i], rate, offset));

@@ -36,8 +36,7 @@ void show(const Unit& unit, std::span<const OptionEvidence> evidence) {
   print_line(table(rows));
 }
 
-// Returns whether one frame excludes all values of all open options for the same reason: then the frame is bad with any
-// options, and says nothing about them.
+// Returns whether one frame excludes all values for one reason: then it says nothing of them.
 bool same_reason(std::span<const OptionEvidence> evidence) {
   return std::all_of(evidence.begin(), evidence.end(), [&](const OptionEvidence& one) {
     return !one.possible && one.capture == evidence.front().capture && one.why == evidence.front().why;

@@ -26,14 +26,12 @@ namespace {
 
 enum class Format : std::uint8_t { human, json, csv };
 
-// Returns the speed as "   12.0 ± 0.3 rpm" if its uncertainty excludes a shaft at rest; otherwise "".
+// Returns the speed as "   12.0 ± 0.3 rpm", or "" if the shaft may be at rest.
 std::string speed_text(const Sample& sample) {
   if (!sample.speed_valid || std::abs(sample.speed) <= sample.speed_uncertainty) return {};
   return fmt::format("   {} {}", to_text(*sample.measured_speed()), speed_unit(sample.reading));
 }
 
-/// Prints readings and failures. The advice is printed only for the first of several failures of one kind in a row
-/// (as JSON for each); the message that the port is absent only when it changes.
 class Display {
  public:
   /// With `speeds`, the line of a reading contains the speed of a shaft that turns.
@@ -118,8 +116,7 @@ struct Tally {
   bool last_good = false;
 };
 
-// Reads `count` times and prints each reading; with `count` 0 without end. A lost port throws os::Failure if `count` is
-// not 0; otherwise reading continues when the port is back.
+// With `count` 0, reads without end, and continues when a lost port is back.
 void read_all(Encoder& live, Display& display, std::uint64_t count, Pace& pace, Tally& tally) {
   for (std::uint64_t i = 0; count == 0 || i < count; ++i) {
     if (i > 0) os::sleep_until(pace.next());
@@ -154,7 +151,7 @@ int run_read(const Invocation& invocation) {
   const Time start = os::now();
   if (count != 0) {
     read_all(live, display, count, pace, tally);
-    // Prints the counts if damaged frames of a stream were dropped, which the printed readings do not show.
+    // The printed readings do not show that damaged frames of a stream were dropped.
     if (live.counters().discarded != 0) print_tally(live, tally, os::now() - start);
     return tally.bad == 0 ? exit_good : exit_failed;
   }

@@ -41,7 +41,7 @@ class RecordingProgress {
   Time next_{};
 };
 
-// Prints the first restart of the position, and each loss and return of the port. The file contains them too.
+// Prints the first restart of the position, and each loss and return of the port.
 void tell(const Sample& sample, const Encoder& live, RecordingProgress& report) {
   if (sample.restarted && live.restarts() == 1) {  // printed only for the first restart; the summary has the number
     report.clear();

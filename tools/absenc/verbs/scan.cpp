@@ -20,7 +20,7 @@ namespace absenc::tool {
 
 namespace {
 
-/// Collects the encoders that a scan finds: each record begins with the address field of one encoder.
+/// Collects the encoders that a scan finds, a record for each.
 struct Records final : FieldSink {
   struct Record {
     bool clash = false;

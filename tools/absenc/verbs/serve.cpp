@@ -19,7 +19,7 @@ namespace {
 constexpr std::string_view usual_host = "127.0.0.1";
 constexpr std::uint16_t usual_port = 8420;
 constexpr std::string_view no_history = "none";
-// Period of checks for a signal: the main thread polls, because another thread may receive the signal.
+// Period of checks for a signal, because another thread may receive it.
 constexpr Time between_looks = std::chrono::milliseconds(100);
 
 // Sets host and port of the server from "HOST:PORT", "HOST" or ":PORT". Throws UsageError.

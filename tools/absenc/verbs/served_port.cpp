@@ -33,7 +33,7 @@ void tell_of_port(const std::string& name, PortEvent what, std::string_view why)
   }
 }
 
-// Runs the machine on the port until a signal or the time `end`; opens the port again when the port was lost.
+// Runs the machine until a signal or the time `end`; opens a lost port again.
 template <class Item, class Open>
 void serve_as(Machine<Item>& machine, const std::string& name, Time end, const Open& open) {
   const auto with_end = [&] {
@@ -74,7 +74,7 @@ EncoderAddress parse_served_port(const Unit& unit, std::string_view text) {
 }
 
 void serve_port(Machine<std::uint8_t>& device, const EncoderAddress& uri, Time end) {
-  // Only a host can detect echo, because it sends first; for a virtual encoder echo=auto means off.
+  // Only a host can detect echo, because it sends first: echo=auto means off here.
   host::EchoFilter line(uri.echo == host::EchoMode::on ? host::EchoMode::on : host::EchoMode::off);
   line.attach(device);
   serve_as(static_cast<Machine<std::uint8_t>&>(line), uri.path, end, [&] {

@@ -66,9 +66,7 @@ void show_change(std::string_view name, const Answer& old, const Answer& now) {
   print_line(table(rows));
 }
 
-// Returns the arguments of the command that writes a setting, from the user's values. With --force, the argument of the
-// role `force` is 1. Throws UsageError if the values do not fit the command, or if --force is given and the command has
-// no argument of this role.
+// Returns the arguments of the command that writes a setting. Throws UsageError.
 std::vector<std::int64_t> setter_arguments(const Invocation& invocation, const Unit& unit, const Command& setter) {
   std::vector<std::int64_t> values = require_arguments(setter, invocation.texts("values"));
   if (!invocation.has("--force")) return values;

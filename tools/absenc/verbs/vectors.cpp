@@ -29,8 +29,7 @@ std::vector<OptionText> vector_settings(const Vector& vector) {
   return settings;
 }
 
-// Returns a frame of a vector. A vector stores its frames as bytes: either the frame itself, or the text of a CAN frame
-// or clocked word.
+// A vector stores a frame as bytes, or as the text of a CAN frame or clocked word.
 WireFrame vector_frame(const Unit& unit, Bytes bytes) {
   if (bytes.empty()) return {};
   if (unit.link != LinkKind::can && unit.link != LinkKind::clocked) return {{bytes.begin(), bytes.end()}, 0, {}};

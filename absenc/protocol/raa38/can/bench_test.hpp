@@ -58,7 +58,7 @@ struct Bench : raa38::testing::Bench<CanFrame, VirtualNode, Format, can_unit> {
       : raa38::testing::Bench<CanFrame, VirtualNode, Format, can_unit>(own, LinkKind::can, {.rate = own.bit_rate()}) {
     add(own);
   }
-  /// Adds a node that shares the number of the first node and counts down, so that its replies differ.
+  /// Adds a node that shares the number of the first node and counts down.
   void add_twin() {
     add({.positive = 1, .negative = 0, .cyclic = 0});
     static_cast<void>(raw(encode(Order::direction, 0x20, 0)));
@@ -78,8 +78,7 @@ struct Bench : raa38::testing::Bench<CanFrame, VirtualNode, Format, can_unit> {
   }
 };
 
-/// A node that answers with the frames that a function makes from each received frame. It can also send frames
-/// cyclically.
+/// A node that answers received frames as a function says, and may send cyclic frames.
 struct Scripted final : Machine<CanFrame> {
   using Script = std::function<Frames(const CanFrame& received_frames)>;
   explicit Scripted(Script script_) : script(std::move(script_)) {}
@@ -119,7 +118,6 @@ struct Scripted final : Machine<CanFrame> {
   bool sending = false;
 };
 
-/// Runs a command against a scripted node on a bus of `rate` bits per second and returns its result.
 inline CommandResult with(Scripted node, std::string_view command, std::vector<std::int64_t> arguments = {},
                           const Format& format = {}, std::uint32_t rate = 250'000) {
   sim::Line<CanFrame> line(LinkKind::can, {.rate = rate});
@@ -129,7 +127,7 @@ inline CommandResult with(Scripted node, std::string_view command, std::vector<s
   return raa38::testing::result_of<CanFrame>(*talk);
 }
 
-/// Returns the answer that a correct node at position `counts` gives to a frame; none to an order for all nodes.
+/// Returns the answer of a correct node 0x20 at `counts` to an order for one node.
 [[nodiscard]] inline Frames correct_answer(const CanFrame& received_frames, std::uint64_t counts) {
   const OrderInfo& info = *order_of(received_frames);
   if (info.answer == Answer::position) return {encode_position(0x20, counts)};

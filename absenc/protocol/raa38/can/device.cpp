@@ -11,8 +11,7 @@ using namespace std::chrono_literals;
 using FrameStep = Step<CanFrame>;
 using FrameEvent = Event<CanFrame>;
 
-// Time from a request to the virtual node's answer, and time from a real power on to its first cyclic position; the
-// document gives neither.
+// The document gives neither of these times.
 constexpr Time answer_time = 200us;
 constexpr Time start_up_time = 100ms;
 
@@ -28,8 +27,7 @@ void VirtualNode::start_cyclic(std::uint8_t readings_per_s, Time from) {
 }
 
 void VirtualNode::power_on(Time now, PowerOn kind) {
-  // The memory may be from the file of an encoder with other settings: the format's node number and bit rate replace
-  // invalid ones.
+  // The memory may hold values that this encoder cannot use; the format's replace them.
   if (node() == 0) memory()[Settings::number_at] = format_.node;
   if (rate_of_index(settings_.rate()) == nullptr) memory()[Settings::rate_at] = rates[format_.rate].index;
   powered_ = true;
@@ -90,8 +88,7 @@ void VirtualNode::receive(const CanFrame& frame, Time at) {
   const bool for_all = function == Function::configuration;
   if (!for_all && (function != Function::command || node_of(frame) != node())) return;
   const bool sets = for_all && info != nullptr && info->answer == Answer::error;
-  // Other nodes answer settings on 7E5, the identifier of settings: outside configuration mode, their answers without
-  // an error code are ignored.
+  // Other nodes also answer on 7E5; outside configuration mode, answers without an error are ignored.
   if (sets && is_zero_from(frame, 1) && !configuring_) return;
   if (!rules_.expect(!frame.remote && frame.size == frame_size, "a frame without its 8 bytes of data", at)) return;
   if (!for_all && !rules_.expect(frame.data[1] == node(), "the second byte is not the node's number", at)) return;
@@ -115,8 +112,7 @@ void VirtualNode::answer(const CanFrame& frame, Time at) {
 
 void VirtualNode::execute(const OrderInfo& info, std::uint8_t value, Time at) {
   const bool changes = info.order == Order::zero || info.order == Order::direction;
-  // A host cannot distinguish the answer to the order `zero` or `direction` from a cyclic position, so it must stop
-  // the cyclic positions first.
+  // A host cannot distinguish the answer to these orders from a cyclic position.
   if (changes) rules_.expect(readings_per_s_ == 0, "a setting changed while the node sends by itself", at);
   if (info.order == Order::enter) configuring_ = value == 1;
   if (info.order == Order::start && readings_per_s_ == 0) start_cyclic(format_.cyclic, at);
@@ -132,8 +128,7 @@ void VirtualNode::execute(const OrderInfo& info, std::uint8_t value, Time at) {
   if (info.answer == Answer::code) answer(encode_answer(node(), info.order), at);
 }
 
-// Stores a setting if the document defines its value, and answers it in any case. A new bit rate becomes active after
-// the answer was sent.
+// Stores a setting if its value is known. A new bit rate becomes active after the answer.
 void VirtualNode::configure(const OrderInfo& info, std::uint8_t value, Time at) {
   const bool known = meaning_of(info, value).has_value();
   const bool is_rate = info.order == Order::rate;

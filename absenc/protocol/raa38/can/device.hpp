@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual RAA38S6 on CAN, as the document describes it, with settings in a memory that wears out.
+// A virtual RAA38S6 on CAN, as the document describes it.
 #pragma once
 
 #include "absenc/protocol/conversation.hpp"

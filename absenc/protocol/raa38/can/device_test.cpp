@@ -53,8 +53,7 @@ TEST(Raa38CanDevice, SettingsSurvivePowerOff) {
   const Step<CanFrame> step = again.next(Time{});
   EXPECT_EQ(step.kind, Step<CanFrame>::Kind::configure);
   EXPECT_EQ(step.rate, 500'000u);
-  // The memory may be from the file of an encoder with other settings: at power on the node replaces
-  // an invalid node number and bit rate.
+  // At power on the node replaces an invalid node number and bit rate.
   std::fill(again.memory().begin(), again.memory().end(), std::uint8_t{0});
   again.memory()[1] = 9;
   again.power_on(Time{}, Device<CanFrame>::PowerOn::skip);

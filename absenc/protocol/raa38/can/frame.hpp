@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// RAA38S6 on CAN: its frames of 8 bytes, orders and settings. The document calls the protocol CANopen, but it is
-// specific to this encoder. README.md, section CAN, draws the frames.
+// Frames, orders and settings of the RAA38S6 on CAN (README.md, section CAN).
 #pragma once
 
 #include <array>
@@ -18,7 +17,7 @@ namespace absenc::raa38::can {
 
 inline constexpr std::uint8_t frame_size = 8;  ///< Number of data bytes of a frame.
 
-/// Purpose of a frame, which its identifier decides; from the table of COB-IDs, with its two wrong numbers corrected.
+/// Purpose of a frame, which its identifier decides (table of COB-IDs).
 enum class Function : std::uint8_t {
   nmt,                  ///< Identifier 000.
   sync,                 ///< Identifier 080.
@@ -50,16 +49,14 @@ enum class Function : std::uint8_t {
   return frame.extended ? Function::unknown : function_of(frame.id);
 }
 
-/// Returns the node number in the identifier of a frame. Valid only for purposes whose identifier contains a node
-/// number.
+/// Returns the node number in an identifier, for purposes whose identifiers have one.
 [[nodiscard]] constexpr std::uint8_t node_of(const CanFrame& frame) {
   const Function function = function_of(frame);
   const bool has_eight_bits = function == Function::reply || function == Function::command;
   return static_cast<std::uint8_t>(frame.id & (has_eight_bits ? 0xFF : 0x7F));
 }
 
-/// Names of the CANopen functions that the document lists but this encoder does not use; empty for all other
-/// functions.
+/// Names of the CANopen functions that this encoder does not use; empty for the others.
 inline constexpr std::array<std::string_view, 10> function_names{"NMT", "SYNC", "EMCY", "", "", "SDO RX", "SDO TX"};
 /// Returns whether the document only names a function, without describing its frames.
 [[nodiscard]] constexpr bool is_only_named(Function function) {
@@ -102,8 +99,7 @@ struct Format {
   bool listens = false;       ///< Host: whether to read the positions that the node sends without a request.
   std::uint8_t positive = 0;  ///< Value of order 22 for counting up; the document does not state it.
   std::uint8_t negative = 1;  ///< Value of order 22 for counting down; the document does not state it.
-  /// Virtual encoder: positions per second that the node sends without a request after power on or the order `start`.
-  /// 0: none.
+  /// Virtual encoder: initial number of positions per second without a request; 0: none.
   std::uint8_t cyclic = 10;
   bool answers_on_7e4 = false;  ///< Virtual encoder: whether it answers settings on 7E4 instead of 7E5.
 
@@ -172,8 +168,7 @@ inline constexpr std::array<OrderInfo, 8> orders{{
 /// Returns the description of an order.
 [[nodiscard]] constexpr const OrderInfo& info_of(Order order) { return orders[static_cast<std::size_t>(order)]; }
 
-/// Returns the order whose code is in byte 0 of a frame: one for all nodes if the frame is on 7E5 or 7E4, otherwise
-/// one for a single node; null if there is no such order.
+/// Returns the order of a frame, by its byte 0 and identifier; null if there is none.
 [[nodiscard]] constexpr const OrderInfo* order_of(const CanFrame& frame) {
   const bool for_all = is_setting(function_of(frame));
   for (const OrderInfo& info : orders) {
@@ -182,15 +177,14 @@ inline constexpr std::array<OrderInfo, 8> orders{{
   return nullptr;
 }
 
-/// Converts the value byte of an order to its meaning, such as a bit rate; no value if the document does not define it.
+/// Returns the meaning of an order's value byte; none if the document does not define it.
 [[nodiscard]] constexpr Values::Number meaning_of(const OrderInfo& info, std::uint8_t value) {
   if (info.order != Order::rate) return value < info.least || value > info.most ? Values::Number{} : value;
   const Rate* const rate = rate_of_index(value);
   return rate != nullptr ? Values::Number(rate->bits_per_second) : Values::Number{};
 }
 
-/// Converts the argument of a command to the value byte of an order; no value for a bit rate that the encoder does
-/// not have.
+/// Converts the argument of a command to the value byte of an order; none for an unknown rate.
 [[nodiscard]] constexpr std::optional<std::uint8_t> value_of(const Format& format, Order order, std::int64_t argument) {
   if (order == Order::direction) return argument == 0 ? format.positive : format.negative;
   if (order != Order::rate) return static_cast<std::uint8_t>(argument);
@@ -209,15 +203,14 @@ inline constexpr std::array<OrderInfo, 8> orders{{
   return frame;
 }
 
-/// Returns the frame in which `node` sends a position; `counts` are sent least significant byte first.
+/// Returns the frame in which `node` sends the position `counts`.
 [[nodiscard]] constexpr CanFrame encode_position(std::uint8_t node, std::uint64_t counts) {
   CanFrame frame{.id = 0x100u | node, .size = frame_size};
   store_little_endian(frame.data, counts);
   return frame;
 }
 
-/// Returns the answer of `node` to order zero, direction or cyclic. It equals the frame of a position with the value of
-/// the order's code.
+/// Returns the answer of `node` to order zero, direction or cyclic, which looks like a position.
 [[nodiscard]] constexpr CanFrame encode_answer(std::uint8_t node, Order order) {
   return encode_position(node, info_of(order).code);
 }
@@ -227,8 +220,7 @@ inline constexpr std::array<OrderInfo, 8> orders{{
   return {.id = id, .size = frame_size, .data = {info_of(order).code, error}};
 }
 
-/// Checks what all frames have in common and returns the error: bad_framing (a remote frame), wrong_length,
-/// unexpected_reply (a 29-bit identifier), or none.
+/// Checks what all frames have in common. Errors: bad_framing, wrong_length, unexpected_reply.
 [[nodiscard]] constexpr Error check_shape(const CanFrame& frame) {
   if (frame.remote) return Error::bad_framing;
   if (frame.size != frame_size) return Error::wrong_length;
@@ -243,8 +235,7 @@ inline constexpr std::array<OrderInfo, 8> orders{{
   return true;
 }
 
-/// Returns the position of a reply, in counts. Errors: those of `check_shape`, unexpected_reply (not from a node),
-/// out_of_range (more bits than the encoder has).
+/// Returns the position in a reply, in counts. Errors: those of `check_shape`, out_of_range.
 [[nodiscard]] constexpr Result<std::uint32_t> decode_position(const Format& format, const CanFrame& frame) {
   if (const Error error = check_shape(frame); error != Error::none) return error;
   if (function_of(frame) != Function::reply) return Error::unexpected_reply;
@@ -253,8 +244,7 @@ inline constexpr std::array<OrderInfo, 8> orders{{
   return static_cast<std::uint32_t>(counts);
 }
 
-/// Checks the answer to a setting and returns the error: those of `check_shape`, unexpected_reply (no answer to this
-/// order), out_of_range (bytes that must be 0), request_rejected, or none.
+/// Checks the answer to a setting. Errors: those of `check_shape`, out_of_range, request_rejected.
 [[nodiscard]] constexpr Error check_configuration_answer(Order order, const CanFrame& frame) {
   if (const Error error = check_shape(frame); error != Error::none) return error;
   if (const OrderInfo* const info = order_of(frame); info == nullptr || info->order != order || !info->for_all) {
@@ -331,8 +321,7 @@ constexpr Result<Values> decode_answer(const Format& format, const OrderInfo& in
 
 }  // namespace detail
 
-/// Decodes a reply to `request`, or only `request` if `reply` is null. If `request` is null, the reply of a node is
-/// taken as a position. Error if both are null: wrong_length.
+/// Decodes a reply to `request`, or only `request` if `reply` is null. Either may be null.
 [[nodiscard]] constexpr Result<Values> decode(const Format& format, const CanFrame* request, const CanFrame* reply) {
   if (reply == nullptr) return request == nullptr ? Error::wrong_length : detail::decode_request(*request);
   if (reply->remote) return Error::bad_framing;

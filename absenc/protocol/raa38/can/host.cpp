@@ -14,14 +14,12 @@ Read::Read(const Format& format, Mode mode) : format_(format) {
 }
 
 void Read::heard(const CanFrame& frame, Time at) {
-  // A 29-bit identifier with the value of the reply's identifier may be from another device; the frame is stored,
-  // because without a reply it is the evidence that the user needs.
+  // A frame with this 29-bit identifier may be from another device, but it is evidence for the user.
   if (frame.extended && frame.id == encode_position(format_.node, 0).id) keep(frame, at);
   if (!is_from(frame, format_.node)) return;
   keep(frame, at);
   const Result<std::uint32_t> counts = decode_position(format_, frame);
-  // The document does not state when the node takes the position. Assumed: at the end of the request if one was sent;
-  // otherwise when the frame was received.
+  // The document does not state when the node takes the position.
   if (counts) {
     reading_ = {.singleturn = *counts,
                 .singleturn_bits = format_.bits,

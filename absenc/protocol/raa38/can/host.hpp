@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host procedures of the RAA38S6 on CAN and their results; README.md, section CAN, gives the reasons.
+// Host procedures of the RAA38S6 on CAN; README.md, section CAN, gives the reasons.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@ namespace absenc::raa38::can {
 
 using namespace std::chrono_literals;
 
-// The document gives no reply times; the timeouts below are assumed to be longer than any node needs.
+// Assumed: the document gives no reply times.
 inline constexpr Time answer_limit = 50ms;  ///< Timeout of a reply on a bus without other frames.
 inline constexpr Time busy_limit = 250ms;   ///< Timeout of a reply on a bus that other nodes keep busy.
 /// Time for which the host listens for unsolicited frames.
@@ -34,8 +34,7 @@ struct Protocol {
   static constexpr author::Manner manner(const Format&, const CanFrame&) { return {}; }
   /// Returns the timeouts of a reply on a quiet and on a busy bus.
   static constexpr author::CanHostTimes host_times(const Format&) { return {answer_limit, busy_limit}; }
-  /// Returns a frame with an 11-bit identifier as text: identifier and data in hexadecimal, such as
-  /// "220:8020000000000000".
+  /// Returns a frame with an 11-bit identifier as text, such as "220:8020000000000000".
   static constexpr ByteBuffer<4 + 2 * frame_size> encode(const Format&, const CanFrame& frame) {
     constexpr std::string_view digits = "0123456789abcdef";
     ByteBuffer<4 + 2 * frame_size> text;
@@ -50,12 +49,11 @@ struct Protocol {
   }
 };
 
-/// Returns cause and advice for the error of `reply`; if it is empty, for a missing reply or an invalid request. Either
-/// text may be empty.
+/// Returns cause and advice for an error; either text may be empty.
 [[nodiscard]] Explanation explain(const Format& format, Error error, std::span<const CanFrame> request,
                                   std::span<const CanFrame> reply);
 
-/// Reads one position: requests it (order 80 or 01), or waits for the next one that the node sends without a request.
+/// Reads one position: requests it, or waits for one that the node sends by itself.
 class Read : public author::CanEngine {
  public:
   /// How the position is obtained: read request, start request, or listening.
@@ -82,7 +80,7 @@ class Read : public author::CanEngine {
 
 /// Returns the frame that requests a position: order 01 in the mode `start`, otherwise order 80.
 [[nodiscard]] constexpr CanFrame position_request(const Format& format, Read::Mode mode) {
-  // `encode` is called twice with a constant order, so that firmware does not link the table of orders.
+  // Constant orders, so that firmware does not link the table of orders.
   return mode == Read::Mode::start ? encode(Order::start, format.node) : encode(Order::read, format.node);
 }
 
@@ -91,21 +89,15 @@ using Dialog = author::DialogOf<Protocol>;
 
 // ---- One node
 
-/// Sets with order 31 the number of positions per second that the node sends, 0 for none, and measures the rate of the
-/// frames that are received. Errors: timeout (of a number above 0: neither an answer nor a frame arrives), bad_framing
-/// (as timeout, and frames are destroyed), cross_check_failed (another rate).
+/// Sets with order 31 the number of positions per second that the node sends by itself; 0: none. Errors: timeout,
+/// bad_framing, cross_check_failed.
 author::Procedure set_cyclic(Dialog& dialog, Values& found, Arguments arguments);
 
-/// Changes the zero or the direction; cyclic positions of the node are stopped meanwhile. Order 20 makes the present
-/// position 0, as the document suggests; it is not sent if the position is near 0 already. Order 22 sets the counting
-/// direction, which no command reads; the position afterwards must be unchanged or mirrored. Errors besides those of
-/// reading the position: not_still (the shaft turns), cross_check_failed (any other position, or the node no longer
-/// sends cyclic positions), timeout (order 22 has neither an answer nor an effect).
+/// Sets the zero (order 20, as the document suggests) or the counting direction (order 22). Errors: not_still,
+/// cross_check_failed, timeout, or those of reading the position.
 author::Procedure change(Dialog& dialog, Values& found, Order order, Arguments arguments);
 
-/// Requests a position of the node, and reports the node's number if a frame from it is received. Requests no other
-/// number: on a CANopen bus such requests are process data of other devices. Errors: timeout, bad_framing (frames are
-/// destroyed: two nodes may share the number).
+/// Reports the node's number if a frame from it follows a request. Errors: timeout, bad_framing.
 author::Procedure find_node(Dialog& dialog, Values& found);
 
 // ---- All nodes on the bus
@@ -119,10 +111,9 @@ struct NodeFrames {
   bool readable = false;          ///< Whether the last frame is a position that fits the format.
   std::uint32_t counts = 0;       ///< Position in the last frame, in counts; 0 if it is not `readable`.
 
-  /// Returns whether the number is in use: a frame from it was received, or frames were destroyed at two requests.
+  /// Returns whether the number seems to be in use.
   [[nodiscard]] constexpr bool is_there() const { return unsolicited != 0 || answers != 0 || damaged > 1; }
-  /// Returns whether two nodes seem to share the number: more than one answer, or destroyed frames at two requests and
-  /// no answer; and in both cases no frame without a request.
+  /// Returns whether two nodes seem to share the number.
   [[nodiscard]] constexpr bool clash() const {
     return (unsolicited == 0 && answers > 1) || (damaged > 1 && answers == 0 && unsolicited == 0);
   }
@@ -136,9 +127,7 @@ struct Nodes {
   [[nodiscard]] unsigned count() const;
 };
 
-/// Finds the nodes on the bus. Listens first, because nodes may send without a request after power on, then requests
-/// every number from 1 to 255. Errors: timeout (no node is found), bad_framing (frames are destroyed at both requests
-/// for more than 16 numbers: wrong bit rate).
+/// Finds the nodes on the bus by requesting every number from 1 to 255. Errors: timeout, bad_framing.
 author::Procedure scan(Dialog& dialog, Nodes& nodes);
 
 /// Result of `configure`: the setting, and the nodes that were found on the bus before it.
@@ -147,12 +136,8 @@ struct ConfigureResult : Values {
   bool verified = false;  ///< Whether the written setting was verified.
 };
 
-/// Changes the node number (order 11) or the bit rate (order 13). The node must answer under the new number and, if it
-/// is another, no longer under the old one; for the bit rate the host switches too, and back if the node does not
-/// answer. Both orders are sent on 7E5, which reaches every node, so only one node may be on the bus. Errors:
-/// invalid_argument (other nodes are on the bus, two nodes share the number, or the document does not have that rate),
-/// unexpected_reply (only other nodes are on the bus), timeout, bad_framing, request_rejected, cross_check_failed (the
-/// node answers under its old number or at its old rate).
+/// Changes the node number (order 11) or the bit rate (order 13) of the only node on the bus. Errors: invalid_argument,
+/// unexpected_reply, timeout, bad_framing, request_rejected, cross_check_failed.
 author::Procedure configure(Dialog& dialog, ConfigureResult& found, Order order, Arguments arguments);
 
 }  // namespace absenc::raa38::can

@@ -60,7 +60,7 @@ TEST(Raa38CanRead, IgnoresFramesFromBeforeTheRequest) {
       by_hand.receive(encode_position(0x20, 1));  // a position that is received before the request is sent
       by_hand.sent();
     }
-    // This position waited in a queue: it was received before the request, or before the host began to listen.
+    // This position was received before the request, or before the host began to listen.
     by_hand.receive(encode_position(0x20, 2), -1ms);
     EXPECT_EQ(by_hand.next(), Kind::wait);
     by_hand.receive(encode_position(0x20, 3), 1ms);
@@ -124,7 +124,7 @@ TEST(Raa38CanCyclic, StartsAndStopsCyclicFrames) {
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
 }
 
-// Checks that a node that keeps its send rate is an error, although its positions of 49 equal the answer to order 31.
+// The positions of 49 equal the answer to order 31.
 TEST(Raa38CanCyclic, FailsWhenSendRateDoesNotChange) {
   for (const std::int64_t rate : {0, 10}) {
     Scripted disobedient([](const CanFrame&) { return Frames{}; });
@@ -168,8 +168,6 @@ TEST(Raa38CanZero, RefusesWhileShaftTurns) {
   EXPECT_EQ(bench.encoder().settings().writes(), 0u);
 }
 
-// Checks the errors of a node that answers order 20 but does not set its zero, and of a node that answers neither
-// order 20 nor order 22.
 TEST(Raa38CanZero, FailsWhenPositionDoesNotBecomeZero) {
   // The answer to order 20 is 32 if it is read as a position; at 21 bits that is near 0.
   for (const std::uint32_t counts : {32u << 10, 1'000'000u}) {
@@ -185,8 +183,7 @@ TEST(Raa38CanZero, FailsWhenPositionDoesNotBecomeZero) {
   EXPECT_TRUE(ended(with(silent, "direction", {1}), Error::timeout, "is the same"));
 }
 
-// Checks that an answer to order 20 that arrives late, in place of a position, is not taken for the position 32, which
-// is near 0 at 21 bits.
+// A late answer to order 20 looks like the position 32, which is near 0 at 21 bits.
 TEST(Raa38CanZero, RejectsLateAnswerAsZeroPosition) {
   bool answer_pending = false;
   Scripted late([&](const CanFrame& request) {
@@ -197,8 +194,7 @@ TEST(Raa38CanZero, RejectsLateAnswerAsZeroPosition) {
   EXPECT_TRUE(ended(with(late, "zero", {}, {.bits = 21}), Error::cross_check_failed));
 }
 
-// Checks that the send rate is restored to 1 % if the adapter delivers frames up to 4 ms early or late: only many
-// frames show the rate.
+// The adapter delivers frames up to 4 ms early or late.
 TEST(Raa38CanZero, RestoresSendRateThroughSlowCarrier) {
   unsigned left = 1000;
   unsigned rate = 0;
@@ -228,8 +224,7 @@ TEST(Raa38CanZero, ReportsNodeThatDoesNotResumeSending) {
   EXPECT_TRUE(ended(with(exhausted, "zero"), Error::cross_check_failed, "no longer sends"));
 }
 
-// Checks that a cyclic position of 32, which the node sends after the order to stop, is not taken for the answer to
-// order 20, which it equals.
+// A cyclic position of 32 equals the answer to order 20.
 TEST(Raa38CanZero, RejectsCyclicPositionThatLooksLikeAnswer) {
   for (const Time period : {80ms, 100ms}) {
     unsigned left = 1000;
@@ -273,8 +268,7 @@ TEST(Raa38CanDirection, FailsWhenPositionIsNeitherSameNorMirrored) {
   EXPECT_TRUE(ended(with(jumping, "direction", {1}), Error::cross_check_failed, "mirror image"));
 }
 
-// Checks that a position that the next reply does not repeat is an error: it may be a late answer to an order, which
-// looks like a position.
+// A position that is not repeated may be a late answer to an order.
 TEST(Raa38CanDirection, RejectsPositionThatIsNotRepeated) {
   unsigned measurements = 0;
   Scripted late([&](const CanFrame& request) {

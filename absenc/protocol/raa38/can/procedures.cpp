@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Procedures of the RAA38S6 on CAN: first those for one node, then those for all nodes on the bus.
+// Procedures of the RAA38S6 on CAN, for one node and for all nodes on the bus.
 #include <algorithm>
 
 #include "absenc/core/bits.hpp"
@@ -13,13 +13,12 @@ namespace {
 using namespace author;
 using MaybeFrame = std::optional<CanFrame>;
 
-// Least number of frames and least time after which a measurement may end early: an adapter may delay frames.
+// A measurement may end early after this number of frames and this time.
 constexpr unsigned enough_frames = 4;
 constexpr Time enough_time = 500ms;
 constexpr unsigned most_measurements = 3;  // greatest number of attempts to measure the send rate
 constexpr Time slowest_period = 1s;        // longest period of a node that sends cyclically: TT = 1
-// Time for which answers to order 20, 22 or 31 are received. It is never shortened, because a cyclic position may equal
-// the answer.
+// Time for answers to order 20, 22 or 31; a cyclic position may equal such an answer.
 constexpr Time command_window = answer_limit;
 
 /// Measures the rate at which a node sends frames without a request.
@@ -34,22 +33,20 @@ struct SendRate {
   }
   /// Returns the mean time between frames; 0 with fewer than two frames.
   [[nodiscard]] Time period() const { return count < 2 ? Time{} : (last - first) / (count - 1); }
-  /// Returns the frames per second, rounded, 1 to 255; 1 if the period is 0, and 0 without a frame.
+  /// Returns the frames per second, rounded, 1 to 255; 0 without a frame.
   [[nodiscard]] unsigned per_second() const {
     if (count == 0) return 0;
     const Time mean = period();
     if (mean <= Time{}) return 1;
     return std::clamp(static_cast<unsigned>((Time(1s) + mean / 2) / mean), 1u, 255u);
   }
-  /// Returns the time after which a node without a frame counts as silent: two periods and a margin, or
-  /// `listening_time` if the period is unknown.
+  /// Returns the time without a frame after which the node counts as silent.
   [[nodiscard]] Time pause() const { return count < 2 ? listening_time : 2 * period() + answer_limit; }
 };
 
 // ---- Receiving until a time is over
 
-// Measures the send rate of the node until the listening time is over; with `until_enough`, ends earlier if at least
-// `enough_frames` were received over at least `enough_time`.
+// Measures the send rate until the time is over; with `until_enough` possibly for less time.
 Part<SendRate> count_frames(Dialog& dialog, bool until_enough = false) {
   SendRate cadence;
   for (;;) {
@@ -101,8 +98,7 @@ Part<PositionResult> read_position(Dialog& dialog, Time pause = {}) {
   co_return PositionResult{counts ? done : only(counts.error(), words.detail, words.advice), *counts};
 }
 
-// ---- Orders 20 and 22, whose answers equal positions. The node's cyclic positions are stopped before and restarted
-// with the old rate afterwards; no position is accepted until the time for the answer is over.
+// ---- Orders 20 and 22, whose answers equal positions
 
 Part<SendRate> stop_cyclic_frames(Dialog& dialog) {
   dialog.listen(listening_time);
@@ -128,7 +124,7 @@ Part<Outcome> restore_cyclic_frames(Dialog& dialog, SendRate before, Outcome out
   co_return outcome;
 }
 
-// Reads the position twice and returns the second one; fails if one is missing or if they show that the shaft turns.
+// Reads the position twice and returns the second one; fails if the shaft turns.
 Part<PositionResult> read_at_rest(Dialog& dialog) {
   const PositionResult first = co_await read_position(dialog);
   if (first.outcome.error != Error::none) co_return first;
@@ -142,8 +138,7 @@ Part<PositionResult> read_at_rest(Dialog& dialog) {
   co_return second;
 }
 
-// Checks that both positions are near 0. Two are needed, because the first may be a late answer, which equals
-// position 32.
+// Both positions must be near 0: the first may be a late answer, which equals position 32.
 Outcome check_zero(const Format& format, const Values& found, std::uint32_t first, std::uint32_t second) {
   if (is_near(first, 0, format.bits, zero_millidegrees) && is_near(second, 0, format.bits, zero_millidegrees)) {
     return done;
@@ -155,7 +150,7 @@ Outcome check_zero(const Format& format, const Values& found, std::uint32_t firs
 }
 
 Outcome check_direction(const Format& format, Values& found, std::uint32_t first, std::uint32_t second) {
-  // Twice the usual tolerance, because the shaft may have vibrated both before and after the order.
+  // Twice the usual tolerance: the shaft may have vibrated before and after the order.
   const auto is_at = [&](std::uint64_t place) {
     return is_near(second, place, format.bits, 2 * standstill_millidegrees);
   };
@@ -190,8 +185,7 @@ Part<Outcome> change_quietly(Dialog& dialog, Values& found, Order order, std::ui
                     : check_direction(dialog.format(), found, first.counts, second.counts);
 }
 
-// Accepts two or more frames whose mean rate is from 75 % of the wanted one to 1 per second above 125 % of it, because
-// the adapter may deliver frames in bursts; if 0 is wanted, no frame may have arrived.
+// Accepts a rate near the wanted one, because the adapter may deliver frames in bursts.
 Outcome check_cyclic(Dialog& dialog, unsigned wanted, bool answered, const SendRate& heard) {
   if (wanted == 0) {
     if (heard.count == 0) return done;
@@ -248,8 +242,7 @@ Procedure change(Dialog& dialog, Values& found, Order order, Arguments arguments
 namespace {
 
 constexpr Time between_requests = 2ms;  // time between two requests; one request and one answer take 1 ms at 250 kbit/s
-// A frame this many requests or more after the request for its node number counts as unsolicited, not as an answer;
-// after the last request every frame counts as an answer.
+// While requests are sent, a frame this many requests after its own is no answer.
 constexpr unsigned answering = 10;
 constexpr Time last_answers = 100ms;
 constexpr Time entering_time = 20ms;  // time after "enter configuration", which is not answered
@@ -263,12 +256,11 @@ constexpr std::string_view connect_alone = "connect this one alone: 7E5 reaches 
 constexpr std::string_view number_shared = "two nodes share the number, or the line is bad";
 constexpr std::string_view scan_hint = "`absenc scan` shows which: set node=";
 
-// Values of `asked` outside the node numbers: before the first request, and after the last request.
+// Values of `asked` that are no node numbers: before the first request, and after the last.
 constexpr unsigned before_requests = 0;
 constexpr unsigned after_requests = 256;
 
-// Counts the frames from all nodes until the time to wait is over. `asked`: the last number that was requested, or one
-// of the values above.
+// Counts frames until the time is over. `asked`: last requested number, or one of the above.
 Part<bool> count_node_frames(Dialog& dialog, Nodes& nodes, unsigned asked) {
   Time from = never;
   while (const MaybeFrame frame = co_await dialog.heard()) {
@@ -278,7 +270,7 @@ Part<bool> count_node_frames(Dialog& dialog, Nodes& nodes, unsigned asked) {
     NodeFrames& node = nodes.at[number];
     if (from == never) from = dialog.heard_at();
     if (asked == before_requests && dialog.heard_at() - from < 1s) ++node.per_second;
-    // Late answers arrive while later numbers are requested; no answer arrives before the request for its number.
+    // Late answers arrive while later numbers are requested.
     const unsigned early = dialog.came_early() && node.damaged == 0 ? 1 : 0;
     const bool was_asked = asked == after_requests || (number + early <= asked && number + answering > asked);
     if (!was_asked) {
@@ -311,7 +303,7 @@ Part<bool> survey(Dialog& dialog, Nodes& nodes) {
   co_return true;
 }
 
-// Stops the procedure unless the node of the format is alone on the bus, because 7E5 reaches every node.
+// Stops the procedure unless the node of the format is alone on the bus.
 Part<bool> require_single_node(Dialog& dialog, Nodes& nodes) {
   co_await survey(dialog, nodes);
   const NodeFrames& node = nodes.at[dialog.format().node];
@@ -366,8 +358,7 @@ Part<Outcome> verify_node(Dialog& dialog, std::uint8_t before, std::uint8_t node
   co_return only(Error::timeout, "it answers neither under its old number nor under the new one", supply);
 }
 
-// Sets the host to the new rate, waits `switching_time`, and checks whether the node answers. If not, sets the host
-// back to the old rate and reports whether the node answers there.
+// Sets the host to the new rate; if the node does not answer there, back to the old one.
 Part<Outcome> verify_rate(Dialog& dialog, std::uint32_t bits_per_second) {
   const Format& format = dialog.format();
   dialog.configure(bits_per_second, switching_time);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of the scan, of the command `node`, and of the settings that reach every node on the bus.
+// Tests of the commands that concern several nodes of a bus.
 #include "absenc/protocol/raa38/can/bench_test.hpp"
 
 namespace absenc::raa38::can {
@@ -46,7 +46,7 @@ TEST(Raa38CanScan, ReportsWrongBitRateInsteadOfClashes) {
   EXPECT_TRUE(ended(with(noise, "scan", {}, {}, 500'000), Error::bad_framing, "bit rate"));
 }
 
-/// Returns the identifiers of all frames that a host sends with one command on a bus where no node answers.
+/// Returns the identifiers of the frames that a command sends if no node answers.
 std::vector<std::uint32_t> identifiers_of(std::string_view command, const Format& format) {
   sim::Line<CanFrame> line(LinkKind::can, {.rate = format.bit_rate()});
   std::vector<std::uint32_t> sent;
@@ -58,15 +58,12 @@ std::vector<std::uint32_t> identifiers_of(std::string_view command, const Format
   return sent;
 }
 
-// Checks that `node` sends one request, to the given number, and `scan` 255: on a CANopen bus, identifiers 201 to 27F
-// are process data of other devices.
+// On a CANopen bus, identifiers 201 to 27F are process data of other devices.
 TEST(Raa38CanNode, PollsGivenNodeOnly) {
   EXPECT_EQ(identifiers_of("node", {.node = 0x42}), std::vector<std::uint32_t>{0x242});
   EXPECT_EQ(identifiers_of("scan", {.node = 0x42}).size(), 255u);
 }
 
-// Checks that each tested command has a text `disturbs`, which warns users before the command is sent, if and only if
-// it sends requests to other nodes.
 TEST(Raa38CanNode, CommandsThatPollOtherNodesWarn) {
   for (const Command& command : can_unit.commands) {
     if (!command.arguments.empty() && command.verb != Verb::config_set) continue;
@@ -91,8 +88,7 @@ TEST(Raa38CanNode, ReportsNodeThatAnswers) {
   EXPECT_TRUE(ended(bench.run_command(Format{}, "node"), Error::timeout, "`absenc scan` asks them all"));
 }
 
-// Checks that an answer that arrives while the next number is requested is counted, as through a slow adapter, and that
-// a frame before the request for its number is no second answer.
+// Through a slow adapter, an answer may arrive while the next number is requested.
 TEST(Raa38CanScan, AcceptsAnswersWhileSendingNextRequest) {
   for (const bool unasked_too : {false, true}) {
     Talk conversation("scan");

@@ -37,7 +37,7 @@ constexpr auto options = author::OptionsOf{
 };
 
 constexpr Argument force{"force", "1: write even what is set already", 0, 1, 0, false, Role::force};
-// CANopen uses identifiers 201 to 27F for RPDO1, by which a master moves drives, and identifiers from 281 on for TPDO2.
+// In CANopen, identifiers 201 to 27F are RPDO1, and those from 281 on TPDO2.
 constexpr std::string_view survey_warning =
     "asks every number, by 201#8001 to 2FF#80FF: on a CANopen bus these are process data of other devices, which may "
     "obey them";
@@ -46,8 +46,7 @@ constexpr std::array<Argument, 2> node_arguments{{{"node", "new number", 1, 255}
 constexpr std::array<Argument, 2> rate_arguments{{{"rate", "1000000, 500000 or 250000", 1, 1'000'000}, force}};
 constexpr std::array<Argument, 1> direction_arguments{{{"direction", "0: positive, 1: negative", 0, 1}}};
 
-/// Returns the frame of the order that a command sends, or invalid_argument for a bit rate that the encoder does not
-/// have; procedures send more frames.
+/// Returns the frame of a command's order, or invalid_argument.
 template <Order order>
 constexpr Result<CanFrame> to(const Format& format, Arguments arguments) {
   const auto value = value_of(format, order, arguments.empty() ? 0 : arguments[0]);
@@ -175,8 +174,7 @@ constexpr Error decode_frames(const Format& format, Frame request, Frame reply, 
 constexpr FrameEnd end_of_frame(const Options&, Direction, Bytes bytes) {
   return {FrameEnd::Kind::complete, bytes.size()};
 }
-// Returns whether this protocol detects a wrong bit in a reply. The controller checks the CRC of CAN; here only bits
-// with a fixed value are checked.
+// Returns whether this protocol detects a wrong bit in a reply; CAN itself has a CRC.
 bool is_checked(const Options& values, Frame request, Frame reply, std::size_t bit) {
   if (is_only_named(function_of(*reply.can))) return false;
   const OrderInfo* const asked = request.can != nullptr ? order_of(*request.can) : &info_of(Order::read);
@@ -187,8 +185,7 @@ BitRanges bits_in(const Options& values, Frame, Frame, const FieldInfo& field) {
   if (&field != fields.of<&Values::singleturn>()) return {};
   return author::bits_of(0, 0, options.format(values).bits);
 }
-// Returns whether a request is answered: SDO requests are, and frames on 2NN and 7E5, except the order that enters
-// configuration mode.
+// Returns whether an answer to a request is to be expected.
 bool awaits_answer(const Options&, Frame request) {
   const Function function = function_of(*request.can);
   if (function != Function::command && function != Function::configuration) return function == Function::sdo_request;

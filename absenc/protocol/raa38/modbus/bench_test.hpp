@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// For tests: virtual RAA38S6 slaves, scripted slaves, and a host on one Modbus line in virtual time.
+// For tests: virtual and scripted RAA38S6 slaves, and a host, on one line in virtual time.
 #pragma once
 
 #include "absenc/protocol/raa38/modbus/device.hpp"
@@ -52,7 +52,7 @@ struct Bench : raa38::testing::Bench<std::uint8_t, VirtualEncoder, Format, modbu
     sim::testing::RawHost host(request, 100ms, 20ms, line.now() + 20ms);
     return run(host).reply;
   }
-  /// Sends `request` with a CRC appended and returns the reply without its CRC, which must be valid.
+  /// Sends `request` with a CRC and returns the reply without its CRC.
   Wire body(const Wire& request) {
     const Wire reply = raw(framed(request));
     if (reply.empty()) return {};

@@ -11,8 +11,7 @@ using modbus::Exception;
 using modbus::FrameBytes;
 using namespace std::chrono_literals;
 
-// Greatest number of settings in one window of time; the virtual encoder reports the next one as a broken rule.
-// Document: "Do not regularly send in case the internal structure of the device would be damaged".
+// More settings in one window of time break the document's rule "Do not regularly send".
 constexpr std::uint32_t most_settings = 10;
 constexpr Time settings_window = 1min;
 
@@ -22,7 +21,7 @@ constexpr bool is_address(std::uint8_t address) {
 
 }  // namespace
 
-// A memory from a file may have any content: the format's address and baud rate replace invalid ones.
+// A memory from a file may have any content; the format's values replace invalid ones.
 void VirtualEncoder::started() {
   if (!is_address(address())) memory()[Settings::number_at] = format_.address;
   if (settings_.rate() >= bauds.size()) memory()[Settings::rate_at] = static_cast<std::uint8_t>(format_.baud);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual RAA38S6 as a Modbus RTU slave. Address, baud rate, direction and zero survive power off, and writing them
-// wears the memory. The slave reports timing errors and too many settings of its host. Several slaves can share a line.
+// A virtual RAA38S6 as a Modbus RTU slave. Several can share a line.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Requests and replies of an RAA38S6 over Modbus RTU (RAA38S6 Operation Manual, 3.1.7): encodes requests, and decodes
-// and checks requests and replies.
+// Requests and replies of an RAA38S6 over Modbus RTU (RAA38S6 Operation Manual, 3.1.7).
 #pragma once
 
 #include <array>
@@ -45,7 +44,7 @@ inline constexpr std::array<std::uint32_t, 5> bauds{2400, 4800, 9600, 19'200, 57
 inline constexpr std::array<std::uint8_t, bauds.size()> baud_parameters{0x24, 0x48, 0x96, 0x19, 0x57};
 inline constexpr std::size_t baud_at_shipping = 3;  ///< Index in `bauds` of the rate at shipping.
 
-/// Returns the meaning of a parameter of function CC in words; "unknown" if the encoder does not have the parameter.
+/// Returns the meaning of a parameter of function CC in words, or "unknown".
 [[nodiscard]] constexpr std::string_view name_of_setting(std::uint8_t value) {
   constexpr std::array<std::string_view, bauds.size()> baud_names{"2400 baud", "4800 baud", "9600 baud", "19200 baud",
                                                                   "57600 baud"};
@@ -67,7 +66,7 @@ inline constexpr std::size_t baud_at_shipping = 3;  ///< Index in `bauds` of the
 
 inline constexpr LineSettings line_settings{.rate = bauds[baud_at_shipping]};  ///< Settings of the line at shipping.
 
-/// Form of the virtual encoder's reply to a request of two registers; the document contains all three forms.
+/// Form of the virtual encoder's reply to a request of two registers; the document has all three.
 enum class Data : std::uint8_t {
   four_bytes,     ///< Byte count 04, four bytes of data.
   three_bytes,    ///< Byte count 03, three bytes of data.
@@ -105,7 +104,7 @@ struct Request {
 /// Bytes of one request.
 using RequestBytes = ByteBuffer<8>;
 
-/// Returns the length in bytes of a request with the function code `code`, which the encoder must have.
+/// Returns the length in bytes of a request with a known function code.
 [[nodiscard]] constexpr std::size_t request_length(std::uint8_t code) {
   if (code == function::read) return 8;
   return code == function::read_address ? 4 : 5;
@@ -133,8 +132,7 @@ using RequestBytes = ByteBuffer<8>;
   return {.address = format.address, .registers = static_cast<std::uint16_t>(format.register_count())};
 }
 
-/// Decodes a request. Errors: wrong_length, bad_checksum, unsupported (another function), unexpected_reply (A0 sent to
-/// a single address instead of FF).
+/// Decodes a request. Errors: wrong_length, bad_checksum, unsupported, unexpected_reply.
 [[nodiscard]] constexpr Result<Request> decode_request(Bytes bytes) {
   if (bytes.size() < modbus::shortest_frame) return Error::wrong_length;
   const std::uint8_t code = bytes[1];
@@ -164,29 +162,25 @@ struct Reply {
   std::size_t doubtful_size = 0;
 };
 
-/// Returns whether a valid reply to a read request would also be valid without its last byte, or with a 00 appended:
-/// the CRC then does not prove whether the reply has three bytes of data or four.
+/// Returns whether the CRC of a valid reply leaves open if it has three or four bytes of data.
 [[nodiscard]] constexpr bool length_is_doubtful(Bytes reply) {
   return reply.size() > 7 && reply[1] == function::read && reply[2] == 4 && (reply.size() == 8 || reply.back() == 0);
 }
 
-/// Returns whether the length of the first reply stays in doubt after the second one: the length of the second is
-/// doubtful too, and different.
+/// Returns whether the length of the first reply stays in doubt after the second one.
 [[nodiscard]] constexpr bool differ_doubtfully(const Reply& first, const Reply& second) {
   return second.doubtful_size != 0 && second.doubtful_size != first.doubtful_size;
 }
 
 namespace detail {
 
-// Returns the exception code of a refusal; no value if the reply is not one. Refusals of A0 and CC have the form of a
-// reply and are not recognised; a refusal of A1 has another length than its reply.
+// Returns the exception code of a refusal of 03 or A1; no value for another reply.
 constexpr std::optional<std::uint8_t> refusal_of(const Request& request, Bytes reply) {
   if (request.function != function::read && request.function != function::set_address) return std::nullopt;
   return modbus::refusal_code(reply, request.function);
 }
 
-// Returns whether the length of a reply to `read` fits its byte count and the request. The reply to a request of two
-// registers has four or three bytes of data, and three may be counted as 03 or 04: 3.1.7 contains all three forms.
+// Returns whether the length of a reply to `read` fits its byte count and the request (3.1.7).
 constexpr bool read_length_is_right(const Request& request, Bytes reply) {
   if (reply.size() < modbus::shortest_frame) return false;
   const std::size_t count = reply[2];
@@ -215,8 +209,8 @@ constexpr bool is_answer(const Request& request, Bytes reply) {
 
 }  // namespace detail
 
-/// Decodes a reply with all checks. Errors: wrong_length, bad_checksum, unexpected_reply, request_rejected, unsupported
-/// (the request reads other registers), out_of_range.
+/// Decodes a reply with all checks. Errors: wrong_length, bad_checksum, unexpected_reply, request_rejected,
+/// unsupported, out_of_range.
 [[nodiscard]] constexpr Result<Reply> decode_reply(const Format& format, const Request& request, Bytes bytes) {
   const std::optional<std::uint8_t> refusal = detail::refusal_of(request, bytes);
   if (!refusal && !detail::length_is_right(request, bytes)) return Error::wrong_length;
@@ -252,8 +246,7 @@ constexpr bool is_answer(const Request& request, Bytes reply) {
   return request;
 }
 
-/// Returns the length of a reply that begins with `begun`, in bytes. A reply with byte count 04 may be one byte
-/// shorter; a refusal of A1 is one byte longer.
+/// Returns the probable length in bytes of a reply that begins with `begun`.
 [[nodiscard]] constexpr std::size_t reply_length(const Request& request, Bytes begun) {
   if (request.function == function::set_address) return 4;
   if (request.function != function::read) return 5;
@@ -264,10 +257,10 @@ constexpr bool is_answer(const Request& request, Bytes reply) {
 
 // ---- Protocol of the host
 
-/// Timeout of a reply. The document gives no time; slaves of this kind are assumed to need a few milliseconds.
+/// Timeout of a reply. The document gives no time.
 inline constexpr Time answer_limit = std::chrono::milliseconds(50);
 
-/// Types and functions of the protocol that the classes in absenc/protocol/author use: frames, lengths and times.
+/// Frames, lengths and times for the classes in absenc/protocol/author.
 struct Protocol {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = rtu::Format;
@@ -277,20 +270,19 @@ struct Protocol {
   using Reply = rtu::Reply;
   static constexpr std::size_t longest_reply = 9;  ///< Greatest length of a reply in bytes.
 
-  /// Returns the host's times on a line with this baud rate: timeouts, and the silence before a request.
+  /// Returns the host's times on a line with this baud rate.
   static constexpr author::HostTimes host_times(const Format&, std::uint32_t rate) {
     return modbus::client_times({.rate = rate}, answer_limit);
   }
   /// Returns the host's times on a line with the baud rate of the format.
   static constexpr author::HostTimes host_times(const Format& format) { return host_times(format, format.line().rate); }
-  /// Returns how a host sends a request: once, unless the caller orders repetitions, because each setting wears the
-  /// memory.
+  /// Returns how a request is sent: once by default, because each setting wears the memory.
   static constexpr author::Manner manner(const Format&, const Request&) { return {}; }
   /// Returns the bytes of `request` as they are sent.
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
   /// Decodes a request; returns an error if its bytes are invalid.
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return rtu::decode_request(bytes); }
-  /// Returns the length in bytes of a reply with these first bytes, with the exceptions of `reply_length`.
+  /// Returns the probable length in bytes of a reply with these first bytes.
   static constexpr std::size_t expected(const Format&, const Request& request, Bytes reply) {
     return reply_length(request, reply);
   }
@@ -305,19 +297,17 @@ struct Protocol {
     if (request.function != function::read) return {};
     return author::position_reading(reply.singleturn, format.bits);
   }
-  /// Returns the time for which a position is reported: the end of the request, because the document does not say when
-  /// the encoder latches it.
+  /// Returns the end of the request: the document does not say when the encoder latches.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
   /// Returns whether a second reply must confirm this reply, because its length is in doubt.
   static constexpr bool needs_another(const Format&, const Reply& reply) { return reply.doubtful_size != 0; }
-  /// Compares a reply with the second one; returns wrong_length if the length is still in doubt, otherwise none.
+  /// Returns wrong_length if the length is still in doubt after the second reply, otherwise none.
   static constexpr Error agree(const Format&, const Reply& first, const Reply& second, Time) {
     return differ_doubtfully(first, second) ? Error::wrong_length : Error::none;
   }
 };
 
-/// Reads a position with function 03. If the CRC does not prove the length of the reply, a second reply must confirm
-/// it.
+/// Reads a position with function 03, and confirms it if the CRC does not prove its length.
 using ReadPosition = author::ReadConfirmed<Protocol>;
 
 }  // namespace absenc::raa38::rtu

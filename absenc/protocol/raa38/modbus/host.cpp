@@ -114,9 +114,7 @@ constexpr Request setting(const Format& format, std::uint8_t value) {
   return {.function = function::set_parameter, .address = format.address, .value = value};
 }
 
-// Reads the position in up to `attempts` attempts; ends early after a refusal, or if the line is never silent. A
-// reply of doubtful length is confirmed by a second request within the attempt. Stops the procedure if one register is
-// requested and the position has more bits.
+// Reads the position in up to `attempts` attempts. Stops the procedure if one register is too few.
 Part<Result<Reply>> read_position(Dialog& dialog, std::uint8_t address, unsigned attempts) {
   Request request = read_request(dialog.format());
   request.address = address;
@@ -140,8 +138,7 @@ void set_rate(Dialog& dialog, std::uint32_t rate) {
   dialog.set_rate(rate, Protocol::host_times(dialog.format(), rate));
 }
 
-// Sends A0 after no encoder answered at the address of the format; ends the command if an encoder reports another
-// address. `baud`: rate to which the line is set.
+// Sends A0; ends the command if another address answers. `baud`: present rate of the line.
 Part<bool> check_other_address(Dialog& dialog, CommandValues& found, std::uint32_t baud) {
   const std::uint8_t asked = dialog.format().address;
   const Result<Reply> reply_to_a0 = co_await dialog.attempt(address_request).repeated(2);
@@ -158,8 +155,7 @@ Part<bool> check_other_address(Dialog& dialog, CommandValues& found, std::uint32
   co_return true;
 }
 
-// Reads the position of the encoder at the address of the format, up to `attempts` times. Stops the procedure if that
-// fails.
+// Reads the position at the address of the format; stops the procedure if that fails.
 Part<Reply> read_own_position(Dialog& dialog, CommandValues& found, unsigned attempts) {
   const Result<Reply> reply = co_await read_position(dialog, dialog.format().address, attempts);
   if (!reply) {
@@ -178,8 +174,7 @@ void show_position(const Dialog& dialog, CommandValues& found) {
   found.angle = degrees(dialog.last().singleturn, dialog.format().bits);
 }
 
-// Checks at which setting the encoder answers after a change: at the new one, or at the old one if the change was not
-// accepted.
+// Checks whether the encoder answers at the new setting, or else at the old one.
 Part<Outcome> verify_setting(Dialog& dialog, std::uint8_t address, std::uint32_t rate,
                              std::string_view at_the_old_one) {
   const Format& format = dialog.format();

@@ -14,8 +14,6 @@ const Wire position_of_1 = framed({1, 3, 2, 0, 9});
 
 // ---- Reading
 
-// Checks that at each baud rate the positions per second are more than 95 % of the limit that characters, silences and
-// the encoder's answer time set.
 TEST(Raa38ModbusHost, ReadsAsFastAsSilencesAllow) {
   for (std::size_t baud = 0; baud < bauds.size(); ++baud) {
     Bench bench({.baud = baud});
@@ -23,8 +21,7 @@ TEST(Raa38ModbusHost, ReadsAsFastAsSilencesAllow) {
     const Time start = bench.line.now();
     constexpr int readings = 200;
     for (int i = 0; i < readings; ++i) ASSERT_EQ(bench.position(), 0x1555u);
-    // Shortest time of one exchange: silence, request of 8 characters, silence, the encoder's answer time, reply of 7
-    // characters.
+    // Shortest time of one exchange: two silences, the answer time, and 15 characters.
     const LineSettings line = bench.format.line();
     const Time least = modbus::frame_silence(line) * 2 + 200us + 15 * line.character();
     const auto seconds = std::chrono::duration<double>(bench.line.now() - start);
@@ -55,9 +52,7 @@ TEST(Raa38ModbusHost, RefusesOneRegisterFor17Bits) {
   EXPECT_TRUE(ended(raa38::testing::result_of<std::uint8_t>(*read), Error::invalid_argument, "16 bits"));
 }
 
-// Checks that ReadPosition and a procedure confirm a frame of doubtful length by a second request, and reject it if the
-// length stays in doubt: one position in 256 has a CRC that ends with 00, and without that byte the frame is a valid
-// frame of another form.
+// A CRC may end with 00; the frame without that byte can be valid too, in another form.
 TEST(Raa38ModbusHost, RejectsReplyThatLostItsLastByte) {
   Wire whole;
   std::uint32_t position = 0x100000;
@@ -285,8 +280,7 @@ TEST(Raa38ModbusSettings, ReportsRefusalWithoutRepetition) {
   EXPECT_TRUE(ended(with(refuses, "set-address", {2}), Error::request_rejected, "illegal function"));
 }
 
-// Checks that the host waits 20 ms or more between a setting and its next request. The document gives no time for
-// storing a setting; a request right after it may read the old value, or get no reply.
+// The document gives no time for storing a setting.
 TEST(Raa38ModbusSettings, WaitsForEncoderToStoreSetting) {
   const std::pair<std::string_view, std::int64_t> commands[]{
       {"set-address", 2}, {"set-baud", 9600}, {"set-direction", 1}, {"zero", 0}};

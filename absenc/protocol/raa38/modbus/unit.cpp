@@ -83,9 +83,7 @@ constexpr bool is_good(Bytes bytes, std::size_t size) {
   return bytes.size() >= size && modbus::crc_order(bytes.first(size)) == CrcOrder::low_first;
 }
 
-// Returns the length of a reply in a byte stream without pauses. On the line, silence separates frames. In a stream,
-// the CRC decides between three and four data bytes after byte count 04; if a 00 follows, the CRC is valid for both,
-// and the range of the position decides.
+// Returns the likely length of a reply in a byte stream without pauses.
 std::size_t length_in_run(const Format& format, const Request& request, Bytes bytes) {
   const std::size_t length = reply_length(request, bytes);
   if (length != 9 || !is_good(bytes, 8)) return length;
@@ -112,8 +110,7 @@ FrameEnd frame_end(const Options& values, Direction way, Bytes bytes) {
 
 // ---- Evidence of captured frames for options; their address does not matter
 
-/// Content of a valid capture, or the error that it has with any options. `reply` has no value if the capture has no
-/// reply, a refusal, or an error.
+/// Content of a capture, or the error that it has with any options.
 struct CaptureContent {
   Request request{};
   std::optional<Reply> reply{};
@@ -289,8 +286,7 @@ constexpr author::Declaration<Protocol, VirtualEncoder> declaration{
     .frame_end = frame_end,
     .bits = bits_in,
     .probe = probe,
-    // Pause that separates frames: longer than 1.5 characters, the longest pause inside a frame, and shorter than 3.5
-    // characters, the shortest pause between frames.
+    // Between 1.5 and 3.5 characters.
     .timing = {.pause_bits = 25, .turnaround_limit = answer_limit},
 };
 

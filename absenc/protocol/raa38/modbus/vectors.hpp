@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Modbus RTU test frames of the RAA38S6 with their source. Each is decoded when unit.cpp is compiled.
+// Modbus RTU test frames of the RAA38S6 with their source.
 #pragma once
 
 #include <array>

@@ -9,8 +9,7 @@ ByteStep VirtualEncoder::next(Time now) {
   if (std::exchange(pending_, false)) return character();
   const bool streams = format().mode == Mode::timing && is_on(now) && !is_transmitting();
   if (streams && now >= due_) {
-    // A frame that is delayed by up to `most_backlog` is sent late, so that the refresh rate is kept; after a longer
-    // delay the delayed frames are dropped.
+    // After a delay above `most_backlog` the delayed frames are dropped.
     if (now - due_ > most_backlog) due_ = now;
     transmit(encode_position(format(), position(due_)), due_);
     due_ += format().period() > Time{} ? format().period() : virtual_period;
@@ -26,8 +25,7 @@ ByteStep VirtualEncoder::next(Time now) {
   return step;
 }
 
-// Returns the step that sends the next character of the frame at its time; the characters are spread over the ordered
-// duration.
+// Returns the step that sends the next character of the frame at its time.
 ByteStep VirtualEncoder::character() {
   const auto before = static_cast<std::int64_t>(sent_);
   const Time at = frame_at_ + before * format().transmission / static_cast<std::int64_t>(frame_.size());
@@ -63,12 +61,10 @@ void VirtualEncoder::triggered(const ByteEvent& event) {
   transmit(encode_position(format(), position(event.at)), event.at + Protocol::device_times(format()).answer_time);
 }
 
-// Reports a request `BC AA Bx` for this encoder that arrives during its transmission. Other bytes are no violation:
-// another encoder with the same number may send them.
+// Reports a request `BC AA Bx` for this encoder that arrives during its transmission.
 void VirtualEncoder::check_during_transmission(const ByteEvent& event) {
   const std::uint32_t own = 0xBCAA00u | number_mark | format().unit;
-  // This program may have been scheduled so late that the frame should have been sent before the request arrived; then
-  // the request breaks no rule.
+  // The request may have waited until this program was scheduled.
   const bool may_have_waited = event.late > Protocol::device_times(format()).answer_time + format().transmission;
   for (const std::uint8_t byte : event.items) {
     last_characters_ = (last_characters_ << 8 | byte) & 0xFFFFFF;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual RAA38S6 on an asynchronous line: transmits at its own rate, on a pulse, or on a request with its number.
+// A virtual RAA38S6 on an asynchronous line.
 #pragma once
 
 #include <optional>
@@ -8,8 +8,7 @@
 
 namespace absenc::raa38::serial {
 
-/// A virtual RAA38S6 on an asynchronous line; its memory holds its zero. Times that the format leaves unknown are those
-/// of frame.hpp.
+/// A virtual RAA38S6 on an asynchronous line; its memory holds its zero.
 class VirtualEncoder final : public author::BusDevice<Protocol, VirtualEncoder, 4> {
  public:
   using BusDevice::BusDevice;
@@ -21,10 +20,9 @@ class VirtualEncoder final : public author::BusDevice<Protocol, VirtualEncoder, 
   /// Switches the encoder off.
   void power_off(Time now) override;
 
-  /// Returns whether a request is for this encoder: a read request with its number, or, if it sets its zero by command,
-  /// a request to do so with the number `zeroed_unit`.
+  /// Returns whether a request is for this encoder.
   [[nodiscard]] bool is_mine(const Request& request) const;
-  /// Executes a request and returns the reply; no value after the request that sets the zero, which is not answered.
+  /// Executes a request and returns the reply; no value if it is not answered.
   std::optional<Position> answer(const Request& request, Time at);
 
  private:

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames of the RAA38S6 on asynchronous lines, their checks and their times. RS-485, RS-232 and RS-422 carry the same
-// bytes. README.md draws the frames.
+// Frames, checks and times of the RAA38S6 on asynchronous lines; README.md draws the frames.
 #pragma once
 
 #include <algorithm>
@@ -26,8 +25,7 @@ enum class Mode : std::uint8_t {
   bus,        ///< A request with the encoder's number.
 };
 
-/// Second byte of a frame: 81 as in the document's tables (fixed), Bx with the encoder's number as in its text about
-/// the bus (echo), or either (automatic).
+/// Second byte of a frame: 81 (fixed), Bx with the encoder's number (echo), or either (automatic).
 enum class SecondByte : std::uint8_t { automatic, fixed, echo };
 
 /// How the zero of an encoder is set; this depends on how the encoder was ordered.
@@ -54,8 +52,8 @@ inline constexpr std::size_t frame_capacity = 6;  ///< Length of the longest fra
 inline constexpr Time trigger_width = 10us;  ///< Time T2: shortest pulse on CLK (3.1.3).
 inline constexpr Time clear_width = 1ms;     ///< Width of the pulse on CLR.
 
-// Times of the host. `answer_limit` is for encoders whose T3 the options do not state.
-/// Timeout of a reply: longest T3, or longest time from a request to its reply.
+// Times of the host.
+/// Timeout of a reply if the options do not state T3.
 inline constexpr Time answer_limit = 100ms;
 inline constexpr Time answer_slack = 5ms;  ///< Time added to a T3 from the options to get the timeout.
 inline constexpr Time gap_limit = 10ms;    ///< Least timeout between two characters of a frame; suits 1200 baud.
@@ -83,7 +81,7 @@ struct Format {
   /// Number x in the request Cx that sets the zero; -1: the same as in Bx.
   std::int32_t zero_unit = -1;
   std::int64_t refresh_millihertz = 0;  ///< Frames per second in timing mode, in 0.001 Hz; 0: unknown.
-  /// Time T3 from the pulse on CLK to the frame, or on a bus the time from a request to its reply; 0: unknown.
+  /// Time T3 from the pulse on CLK, or from a request on a bus, to the frame; 0: unknown.
   Time acquisition{};
   /// Time T1 - T3, the duration of a frame; 0: as long as its characters take.
   Time transmission{};
@@ -120,8 +118,7 @@ using FrameBytes = ByteBuffer<frame_capacity>;
 /// Bytes of one request.
 using RequestBytes = ByteBuffer<request_bytes>;
 
-/// Returns the checksum of `bytes`: "Sum of the first n bytes, the bottom eight bits". It does not detect exchanged
-/// bytes.
+/// Returns the checksum of `bytes`, which does not detect exchanged bytes.
 [[nodiscard]] constexpr std::uint8_t checksum(Bytes bytes) {
   unsigned sum = 0;
   for (const std::uint8_t byte : bytes) sum += byte;
@@ -140,7 +137,7 @@ using RequestBytes = ByteBuffer<request_bytes>;
   return bytes;
 }
 
-/// Value of `unit` with which decoding accepts a frame of any unit, because no request names one.
+/// Value of `unit` with which decoding accepts a frame of any unit.
 inline constexpr int any_unit = -1;
 
 /// Returns whether `second_byte` is valid in a frame of `unit`.
@@ -150,8 +147,8 @@ inline constexpr int any_unit = -1;
   return numbered || (format.second_byte == SecondByte::automatic && second_byte == fixed_second_byte);
 }
 
-/// Decodes a frame of `unit`, 0 to 15, or of `any_unit`. Errors: wrong_length, bad_checksum, unexpected_reply (another
-/// first or second byte), out_of_range.
+/// Decodes a frame of `unit`, 0 to 15, or of `any_unit`. Errors: wrong_length, bad_checksum, unexpected_reply,
+/// out_of_range.
 [[nodiscard]] constexpr Result<Position> decode_position(const Format& format, Bytes bytes, int unit = any_unit) {
   if (bytes.size() != format.frame_bytes()) return Error::wrong_length;
   if (checksum(bytes.first(bytes.size() - 1)) != bytes.back()) return Error::bad_checksum;
@@ -217,7 +214,7 @@ struct Values {
           .angle = degrees(position.singleturn, format.bits)};
 }
 
-/// Types and functions of the protocol that the classes in absenc/protocol/author use: frames, lengths and times.
+/// Frames, lengths and times for the classes in absenc/protocol/author.
 struct Protocol {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = serial::Format;
@@ -227,13 +224,13 @@ struct Protocol {
   using Reply = Position;
   static constexpr std::size_t longest_reply = frame_capacity;  ///< Greatest length of a reply in bytes.
 
-  /// Returns the host's timeouts: for a reply, between two of its characters, and for a line that is never silent.
+  /// Returns the host's timeouts.
   static constexpr author::HostTimes host_times(const Format& format) {
     return {.answer_limit = format.acquisition > Time{} ? format.acquisition + answer_slack : answer_limit,
             .gap_limit = std::max(format.transmission, gap_limit),
             .patience = patience};
   }
-  /// Returns how a host sends a request: as bytes or as a pulse on a wire, and whether a reply is expected.
+  /// Returns how a host sends a request: as bytes or as a pulse, and whether a reply is expected.
   static constexpr author::Manner manner(const Format&, const Request& request) {
     switch (request.kind) {
       case Request::Kind::trigger:
@@ -248,12 +245,12 @@ struct Protocol {
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
   /// Decodes a request; returns an error if its bytes are invalid.
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return serial::decode_request(bytes); }
-  /// Returns the length of a request in bytes; 0 if the first byte, or the second one, is not that of a request.
+  /// Returns the length of a request in bytes; 0 if the first two bytes are not those of one.
   static constexpr std::size_t request_size(const Format&, Bytes begin) {
     const RequestBytes request = encode_request({});
     return begin[0] == request[0] && (begin.size() < 2 || begin[1] == request[1]) ? request_bytes : 0;
   }
-  /// Returns the length in bytes of the reply to a request that is sent as bytes; 0 for BC AA Cx, which has no reply.
+  /// Returns the length in bytes of the reply to a request of bytes; 0: it has none.
   static constexpr std::size_t reply_size(const Format& format, const Request& request) {
     return request.kind == Request::Kind::zero_clear ? 0 : format.frame_bytes();
   }
@@ -275,17 +272,15 @@ struct Protocol {
   static constexpr Reading reading(const Format& format, const Request&, const Position& position) {
     return author::position_reading(position.singleturn, format.bits);
   }
-  /// Returns the time for which a position is reported: `sent_at`, the end of the request or the beginning of the
-  /// pulse, because the document does not say when the encoder latches it.
+  /// Returns `sent_at`: the document does not say when the encoder latches the position.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
-  /// Returns the times of the virtual encoder: the time until a reply, and the silence after which it drops an
-  /// incomplete request.
+  /// Returns the times of the virtual encoder.
   static constexpr author::DeviceTimes device_times(const Format& format) {
     return {.answer_time = format.acquisition > Time{} ? format.acquisition : virtual_acquisition, .gap = request_gap};
   }
 };
 
-/// Returns the request on which an encoder sends a position: bytes in bus mode, otherwise a pulse.
+/// Returns the request on which an encoder sends a position: bytes or a pulse.
 [[nodiscard]] constexpr Request position_request(const Format& format) {
   return {format.mode == Mode::bus ? Request::Kind::read : Request::Kind::trigger, format.unit};
 }

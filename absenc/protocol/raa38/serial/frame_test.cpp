@@ -24,8 +24,7 @@ TEST(Raa38SerialFrame, FirstFailingCheckGivesError) {
   EXPECT_EQ(error({0xFF, 0xB2, 0x01, 0x7F, 0x31}), Error::none);
 }
 
-// Checks for each position of several numbers of bits that the repeated frame of an encoder at standstill, decoded from
-// any other FF 81 on, never gives another position, so that a search cannot align wrongly.
+// A repeated frame, decoded from another FF 81 on, must give the same position or none.
 TEST(Raa38SerialFrame, RepeatedFrameHasNoOtherAlignment) {
   for (const unsigned bits : {10u, 14u, 16u, 17u, 21u}) {
     const Format format{.bits = bits};

@@ -11,7 +11,6 @@ namespace absenc::raa38::serial {
 
 namespace {
 
-// Returns whether the rules of a bus apply: in bus mode, and in any mode if the request is a bus request.
 bool is_on_bus(const Format& format, Bytes request) {
   return format.mode == Mode::bus || decode_request(request).has_value();
 }
@@ -80,11 +79,10 @@ ByteStep Listen::next(Time now) {
     restart_timeout_ = true;
     return {.kind = ByteStep::Kind::emit};
   }
-  // After an emitted result the timeout restarts in the next call: the time that the caller takes to process the
-  // result does not count.
+  // The time that the caller takes to process a result does not count.
   if (restart_timeout_) deadline_ = now + std::max(listen_limit, 4 * format_.period());
   restart_timeout_ = false;
-  // Bytes that form no frames do not extend the deadline, so the deadline is checked even while bytes arrive.
+  // Bytes that form no frames do not extend the deadline.
   if (!done_ && now >= deadline_) end_stream();
   if (done_) return {.kind = ByteStep::Kind::done};
   return {.at = deadline_};
@@ -126,8 +124,7 @@ void Listen::take(const StreamFrame& found) {
   ++valid_count_;
 }
 
-// Returns the time that is assumed for the position: the reception of its frame. Of frames that were received together,
-// each earlier one is assumed a period earlier; without a period, they share the time since the reception before.
+// Returns the time that is assumed for the position, also of frames received together.
 Time Listen::latched_time(const StreamFrame& found) const {
   if (found.at != received_at_) return found.at;
   const auto behind = static_cast<std::int64_t>(waiting_.size() - taken_);
@@ -170,7 +167,7 @@ using namespace author;
 
 constexpr unsigned scan_attempts = 2;
 
-// Listens until the decoder finds frames and returns the newest position; an error if it finds none in time.
+// Listens for the newest position; an error if no frame is found in time.
 Part<Result<Position>> receive_frame(Dialog& dialog) {
   StreamDecoder decoder(dialog.format());
   Position position{.second_byte = dialog.format().own_second_byte()};

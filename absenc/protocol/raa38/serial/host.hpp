@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host procedures of an RAA38S6 on an asynchronous line, and the conversation that receives a stream.
+// Host procedures of an RAA38S6 on an asynchronous line, and reception of its stream.
 #pragma once
 
 #include <array>
@@ -23,13 +23,11 @@ inline constexpr auto fields = author::fields_of<Values>(
     author::field<&Values::unit>("unit", "", "the number behind B or C"),
     author::field<&Values::skipped>("skipped", "bytes", "received so far that belong to no valid frame"));
 
-/// Returns cause and advice for an error of `reply` to `request`, which is empty for a pulse. With an empty reply,
-/// explains why no reply was received, or what is wrong with the request.
+/// Returns cause and advice for an error of `request` or `reply`; either may be empty.
 [[nodiscard]] Explanation explain(const Format& format, Error error, Bytes request, Bytes reply);
 
-/// Receives the frames of a streaming encoder and sends nothing. Emits the results of the StreamDecoder: valid frames,
-/// and losses of alignment with their error. Ends if it has emitted nothing for some time: timeout, bad_framing,
-/// out_of_range.
+/// Receives the frames of a streaming encoder and sends nothing. Emits valid frames and losses of alignment. Errors at
+/// the end: timeout, bad_framing, out_of_range.
 class Listen final : public Conversation<std::uint8_t> {
  public:
   /// Creates a conversation that receives an encoder of this format.
@@ -45,8 +43,7 @@ class Listen final : public Conversation<std::uint8_t> {
   [[nodiscard]] std::string_view advice() const override { return words_.advice; }
   [[nodiscard]] const Reading* reading() const override;
   void report(FieldSink& sink) const override;
-  /// Returns the frame of the last emitted result, valid or damaged, with an empty request; no bytes after a damaged
-  /// character, and after the stream has ended. The times are those of the last received bytes.
+  /// Returns the frame of the last emitted result, which may be empty, without a request.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const override;
 
   /// Returns the decoder that finds the frames in the stream.
@@ -82,17 +79,13 @@ class Listen final : public Conversation<std::uint8_t> {
 /// Interface by which procedures send requests and await replies.
 using Dialog = author::DialogOf<Protocol>;
 
-/// Reads the position, sets the zero, and polls until the position is zero. Errors besides those of reading the
-/// position: unsupported and invalid_argument (the options have no means to set the zero), not_still (the shaft turns),
-/// cross_check_failed (the position is not zero after half a second).
+/// Reads the position, sets the zero, and polls until the position is zero. Errors: unsupported, invalid_argument,
+/// not_still, cross_check_failed, or those of reading the position.
 author::Procedure set_zero(Dialog& dialog, Values& found);
 
-/// Result of a scan of the units on a bus; the index is the unit number. The scan listens for encoders that transmit
-/// without a request, then requests every number, whatever the option mode is. If all replies of a number are damaged,
-/// two encoders share it or the line is bad. Errors: timeout if no unit answers, unexpected_reply if bytes are received
-/// without a request, or the error of a line that is never silent.
+/// Result of a scan of the units on a bus; the index is the unit number.
 using Units = std::array<Values, unit_count>;
-/// Scans the bus for units.
+/// Scans the bus for units. Errors: timeout, unexpected_reply, or that of an exchange.
 author::Procedure scan(Dialog& dialog, Units& found);
 
 }  // namespace absenc::raa38::serial

@@ -145,7 +145,6 @@ TEST(Raa38SerialSession, ReadsEveryFrame) {
   EXPECT_EQ(bench.encoder.answer_count(), bench.session.counters().good);
 }
 
-// Checks that after a pause of the caller the session returns a frame that was received in the last 2 ms.
 TEST(Raa38SerialSession, TakesNewestFrameAfterPause) {
   SessionBench bench;
   bench.read(host::Take::newest);
@@ -153,7 +152,7 @@ TEST(Raa38SerialSession, TakesNewestFrameAfterPause) {
     bench.clock += 50ms;
     const Reading reading = *bench.read(host::Take::newest).reading();
     EXPECT_GT(reading.received, bench.clock - 2ms);
-    // A frame begins each millisecond and takes less than one: the time of reception gives the index of the frame.
+    // A frame begins each millisecond and takes less than one.
     const auto frame = static_cast<std::uint64_t>(reading.received / 1ms);
     EXPECT_EQ(reading.singleturn, 16'384 * frame / 1000 % 16'384);
   }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests every row of README's table of order codes: its options are valid and need the row's link settings, and a
-// virtual encoder with them can be read; its zero can be set if the options have `zeroing`, and only then.
+// Tests every row of README's table of order codes with a virtual encoder.
 #include <gtest/gtest.h>
 
 #include <fstream>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds frames in the bytes of a streaming encoder: while aligned, each directly after the previous one; otherwise two
-// valid frames in a row.
+// Finds frames in the bytes of a streaming encoder.
 #pragma once
 
 #include <algorithm>
@@ -13,17 +12,15 @@
 
 namespace absenc::raa38::serial {
 
-/// A result of the stream decoder: a valid frame, or the error that ended the alignment. Each loss of alignment is
-/// reported once.
+/// A result of the stream decoder: a valid frame, or the error that ended the alignment.
 struct StreamFrame {
   Error error = Error::none;     ///< Error that ended the alignment; `none` for a valid frame.
   std::uint32_t singleturn = 0;  ///< Position in the valid frame, in counts.
   Time at{};                     ///< Time at which the last byte of the valid frame was received.
 };
 
-/// Finds frames in received bytes. While aligned, a frame is accepted where the previous one ended; one with an FF
-/// after its second byte is accepted only when another header follows, which may take a period. Without alignment, two
-/// valid frames must follow each other; both are then reported.
+/// Finds frames in received bytes. Without alignment, two valid frames must follow each other. While aligned, a frame
+/// with an FF behind its second byte waits for the next header.
 class StreamDecoder {
  public:
   /// Creates a decoder for a streaming encoder of this format.
@@ -33,8 +30,7 @@ class StreamDecoder {
         second_byte_(format.own_second_byte()),
         discarded_(format.frame_bytes()) {}
 
-  /// Processes bytes that were received at `at`. Calls `on_frame(const StreamFrame&)` for each result, in the order of
-  /// the line.
+  /// Processes bytes that were received at `at`; calls `on_frame(const StreamFrame&)` for each result.
   template <class OnFrame>
   constexpr void feed(Bytes bytes, Time at, OnFrame&& on_frame) {
     for (const std::uint8_t byte : bytes) {
@@ -60,12 +56,11 @@ class StreamDecoder {
   [[nodiscard]] constexpr bool in_step() const { return in_step_; }
   /// Returns the number of received bytes that belong to no frame.
   [[nodiscard]] constexpr std::uint64_t skipped() const { return discarded_.skipped(); }
-  /// Returns the number of discarded frames, which DiscardedFrames computes from the bytes that belong to no valid
-  /// frame.
+  /// Returns the number of discarded frames, as DiscardedFrames computes it.
   [[nodiscard]] constexpr std::uint64_t discarded() const { return discarded_.count(); }
   /// Returns whether a frame was valid except for a position with more bits than the format has.
   [[nodiscard]] constexpr bool saw_larger_positions() const { return saw_larger_positions_; }
-  /// Returns the bytes of the last frame that ended the alignment; empty if a damaged character ended it.
+  /// Returns the bytes of the last frame that ended the alignment; may be empty.
   [[nodiscard]] constexpr Bytes bad() const { return bad_.view(); }
 
  private:
@@ -81,8 +76,7 @@ class StreamDecoder {
   template <class OnFrame>
   constexpr bool follow(OnFrame& on_frame) {
     if (size_ < frame_) return false;
-    // After lost bytes the next header may be inside a frame: FF 81 02 (00 82 lost) FF 81 passes all checks except that
-    // no header follows it.
+    // After lost bytes the next header may be inside a frame: FF 81 02 (00 82 lost) FF 81.
     const bool may_hold_header =
         std::find(window_.begin() + 2, window_.begin() + end(frame_), header) != window_.begin() + end(frame_);
     const bool good = frame_at(0).has_value();
@@ -95,8 +89,7 @@ class StreamDecoder {
     return true;
   }
 
-  // Accepts two valid frames in a row that are not too early; otherwise drops the first byte. Returns false if more
-  // bytes are needed.
+  // Looks for two valid frames in a row. Returns false if more bytes are needed.
   template <class OnFrame>
   constexpr bool search(OnFrame& on_frame) {
     if (size_ < frame_) return false;
@@ -114,8 +107,7 @@ class StreamDecoder {
     return true;
   }
 
-  // Returns whether the second of two frames in a row was received less than half a period after the first, so that the
-  // bytes are no frames. Frames that were received at once are not too early.
+  // Returns whether the second of two frames came too soon after the first.
   [[nodiscard]] constexpr bool is_too_early() const {
     const Time between = times_[2 * frame_ - 1] - times_[frame_ - 1];
     return between > Time{} && between < format_.period() / 2;

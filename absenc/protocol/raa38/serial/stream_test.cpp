@@ -101,8 +101,7 @@ TEST(Raa38SerialStream, IgnoresFramesOfOtherUnits) {
   }
 }
 
-// Checks that FF 81 02 FF 81 is not taken for a frame: these five bytes have a valid checksum and fit into 10 bits, but
-// two bytes were lost between FF 81 02 and the frame FF 81 02 09 8B.
+// FF 81 02 FF 81 has a valid checksum, but two bytes were lost after FF 81 02.
 TEST(Raa38SerialStream, RejectsFrameWithHeaderInside) {
   const Format format{.bits = 10};
   for (std::size_t piece = 1; piece < 20; ++piece) {
@@ -116,7 +115,7 @@ TEST(Raa38SerialStream, RejectsFrameWithHeaderInside) {
   }
 }
 
-// Checks that the frame FF 81 00 7F FF, whose checksum is FF, is accepted as soon as the next header follows.
+// The checksum of the frame FF 81 00 7F FF is FF.
 TEST(Raa38SerialStream, FrameWithFFWaitsForNextHeader) {
   const Format format{.bits = 14};
   StreamDecoder decoder(format);
@@ -167,8 +166,7 @@ TEST(Raa38SerialStream, RejectsFramesCloserThanRefreshRate) {
   EXPECT_EQ(accepted_without_rate, 2u);
 }
 
-// Checks that a stream with a refresh rate is aligned if each piece ends inside a frame, as the operating system may
-// deliver it.
+// The operating system may deliver pieces that end inside frames.
 TEST(Raa38SerialStream, AlignsWhenPiecesEndInsideFrames) {
   const Format format{.bits = 14};
   const Wire wire = stream(format, 1, 100);
@@ -198,8 +196,7 @@ struct Sent {
   bool hit = false;
 };
 
-/// Disturbs the end of the stream in `wire`: adds random bytes with many headers, cuts the last frame, flips a bit, or
-/// removes a byte. Returns whether the last frame was hit.
+/// Disturbs the end of the stream in `wire`. Returns whether the last frame was hit.
 bool disturb(Wire& wire, std::size_t size, sim::Random& random) {
   switch (random.below(4)) {
     case 0:
@@ -221,8 +218,7 @@ bool disturb(Wire& wire, std::size_t size, sim::Random& random) {
   }
 }
 
-// Compares sent and received positions in order. A received position is wrong if none of the next 12 sent ones equals
-// it; a sent position that was not received is lost, unless a disturbance hit its frame.
+// Compares sent and received positions in order, and counts lost and wrong ones.
 void judge_option(Tally& tally, const std::vector<Sent>& sent, const std::vector<std::uint32_t>& results) {
   constexpr std::size_t most_missing = 12;  // number of sent frames in which a received one is searched
   std::size_t next = 0;

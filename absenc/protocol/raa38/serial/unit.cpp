@@ -156,11 +156,11 @@ BitRanges bits_in(const Options& values, Frame, Frame, const FieldInfo& field) {
   if (&field != fields.of<&Values::singleturn>()) return {};
   return author::big_endian_bits(2, format.data_bytes(), format.bits);
 }
-// Rate 0: the user must set the baud rate, because the document only has "T1: baud rate" without a value.
+// Rate 0: the document gives no baud rate, so the user must set it.
 constexpr LineSettings line_of(const Format&) { return {.rate = 0}; }
 constexpr Resolution resolution_of(const Format& format) { return {format.bits, 0}; }
 constexpr Result<Request> guess_request(const Format&, Bytes) { return Request{Request::Kind::trigger}; }
-// Returns whether frames are unsolicited. A pulse has no bytes, so the frames after a pulse count as unsolicited too.
+// Returns whether frames are unsolicited; a pulse has no bytes and counts as no request.
 bool is_streaming(const Options& values) { return options.format(values).mode != Mode::bus; }
 bool is_answered(const Options&, Frame request) {
   const Result<Request> asked = decode_request(request.bytes);

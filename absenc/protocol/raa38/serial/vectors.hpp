@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Serial test frames of the RAA38S6 with their source. Each is decoded when unit.cpp is compiled.
+// Serial test frames of the RAA38S6 with their source.
 #pragma once
 
 #include <array>
