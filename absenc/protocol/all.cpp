@@ -24,6 +24,7 @@
   one(biss, safety_unit) \
   one(biss, chain_unit) \
   one(nikon, unit) \
+  one(hiperface, unit) \
 
 #endif
 // clang-format on

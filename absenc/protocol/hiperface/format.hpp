@@ -1,0 +1,341 @@
+// SPDX-License-Identifier: Apache-2.0
+// Constants of SICK's HIPERFACE parameter channel: commands, status codes, types, times; and Format, the differences
+// between encoders. README.md has the source of each.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+#include <utility>
+
+#include "absenc/core/time.hpp"
+#include "absenc/link/line.hpp"
+#include "absenc/protocol/unit.hpp"
+
+/// SICK HIPERFACE, the parameter channel.
+namespace absenc::hiperface {
+
+using namespace std::chrono_literals;
+
+/// Baud rates of the line in bits per second. The index is the code of the rate in the interface setting.
+inline constexpr std::array<std::uint32_t, 7> rates{600, 1'200, 2'400, 4'800, 9'600, 19'200, 38'400};
+inline constexpr std::uint8_t rate_at_shipping = 4;  ///< Index in `rates` of the rate at shipping.
+/// Bits of the interface setting that are the code of the rate.
+inline constexpr std::uint8_t rate_bits = 0x07;
+/// Interface setting at shipping (Mode_485): 9600 baud, parity even.
+inline constexpr std::uint8_t interface_at_shipping = 0xE4;
+
+inline constexpr std::uint8_t first_address = 0x40;      ///< Lowest address of an encoder; that at shipping.
+inline constexpr std::uint8_t last_address = 0x5F;       ///< Highest address of an encoder.
+inline constexpr std::uint8_t broadcast_address = 0xFF;  ///< Address that every encoder answers.
+inline constexpr std::uint8_t code_at_shipping = 0x55;   ///< Value of each access code at shipping; code 0 is one.
+/// Bit of the command in a reply: the encoder has an error or a warning, which the status names.
+inline constexpr std::uint8_t error_bit = 0x80;
+
+// ---- Times, of drivers or assumed (README.md)
+
+inline constexpr Time answer_time = 5ms;    ///< Least time from a request to the reply of the virtual encoder.
+inline constexpr Time store_time = 20ms;    ///< Time that the virtual encoder needs in addition to store something.
+inline constexpr Time request_pause = 6ms;  ///< Shortest time from a reply to the host's next request.
+/// Time in which the reply to a request that reads must begin; see `reply_characters`.
+inline constexpr Time read_limit = 50ms;
+/// Time in which the reply to a request that stores something must begin; see `reply_characters`.
+inline constexpr Time store_limit = 250ms;
+/// Longest pause inside a frame, in characters; hosts also add its duration to the time limits above.
+inline constexpr int reply_characters = 5;
+inline constexpr Time create_time = 200ms;  ///< Time that a host waits after it has created a data field.
+inline constexpr Time start_time = 250ms;   ///< Time from power on or a reset until the virtual encoder answers.
+inline constexpr Time start_limit = 2s;     ///< Greatest sum of a host's pauses after a reset, until an answer.
+
+/// Code of a command: the second byte of requests and replies.
+enum class CommandCode : std::uint8_t {
+  position = 0x42,
+  set_position = 0x43,
+  analog_value = 0x44,
+  counter = 0x46,
+  count_up = 0x47,
+  clear_counter = 0x49,
+  read_data = 0x4A,
+  store_data = 0x4B,
+  field_status = 0x4C,
+  create_field = 0x4D,
+  free_memory = 0x4E,
+  access_code = 0x4F,
+  status = 0x50,
+  type_label = 0x52,
+  reset = 0x53,
+  set_address = 0x55,
+  serial_number = 0x56,
+  interface = 0x57,
+};
+
+/// Channel of the command 44 whose value is the temperature of the encoder in degC.
+inline constexpr std::uint8_t temperature_channel = 0x48;
+
+// ---- Data fields
+
+inline constexpr std::size_t field_capacity = 128;  ///< Greatest size of a data field in bytes.
+inline constexpr std::size_t block_size = 16;       ///< Sizes of data fields and of the memory are multiples of this.
+inline constexpr std::uint8_t user_fields = 14;     ///< Number of data fields, from 0 on, that hosts access.
+/// Data field with the resolution and the range of the encoder.
+inline constexpr std::uint8_t description_field = 0xFF;
+inline constexpr std::size_t description_size = 10;        ///< Bytes of the description that drivers read.
+inline constexpr std::uint8_t type_in_description = 0xFF;  ///< Type of encoders whose description must be read.
+/// Size of the memory in the type label of the virtual encoder, in blocks of 16 bytes.
+inline constexpr std::uint8_t memory_blocks = 0x80;
+/// Greatest number of bytes that a host reads from a data field with one request.
+inline constexpr std::size_t read_at_once = 32;
+
+/// Bits of the status of a data field.
+namespace field_status {
+inline constexpr std::uint8_t exists = 0x80;       ///< The field exists.
+inline constexpr std::uint8_t writable = 0x40;     ///< The field can be written.
+inline constexpr std::uint8_t code_number = 0x30;  ///< Number of the access code, 0 to 3.
+inline constexpr std::uint8_t needs_code = 0x08;   ///< The field needs its access code.
+inline constexpr std::uint8_t size = 0x07;         ///< Number of blocks of 16 bytes, minus one.
+}  // namespace field_status
+
+/// Returns the size in bytes of a data field with this status; 0 if it does not exist.
+[[nodiscard]] constexpr std::size_t field_size(std::uint8_t status) {
+  return (status & field_status::exists) == 0 ? 0 : block_size * ((status & field_status::size) + 1u);
+}
+
+/// Areas of the memory that hosts can access: pages are data fields.
+inline constexpr std::array<MemoryArea, 3> memory_areas{{
+    {0, 0, field_capacity, "data field 0; it may be smaller"},
+    {.page = 1,
+     .first = 0,
+     .count = field_capacity,
+     .meaning = "data field, if the encoder has it; it may be smaller",
+     .in_dump = false,
+     .pages = user_fields - 1},
+    {description_field, 0, description_size, "description of the encoder: resolution and range", false, false},
+}};
+
+// ---- Status codes
+
+/// An alarm of the encoder: a status code that describes its state, not a refused request.
+struct Alarm {
+  std::uint8_t code;         ///< Status code.
+  std::string_view name;     ///< Name of the alarm.
+  std::string_view meaning;  ///< What happened, as a phrase.
+  std::string_view action;   ///< What the operator can do.
+};
+
+namespace detail {
+inline constexpr std::string_view restart = "`absenc run ... reset`; if it stays, replace the encoder";
+inline constexpr std::string_view check_turns =
+    "`absenc run ... reset`, then compare the turns with a known position; if it stays, replace the encoder";
+}  // namespace detail
+
+/// All alarms; the index is the number of the bit in the alarms of a reading.
+inline constexpr auto alarms = std::array{
+    Alarm{0x01, "analog_signals", "sine and cosine are outside their limits, or the compensation data is wrong",
+          detail::restart},
+    Alarm{0x02, "angular_offset", "the internal angular offset is wrong", detail::restart},
+    Alarm{0x03, "field_table", "the table of the data fields is damaged", detail::restart},
+    Alarm{0x04, "analog_limits", "the limits of the analog signals are not available", detail::restart},
+    Alarm{0x05, "internal_bus", "the internal I2C bus does not work", detail::restart},
+    Alarm{0x06, "internal_checksum", "an internal checksum is wrong", detail::restart},
+    Alarm{0x07, "watchdog_reset", "the encoder was reset by its program monitoring",
+          "read again; if it stays, replace the encoder"},
+    Alarm{0x08, "counter_overflow", "the counter has overflowed", "`absenc run ... clear-counter`"},
+    Alarm{0x1C, "signal_amplitude", "the amplitude of sine and cosine is outside its limits",
+          "look for dirt, heat and a mounting that is out of tolerance"},
+    Alarm{0x1D, "led_current", "the current of the LED is critical: dirt, or the LED ages",
+          "plan to replace the encoder"},
+    Alarm{0x1E, "temperature", "the temperature of the encoder is critical", "cool it, then read again"},
+    Alarm{0x1F, "over_speed", "the shaft turns too fast to form a position", "turn it more slowly, then read again"},
+    Alarm{0x20, "singleturn_position", "the position within the turn is not reliable", detail::restart},
+    Alarm{0x21, "multiturn_position_1", "the turns are wrong (code 21)", detail::check_turns},
+    Alarm{0x22, "multiturn_position_2", "the turns are wrong (code 22)", detail::check_turns},
+    Alarm{0x23, "multiturn_position_3", "the turns are wrong (code 23)", detail::check_turns},
+};
+
+/// Mask of all alarms.
+inline constexpr std::uint32_t all_alarms = (1u << alarms.size()) - 1;
+
+/// Status codes of the alarms, apart from their texts, which firmware does not need.
+inline constexpr auto alarm_codes = [] {
+  std::array<std::uint8_t, alarms.size()> codes{};
+  for (std::size_t i = 0; i < codes.size(); ++i) codes[i] = alarms[i].code;
+  return codes;
+}();
+
+/// Returns the mask of the alarm with this status code; 0 if the code is no alarm.
+[[nodiscard]] constexpr std::uint32_t alarm_of(std::uint8_t code) {
+  for (std::size_t i = 0; i < alarm_codes.size(); ++i) {
+    if (alarm_codes[i] == code) return 1u << i;
+  }
+  return 0;
+}
+/// Mask of the alarms that are warnings: position and turns stay valid.
+inline constexpr std::uint32_t warnings =
+    alarm_of(0x03) | alarm_of(0x05) | alarm_of(0x07) | alarm_of(0x08) | alarm_of(0x1D) | alarm_of(0x1E);
+/// Mask of the alarms that make the turns alone invalid.
+inline constexpr std::uint32_t turns_lost = alarm_of(0x21) | alarm_of(0x22) | alarm_of(0x23);
+
+/// Status codes with which an encoder refuses a request.
+namespace refusal {
+inline constexpr std::uint8_t parity = 0x09;         ///< A character of the request had a wrong parity.
+inline constexpr std::uint8_t checksum = 0x0A;       ///< The checksum of the request is wrong.
+inline constexpr std::uint8_t command = 0x0B;        ///< The encoder does not have this command.
+inline constexpr std::uint8_t length = 0x0C;         ///< The number of bytes of the request is wrong.
+inline constexpr std::uint8_t argument = 0x0D;       ///< A value of the request is not permitted.
+inline constexpr std::uint8_t not_writable = 0x0E;   ///< The data field must not be written.
+inline constexpr std::uint8_t access_code = 0x0F;    ///< The access code is wrong.
+inline constexpr std::uint8_t size_is_fixed = 0x10;  ///< The size of the data field cannot be changed.
+inline constexpr std::uint8_t outside = 0x11;        ///< The address is outside the data field.
+inline constexpr std::uint8_t no_field = 0x12;       ///< The data field does not exist.
+
+/// Texts for the codes from `parity` to `no_field`, in their order.
+inline constexpr auto texts = std::array<std::string_view, 10>{
+    "09: it received a character with a wrong parity",
+    "0A: it received the request with a wrong checksum",
+    "0B: it does not have this command",
+    "0C: the request has a wrong number of bytes for it",
+    "0D: a value of the request is not permitted",
+    "0E: the data field must not be written",
+    "0F: the access code is wrong (options code0 and access_code)",
+    "10: the size of this data field cannot be changed",
+    "11: the address is outside the data field",
+    "12: the data field does not exist",
+};
+}  // namespace refusal
+
+/// Returns whether no source explains a status code: it is not 0, no alarm, and refuses no request.
+[[nodiscard]] constexpr bool is_unexplained(std::uint8_t code) {
+  return code != 0 && alarm_of(code) == 0 && (code < refusal::parity || code > refusal::no_field);
+}
+
+/// Returns a status code in words.
+[[nodiscard]] constexpr std::string_view text_of_status(std::uint8_t code) {
+  if (code == 0) return "no error";
+  if (code >= refusal::parity && code <= refusal::no_field) return refusal::texts[code - refusal::parity];
+  for (const Alarm& alarm : alarms) {
+    if (alarm.code == code) return alarm.meaning;
+  }
+  return "a code that no source explains";
+}
+
+// ---- Types
+
+/// A type of encoder, as the type label names it.
+struct Type {
+  std::uint8_t id;          ///< Type in the type label.
+  std::string_view name;    ///< Names of the families of this type.
+  Resolution resolution{};  ///< Numbers of bits of position and turns; 0 and 0: the type does not show them.
+};
+/// All types whose names drivers know.
+inline constexpr auto types = std::array{
+    Type{0x02, "SHS, SCS", {14, 0}},
+    Type{0x07, "SCM", {14, 12}},
+    Type{0x22, "SRS, SCK, SFS60", {15, 0}},
+    Type{0x27, "SRM, SCL, SFM60", {15, 12}},
+    Type{0x32, "SKS", {12, 0}},
+    Type{0x37, "SKM", {12, 12}},
+    Type{0x42, "SEK", {9, 0}},
+    Type{0x47, "SEL", {9, 12}},
+    Type{0x82, "LinCoder"},
+    Type{0x90, "DME, 1 mm"},
+    Type{0x91, "DME, 2 mm"},
+    Type{0x92, "DME, 4 mm"},
+    Type{0x93, "DME, 8 mm"},
+    Type{0x94, "DME, 16 mm"},
+    Type{type_in_description, "described by data field FF"},
+};
+/// Returns the name of a type; "unknown" if no driver knows it.
+[[nodiscard]] constexpr std::string_view name_of_type(std::uint8_t id) {
+  for (const Type& type : types) {
+    if (type.id == id) return type.name;
+  }
+  return "unknown";
+}
+
+/// Types with their numbers of bits, apart from their names, which firmware does not need.
+inline constexpr auto type_resolutions = [] {
+  std::array<std::pair<std::uint8_t, Resolution>, types.size()> all{};
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = {types[i].id, types[i].resolution};
+  return all;
+}();
+
+/// Returns the numbers of bits of a type; 0 and 0 if the type does not show them.
+[[nodiscard]] constexpr Resolution resolution_of_type(std::uint8_t id) {
+  for (const auto& [type, resolution] : type_resolutions) {
+    if (type == id) return resolution;
+  }
+  return {};
+}
+
+/// Returns the type with these numbers of bits; that of an encoder that data field FF describes if there is none.
+[[nodiscard]] constexpr std::uint8_t type_with(const Resolution& bits) {
+  for (const Type& type : types) {
+    if (type.resolution.singleturn_bits == bits.singleturn_bits &&
+        type.resolution.multiturn_bits == bits.multiturn_bits) {
+      return type.id;
+    }
+  }
+  return type_in_description;
+}
+
+/// Fewest bits of the position in a turn: the 5 bits of one sine period.
+inline constexpr std::uint8_t least_singleturn_bits = 5;
+inline constexpr std::uint8_t most_singleturn_bits = 20;  ///< Greatest number of bits of the position in a turn.
+inline constexpr std::uint8_t most_multiturn_bits = 12;   ///< Greatest number of bits of the turns.
+/// Resolution of encoders whose options and type do not show it: that of an SKM.
+inline constexpr Resolution assumed_resolution{12, 12};
+
+/// Properties of an encoder that its frames depend on, and how it is asked. Its members are the options of the unit.
+struct Format {
+  std::uint8_t singleturn_bits = 0;  ///< Bits of the position within the turn, 5 to 20; 0: the type label shows them.
+  /// Bits of the turns, 0 to 12; 0: single-turn encoder; -1: the type label shows them.
+  std::int8_t multiturn_bits = -1;
+  std::uint8_t address = first_address;         ///< Address of the encoder.
+  std::uint8_t code0 = code_at_shipping;        ///< Code 0, which protects settings.
+  std::uint8_t access_code = code_at_shipping;  ///< Access code to read, write and create data fields.
+  std::uint8_t rate = rate_at_shipping;         ///< Index of the baud rate in `rates`.
+  /// Type of the encoder; 0: not stated, and the virtual encoder has the one with its resolution.
+  std::uint8_t type = 0;
+  std::uint8_t status_bytes = 1;    ///< Bytes of the status in a reply, 1 or 2.
+  std::uint8_t counter_bytes = 3;   ///< Bytes of the counter in a reply, 1 to 4.
+  std::uint8_t free_bytes = 1;      ///< Bytes of the free memory in a reply. 1: in blocks of 16 bytes; 2: in bytes.
+  std::uint8_t serial_bytes = 9;    ///< Characters of the serial number.
+  std::uint8_t version_bytes = 28;  ///< Characters of the program version with its date.
+
+  /// Returns the settings of the RS-485 line.
+  [[nodiscard]] constexpr LineSettings line() const { return {.rate = rates[rate], .parity = Parity::even}; }
+  /// Returns whether the options state the numbers of bits of position and turns.
+  [[nodiscard]] constexpr bool is_known() const { return singleturn_bits != 0 && multiturn_bits >= 0; }
+  /// Returns the numbers of bits of position and turns. Those that the options do not state are of `type`, or assumed.
+  [[nodiscard]] constexpr Resolution resolution() const {
+    Resolution bits = resolution_of_type(type);
+    if (bits.singleturn_bits == 0) bits = assumed_resolution;
+    if (singleturn_bits != 0) bits.singleturn_bits = singleturn_bits;
+    if (multiturn_bits >= 0) bits.multiturn_bits = static_cast<unsigned>(multiturn_bits);
+    return bits;
+  }
+  /// Returns the number of bits of the whole position.
+  [[nodiscard]] constexpr unsigned position_bits() const {
+    const Resolution bits = resolution();
+    return bits.singleturn_bits + bits.multiturn_bits;
+  }
+  /// Returns the type in the type label of the virtual encoder.
+  [[nodiscard]] constexpr std::uint8_t type_in_label() const { return type != 0 ? type : type_with(resolution()); }
+  /// Returns whether `bits`, which an encoder reports, differs from what the options state; 0 and 0: it reports none.
+  [[nodiscard]] constexpr bool contradicts(const Resolution& bits) const {
+    const bool is_other_turn = singleturn_bits != 0 && singleturn_bits != bits.singleturn_bits;
+    const bool are_other_turns = multiturn_bits >= 0 && static_cast<unsigned>(multiturn_bits) != bits.multiturn_bits;
+    return bits.singleturn_bits != 0 && (is_other_turn || are_other_turns);
+  }
+  /// Returns this format with the resolution `bits`.
+  [[nodiscard]] constexpr Format with(const Resolution& bits) const {
+    Format known = *this;
+    known.singleturn_bits = static_cast<std::uint8_t>(bits.singleturn_bits);
+    known.multiturn_bits = static_cast<std::int8_t>(bits.multiturn_bits);
+    return known;
+  }
+};
+
+}  // namespace absenc::hiperface

@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: Apache-2.0
+// Requests of the HIPERFACE parameter channel: encoding, decoding, lengths. README.md draws them.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "absenc/core/bits.hpp"
+#include "absenc/core/bytes.hpp"
+#include "absenc/core/result.hpp"
+#include "absenc/protocol/hiperface/format.hpp"
+
+namespace absenc::hiperface {
+
+inline constexpr std::size_t shortest_frame = 3;  ///< Length of the shortest frame: address, command, checksum.
+/// Length of the longest request in bytes: it stores a whole data field.
+inline constexpr std::size_t request_capacity = 7 + field_capacity;
+/// Length of the longest reply in bytes: it has a whole data field.
+inline constexpr std::size_t reply_capacity = 6 + field_capacity;
+/// Bytes of a request.
+using RequestBytes = ByteBuffer<request_capacity>;
+/// Bytes of a reply.
+using ReplyBytes = ByteBuffer<reply_capacity>;
+/// Bytes of a data field.
+using FieldBytes = ByteBuffer<field_capacity>;
+
+/// Returns the checksum of `bytes`, their exclusive OR; 0 if `bytes` is a frame with its right checksum.
+[[nodiscard]] constexpr std::uint8_t checksum(Bytes bytes) {
+  std::uint8_t sum = 0;
+  for (const std::uint8_t byte : bytes) sum ^= byte;
+  return sum;
+}
+
+/// Returns whether a frame can begin with this byte: the address of an encoder, or that of all.
+[[nodiscard]] constexpr bool is_address(std::uint8_t byte) {
+  return (byte >= first_address && byte <= last_address) || byte == broadcast_address;
+}
+
+/// A request. The members behind `address` are those of its command; others are 0.
+struct Request {
+  CommandCode command = CommandCode::position;  ///< Command of the request.
+  std::uint8_t address = first_address;         ///< Address of the encoder, or `broadcast_address`.
+  /// The first byte behind the command: a channel, a data field, the number of an access code, a new address or a new
+  /// interface setting.
+  std::uint8_t subject = 0;
+  std::uint8_t first = 0;      ///< Read and store data: first address in the data field.
+  std::uint8_t count = 0;      ///< Read and store data: number of bytes, 1 to 128.
+  std::uint8_t code = 0;       ///< Code 0, or the access code; of the command 4F the old one.
+  std::uint8_t new_value = 0;  ///< Create field: its status; command 4F: the new access code.
+  std::uint32_t position = 0;  ///< Set position: the position that the encoder shall have.
+  FieldBytes data{};           ///< Store data: the bytes.
+  /// Read position: number of requests for the status that a capture joins to it; 0 in a request of a host.
+  std::uint8_t statuses = 0;
+  /// Type label and description: whether the encoder may report another resolution than the options. No byte of the
+  /// request shows it.
+  bool any_resolution = false;
+};
+
+/// Returns whether requests with this code store something in the encoder.
+[[nodiscard]] constexpr bool stores(CommandCode command) {
+  switch (command) {
+    case CommandCode::set_position:
+    case CommandCode::count_up:
+    case CommandCode::clear_counter:
+    case CommandCode::store_data:
+    case CommandCode::create_field:
+    case CommandCode::access_code:
+    case CommandCode::set_address:
+    case CommandCode::interface:
+      return true;
+    default:
+      return false;
+  }
+}
+
+/// Numbers of bytes between command and checksum.
+struct DataSizes {
+  std::uint8_t request = 0;  ///< Bytes of the request; of the command 4B without the stored bytes.
+  std::uint8_t reply = 0;    ///< Bytes of the reply; of the command 4A without the read bytes.
+  /// Fewest bytes of the reply, for commands whose reply no source shows: it may repeat fewer bytes of the request.
+  std::uint8_t least = 0;
+};
+
+/// Returns the numbers of bytes of a command; nothing if there is no such command.
+[[nodiscard]] constexpr std::optional<DataSizes> data_sizes(const Format& format, std::uint8_t code) {
+  switch (static_cast<CommandCode>(code)) {
+    case CommandCode::position:
+      return DataSizes{0, 4, 4};
+    case CommandCode::set_position:
+      return DataSizes{5, 0, 0};
+    case CommandCode::analog_value:
+      return DataSizes{1, 3, 3};
+    case CommandCode::counter:
+      return DataSizes{0, format.counter_bytes, format.counter_bytes};
+    case CommandCode::count_up:
+    case CommandCode::reset:
+      return DataSizes{0, 0, 0};
+    case CommandCode::clear_counter:
+      return DataSizes{1, 0, 0};
+    case CommandCode::read_data:
+    case CommandCode::store_data:
+      return DataSizes{4, 3, 3};
+    case CommandCode::field_status:
+      return DataSizes{1, 2, 2};
+    case CommandCode::create_field:
+      return DataSizes{3, 2, 0};
+    case CommandCode::free_memory:
+      return DataSizes{0, format.free_bytes, format.free_bytes};
+    case CommandCode::access_code:
+      return DataSizes{3, 1, 0};
+    case CommandCode::status:
+      return DataSizes{0, format.status_bytes, format.status_bytes};
+    case CommandCode::type_label:
+      return DataSizes{0, 4, 4};
+    case CommandCode::set_address:
+    case CommandCode::interface:
+      return DataSizes{2, 1, 0};
+    case CommandCode::serial_number: {
+      const auto size = static_cast<std::uint8_t>(format.serial_bytes + format.version_bytes);
+      return DataSizes{0, size, size};
+    }
+  }
+  return std::nullopt;
+}
+
+namespace detail {
+constexpr void append_big_endian(auto& bytes, std::uint32_t value, unsigned size) {
+  for (unsigned i = size; i-- > 0;) bytes.push_back(static_cast<std::uint8_t>(value >> 8 * i));
+}
+// Appends the bytes between command and checksum of a request.
+constexpr void append_data(RequestBytes& bytes, const Request& request) {
+  switch (request.command) {
+    case CommandCode::set_position:
+      append_big_endian(bytes, request.position, 4);
+      bytes.push_back(request.code);
+      break;
+    case CommandCode::clear_counter:
+      bytes.push_back(request.code);
+      break;
+    case CommandCode::analog_value:
+    case CommandCode::field_status:
+      bytes.push_back(request.subject);
+      break;
+    case CommandCode::read_data:
+    case CommandCode::store_data:
+      for (const std::uint8_t byte : {request.subject, request.first, request.count, request.code}) {
+        bytes.push_back(byte);
+      }
+      if (request.command == CommandCode::store_data) bytes.append(request.data);
+      break;
+    case CommandCode::create_field:
+      for (const std::uint8_t byte : {request.subject, request.new_value, request.code}) bytes.push_back(byte);
+      break;
+    case CommandCode::access_code:
+      for (const std::uint8_t byte : {request.subject, request.code, request.new_value}) bytes.push_back(byte);
+      break;
+    case CommandCode::set_address:
+    case CommandCode::interface:
+      bytes.push_back(request.subject);
+      bytes.push_back(request.code);
+      break;
+    default:
+      break;
+  }
+}
+}  // namespace detail
+
+namespace detail {
+// Appends one frame: the request without the requests for the status behind it.
+constexpr void append_frame(RequestBytes& bytes, const Request& request) {
+  const std::size_t begin = bytes.size();
+  bytes.push_back(request.address);
+  bytes.push_back(static_cast<std::uint8_t>(request.command));
+  append_data(bytes, request);
+  bytes.push_back(checksum(bytes.view().subspan(begin)));
+}
+}  // namespace detail
+
+/// Returns the bytes of a request.
+[[nodiscard]] constexpr RequestBytes encode_request(const Request& request) {
+  RequestBytes bytes;
+  detail::append_frame(bytes, request);
+  const Request status{.command = CommandCode::status, .address = request.address};
+  for (unsigned i = 0; i < request.statuses; ++i) detail::append_frame(bytes, status);
+  return bytes;
+}
+
+/// Returns the length of the request that begins with `begin`, or how many bytes are needed to know it; 0: no request
+/// begins with these bytes.
+[[nodiscard]] constexpr std::size_t request_length(const Format& format, Bytes begin) {
+  if (!is_address(begin[0])) return 0;
+  if (begin.size() < 2) return 2;
+  const std::optional<DataSizes> sizes = data_sizes(format, begin[1]);
+  if (!sizes) return 0;
+  if (begin[1] != static_cast<std::uint8_t>(CommandCode::store_data)) return shortest_frame + sizes->request;
+  if (begin.size() < 5) return 5;
+  if (begin[4] == 0 || begin[4] > field_capacity) return 0;
+  return shortest_frame + sizes->request + begin[4];
+}
+
+/// Returns the request for the position, with the requests for the status behind it; nothing if the bytes are others.
+/// `bytes` has at least 3.
+[[nodiscard]] constexpr std::optional<Request> decode_joined(Bytes bytes) {
+  const Request request{.address = bytes[0], .statuses = static_cast<std::uint8_t>(bytes.size() / shortest_frame - 1)};
+  if (request.statuses > alarms.size() + 1) return {};  // the last one may repeat a code
+  const RequestBytes joined = encode_request(request);
+  if (!std::equal(bytes.begin(), bytes.end(), joined.view().begin(), joined.view().end())) return {};
+  return request;
+}
+
+/// Decodes a request. Errors: wrong_length; unexpected_reply (no address, or no such command); bad_checksum;
+/// out_of_range (a count of bytes that no data field has).
+[[nodiscard]] constexpr Result<Request> decode_request(const Format& format, Bytes bytes) {
+  if (bytes.size() < shortest_frame) return Error::wrong_length;
+  if (!is_address(bytes[0]) || !data_sizes(format, bytes[1])) return Error::unexpected_reply;
+  if (const std::optional<Request> joined = decode_joined(bytes)) return *joined;
+  const std::size_t length = request_length(format, bytes);
+  if (length != 0 && bytes.size() != length) return Error::wrong_length;
+  if (checksum(bytes) != 0) return Error::bad_checksum;
+  if (length == 0) return Error::out_of_range;
+  Request request{.command = static_cast<CommandCode>(bytes[1]), .address = bytes[0]};
+  const Bytes data = bytes.subspan(2, bytes.size() - shortest_frame);
+  switch (request.command) {
+    case CommandCode::set_position:
+      request.position = static_cast<std::uint32_t>(load_big_endian(data.first(4)));
+      request.code = data[4];
+      break;
+    case CommandCode::clear_counter:
+      request.code = data[0];
+      break;
+    case CommandCode::analog_value:
+    case CommandCode::field_status:
+      request.subject = data[0];
+      break;
+    case CommandCode::read_data:
+    case CommandCode::store_data:
+      request.subject = data[0];
+      request.first = data[1];
+      request.count = data[2];
+      request.code = data[3];
+      if (request.count == 0 || request.count > field_capacity) return Error::out_of_range;
+      if (request.command == CommandCode::store_data) request.data.append(data.subspan(4));
+      break;
+    case CommandCode::create_field:
+      request.subject = data[0];
+      request.new_value = data[1];
+      request.code = data[2];
+      break;
+    case CommandCode::access_code:
+      request.subject = data[0];
+      request.code = data[1];
+      request.new_value = data[2];
+      break;
+    case CommandCode::set_address:
+    case CommandCode::interface:
+      request.subject = data[0];
+      request.code = data[1];
+      break;
+    default:
+      break;
+  }
+  return request;
+}
+
+}  // namespace absenc::hiperface
