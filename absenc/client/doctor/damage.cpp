@@ -13,7 +13,7 @@ bool has_characters(const Case& one) {
   return one.unit.link == LinkKind::half_duplex || one.unit.link == LinkKind::full_duplex;
 }
 
-// Returns whether the reply becomes good if one of its bits, whichever it is, is flipped.
+// Returns whether flipping a single bit of the reply can make it good.
 bool is_mended(const Case& one, const Frame& request, std::vector<std::uint8_t> bytes, std::size_t bits) {
   const std::size_t count = bits != 0 ? bits : bytes.size() * 8;
   for (std::size_t bit = 0; bit < count; ++bit) {

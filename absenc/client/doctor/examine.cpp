@@ -31,9 +31,11 @@ constexpr unsigned trial_turns = 2;
 // Time limit for the readings with each setting per turn, and the number of characters whose duration is added to it.
 constexpr Time trial_limit = std::chrono::milliseconds(500);
 constexpr int trial_characters = 200;
+// An encoder that was powered on just before the first request replies after this time. tformat needs 1.5 s.
+constexpr Time longest_start = std::chrono::seconds(2);
 constexpr Time models_limit = std::chrono::seconds(3);  // time limit of first readings with other models and options
 constexpr Time addresses_limit = std::chrono::seconds(4);
-constexpr Time identify_limit = std::chrono::seconds(10);
+constexpr Time identify_limit = std::chrono::seconds(16);
 
 bool is_serial(const EncoderAddress& address) {
   return address.port_kind == PortKind::serial || address.port_kind == PortKind::slcan;
@@ -49,7 +51,7 @@ bool streams(const EncoderAddress& address) {
   return address.unit->streams != nullptr && address.unit->streams(address.options);
 }
 
-// Stores the addresses at which a scan receives only damaged replies.
+// Stores the addresses at which a scan receives damaged replies, or those of two encoders.
 struct Clashes final : FieldSink {
   void put(const FieldValue& value) override {
     if (value.info->role == Role::encoder) address = value.number;
@@ -167,7 +169,7 @@ class Doctor {
     return adapter && adapter->finding_kind != FindingKind::seven_bits;
   }
 
-  // Scans the bus, and stores the encoder's address if two encoders share it.
+  // Scans the bus, and stores the encoder's address if two encoders seem to share it.
   template <class Item>
   void scan(Examiner<Item>& examiner) {
     const Command* command = find_command(*address_.unit, Verb::scan);
@@ -235,7 +237,8 @@ class Doctor {
   // powered on meanwhile.
   void ask_once_more() {
     std::vector<Attempted> attempts;
-    ask<std::uint8_t>(address_, first_readings, attempts);
+    const Time first = seen_.readings.empty() ? Time::min() : seen_.readings.front().began + longest_start;
+    ask<std::uint8_t>(address_, first_readings, attempts, first);
     if (count_good(attempts) == first_readings) read_again<std::uint8_t>();
   }
 
@@ -248,14 +251,16 @@ class Doctor {
     examiner.conclude(seen_);
   }
 
-  // Takes up to `count` readings with these settings and returns their duration, 0 if the port fails. A port that does
-  // not open adds no attempts.
+  // Takes up to `count` readings with these settings, none before `earliest`, and returns their duration, 0 if the port
+  // fails. A port that does not open adds no attempts.
   template <class Item>
-  Time ask(const EncoderAddress& address, std::size_t count, std::vector<Attempted>& attempts) {
+  Time ask(const EncoderAddress& address, std::size_t count, std::vector<Attempted>& attempts,
+           Time earliest = Time::min()) {
     const Command* read = find_command(*address.unit, Verb::read);
     if (read == nullptr || read->changes_encoder) return {};
     try {
       Examiner<Item> examiner(address, surroundings_.open(address), choices_.over);
+      examiner.wait_until(earliest);
       const Time begin = examiner.now();
       const Time limit = trial_limit + trial_characters * address.line.with_some_rate().character();
       examiner.read(*read, count, limit, attempts);

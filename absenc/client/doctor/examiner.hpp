@@ -54,6 +54,11 @@ class Examiner {
   /// Listens once more, for 100 ms, so that a reply later than its timeout is recorded.
   void listen_for_late() { runner_.listen(pieces * piece_time); }
 
+  /// Waits until `at`, a time of the port's clock.
+  void wait_until(Time at) {
+    if (at > now()) runner_.listen(at - now());
+  }
+
   /// Takes up to `count` readings, begins none after `limit`, and adds them to `into`. Ends early if the first ones
   /// bring no good reply. Throws the exceptions of the port.
   void read(const Command& command, std::size_t count, Time limit, std::vector<Attempted>& into) {

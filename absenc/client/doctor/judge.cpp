@@ -88,7 +88,7 @@ std::string inversion(const Case& one) {
   std::size_t zeros = 0;
   for (const Attempted& attempt : seen.readings) {
     const auto& reply = attempt.exchange.reply.bytes;
-    // Ignores a cut frame of a few zeros: it may be the beginning of a good frame.
+    // A cut frame of a few zeros is no evidence: it may be the beginning of a good frame.
     constexpr std::size_t many = 8;
     if (!reply.empty() && all_are(reply, 0) && (reply.size() >= many || !is_cut(one, attempt))) ++zeros;
   }

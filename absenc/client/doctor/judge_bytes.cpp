@@ -71,7 +71,7 @@ class Mender {
     return is_good(rest);
   }
 
-  /// Gives up after 5000 decodings.
+  /// Returns whether up to `most` inserted bytes of `values` mend the reply; tries 5000 times at most.
   [[nodiscard]] bool with(Bytes values, std::size_t most, std::size_t& put) const {
     ByteList used(values.begin(), values.end());
     if (random_ != nullptr) {

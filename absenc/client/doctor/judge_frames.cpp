@@ -36,7 +36,7 @@ std::string errors_of(const All& all) {
 
 bool is_good(const Case& one, const Frame& request, Bytes reply) { return decodes(one, request, {.bytes = reply}); }
 
-// ---- Judges for lines on which no reply is good
+// ---- Judges for lines on which hardly any reply is good
 
 Finding counted(FindingKind finding_kind, const Case& one, const All& those) {
   return finding(finding_kind,
@@ -241,14 +241,14 @@ All heard(const std::vector<Attempted>& attempts) {
 
 bool is_silent(const Attempted& one) { return one.error != Error::none && !one.heard; }
 
-// This computer may have read the rest of such a reply too late.
+// Returns whether the reply is shorter than each good one: this computer may have read its rest late.
 bool is_cut(const Observations& seen, const Attempted& attempt) {
   return std::ranges::none_of(seen.readings, [&](const Attempted& one) {
     return one.error == Error::none && one.exchange.reply.bytes.size() <= attempt.exchange.reply.bytes.size();
   });
 }
 
-// Where requests stay unanswered, a late reply may collide with the next one.
+// Returns none if as many requests stay unanswered: a late reply may collide with the next request.
 All damaged_requests(const Case& one) {
   All all = damaged(one.seen.repeated);
   std::erase_if(all, [&](const Attempted* attempt) { return is_refusal(*attempt) || has_good_part(one, *attempt); });
@@ -336,7 +336,7 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
   All all = damaged(one.seen.readings);
   const All repeated = damaged_requests(one);
   const All of_stream = damaged(one.seen.damaged_frames);
-  // A reading that repeats its requests is good, although an adapter damages some replies.
+  // A reading that repeats its requests may be good although an adapter damages some replies.
   All by_adapter = one.seen.is_stream ? of_stream : all;
   by_adapter.insert(by_adapter.end(), repeated.begin(), repeated.end());
   if (std::optional<Finding> adapter = damage_by_adapter(one, by_adapter)) {

@@ -35,7 +35,7 @@ void judge_line(const Case& one, std::vector<Finding>& findings);
 void judge_bad_frames(const Case& one, std::vector<Finding>& findings);
 [[nodiscard]] std::optional<Finding> coming_and_going(const Case& one);
 void judge_mixed_frames(const Case& one, std::vector<Finding>& findings);
-/// Returns the finding about an encoder that began to reply.
+/// Returns a finding if the encoder began to reply only during the readings; otherwise nothing.
 [[nodiscard]] std::optional<Finding> judge_start(const Case& one);
 [[nodiscard]] Finding some_silence(const Observations& seen, std::size_t silent, std::size_t all);
 void judge_state(const Case& one, std::vector<Finding>& findings);

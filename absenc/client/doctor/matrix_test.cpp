@@ -126,7 +126,7 @@ Read reading_of(const EncoderAddress& address) {
   return link.bytes != nullptr ? reading_on(address, *link.bytes) : reading_on(address, *link.frames);
 }
 
-/// Returns all alarms, and status flags with an advice.
+/// Returns the raised alarms, and the raised status flags with an advice, as bits.
 std::uint64_t defects_of(const Unit& unit, const Reading& reading) {
   std::uint64_t bits = reading.alarms;
   unsigned at = 0;

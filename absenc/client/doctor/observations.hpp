@@ -25,7 +25,7 @@ struct Trial {
   std::string setting{};       // the other setting, "baud=9600"
   std::size_t good = 0;
   std::size_t tried = 0;
-  // Number of good readings with the user's setting, which take turns with those of the other.
+  // number of good readings with the user's setting, taken in turns with those of `setting`
   std::size_t good_as_said = 0;
   std::size_t tried_as_said = 0;
   std::string command{};  // address that reads the encoder, if `identify` found it; "": it did not
@@ -53,7 +53,7 @@ struct Observations {
   // Failed requests that readings repeated.
   std::vector<Attempted> repeated{};
   std::vector<Attempted> damaged_frames{};  // damaged frames of a stream, cut at the pauses between frames
-  std::size_t doubled = 0;                  // number of frames of a stream that arrived twice
+  std::size_t doubled = 0;                  // number of frames of a stream that arrived twice; 0 also if these are few
   bool is_stream = false;                   // whether the encoder sends frames without requests
   std::vector<Attempted> turned{};          // readings during which the user was to turn the shaft by hand
   std::uint64_t line_errors = 0;            // number of line errors that the port reported; on CAN, of error frames
@@ -64,11 +64,11 @@ struct Observations {
   std::size_t most_behind = 0;  // greatest number of further bytes after a good reply
   std::vector<Trial> trials{};
   host::EchoMode echo_said{};     // echo mode that the user set
-  host::EchoMode echo{};          // echo mode that was detected
+  host::EchoMode echo{};          // echo mode at the end: that of the user, or detected
   std::optional<Time> latency{};  // latency that the user set
   Time computer_late{};           // greatest delay of this computer during the readings (os::DelayWatch)
   host::SpeedLimit limit{};       // speed limit of the encoder's shaft
-  std::string clash{};            // address that two encoders share, "address 3"; "": none
+  std::string clash{};            // address at which two encoders seem to reply, "address 3"; "": none
   bool complete = true;
 };
 
@@ -83,7 +83,7 @@ struct Observations {
   return count_good(attempts) * 20 < attempts.size() + 1;
 }
 
-/// Returns the findings in the order of their kinds.
+/// Judges the observations and returns the result, with findings in the order of their kinds.
 [[nodiscard]] Examination judge(const Unit& unit, const Options& options, const Observations& seen);
 
 /// Returns the most likely finding for a single failed reading.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Checks that doctor's first finding for a fault is an expected one.
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
 #include "absenc/client/doctor/path_faults_test.hpp"
@@ -25,8 +26,10 @@ class DoctorWays : public ::testing::TestWithParam<const Unit*> {
         SCOPED_TRACE(fmt::format("{} {} {}: {}", unit.id, mode, rate, fault.name));
         const std::optional<Outcome> outcome = fault.examine(unit, mode, rate);
         if (!outcome) continue;
-        EXPECT_TRUE(outcome->causes.contains(outcome->seen.first())) << outcome->seen.changed << " replies changed\n"
-                                                                     << sentences(outcome->seen.examination);
+        EXPECT_TRUE(outcome->causes.contains(outcome->seen.first()))
+            << fmt::format("with the fault \"{}\" doctor finds {} first, not {}; {} replies changed\n{}", fault.name,
+                           outcome->seen.first(), fmt::join(outcome->causes, " or "), outcome->seen.changed,
+                           sentences(outcome->seen.examination));
       }
     }
   }

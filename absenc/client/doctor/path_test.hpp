@@ -237,7 +237,7 @@ inline std::vector<const Unit*> character_units() {
   return units;
 }
 
-/// Returns a setting that makes the unit reply to requests; may be "".
+/// Returns a setting with which the unit sends no stream; "": none is needed, or none was found.
 inline std::string asked_mode(const Unit& unit) {
   const auto streams = [&](const std::string& mode) {
     const auto address = parse_address(fmt::format("sim:{}{}{}", unit.id, mode.empty() ? "" : "?", mode));
@@ -285,7 +285,7 @@ struct Pair {
   Far far;
 };
 
-/// Adds the settings `state` to the encoder only.
+/// Returns the user's address and the far end; only the encoder has the settings `state`.
 inline Pair pair_of(const Unit& unit, const std::string& mode, const std::string& rate,
                     const std::vector<std::string>& state = {}) {
   std::vector<std::string> settings{mode, of_encoder(unit, rate)};

@@ -15,7 +15,7 @@ namespace {
 using namespace std::chrono_literals;
 using ByteList = std::vector<std::uint8_t>;
 
-constexpr std::size_t enough = 8;  // least number of frames for a statement about their lengths or distances
+constexpr std::size_t enough = 8;  // least number of pieces, distances or doubled frames for a statement about them
 
 /// Bytes without a pause between them, and the time at which the first of them arrived.
 struct PausedBytes {
@@ -23,7 +23,7 @@ struct PausedBytes {
   ByteList bytes{};
 };
 
-// Leaves out the first and the last piece, which may be cut.
+// Returns the pieces of the stream between pauses, without the first and the last, which may be cut.
 std::vector<PausedBytes> pieces_of(const StreamBytes& stream, Time pause) {
   std::vector<PausedBytes> pieces;
   std::size_t begin = 0;
@@ -51,7 +51,7 @@ double evenness(const std::vector<PausedBytes>& pieces) {
   return static_cast<double>(usual->second) / static_cast<double>(pieces.size());
 }
 
-// Of several good pauses, the middle one is safest.
+// Of several pauses that divide a stream equally well, the middle one is safest.
 std::vector<PausedBytes> most_even_pieces(const StreamBytes& stream) {
   constexpr Time shortest = 100us;
   constexpr Time longest = 200ms;
@@ -74,7 +74,7 @@ std::vector<Time> distances_of(const std::vector<Time>& arrivals) {
   return distances;
 }
 
-// Returns 0 if there are too few frames, or they are irregular.
+// Returns the usual distance of frames; 0 if there are too few distances, or they are irregular.
 Time period_of(std::vector<Time> distances) {
   if (distances.size() < enough) return {};
   std::ranges::sort(distances);
@@ -120,7 +120,7 @@ void insert_missing_frames(std::vector<Attempted>& readings, const std::vector<T
     const std::size_t come = 1 + readings[i].discarded;
     // Two damaged frames may have been discarded as one.
     if (due > come && readings[i].discarded == 0) missing[i] = due - come;
-    // A late frame was counted as missing, and those after it come early.
+    // A late frame may have been counted as missing; the frames after it then seem early.
     std::size_t early = come > due ? come - due : 0;
     for (std::size_t back = i; early > 0 && back > 0; --back) {
       const std::size_t late = std::min(missing[back - 1], early);
@@ -166,7 +166,7 @@ void conclude_stream(const Unit& unit, const Options& options, const StreamBytes
     seen.doubled = count_doubled(seen.readings, stream.arrivals);
     insert_missing_frames(seen.readings, stream.arrivals);
   } else if (!frames.empty()) {
-    // The frames themselves are examined, because there is hardly any reading.
+    // The frames themselves are examined, because hardly any reading is good.
     seen.readings = std::move(frames);
   } else if (!stream.bytes.empty()) {
     constexpr std::size_t most_shown = 256;

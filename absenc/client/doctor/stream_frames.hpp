@@ -9,7 +9,7 @@
 
 namespace absenc::client {
 
-/// The bytes received from a stream, with the times of their arrival.
+/// Bytes received from a stream, with the times of their arrival.
 struct StreamBytes {
   /// A time, and the number of bytes that had arrived by then.
   struct Mark {
@@ -18,9 +18,9 @@ struct StreamBytes {
   };
   std::vector<std::uint8_t> bytes{};
   std::vector<Mark> marks{};
-  std::vector<Time> arrivals{};  // for each reading, the time at which its last byte arrived, or that of the one before
+  std::vector<Time> arrivals{};  // arrival of each reading's last byte; without bytes: time of the reading before, or 0
 
-  /// Appends no bytes beyond 1 MiB in all.
+  /// Appends the bytes and times of a reading; no bytes beyond 1 MiB in all.
   void append(const LineExchange<std::uint8_t>& line);
 };
 
@@ -31,7 +31,7 @@ struct StreamBytes {
 /// Inserts failed readings for frames that seem to be missing.
 void insert_missing_frames(std::vector<Attempted>& readings, const std::vector<Time>& arrivals);
 
-/// Counts good frames that arrived twice in a row.
+/// Counts good frames that arrived twice in a row; 0 unless there are many and the frames change.
 [[nodiscard]] std::size_t count_doubled(const std::vector<Attempted>& readings, const std::vector<Time>& arrivals);
 
 /// Adds evidence of the stream to `seen`; may replace `seen.readings`.

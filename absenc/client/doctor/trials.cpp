@@ -102,7 +102,7 @@ void add_spi(const EncoderAddress& address, std::vector<Other>& others) {
 
 // ---- Trials of other models and addresses
 
-/// Decides which requests could change an encoder of another protocol on the line.
+/// Decides which options may be tried: their request must not change an encoder of another protocol.
 class Safety {
  public:
   explicit Safety(const EncoderAddress& address)
@@ -111,7 +111,7 @@ class Safety {
     harmful_ = harmful_to_others(unit_, address.line.rate, search_of(address));
     said_ = is_harmful(address.options);
   }
-  /// Allows every request if the user's own one is harmful.
+  /// Returns whether the request of these options may be sent; always if the user's own one is harmful.
   [[nodiscard]] bool allows(const Options& options) const { return said_ || !is_harmful(options); }
 
  private:
@@ -150,6 +150,8 @@ bool is_possible(const Unit& unit, const Options& options) {
 
 LineSearch search_of(const EncoderAddress& address) {
   LineSearch search;
+  // On a line of 8-bit characters, a request in longer characters would arrive as another request.
+  search.most_data_bits = address.unit->line.data_bits > 8 ? search.most_data_bits : 8;
   search.place =
       address.port_kind == PortKind::tcp ? fmt::format("tcp:{}:{}", address.host, address.port) : address.path;
   if (address.latency) {

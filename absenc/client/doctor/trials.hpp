@@ -21,17 +21,17 @@ struct Other {
   EncoderAddress address{};
 };
 
-/// Returns other rates only if the port has a rate (`has_rate`).
+/// Returns other settings of port and line; other rates only if the port has a rate (`has_rate`).
 [[nodiscard]] std::vector<Other> other_lines(const EncoderAddress& address, bool has_rate);
 
 [[nodiscard]] std::vector<Other> other_models(const EncoderAddress& address);
 
 [[nodiscard]] std::vector<Other> other_addresses(const EncoderAddress& address);
 
-/// Returns a search on the port; only for lines of characters.
+/// Returns a search on the port of the address, with the user's settings of latency and RS-485.
 [[nodiscard]] LineSearch search_of(const EncoderAddress& address);
 
-/// Uses Fisher's exact test.
+/// Returns whether at least 8 of 10 readings are good and chance (Fisher's exact test) is unlikely.
 [[nodiscard]] bool is_far_better(std::size_t good, std::size_t tried, std::size_t good_as_said,
                                  std::size_t tried_as_said);
 

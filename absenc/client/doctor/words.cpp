@@ -25,9 +25,9 @@ struct Words {
 
 using enum Severity;
 
-// In these texts {0}, {1} ... are replaced by the values that the judge passes to `finding`.
+// In the texts of `table`, {0}, {1} ... are replaced by the values that the judge passes to `finding`.
 constexpr auto table = std::to_array<Words>({
-    // Here "{0}" alone is the error of the system with its advice.
+    // In findings about a port or bus, "{0}" alone is the error of the system with its advice.
     {FindingKind::port_missing, "port_missing", fault, "{0}",
      "the adapter is not plugged in, or the name is another one",
      "plug it in, or correct the name; `ls /dev/serial/by-id` shows adapters by their own names"},
@@ -194,7 +194,7 @@ constexpr auto table = std::to_array<Words>({
 
     {FindingKind::starting, "starting", warning, "{0}",
      "it was switched on just now, or its supply is too weak to come up", "wait, then look again; measure the supply"},
-    // {1} and {2} of alarm and status come from the encoder's document.
+    // {1} of alarm and status comes from the encoder's document, and {2} if the document states an action.
     {FindingKind::alarm, "alarm", warning, "the encoder reports {0}", "{1}", "{2}"},
     {FindingKind::status, "status", warning, "the status of the encoder has {0}", "{1}", "{2}"},
     {FindingKind::position_invalid, "position_invalid", fault,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The texts of all findings of doctor, in one table.
+// The texts of the findings of doctor.
 #pragma once
 
 #include <string>

@@ -24,7 +24,15 @@ using namespace std::chrono_literals;
 using capture::Hypothesis;
 using capture::ObservedExchange;
 
-inline constexpr unsigned reads = 6;              // number of readings that are taken of each encoder that replies
+/// How long an attempt asks an encoder that does not answer.
+struct Effort {
+  Time scan{};              // time without a reply after which a scan ends
+  bool asks_again = false;  // whether silent encoders are asked again: by further requests, and after a silent scan
+};
+inline constexpr Effort quick{.scan = 150ms};
+inline constexpr Effort thorough{.scan = 5s, .asks_again = true};
+
+inline constexpr unsigned reads = 6;              // intended number of answered readings of each encoder that replies
 inline constexpr Time listening = 100ms;          // time of listening before the first request at a setting of the line
 inline constexpr std::size_t stream_size = 2048;  // number of unsolicited bytes or frames that are enough
 inline constexpr unsigned most_unanswered = 3;    // number of readings without a reply after which no more are taken
@@ -44,7 +52,7 @@ struct ScannedAddresses final : FieldSink {
 
 /// Reason why a conversation was aborted.
 enum class TryEnd : std::uint8_t {
-  silent,   // no valid reply arrived in the allowed time
+  silent,   // no valid reply arrived within the limits of `Patience`
   harmful,  // the next request, or pulse of the wire `clear`, might change an encoder
 };
 
@@ -67,12 +75,12 @@ struct IdentitySink final : FieldSink {
 template <class Item>
 class Attempt {
  public:
-  Attempt(const LineSearch& search, const Unit& unit, SettingTexts settings, Time patience, Time deadline,
+  Attempt(const LineSearch& search, const Unit& unit, SettingTexts settings, const Effort& effort, Time deadline,
           LineFindings& findings)
       : search_(search),
         unit_(unit),
         settings_(std::move(settings)),
-        patience_(patience),
+        effort_(effort),
         findings_(findings),
         address_(parse_address(fmt::format("{}:{}", unit.id, search.place), settings_)),
         runner_(address_) {
@@ -93,8 +101,8 @@ class Attempt {
   Attempt& operator=(const Attempt&) = delete;
 
   [[nodiscard]] const LineSettings& line() const { return address_.line; }
-  /// Returns whether a scan without any reply was ended before it had polled every address.
-  [[nodiscard]] bool cut() const { return cut_; }
+  /// Returns whether nothing was received after any request.
+  [[nodiscard]] bool silent() const { return silent_; }
   void open() {
     link_ = search_.open(address_);
     if constexpr (is_can) {
@@ -123,7 +131,9 @@ class Attempt {
       SettingTexts settings = settings_;
       settings.insert(settings.end(), way.begin(), way.end());
       const Options options = require_options(unit_, {}, option_settings(unit_, settings, true));
-      std::vector<SettingTexts> targets = scanned(settings, options);
+      bool nobody = false;
+      std::vector<SettingTexts> targets = scanned(settings, options, nobody);
+      if (nobody && !effort_.asks_again) continue;
       if (targets.empty()) targets.push_back(settings);
       bool answered = false;
       for (const SettingTexts& target : targets) {
@@ -144,7 +154,9 @@ class Attempt {
                                               [](const Argument& argument) { return argument.required; });
       if (command.verb != Verb::info || command.changes_encoder || needs_argument) continue;
       std::vector<ObservedExchange> ignored;
-      const Conversed one = converse(command, options, ignored, &identity);
+      Conversed one = converse(command, options, ignored, &identity);
+      // An access of many frames may fail once on a busy computer.
+      if (one.error == Error::timeout || is_damage(one.error)) one = converse(command, options, ignored, &identity);
       all.agrees = all.agrees || one.error == Error::none;
       const bool contradicts = one.error == Error::unexpected_reply || one.error == Error::out_of_range;
       if (contradicts) all.contradiction = fmt::format("{}: {}", command.name, one.detail);
@@ -170,7 +182,7 @@ class Attempt {
   void look_at(Step<Item>& step, Time now, Talk& talk) {
     using Kind = typename Step<Item>::Kind;
     if (step.kind == Kind::pulse && step.wire == ExtraWire::clear) throw TryEnd::harmful;
-    if (talk.patience.is_over(now) && !talk.understood) {
+    if (step.kind != Kind::done && talk.patience.is_over(step, now) && !talk.understood) {
       talk.understood = is_good(observed_exchange(runner_.last()), talk.options);
       if (!talk.understood) throw TryEnd::silent;
     }
@@ -197,6 +209,7 @@ class Attempt {
     std::size_t heard = 0;  // number of items that an encoder sent in this conversation
     Error error = Error::timeout;
     std::string detail{};  // the unit's explanation of `error`
+    bool ended = false;    // whether the command ran to its end
   };
 
   // Runs one conversation and stores its exchanges in `exchanges`. On a line of characters it repeats the conversation
@@ -209,7 +222,9 @@ class Attempt {
       const auto known = static_cast<std::ptrdiff_t>(exchanges.size());
       Conversed one = converse_once(command, options, exchanges, sink);
       if (is_can || unit_.link == LinkKind::clocked || unit_.link == LinkKind::spi) return one;
-      if (is_unanswered_) runner_.settle(late_window, longest_settling);
+      // A scan that was given up is followed by a reading, whose reply is late, too, if any is.
+      const bool is_cut = command.verb == Verb::scan && !one.ended && !effort_.asks_again;
+      if (is_unanswered_ && !is_cut) runner_.settle(late_window, longest_settling);
       if (runner_.late() == late || allowance_ == most_allowance) return one;
       allowance_ = std::min(most_allowance, 2 * std::max(runner_.lateness(), allowance_));
       exchanges.erase(exchanges.begin() + known, exchanges.end());
@@ -220,10 +235,12 @@ class Attempt {
   Conversed converse_once(const Command& command, const Options& options, std::vector<ObservedExchange>& exchanges,
                           FieldSink* sink) {
     const bool scans = command.verb == Verb::scan;
-    const Time quiet = (scans ? patience_ : 500ms) + 5 * (link_.latency + allowance_);
-    Talk talk{
-        .options = options,
-        .patience = Patience<Item>({.quiet = quiet, .nonsense = scans ? 2 * quiet : quiet, .latency = link_.latency})};
+    const Time quiet = (scans ? effort_.scan : 500ms) + 5 * (link_.latency + allowance_);
+    Talk talk{.options = options,
+              .patience = Patience<Item>({.quiet = quiet,
+                                          .nonsense = scans ? 2 * quiet : quiet,
+                                          .is_one_request = !scans && !effort_.asks_again,
+                                          .latency = link_.latency})};
     runner_.set_options(options);
     runner_.start_again();
     const std::vector<std::int64_t> arguments = require_arguments(command, {});
@@ -234,12 +251,12 @@ class Attempt {
       talk_ = nullptr;
       if (runner_.port().take_aborted()) throw os::Interrupted{};
       if (ended == nullptr) return one;
+      one.ended = true;
       one.error = ended->error();
       one.detail = ended->detail();
       if (sink != nullptr && one.error == Error::none) ended->report(*sink);
     } catch (const TryEnd& stop) {
       talk_ = nullptr;
-      cut_ = cut_ || (scans && stop == TryEnd::silent && talk.patience.heard() == 0);
       if (stop == TryEnd::harmful) {
         findings_.notes.push_back(
             fmt::format("{} of {} was not sent: to another encoder it might be a command", command.name, unit_.id));
@@ -260,6 +277,7 @@ class Attempt {
   void take(Talk& talk, std::vector<ObservedExchange>& exchanges) {
     findings_.requests += talk.exchanges.size();
     findings_.heard += talk.patience.heard();
+    silent_ = silent_ && talk.patience.heard() == 0;
     exchanges.insert(exchanges.end(), talk.exchanges.begin(), talk.exchanges.end());
   }
 
@@ -274,9 +292,9 @@ class Attempt {
     return !same_as(0x00) && !same_as(0xFF);
   }
 
-  // Scans the line; returns, for each address at which one encoder replies, `settings` with this address. Empty if the
-  // unit has no scan, or one that changes or disturbs encoders, or if the scan finds none.
-  std::vector<SettingTexts> scanned(const SettingTexts& settings, const Options& options) {
+  // Scans the line; returns, for each address at which one encoder replies, `settings` with this address. `nobody`
+  // becomes true if the whole line was scanned in silence.
+  std::vector<SettingTexts> scanned(const SettingTexts& settings, const Options& options, bool& nobody) {
     std::vector<SettingTexts> targets;
     const Command* command = find_command(unit_, Verb::scan);
     if (command == nullptr || command->changes_encoder) return targets;
@@ -286,7 +304,8 @@ class Attempt {
     }
     ScannedAddresses addresses;
     std::vector<ObservedExchange> ignored;
-    converse(*command, options, ignored, &addresses);
+    const Conversed one = converse(*command, options, ignored, &addresses);
+    nobody = one.ended && one.heard == 0;
     const Option* option = find_role(unit_.options, Role::encoder);
     for (const std::int64_t address : addresses.all) {
       targets.push_back(settings);
@@ -302,6 +321,7 @@ class Attempt {
     const Options options = require_options(unit_, {}, option_settings(unit_, settings, true));
     std::vector<ObservedExchange> exchanges;
     if (converse(read, options, exchanges).heard == 0) {
+      if (!effort_.asks_again) return false;
       // tries once more: the reply may have been late, or the encoder may have missed the first request
       exchanges.clear();
       if (converse(read, options, exchanges).heard == 0) return false;
@@ -358,14 +378,14 @@ class Attempt {
   const LineSearch& search_;
   const Unit& unit_;
   SettingTexts settings_;
-  Time patience_;
+  Effort effort_;
   LineFindings& findings_;
   EncoderAddress address_;
   Link link_;  // the open port; must outlive the runner
   Runner<Item> runner_;
   std::vector<std::vector<std::uint8_t>> harmful_;  // beginnings of requests that must not be sent; empty on CAN
   Talk* talk_ = nullptr;
-  bool cut_ = false;
+  bool silent_ = true;          // whether nothing was received after any request
   bool asked_ = false;          // whether a conversation was begun, so that a reply to it may still be on the line
   bool is_unanswered_ = false;  // whether the last request has no reply yet
   Time allowance_{};            // time by which each timeout is extended, because replies were late

@@ -21,10 +21,6 @@ namespace absenc::client {
 
 namespace {
 
-constexpr Time short_patience = 700ms;  // time without a reply after which a scan ends
-// time without a reply after which a scan ends, once an encoder has replied beyond doubt
-constexpr Time brief_patience = 150ms;
-constexpr Time long_patience = 5s;     // time without a reply for scans at the end, unless a find is beyond doubt
 constexpr std::size_t busy_line = 32;  // number of bytes received while listening from which on no requests are sent
 constexpr std::size_t most_introduced = 4;  // number of candidates of one encoder that are asked for their identity
 constexpr double beyond_doubt = -3;         // greatest log10 of a candidate's chance that is beyond doubt
@@ -33,7 +29,7 @@ constexpr std::array<std::uint32_t, 10> common_rates{9600,    19'200,  38'400,  
 
 /// Unsolicited frames that came from the same encoder.
 struct Sender {
-  const Option* option = nullptr;  // the option that holds the encoder's address; null: the frames carry no address
+  const Option* option = nullptr;  // the option that holds the encoder's address; null: the frames show no address
   std::string number{};            // value of the address option; "": none
   std::vector<ObservedExchange> exchanges{};
 
@@ -66,7 +62,7 @@ std::vector<Sender> senders(const Unit& unit, std::span<const CanFrame> frames) 
   return all;
 }
 
-/// A search for encoders: makes all attempts, first with the usual settings of every unit.
+/// A search for encoders: usual settings of each fitting unit, other rates, then, if in doubt, silent units again.
 class Search {
  public:
   explicit Search(const LineSearch& search) : search_(search), deadline_(search.now() + search.limit) {}
@@ -95,14 +91,13 @@ class Search {
 
   void ask_everybody() {
     for (const Unit* unit : all_units()) {
-      if (fits(*unit, search_)) attempt(*unit, search_.settings);
+      if (fits(*unit, search_)) attempt(*unit, search_.settings, quick);
     }
     for (const Unit* unit : all_units()) {
       if (fits(*unit, search_)) try_rates(*unit);
     }
-    if (is_beyond_doubt()) cut_.clear();
-    patience_ = long_patience;
-    for (const Unit* unit : std::exchange(cut_, {})) attempt(*unit, search_.settings);
+    if (is_beyond_doubt()) return;
+    for (const Unit* unit : std::exchange(silent_, {})) attempt(*unit, search_.settings, thorough);
   }
 
   // Reads the identity of each found encoder that replies to requests, with the options of its likeliest candidate and
@@ -161,7 +156,7 @@ class Search {
   template <class Item>
   Introduction introduce_on(const Candidate& candidate) {
     try {
-      Attempt<Item> one(search_, *candidate.unit, all_settings(candidate), short_patience, deadline_, findings_);
+      Attempt<Item> one(search_, *candidate.unit, all_settings(candidate), thorough, deadline_, findings_);
       one.open();
       return one.introduce(candidate.hypothesis.options);
     } catch (const os::Failure& failure) {
@@ -187,14 +182,14 @@ class Search {
       if (is_beyond_doubt() || is_explained(unit)) return;
       SettingTexts settings = search_.settings;
       settings.push_back(fmt::format("{}={}", rate_setting, value));
-      attempt(unit, settings);
+      attempt(unit, settings, quick);
     }
   }
 
-  void attempt(const Unit& unit, const SettingTexts& settings) {
+  void attempt(const Unit& unit, const SettingTexts& settings, const Effort& effort) {
     if (!takes_rate(unit)) return;
-    if (unit.link == LinkKind::can) return attempt_on<CanFrame>(unit, settings);
-    attempt_on<std::uint8_t>(unit, settings);
+    if (unit.link == LinkKind::can) return attempt_on<CanFrame>(unit, settings, effort);
+    attempt_on<std::uint8_t>(unit, settings, effort);
   }
 
   // Returns whether the unit supports the rate that the user set; true if the user set none, or if the unit has no list
@@ -210,10 +205,9 @@ class Search {
   }
 
   template <class Item>
-  void attempt_on(const Unit& unit, const SettingTexts& settings) {
+  void attempt_on(const Unit& unit, const SettingTexts& settings, const Effort& effort) {
     if (search_.now() >= deadline_) throw OutOfTime{};
-    const Time patience = is_beyond_doubt() ? brief_patience : patience_;
-    Attempt<Item> one(search_, unit, settings, patience, deadline_, findings_);
+    Attempt<Item> one(search_, unit, settings, effort, deadline_, findings_);
     // units without a usual rate are tried at other rates later
     if (one.line().rate == 0 && medium_of(search_) == Medium::serial) return;
     const std::string line = line_of(unit.link, one.line());
@@ -231,7 +225,7 @@ class Search {
     }
     findings_.lines.insert(line);
     if (medium_of(search_) == Medium::spi || !listen(one, unit)) one.ask();
-    if (one.cut() && settings == search_.settings) cut_.push_back(&unit);
+    if (one.silent() && settings == search_.settings) silent_.push_back(&unit);
   }
 
   // Listens once for all units with these line settings. Returns whether at least `busy_line` bytes were received, so
@@ -320,8 +314,7 @@ class Search {
   Time deadline_;
   LineFindings findings_;
   std::vector<std::pair<std::tuple<std::uint32_t, Parity, std::uint8_t>, bool>> listened_;
-  Time patience_ = short_patience;
-  std::vector<const Unit*> cut_;  // units with more addresses than could be polled in the time
+  std::vector<const Unit*> silent_;  // units whose first requests nobody answered
   std::optional<os::Failure> failure_;
   bool opened_ = false;
 };

@@ -15,9 +15,10 @@ template <class Item>
 class Patience {
  public:
   struct Limits {
-    Time quiet{};     // limit of the time in which no item at all is received
-    Time nonsense{};  // limit of the time in which items but no good reply are received
-    Time latency{};   // latency that the port adds to the timeouts of a step
+    Time quiet{};                 // limit of the time in which no item at all is received
+    Time nonsense{};              // limit of the time in which items but no good reply are received
+    bool is_one_request = false;  // whether one request without any item received is enough
+    Time latency{};               // latency that the port adds to the timeouts of a step
   };
   explicit Patience(const Limits& limits) : limits_(limits) {}
 
@@ -35,13 +36,17 @@ class Patience {
   /// Takes each step of the conversation, and the time at which it begins.
   void see(const Step<Item>& step, Time now) {
     using Kind = typename Step<Item>::Kind;
-    if (step.kind == Kind::transfer) asked_ = answered_ = false;
+    if (step.kind == Kind::transfer) {
+      asked_ = answered_ = false;
+      has_asked_ = true;
+    }
     due_ = step.kind == Kind::wait ? due(step, now) : never;
   }
-  /// Returns whether the time since the first call has reached `quiet`, if nothing was received yet, or `nonsense`. The
-  /// caller must know that no good reply arrived.
-  [[nodiscard]] bool is_over(Time now) {
+  /// Returns whether a limit forbids the step. The caller must know that no good reply arrived.
+  [[nodiscard]] bool is_over(const Step<Item>& step, Time now) {
     if (begun_ == never) begun_ = now;
+    using Kind = typename Step<Item>::Kind;
+    if (limits_.is_one_request && has_asked_ && heard_ == 0 && step.kind == Kind::transfer) return true;
     return now - begun_ - missed_ >= (heard_ == 0 ? limits_.quiet : limits_.nonsense);
   }
   [[nodiscard]] std::size_t heard() const { return heard_; }
@@ -56,9 +61,10 @@ class Patience {
   }
 
   Limits limits_;
-  std::size_t heard_ = 0;  // number of received items of the conversation
-  bool asked_ = false;     // whether the last request was sent
-  bool answered_ = false;  // whether something was received after the last request
+  std::size_t heard_ = 0;   // number of received items of the conversation
+  bool has_asked_ = false;  // whether a request was begun
+  bool asked_ = false;      // whether the last request was sent
+  bool answered_ = false;   // whether something was received after the last request
   Time begun_ = never;
   Time missed_{};  // sum of the delays between due events and their handling by this process
   Time due_ = never;

@@ -21,6 +21,7 @@ Medium medium_of(const LineSearch& search) {
 }
 
 bool fits(const Unit& unit, const LineSearch& search) {
+  if (unit.line.data_bits > search.most_data_bits) return false;
   const Medium way = medium_of(search);
   if (way == Medium::can) return unit.link == LinkKind::can;
   if (way == Medium::spi) return unit.link == LinkKind::spi || unit.link == LinkKind::clocked;
@@ -96,7 +97,8 @@ std::vector<std::vector<std::uint8_t>> harmful_to_others(const Unit& unit, std::
   std::vector<std::vector<std::uint8_t>> all;
   for (const Unit* other : all_units()) {
     if (other == &unit || !fits(*other, search) || !can_receive(*other, rate, search)) continue;
-    if (other->line.data_bits != unit.line.data_bits) continue;  // it receives other characters
+    // An encoder that expects characters of another length cannot understand requests of `unit`.
+    if (other->line.data_bits != unit.line.data_bits) continue;
     Options defaults;
     for (std::size_t i = 0; i < other->options.size(); ++i) defaults.values[i] = other->options[i].default_value;
     for (const Command& command : other->commands) {

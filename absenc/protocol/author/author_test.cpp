@@ -225,6 +225,27 @@ Procedure many_parts(ToyDialog& dialog, Found& found, Arguments arguments) {
   co_return done;
 }
 
+struct FoundReading {
+  Reading reading{};
+};
+
+Procedure read_turns(ToyDialog& dialog, FoundReading& found, unsigned bits) {
+  found.reading.multiturn = co_await dialog.ask(1);
+  found.reading.multiturn_bits = bits;
+  co_return done;
+}
+
+TEST(Procedures, DeliverReadingThatHasOnlyTurns) {
+  alignas(std::max_align_t) std::array<std::byte, 4096> arena;
+  author::Run<Toy, FoundReading, read_turns, 8u> turns({}, {}, arena);
+  Bench(echo).run(turns);
+  ASSERT_NE(turns.reading(), nullptr);
+  EXPECT_EQ(turns.reading()->multiturn, 0x81u);
+  author::Run<Toy, FoundReading, read_turns, 0u> none({}, {}, arena);
+  Bench(echo).run(none);
+  EXPECT_EQ(none.reading(), nullptr);
+}
+
 TEST(Procedures, PartsReleaseTheirStorage) {
   const std::array<std::int64_t, 1> depth{3};
   Case<many_parts> good(echo, {}, depth);
@@ -292,6 +313,32 @@ TEST(Scan, RequestsEachAddress) {
   Bench noise(echo);
   noise.run(anywhere);
   EXPECT_EQ(anywhere.error(), Error::wrong_length);
+}
+
+constexpr std::uint8_t request_to_all() { return 9; }
+
+TEST(Scan, AsksNoAddressWhereNobodyAnswersTheOneOfAll) {
+  using Host = author::Run<Toy, Nodes<8>, scan<Toy, 8, request_to, request_to_all>>;
+  alignas(std::max_align_t) std::array<std::byte, 4096> arena;
+  unsigned asked = 0;
+  const auto count_all = [&asked](unsigned answered) {
+    return [&asked, answered](std::uint8_t request, unsigned n) {
+      ++asked;
+      return request == 5 || (request == 9 && asked == answered) ? echo(request, n) : Wire{};
+    };
+  };
+  Host nobody({}, {}, arena);
+  Bench silent(count_all(0));
+  silent.run(nobody);
+  EXPECT_EQ(nobody.error(), Error::timeout);
+  EXPECT_EQ(asked, 3u);
+  asked = 0;
+  Host somebody({}, {}, arena);
+  Bench third(count_all(3));
+  third.run(somebody);
+  EXPECT_EQ(somebody.error(), Error::none);
+  EXPECT_TRUE(somebody.found().there[5]);
+  EXPECT_EQ(asked, 3u + 8u + 1u);
 }
 
 constexpr Report<Toy> report{.explain = [](const Toy::Format&, Error, Bytes, Bytes) -> Explanation {

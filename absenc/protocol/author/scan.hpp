@@ -4,27 +4,41 @@
 
 #include <array>
 #include <cstddef>
+#include <type_traits>
 
 #include "absenc/protocol/author/dialog.hpp"
 
 namespace absenc::author {
 
-/// Result of `scan`: the addresses at which an encoder answered.
+/// Result of `scan`: the addresses at which something answered, and clashes.
 template <std::size_t addresses>
 struct Nodes {
-  std::array<bool, addresses> there{};  ///< Whether an encoder answered, for each address.
+  std::array<bool, addresses> there{};  ///< For each address: whether a valid reply, or two invalid ones, came.
   /// Whether no answer was valid and at least one was damaged, for each address: two encoders share the address, or the
   /// line is bad.
   std::array<bool, addresses> clash{};
 };
 
+/// Request of `scan` for protocols in which no address reaches every encoder.
+struct NoneReachesAll {};
+
 /// Sends the request `request_to(i)` to each address i, and stores in `nodes` which addresses answered. An address that
-/// is not silent is requested twice, because one answer may be noise. Errors: timeout (no answer at any address),
-/// wrong_length (eight addresses answered without a silent one among them, so the device is no encoder), or that of a
-/// line that is never silent.
-template <class P, std::size_t addresses, auto request_to>
+/// is not silent is requested twice, because one answer may be noise. Errors: timeout (no answer at any address, or
+/// none to `request_to_all`), wrong_length (eight addresses in a row answered, so the device is no encoder), or that of
+/// a line that is never silent. With `request_to_all`, a request that every encoder answers, the addresses are only
+/// asked if it is answered.
+template <class P, std::size_t addresses, auto request_to, auto request_to_all = NoneReachesAll{}>
 Procedure scan(DialogOf<P>& dialog, Nodes<addresses>& nodes) {
   constexpr unsigned most_in_a_row = 8;
+  if constexpr (!std::is_same_v<std::remove_const_t<decltype(request_to_all)>, NoneReachesAll>) {
+    constexpr unsigned tries = 3;
+    for (unsigned i = 0;; ++i) {
+      if (i == tries) co_return {Error::timeout, "the address of all encoders was not answered at this rate"};
+      const Result<typename P::Reply> any = co_await dialog.attempt(request_to_all()).once();
+      if (dialog.is_noisy()) co_return {any.error()};
+      if (any || any.error() != Error::timeout) break;
+    }
+  }
   bool any = false;
   unsigned noise = 0;
   for (std::size_t i = 0; i < addresses; ++i) {
