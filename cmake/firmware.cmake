@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-# Builds programs for machines that QEMU emulates (firmware/). QEMU has no machine with a Cortex-M0+, but its code runs
-# on all of these. `./dev firmware` builds and runs them.
+# Builds programs for machines that QEMU emulates (firmware/). QEMU has no machine with a Cortex-M0+, but code for it
+# runs on those with another Cortex-M. `./dev firmware` builds and runs them.
 find_package(Python3 REQUIRED COMPONENTS Interpreter)
 
 set(firmware_folder "${CMAKE_CURRENT_BINARY_DIR}/firmware")
-set(m4f_flags -mcpu=cortex-m4 -mfloat-abi=hard -mfpu=fpv4-sp-d16)  # follow the flags of the toolchain and override them
+set(m4f_flags -mcpu=cortex-m4 -mfloat-abi=hard -mfpu=fpv4-sp-d16)  # these follow and override flags of the toolchain
 
 # Sources of each machine in firmware/machine, and start addresses of its program and its RAM.
 set(microbit_machine cortex_m microbit)
@@ -17,7 +17,7 @@ set(begin_of_virt 0x80000000 0x80400000)
 # firmware_program(NAME MACHINE ROM RAM SOURCES... [LIBRARY ...] [FLAGS ...]) builds NAME.elf.
 function(firmware_program name machine rom ram)
   cmake_parse_arguments(one "" "LIBRARY" "SOURCES;FLAGS" ${ARGN})
-  string(MAKE_C_IDENTIFIER "firmware_${machine}${one_FLAGS}" machine_objects)  # compiled once for all programs
+  string(MAKE_C_IDENTIFIER "firmware_${machine}${one_FLAGS}" machine_objects)  # compiled once per machine and flags
   if(NOT TARGET ${machine_objects})
     set(machine_sources start machine ${${machine}_machine})
     list(TRANSFORM machine_sources REPLACE "(.+)" "${PROJECT_SOURCE_DIR}/firmware/machine/\\1.cpp")
@@ -67,8 +67,8 @@ target_compile_options(absenc-m4f PRIVATE ${m4f_flags})
 firmware_program(vectors-m0plus mps2 1M 64K SOURCES ${vector_sources} LIBRARY absenc)
 firmware_program(vectors-m4f mps2 1M 64K SOURCES ${vector_sources} LIBRARY absenc-m4f FLAGS ${m4f_flags})
 
-# Two programs for the two ends of a T-format line.
-foreach(program IN ITEMS drive encoder)
+# Two programs for the two ends of a T-format line, and two with both ends of a line.
+foreach(program IN ITEMS drive encoder cycles_tformat cycles_biss)
   set(source "${PROJECT_SOURCE_DIR}/firmware/${program}.cpp")
   firmware_program(${program}-microbit microbit 256K 16K SOURCES "${source}" LIBRARY absenc)
   firmware_program(${program}-m0plus mps2 1M 64K SOURCES "${source}" LIBRARY absenc)
@@ -76,10 +76,13 @@ foreach(program IN ITEMS drive encoder)
 endforeach()
 
 add_custom_target(firmware DEPENDS firmware_vectors-m0plus firmware_drive-microbit firmware_drive-m0plus
-                  firmware_encoder-microbit firmware_encoder-m0plus)
-add_custom_target(firmware-all DEPENDS firmware firmware_vectors-m4f firmware_drive-m4f firmware_encoder-m4f)
+                  firmware_encoder-microbit firmware_encoder-m0plus firmware_cycles_tformat-microbit
+                  firmware_cycles_biss-microbit firmware_cycles_tformat-m0plus firmware_cycles_biss-m0plus)
+add_custom_target(firmware-all DEPENDS firmware firmware_vectors-m4f firmware_drive-m4f firmware_encoder-m4f
+                  firmware_cycles_tformat-m4f firmware_cycles_biss-m4f)
 
-# Programs that each read one position, measured by firmware/figures.py.
+# Programs that each read one position, or use one part of absenc/host, and a base that does neither, measured by
+# firmware/figures.py. `bounds-...` are the same programs, without the base, with many inputs.
 set(reading_sources ${m4f_sources})
 list(FILTER reading_sources INCLUDE REGEX "(engine|/host)\\.cpp$")
 foreach(cpu IN ITEMS m0plus m4f)
@@ -88,14 +91,27 @@ foreach(cpu IN ITEMS m0plus m4f)
   target_include_directories(absenc-reading-${cpu} PUBLIC "${PROJECT_SOURCE_DIR}")
 endforeach()
 target_compile_options(absenc-reading-m4f PRIVATE ${m4f_flags})
+set(flags_of_m4f FLAGS ${m4f_flags})
+set(library_of_m0plus absenc)
+set(library_of_m4f absenc-m4f)
 
 add_custom_target(firmware-readers)
 file(GLOB reader_sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/firmware/readers/*.cpp")
 foreach(source IN LISTS reader_sources)
   cmake_path(GET source STEM reader)
-  firmware_program(reader-${reader}-m0plus mps2 256K 16K SOURCES "${source}" LIBRARY absenc-reading-m0plus)
-  firmware_program(reader-${reader}-m4f mps2 256K 16K SOURCES "${source}" LIBRARY absenc-reading-m4f
-                   FLAGS ${m4f_flags})
-  add_dependencies(firmware-readers firmware_reader-${reader}-m0plus firmware_reader-${reader}-m4f)
+  string(REGEX REPLACE "_(known|carrier)$" "" unit "${reader}")
+  string(REPLACE _ - unit "${unit}")
+  foreach(cpu IN ITEMS m0plus m4f)
+    firmware_program(reader-${reader}-${cpu} mps2 256K 16K SOURCES "${source}" LIBRARY absenc-reading-${cpu}
+                     ${flags_of_${cpu}})
+    add_dependencies(firmware-readers firmware_reader-${reader}-${cpu})
+    if(NOT reader STREQUAL base)
+      firmware_program(bounds-${reader}-${cpu} mps2 1M 64K SOURCES "${source}" "${vector_tables}"
+                       LIBRARY absenc-reading-${cpu} ${flags_of_${cpu}})
+      target_link_libraries(firmware_bounds-${reader}-${cpu} PRIVATE ${library_of_${cpu}})
+      target_compile_definitions(firmware_bounds-${reader}-${cpu} PRIVATE ABSENC_UNIT="${unit}")
+      add_dependencies(firmware-readers firmware_bounds-${reader}-${cpu})
+    endif()
+  endforeach()
 endforeach()
 add_dependencies(firmware firmware-readers)

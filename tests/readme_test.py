@@ -149,6 +149,11 @@ class Readme(unittest.TestCase):
         source = (SOURCE / "firmware/hookup/first_reading.cpp").read_text(encoding="utf-8")
         self.assertEqual(source.split("\n", 2)[2].strip(), shown.strip())
 
+    def test_programs_of_drive_equal_sources(self):
+        shown = [block.strip() for language, block in blocks((SOURCE / "docs/drive.md").read_text(encoding="utf-8")) if language == "cpp"]
+        sources = [SOURCE / "firmware/hookup" / name for name in ("drive_tformat.cpp", "drive_biss.cpp")]
+        self.assertEqual(shown, [path.read_text(encoding="utf-8").split("\n", 2)[2].strip() for path in sources])
+
     def test_links_lead_to_files_and_headings(self):
         for name in [*PAGES, "docs/encoders.md"]:
             text = (SOURCE / name).read_text(encoding="utf-8")

@@ -32,7 +32,7 @@ struct RuleCount {
 
 /// Counts of what the virtual encoder received from hosts.
 struct RequestCounts {
-  /// Number of good requests, including those for other encoders on the line.
+  /// Number of good requests; those for other encoders on the line may count, too.
   std::uint64_t good = 0;
   /// Number of byte runs, CAN frames and characters that are no good request; starts again at the first good one.
   std::uint64_t bad = 0;
@@ -93,8 +93,8 @@ class Emulation {
   [[nodiscard]] RequestCounts request_counts() const;
 
  private:
-  struct Service;
-  std::unique_ptr<Service> service_;
+  struct Running;
+  std::unique_ptr<Running> running_;
 };
 
 /// Starts a virtual encoder and returns it. `text` is an address without `sim:`, as "tformat?model=23-bit". The link of

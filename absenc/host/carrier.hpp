@@ -27,7 +27,7 @@ class Carrier {
     machine_ = &machine;
     expected_ = gathered_ = 0;
     sending_ = waiting_ = item_received_ = false;
-    silence_reported_ = true;  // no silence is reported before a transfer is sent, or an item or line error arrives
+    silence_reported_ = true;  // no silence is reported before a step was sent, or an item or line error arrived
     take_steps(now);
   }
   /// Returns whether a conversation runs.
@@ -69,6 +69,10 @@ class Carrier {
     }
     at_ = never;
     deliver({.kind = Event<Item>::Kind::timer, .at = now});
+  }
+  /// Takes the machine's steps, after something other than an event has changed what it wants.
+  void wake(Time now) {
+    if (is_busy() && !waiting_ && !sending_) take_steps(now);
   }
   /// Returns the time at which `tick` must be called, or `never`.
   [[nodiscard]] Time due() const {
@@ -149,6 +153,9 @@ class Carrier {
           break;
         case Kind::transfer:
         case Kind::pulse:
+          if constexpr (requires { line_->hold_clock(true); }) {
+            if (step.bits != 0) line_->hold_clock(step.hold_low);
+          }
           waiting_ = step.at > now;
           sending_ = !waiting_;
           silence_reported_ = true;
@@ -179,7 +186,7 @@ class Carrier {
   std::uint8_t gathered_ = 0;
   bool waiting_ = false;
   bool sending_ = false;
-  bool item_received_ = false;  // an item or line error arrived since the last transfer or pulse
+  bool item_received_ = false;  // an item or line error arrived since the last transfer or pulse was sent
   bool silence_reported_ = true;
   Time silent_since_{};
   std::array<Item, room> items_;  // characters gathered and not yet delivered

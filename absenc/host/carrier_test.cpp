@@ -48,7 +48,7 @@ TEST_F(CarrierTest, CarriesAConversationByteByByte) {
   EXPECT_EQ(carrier.silences(), 0u);
 }
 
-// Lists as text the received items, line errors and silences that it was fed.
+// A machine that lists as text the items, line errors and silences that it receives.
 struct Fed final : Machine<std::uint8_t> {
   void feed(const ByteEvent& event) override {
     if (event.kind == ByteEvent::Kind::sent) receiving = true;

@@ -29,7 +29,7 @@ inline constexpr std::uint32_t assumed_rate = 115'200;
 
 /// Settings of a line.
 struct LineSettings {
-  std::uint32_t rate = 0;        ///< bits per second: baud rate, SPI or shift clock, CAN bit rate
+  std::uint32_t rate = 0;        ///< bits per second: baud rate, SPI or shift clock, CAN bit rate; 0: not set
   Parity parity = Parity::none;  ///< Parity of each character.
   std::uint8_t stop_bits = 1;    ///< Number of stop bits, 1 or 2.
   /// Data bits of each character, 5 to 16, the lowest first. More than 8 bits carry two bytes, the low one first.

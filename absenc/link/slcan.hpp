@@ -64,7 +64,7 @@ constexpr std::int64_t digits_of(Bytes text) {
 }
 }  // namespace detail
 
-/// Returns `frame` as a line with CR, and with `time`, in milliseconds (0 to 59999), as timestamp.
+/// Returns `frame` as a line with CR. `time`: timestamp in milliseconds, 0 to 59999; empty: none.
 [[nodiscard]] constexpr LineText encode(const CanFrame& frame, std::optional<std::uint16_t> time = {}) {
   LineText text;
   text.push_back(frame.remote ? (frame.extended ? 'R' : 'r') : (frame.extended ? 'T' : 't'));

@@ -28,7 +28,9 @@ struct Step {
 
   Kind kind = Kind::wait;  ///< requested action
   ExtraWire wire{};        ///< pulse: the wire to drive
-  bool hold_low = false;   ///< transfer on a clocked link: the clock line, which idles high, is held low until `at`
+  /// Transfer, wait: no request of another machine may come before the next step of this machine.
+  bool holds_line = false;
+  bool hold_low = false;  ///< transfer on a clocked link: the clock line, which idles high, is held low until `at`
   /// Transfer of characters: `out` is sent in frames of this many items, with pauses of `width`; 0: in one piece.
   std::uint8_t frame = 0;
   std::span<const Item> out{};  ///< transfer: items to send; valid until the next feed
@@ -53,7 +55,7 @@ template <class Item>
 struct Event {
   /// Kinds of events at a port.
   enum class Kind : std::uint8_t {
-    sent,      ///< the transfer is complete (device side of spi and clocked: the host has stopped clocking)
+    sent,      ///< the transfer or pulse has ended (device side of spi and clocked: the host stopped clocking)
     received,  ///< `items` were received from the line
     silence,   ///< the `answer` or `gap` limit of the last step has passed
     timer,     ///< the time `at` of the last wait step was reached
@@ -65,7 +67,7 @@ struct Event {
   };
 
   Kind kind = Kind::timer;        ///< kind of the event
-  Time at{};                      ///< time at which the event was complete
+  Time at{};                      ///< time of the event
   std::span<const Item> items{};  ///< received: the items that were received; valid during the call
   std::size_t bits = 0;           ///< sent, device side of a clocked link: number of clocks counted
   ExtraWire wire{};               ///< triggered: the wire of the pulse

@@ -60,6 +60,8 @@ struct Conversation : Machine<Item> {
   [[nodiscard]] bool streams() const { return stream() != nullptr; }
   /// Returns whether a conversation that streams sends a request for each result.
   [[nodiscard]] virtual bool asks() const { return false; }
+  /// Returns the position that the last reply carried; without bits: none, or this conversation does not tell it.
+  [[nodiscard]] virtual Reading carried() const { return {}; }
   /// Puts every named value of the result into `sink`; nothing after an error.
   virtual void report(FieldSink& sink) const = 0;
   /// Returns the last request and the items received after it.
@@ -118,7 +120,7 @@ struct Device : Machine<Item> {
   [[nodiscard]] virtual std::uint32_t violation_count() const = 0;
   /// Sets the observer of rule checks, which must outlive the encoder; null: none.
   virtual void watch_rules(RuleWatch* /*watch*/) {}
-  /// Returns at least how many answers the encoder has given.
+  /// Returns how many requests or transfers the encoder has served; unsolicited frames may count too.
   [[nodiscard]] virtual std::uint64_t answer_count() const = 0;
 
  protected:

@@ -32,7 +32,7 @@ enum class Verb : std::uint8_t {
   config_get,
   config_set,
   scan,  ///< finds the encoders on the line: each record begins with the encoder's address
-  run,   ///< a procedure with none of the purposes above; `absenc run` starts it by name
+  run,   ///< none of the purposes above; `absenc run` starts the command by name
 };
 
 /// Description of an argument of a command.
@@ -69,7 +69,7 @@ struct Command {
   bool reads_alarms = false;
 };
 
-/// A range of bytes or words in the encoder's memory. In `data` the low byte of each word is first.
+/// A range of bytes or words in the encoder's memory. In a field with Role::data the low byte of each word is first.
 struct MemoryArea {
   std::uint32_t page;            ///< first page of the area; 0 if the memory has no pages
   std::uint32_t first;           ///< First address of the area on its page.
@@ -188,11 +188,11 @@ struct BitRange {
 /// The ranges of bits that carry one value, the least significant range first.
 using BitRanges = Buffer<BitRange, 8>;
 
-/// A frame that several exchanges carried, one byte each. It is decoded like any other frame.
+/// A frame that is composed of several exchanges. It is decoded like any other frame.
 struct Composed {
   Bytes request{};          ///< Bytes of the request of the composed frame.
   Bytes reply{};            ///< Bytes of the reply of the composed frame; empty: none.
-  std::uint64_t first = 0;  ///< number of the exchange that carried the first byte
+  std::uint64_t first = 0;  ///< number of the first exchange of which the frame is composed
   /// Error if the composed frame contradicts the exchanges that carried it.
   Error error = Error::none;
 };
@@ -258,7 +258,7 @@ inline constexpr std::size_t longest_encoded = 1024;
 struct Resolution {
   unsigned singleturn_bits = 0;   ///< Bits of the position within the turn, or of a linear encoder; 0: none.
   unsigned multiturn_bits = 0;    ///< Bits of the turns; 0: none.
-  double unit_um = 0;             ///< linear encoders: micrometres per count; 0: a rotary encoder
+  double unit_um = 0;             ///< linear encoders: micrometres per count; 0: rotary, or not known
   bool multiturn_signed = false;  ///< true: the number of turns is signed, so turns below zero are possible
 };
 
@@ -274,7 +274,7 @@ struct LineTiming {
   Time frame_pause{};        ///< longest pause between the frames of one request; 0: a request is one frame
   /// Time from a request to its reply at the default rate of the line; 0: unknown.
   Time turnaround{};
-  Time turnaround_limit = std::chrono::milliseconds(100);  ///< longest time that hosts wait for a reply to begin
+  Time turnaround_limit = std::chrono::milliseconds(100);  ///< captures: longest time until a reply begins
 };
 
 /// Descriptor of a protocol, for the layers that know no protocol.
@@ -343,8 +343,8 @@ struct Unit {
   LineSettings (*settings)(const Options& options) = nullptr;
   /// The unit of the same encoder behind an SPI controller, if that is another; null: none.
   const Unit* over_spi = nullptr;
-  /// Compares captures, in the order of time, with values of probeable options, and puts the evidence into `sink`.
-  /// Returns whether the values left in `options` explain all captures. Null: frames do not show option values.
+  /// Compares captures, in the order of time, with values of some options, and puts the evidence into `sink`. Returns
+  /// whether no capture contradicts the values left in `options`. Null: frames do not show option values.
   bool (*probe)(Options& options, std::span<const Capture> captures, EvidenceSink& sink) = nullptr;
   /// Returns the wires beside the data line that an encoder with these options needs. Null: none.
   ExtraWires (*extra_wires)(const Options& options) = nullptr;
@@ -354,6 +354,9 @@ struct Unit {
   bool (*streams)(const Options& options) = nullptr;
   /// Returns whether the encoder answers this valid request. Null: it answers every request.
   bool (*is_answered)(const Options& options, Frame request) = nullptr;
+  /// Returns the shortest silence between a reply and the next request. Null: the unit does not state one.
+  Time (*rest)(const Options& options) = nullptr;
+  bool services_carry_position = false;  ///< Whether most replies to commands also have the position.
   /// Returns the shortest pause before this valid request is repeated. Null: none.
   Time (*pause)(const Options& options, Frame request) = nullptr;
   /// Conditions of the virtual encoder's environment, which can be set while it runs.

@@ -34,7 +34,7 @@ class UartDma {
   // ---- Functions that interrupts call
 
   void tick(Time now) { carrier_.tick(now); }
-  // Receives before the driver releases the line: the first character may follow after 3 us.
+  // Starts receiving before the driver releases the line: the first character may follow after 3 us.
   void transmission_complete(Time now) {
     arm(expected_);
     hardware_->drive(false);

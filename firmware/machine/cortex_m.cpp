@@ -10,6 +10,7 @@ extern std::uint32_t stack_top;
 [[noreturn]] void fault();
 void tick();
 void uart() { absenc::machine::handle_uart(); }
+void alarm() { absenc::machine::handle_alarm(); }
 }
 
 namespace {
@@ -27,13 +28,21 @@ constexpr auto filled = []<std::size_t count>(std::array<void (*)(), count> all,
   return all;
 };
 
-// Only the UART's device interrupts are enabled, so all device vectors call its handler.
+// Only the interrupts of the UART and of one timer are enabled.
+constexpr auto devices = [] {
+  auto all = filled(std::array<void (*)(), 32>{}, uart);
+  all[absenc::machine::alarm_number] = alarm;
+  return all;
+}();
+
 [[gnu::section(".vectors"), gnu::used]] const Vectors vectors{
-    &stack_top, start, filled(std::array<void (*)(), 13>{}, fault), tick, filled(std::array<void (*)(), 32>{}, uart)};
+    &stack_top, start, filled(std::array<void (*)(), 13>{}, fault), tick, devices};
 
 }  // namespace
 
 namespace absenc::machine {
+
+[[gnu::weak]] void on_alarm() {}
 
 std::uint32_t call_emulator(std::uint32_t number, const void* parameter) {
   register std::uint32_t r0 asm("r0") = number;

@@ -25,6 +25,9 @@ void start_clock(Time period);
 /// Returns the time since `start_clock`, with a resolution below one microsecond.
 [[nodiscard]] Time now();
 
+/// Sets that `on_alarm` is called once after `delay`, at most 1 s; a call before that replaces the delay.
+void set_alarm(Time delay);
+
 /// Starts the UART: from now on it calls `on_received` and `on_sent`.
 void start_uart();
 /// Sends `bytes` by interrupts; they must stay valid until `on_sent` is called.
@@ -47,6 +50,7 @@ class InterruptLock {
 // ---- Functions that the program provides; all interrupts have one priority
 
 void on_tick();
+void on_alarm();
 void on_received(std::uint8_t byte);
 /// Called when the last bit of the bytes given to `send` is on the line.
 void on_sent();
@@ -64,6 +68,8 @@ struct Frequency {
 };
 extern const Frequency frequency;
 void handle_uart();
+void handle_alarm();
+inline constexpr unsigned alarm_number = 8;  ///< Interrupt of the timer that `set_alarm` starts.
 
 /// Returns a reference to the machine's register at `address`.
 inline volatile std::uint32_t& register_at(std::uint32_t address) {

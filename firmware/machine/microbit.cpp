@@ -16,6 +16,37 @@ Bytes unsent{};  // bytes whose transmission has not ended; the first one is in 
 
 const Frequency frequency{16'000'000, 125, 2};
 
+// ---- Timer (nRF51 Series Reference Manual, 18)
+
+namespace {
+constexpr std::uint32_t timer = 0x4000'8000;
+constexpr std::uint32_t timer_start = timer, timer_stop = timer + 0x004, timer_clear = timer + 0x00C,
+                        timer_compared = timer + 0x140, timer_interrupts = timer + 0x304, timer_width = timer + 0x508,
+                        timer_prescaler = timer + 0x510, timer_compare = timer + 0x540;
+constexpr std::uint32_t compare_bit = 1u << 16, width_of_32_bits = 3;
+}  // namespace
+
+void set_alarm(Time delay) {
+  const auto counts = static_cast<std::uint32_t>(delay.count()) / frequency.nanoseconds * frequency.counts;
+  register_at(timer_stop) = 1;
+  register_at(timer_clear) = 1;
+  register_at(timer_compared) = 0;
+  register_at(timer_width) = width_of_32_bits;
+  register_at(timer_prescaler) = 0;
+  register_at(timer_compare) = counts > 0 ? counts : 1;
+  register_at(timer_interrupts) = compare_bit;
+  register_at(set_enable) = 1u << alarm_number;
+  register_at(timer_start) = 1;
+}
+
+void handle_alarm() {
+  register_at(timer_stop) = 1;
+  register_at(timer_compared) = 0;
+  on_alarm();
+}
+
+// ---- UART
+
 void start_uart() {
   register_at(enable) = 4;
   register_at(start_receiver) = 1;

@@ -16,6 +16,31 @@ Bytes unsent{};  // bytes whose transmission has not ended; the first one is in 
 
 const Frequency frequency{25'000'000, 40, 1};
 
+// ---- Timer
+
+namespace {
+constexpr std::uint32_t timer = 0x4000'0000;
+constexpr std::uint32_t timer_control = timer, timer_value = timer + 0x04, timer_reload = timer + 0x08,
+                        timer_pending = timer + 0x0C;
+}  // namespace
+
+void set_alarm(Time delay) {
+  const auto counts = static_cast<std::uint32_t>(delay.count()) / frequency.nanoseconds;
+  register_at(timer_control) = 0;
+  register_at(timer_reload) = ~std::uint32_t{0};
+  register_at(timer_value) = counts > 0 ? counts : 1;
+  register_at(timer_control) = 9;  // enables the timer and its interrupt
+  register_at(set_enable) = 1u << alarm_number;
+}
+
+void handle_alarm() {
+  register_at(timer_control) = 0;
+  register_at(timer_pending) = 1;
+  on_alarm();
+}
+
+// ---- UART
+
 void start_uart() {
   register_at(divider) = 16;
   register_at(control) = 0xF;  // enables transmitter, receiver and the interrupts of both

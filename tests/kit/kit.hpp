@@ -51,6 +51,9 @@ namespace absenc::kit {
 /// Runs each command that changes nothing on an undamaged line, and checks its report.
 [[nodiscard]] Findings check_commands(const Unit& unit);
 
+/// Runs commands beside the positions of cycles, and checks both.
+[[nodiscard]] Findings check_cycles(const Unit& unit);
+
 /// Settings of `check_exchanges`, which runs hosts against virtual encoders on a faulty line.
 struct ExchangeTest {
   std::uint64_t count = 100'000;

@@ -131,6 +131,15 @@ class World {
     return result;
   }
 
+  /// Runs a machine at the host's end for the time `limit`, or until `on_emit` returns false.
+  void run(Machine<Item>& machine, Time limit, std::function<bool()> on_emit) {
+    on_emit_ = std::move(on_emit);
+    attach(machine);
+    line_->run(node_, line_->now() + limit);
+    on_emit_ = {};
+    idle_.detach(*line_, node_);
+  }
+
   /// Returns the number of faults that change bits.
   [[nodiscard]] std::uint64_t changed_bytes() const {
     using sim::FaultKind;

@@ -6,7 +6,7 @@
 
 namespace absenc::client {
 
-/// Throws UsageError.
+/// Runs a command on a new virtual encoder of the address and returns the result. Throws UsageError.
 [[nodiscard]] Attempted answer_of(const EncoderAddress& address, const Command& command, Arguments arguments);
 
 }  // namespace absenc::client

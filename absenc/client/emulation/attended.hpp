@@ -10,7 +10,7 @@
 
 namespace absenc::client {
 
-/// Time by which the encoder may send early.
+/// Longest time by which the encoder may send before the time of its reply.
 inline constexpr Time send_slack = std::chrono::microseconds(500);
 
 /// A machine that calls `look` in the thread of the encoder.

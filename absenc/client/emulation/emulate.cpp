@@ -55,8 +55,8 @@ DeviceSettings with_faults_to_come(DeviceSettings settings) {
 
 }  // namespace
 
-struct Emulation::Service {
-  Service(std::string_view text, const EmulateChoices& choices)
+struct Emulation::Running {
+  Running(std::string_view text, const EmulateChoices& choices)
       : address(virtual_address(text)),
         device(*address.unit, address.options, with_faults_to_come(address.device)),
         interface(choices.can) {
@@ -72,7 +72,7 @@ struct Emulation::Service {
     thread = std::jthread([this] { serve(); });
   }
 
-  ~Service() {
+  ~Running() {
     const std::lock_guard lock(mutex);
     stopped = true;
   }
@@ -173,89 +173,89 @@ struct Emulation::Service {
 };
 
 Emulation::Emulation(std::string_view text, const EmulateChoices& choices)
-    : service_(std::make_unique<Service>(text, choices)) {}
+    : running_(std::make_unique<Running>(text, choices)) {}
 Emulation::Emulation(Emulation&&) noexcept = default;
 Emulation& Emulation::operator=(Emulation&&) noexcept = default;
 Emulation::~Emulation() = default;
 
 const std::string& Emulation::path() const {
-  return service_->port != nullptr ? service_->port->path() : service_->interface;
+  return running_->port != nullptr ? running_->port->path() : running_->interface;
 }
-std::uint16_t Emulation::tcp_port() const { return service_->port != nullptr ? service_->port->tcp_port() : 0; }
-const Unit& Emulation::unit() const { return *service_->address.unit; }
-const Options& Emulation::options() const { return service_->address.options; }
+std::uint16_t Emulation::tcp_port() const { return running_->port != nullptr ? running_->port->tcp_port() : 0; }
+const Unit& Emulation::unit() const { return *running_->address.unit; }
+const Options& Emulation::options() const { return running_->address.options; }
 
 std::string Emulation::address() const {
-  return fmt::format("{}:{}{}", unit().id, unit().link == LinkKind::can && service_->interface.empty() ? "slcan:" : "",
+  return fmt::format("{}:{}{}", unit().id, unit().link == LinkKind::can && running_->interface.empty() ? "slcan:" : "",
                      path());
 }
 
 void Emulation::power_off() {
-  service_->carry_out([this](Time now) { service_->device.switch_off(now); });
+  running_->carry_out([this](Time now) { running_->device.switch_off(now); });
 }
 
 void Emulation::power_on(bool real) {
-  service_->carry_out([this, real](Time now) { service_->device.switch_on(now, real); });
+  running_->carry_out([this, real](Time now) { running_->device.switch_on(now, real); });
 }
 
 void Emulation::raise_alarm(std::string_view name) {
-  const std::uint32_t bits = require_alarms(unit(), service_->device.options(), std::array{std::string(name)});
-  service_->carry_out([this, bits](Time) { service_->device.raise_alarms(bits); });
+  const std::uint32_t bits = require_alarms(unit(), running_->device.options(), std::array{std::string(name)});
+  running_->carry_out([this, bits](Time) { running_->device.raise_alarms(bits); });
 }
 
 void Emulation::lower_alarm(std::string_view name) {
   const std::uint32_t bits = require_alarms(unit(), std::array{std::string(name)});
-  service_->carry_out([this, bits](Time) { service_->device.lower_alarms(bits); });
+  running_->carry_out([this, bits](Time) { running_->device.lower_alarms(bits); });
 }
 
 void Emulation::set_condition(std::string_view name, std::int64_t value) {
   const Condition& condition = require_condition(unit(), name);
   static_cast<void>(require_value(condition, fmt::format("{}", value)));
   const auto index = static_cast<std::size_t>(&condition - unit().conditions.data());
-  service_->carry_out([this, index, value](Time now) { service_->device.set_condition(index, value, now); });
+  running_->carry_out([this, index, value](Time now) { running_->device.set_condition(index, value, now); });
 }
 
 void Emulation::set_fault(std::string_view kind, double rate) {
   const sim::FaultRate fault = require_fault(fmt::format("{}={}", kind, rate));
-  service_->carry_out([this, fault](Time) {
-    sim::FaultRates rates = service_->device.fault_rates();
+  running_->carry_out([this, fault](Time) {
+    sim::FaultRates rates = running_->device.fault_rates();
     rates[fault.kind] = fault.rate;
-    service_->device.set_faults(rates);
+    running_->device.set_faults(rates);
   });
 }
 
 void Emulation::clear_faults() {
-  service_->carry_out([this](Time) { service_->device.set_faults({.delay = service_->device.fault_rates().delay}); });
+  running_->carry_out([this](Time) { running_->device.set_faults({.delay = running_->device.fault_rates().delay}); });
 }
 
 std::uint64_t Emulation::fault_count(std::string_view kind) const {
   const sim::FaultKind wanted = require_fault(fmt::format("{}=0", kind)).kind;
-  return service_->ask([this, wanted](const auto&) -> std::uint64_t {
-    const sim::FaultCounts* const counts = service_->device.faults();
+  return running_->ask([this, wanted](const auto&) -> std::uint64_t {
+    const sim::FaultCounts* const counts = running_->device.faults();
     return counts != nullptr ? (*counts)[static_cast<std::size_t>(wanted)] : 0;
   });
 }
 
 std::uint64_t Emulation::answer_count() const {
-  return service_->ask([](const auto& device) { return device.answer_count(); });
+  return running_->ask([](const auto& device) { return device.answer_count(); });
 }
 
 std::uint32_t Emulation::violations() const {
-  return service_->ask([](const auto& device) { return device.violation_count(); });
+  return running_->ask([](const auto& device) { return device.violation_count(); });
 }
 
 std::string Emulation::first_violation() const {
-  return service_->ask([](const auto& device) {
+  return running_->ask([](const auto& device) {
     return std::string(device.violations().empty() ? std::string_view{} : device.violations()[0].rule);
   });
 }
 
 std::vector<RuleCount> Emulation::rule_counts() const {
-  return service_->ask([this](const auto&) { return service_->rules.counts(); });
+  return running_->ask([this](const auto&) { return running_->rules.counts(); });
 }
 
 RequestCounts Emulation::request_counts() const {
-  return service_->ask([this](const auto&) { return service_->count_requests(); });
+  return running_->ask([this](const auto&) { return running_->count_requests(); });
 }
 
 }  // namespace absenc::client

@@ -80,11 +80,11 @@ class RequestWatch final : public Machine<Item> {
     note_bad(to_hex(bytes));
   }
 
-  // Ignores bytes after a collision, and after bytes that begin no request.
+  // Ignores bytes after a collision, or after bytes that begin no request, until the next pause.
   void look_at_bytes(Bytes bytes, Time at, Time late) {
     const Time pause = at - character_ * static_cast<std::int64_t>(bytes.size()) - heard_at_;
     heard_at_ = at;
-    // In time, such a late request might have found the reply already sent.
+    // If this event may be that late, the host may have waited for the reply before.
     const bool may_have_waited = late > unit_.timing.turnaround + most_in_reply * character_;
     if (pause > 2 * character_ || may_have_waited) skipping_ = waits_ = false;
     if (sending_ && unit_.link == LinkKind::half_duplex) skipping_ = true;

@@ -20,6 +20,7 @@ void CanEngine::ask_for(const CanFrame& frame, Time duration) {
   has_relevant_ = false;
   silence_ = until_ = {};
   duration_ = duration;
+  listens_ = false;
   state_ = State::ready;
 }
 
@@ -27,6 +28,7 @@ void CanEngine::listen(Time duration) {
   silence_ = {};
   duration_ = duration;
   disturbed_ = false;
+  listens_ = true;
   state_ = State::beginning;
 }
 
@@ -105,6 +107,8 @@ FrameStep CanEngine::next(Time now) {
     case State::receiving:
       step.answer = step.gap = silence_;
       if (state_ == State::receiving) step.at = until_;
+      step.holds_line = listens_;
+      step.expect = listens_ ? 0 : 1;
       break;
     case State::configuring:
       listen(duration_);

@@ -40,13 +40,13 @@ class CanEngine : public Conversation<CanFrame> {
             relevant_at_};
   }
 
-  /// Returns the time at which the last request was sent completely.
+  /// Returns the time of the `sent` event of the last request.
   [[nodiscard]] Time sent_at() const { return sent_at_; }
   /// Returns whether a bus error was reported since the last request or `listen`.
   [[nodiscard]] bool is_disturbed() const { return disturbed_; }
   /// Returns why no answer was received: timeout, or bad_framing on a bus with errors.
   [[nodiscard]] Error missing() const { return disturbed_ ? Error::bad_framing : Error::timeout; }
-  /// Returns false: a node that sends without a pause still leaves the bus to others.
+  /// Returns false: on a CAN bus, frames without a pause are not treated as noise.
   [[nodiscard]] bool is_noisy() const { return false; }
 
  protected:
@@ -60,7 +60,7 @@ class CanEngine : public Conversation<CanFrame> {
   void ask_for(const CanFrame& frame, Time duration);
   /// Sets whether early frames, from before the request or `listen`, are delivered, too.
   void overhear(bool yes = true) { receives_early_ = yes; }
-  /// Returns whether the delivered frame was received before the request was sent.
+  /// Returns whether the delivered frame is early: from before the request or `listen`.
   [[nodiscard]] bool came_early() const { return early_; }
   /// Sets that frames are received next for `duration` without sending.
   void listen(Time duration);
@@ -88,6 +88,7 @@ class CanEngine : public Conversation<CanFrame> {
   bool disturbed_ = false;
   bool receives_early_ = false;
   bool early_ = false;
+  bool listens_ = false;  // frames are received without a request
   std::uint32_t rate_ = 0;
   CanFrame request_{};
   CanFrame relevant_{};

@@ -55,11 +55,11 @@ struct Declaration {
   Resolution (*resolution)(const Format&) = nullptr;
   /// Returns whether the options do not contradict each other. Null: always.
   bool (*is_usable)(const Format&) = nullptr;
-  /// Returns the request that this reply answers, as far as the reply shows it, or an error.
+  /// Returns the request that a reply captured without one is taken to answer, or an error.
   Result<Request> (*guess_request)(const Format&, Bytes reply) = nullptr;
   /// Returns the length of the reply that begins with `begin`; 0: none does. Null: P::longest_reply.
   std::size_t (*reply_size)(const Format&, Bytes begin) = nullptr;
-  /// Returns the error to report for the reply to an invalid request. Null: its error `error`.
+  /// Returns the error to report for the reply to an invalid request. Null: the request's error `error`.
   Error (*answer_to_bad)(const Format&, Bytes request, Error error, Bytes reply) = nullptr;
   /// Checks a frame and puts its fields into the sink. Null: the protocol and the report do.
   Error (*decode)(const Format&, Frame request, Frame reply, FieldSink&) = nullptr;

@@ -30,6 +30,8 @@ namespace absenc::author {
 ///     // only for `last_reading`:
 ///     static Reading reading(const Format&, const Request&, const Reply&);
 ///     static Time latched(const Format&, Time sent_at);              // when the encoder latches the position
+///     // only if replies to most requests have the position: `reading` then gives it, or an empty one
+///     static constexpr bool replies_carry_position;
 ///   };
 template <class P>
 class HostOf : public Engine {
@@ -98,7 +100,7 @@ class ReadPosition : public HostOf<P> {
   ReadPosition(const typename P::Format& format, const typename P::Request& request) : HostOf<P>(format) {
     this->ask(request);
   }
-  /// Returns the position that is the result; null after an error, or if there is none.
+  /// Returns the position or turns that are the result; null after an error, or if there are none.
   [[nodiscard]] const Reading* reading() const final {
     // `reading_` is set only if no error occurred.
     return reading_.singleturn_bits + reading_.multiturn_bits != 0 ? &reading_ : nullptr;
@@ -117,13 +119,16 @@ class ReadPosition : public HostOf<P> {
 /// A conversation that a procedure (a coroutine) controls.
 template <class P>
 class DialogOf : public HostOf<P>, public Routine {
+  static constexpr bool carries_position = requires { P::replies_carry_position; };
+  struct Nothing {};
+
  public:
   /// Type of the protocol's requests.
   using Request = typename P::Request;
   /// Type of the protocol's replies.
   using Reply = typename P::Reply;
 
-  /// A request that a procedure can await. With `must`, the procedure ends without a valid reply.
+  /// A request that a procedure can await. With `must`, the procedure ends if no valid reply comes.
   template <bool must>
   class [[nodiscard]] Question {
    public:
@@ -198,6 +203,8 @@ class DialogOf : public HostOf<P>, public Routine {
     };
     return Rest{*this, pause};
   }
+  /// Sets whether no other machine's request may come between each further request and the one behind it.
+  void hold_line(bool yes) { holds_line_ = yes; }
   /// Sets that the caller gets the present result (step `emit`).
   void emit() { HostOf<P>::emit(); }
   using HostOf<P>::set_format;
@@ -232,6 +239,10 @@ class DialogOf : public HostOf<P>, public Routine {
   /// Returns whether the explanation of the last reply is left out (`only`).
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
   [[nodiscard]] ChangeSent change_sent() const final { return change(); }
+  [[nodiscard]] Reading carried() const final {
+    if constexpr (carries_position) return carried_;
+    return {};
+  }
   /// Declares whether the procedure, when asked to end early, restores the encoder first: it must check `is_aborted`.
   void restores(bool yes = true) { restores_ = yes; }
   /// Returns whether the caller has asked the procedure to end early, after `restores`.
@@ -250,6 +261,7 @@ class DialogOf : public HostOf<P>, public Routine {
   void prepare(const Request& request) {
     next_ = request;
     asking_ = P::manner(this->format(), request);
+    asking_.holds_line = asking_.holds_line || holds_line_;
     earliest_ = {};
     words_ = {};
     changing_ = false;
@@ -261,6 +273,7 @@ class DialogOf : public HostOf<P>, public Routine {
   }
   void concluded(Error error) final {
     failure_ = error;
+    if constexpr (carries_position) carried_ = error == Error::none ? this->last_reading() : Reading{};
     if (changing_ && error == Error::request_rejected) refused();
     if (must_ && error != Error::none) return end_with({error, words_, {}, asking_.hold});
     resume();
@@ -285,8 +298,10 @@ class DialogOf : public HostOf<P>, public Routine {
   Outcome outcome_{};
   Error failure_ = Error::none;
   Heard heard_{};
+  [[no_unique_address]] std::conditional_t<carries_position, Reading, Nothing> carried_{};
   bool must_ = false;
   bool changing_ = false;  // whether the present request changes the encoder if it is executed
+  bool holds_line_ = false;
   bool restores_ = false;
   bool aborted_ = false;
 };
@@ -329,10 +344,11 @@ class Run : public ProcedureDialog<P> {
   [[nodiscard]] const StreamCounts* stream() const final { return goes_on ? &counts_ : ProcedureDialog<P>::stream(); }
   /// Returns whether `Found` has a member `streams`.
   [[nodiscard]] bool asks() const final { return goes_on; }
-  /// Returns the position that is the result; null after an error, or if there is none.
+  /// Returns `Found::reading` if it has a position or turns; null after an error, or if there is none.
   [[nodiscard]] const Reading* reading() const final {
     if constexpr (requires { found_.reading; }) {
-      return this->error() == Error::none && found_.reading.singleturn_bits != 0 ? &found_.reading : nullptr;
+      const bool is_there = found_.reading.singleturn_bits + found_.reading.multiturn_bits != 0;
+      return this->error() == Error::none && is_there ? &found_.reading : nullptr;
     } else {
       return ProcedureDialog<P>::reading();
     }

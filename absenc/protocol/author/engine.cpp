@@ -62,6 +62,7 @@ ByteStep Engine::next(Time now) {
   } else if (const Time rest = rest_end(); now < rest) {
     step.at = rest;
     step.answer = step.gap = {};
+    step.holds_line = state_ == State::listening;
   } else {
     begin_or_end(step, now);
   }
@@ -95,6 +96,7 @@ void Engine::begin_or_end(ByteStep& step, Time now) {
     step.width = manner_.frame != 0 ? manner_.frame_pause : manner_.pulse;
     step.frame = manner_.frame;
     step.wire = manner_.wire;
+    step.holds_line = manner_.holds_line;
     step.out = out_;
     if (manner_.expects_reply) step.expect = expected();
   } else if (state_ >= State::ending) {
@@ -149,7 +151,7 @@ void Engine::end_noise(State before) {
   if (is_awaited() || (before == State::ready && state_ == State::ready)) {
     conclude();
   } else if (state_ != State::sending) {
-    item_received_ = noisy_ = false;  // a valid reply has ended the exchange, so this noise does not matter
+    item_received_ = noisy_ = false;  // no exchange awaits a reply now, so this noise does not matter
   }
 }
 

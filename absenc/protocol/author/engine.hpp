@@ -12,26 +12,41 @@
 
 namespace absenc::author {
 
-/// Time limits and pauses of a host: those of the protocol's document, or chosen.
+/// Time limits and pauses of a host: those of the protocol's document, or chosen. A pause begins
+/// with the last sent or received character. Which member has it:
+///
+///   | the document demands                           | member                                     |
+///   |------------------------------------------------|--------------------------------------------|
+///   | a pause after each reply                       | HostTimes::pause                           |
+///   | a silent line before each request              | HostTimes::silence: the host listens in it |
+///   | a longer pause before a request is repeated    | Manner::pause                              |
+///   | a pause after a failed request                 | Manner::hold                               |
+///   | a pause between two requests of a procedure    | `dialog.rest`, `after` of a question       |
+///   | pauses between the frames of a request         | Manner::frame_pause, with Manner::frame    |
 struct HostTimes {
-  Time answer_limit{};          ///< longest time from the end of a request to the first character of its reply
-  Time gap_limit{};             ///< longest time between two characters of a reply
-  Time silence{};               ///< shortest silence of the line before each request; received bytes restart it
+  Time answer_limit{};  ///< longest time from the end of a request to the first character of its reply
+  Time gap_limit{};     ///< longest time between two characters of a reply
+  /// Shortest silence of the line before each request; received bytes restart it.
+  Time silence{};
   Time patience = noise_limit;  ///< a line without silence for this long is treated as never silent
-  Time pause{};  ///< shortest time from a reply to the next request; it is too short to listen in between
+  /// Shortest time from a reply to the next request. The host does not listen in it.
+  Time pause{};
 };
 
 /// How a request is sent, repeated and timed, and how its reply ends.
 struct Manner {
   unsigned repeats = 0;       ///< how often the request is sent again, at most, after an invalid or missing reply
-  Time pause{};               ///< pause before a repetition, from the last sent or received character
+  Time pause{};               ///< pause before a repetition; the pauses of HostTimes hold for it, too
   bool expects_reply = true;  ///< false: the encoder does not reply, so the exchange ends with the request
   /// Whether a reply is checked only after the silence that follows it.
   bool ends_by_silence = false;
   /// Whether the content of the reply is not checked, and a missing reply is no error.
   bool any_reply = false;
-  Time answer_limit{};     ///< longest time until the reply begins; 0: HostTimes::answer_limit
-  Time hold{};             ///< how long the encoder may still be busy with the request after an error
+  bool holds_line = false;  ///< whether no other machine's request may come before the next one of this conversation
+  Time answer_limit{};      ///< longest time until the reply begins; 0: HostTimes::answer_limit
+  /// How long the encoder may be busy with the request after an error: the conversation ends so
+  /// much later, and no command begins before. After a valid reply it has no effect.
+  Time hold{};
   std::uint8_t frame = 0;  ///< if not 0, the request is sent in frames of this number of bytes
   Time frame_pause{};      ///< pause between two frames of the request
   Time pulse{};            ///< if not 0, the request is a pulse of this duration on `wire` instead of bytes
@@ -108,7 +123,7 @@ class Engine : public Conversation<std::uint8_t> {
  private:
   enum class State : std::uint8_t {
     receiving,  ///< the reply to the last request is awaited
-    settling,   ///< the reply has an error: waits until the line is silent
+    settling,   ///< the exchange has an error: waits until the line is silent
     ready,      ///< the next request is to be sent, as soon as pauses permit
     sending,    ///< the request is being sent
     sleeping,

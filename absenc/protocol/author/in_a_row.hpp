@@ -21,7 +21,7 @@ struct InARow {
   unsigned requests = 0;  ///< number of equal requests that execute the command, 2 or more
   Time interval{};        ///< shortest time before the next request of the row, as hosts keep it
   IntervalBounds between = IntervalBounds::reply_and_request;  ///< the events between which hosts keep `interval`
-  /// Shortest time between two requests of a row that a virtual encoder accepts.
+  /// Shortest time from the request before, or its reply, to a request that a virtual encoder accepts.
   Time accepted{};
   std::string_view number_rule{};    ///< rule of the virtual encoder: the host sent too few requests
   std::string_view interval_rule{};  ///< rule of the virtual encoder: the host sent two requests too fast
@@ -69,15 +69,18 @@ template <class P>
 Part<bool> send_in_a_row(DialogOf<P>& dialog, typename P::Request request, const InARow& row) {
   Time pause = row.between == InARow::IntervalBounds::reply_and_request ? row.interval : Time{};
   for (unsigned sent = 1;; ++sent) {
+    dialog.hold_line(sent < row.requests);
     const Result<typename P::Reply> reply = co_await dialog.attempt(request).once().changes().after(pause);
     if (sent == row.requests) co_return reply.error() == Error::none;
     if (!reply) {
+      dialog.hold_line(false);
       co_await dialog.stop({reply.error(),
                             "one of the requests in a row was not answered well, so the encoder has most likely done "
                             "nothing: see that with `absenc read` before you try again"});
     }
     if (row.between == InARow::IntervalBounds::requests) {
-      pause = dialog.begun_at() + row.interval - dialog.received_at();
+      // The request may have begun later than its step said, so its end counts.
+      pause = dialog.sent_at() + row.interval - dialog.received_at();
     }
   }
 }

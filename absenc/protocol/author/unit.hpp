@@ -45,7 +45,9 @@ struct Descriptor {
   static_assert(Clocked<P> || declared.decode != nullptr || declared.report.put_request != nullptr,
                 "a report needs put_request");
 
-  /// Whether functions of the protocol decode requests and replies.
+  /// Whether replies to most requests have the position.
+  static constexpr bool carries_position = requires { P::replies_carry_position; };
+  /// Whether the protocol has requests that its functions decode.
   static constexpr bool has_requests = !Clocked<P> && declared.decode == nullptr;
 
   // ---- Functions of the descriptor
@@ -122,7 +124,7 @@ struct Descriptor {
     return Error::none;
   }
 
-  /// Returns the request of an exchange; if `asked` is empty, the one that the reply shows.
+  /// Returns the request of an exchange, or the one that a reply captured without it is taken to answer, or an error.
   static constexpr Result<Request> request_of(const Format& f, Bytes asked, Bytes reply) {
     static_assert(declared.guess_request != nullptr, "a unit that sends requests needs `guess_request`");
     if (asked.empty()) {
@@ -320,11 +322,30 @@ struct Descriptor {
     VectorCheck check(vector.fields);
     return known && decode_vector(values, vector, check) == vector.error && check.all();
   }
-  static_assert(std::all_of(Made::vectors.begin(), Made::vectors.end(), holds),
-                "a vector does not decode to what it says");
+  /// Number, from 0, of the first vector that does not decode to what it says; if all do, the number of vectors.
+  static constexpr std::size_t first_wrong_vector = static_cast<std::size_t>(
+      std::find_if_not(Made::vectors.begin(), Made::vectors.end(), holds) - Made::vectors.begin());
+  static_assert(first_wrong_vector == Made::vectors.size(),
+                "a vector does not decode to what it says: the compiler shows its number, from 0, before that of all");
 
+  /// Returns the shortest silence that a host keeps between a reply and its next request.
+  static Time rest(const Options& values) {
+    const auto times = P::host_times(declared.format(values));
+    return std::max(times.silence, times.pause);
+  }
+
+  /// Returns the times of the virtual encoder; if the protocol states none, times that break no rule below.
+  static constexpr DeviceTimes device_times() {
+    if constexpr (requires { P::device_times(Format{}); }) return P::device_times(Format{});
+    return {};
+  }
   /// Returns the descriptor of the unit.
   static constexpr Unit make() {
+    static_assert(declared.line != nullptr || device_times().character == Time{} ||
+                      device_times().character == line_of(Format{}).byte_time(),
+                  "DeviceTimes::character is the duration of one byte: format.line().byte_time()");
+    static_assert(device_times().frame == 0 || device_times().gap > device_times().frame_pause,
+                  "DeviceTimes::gap ends an incomplete request, so it is longer than DeviceTimes::frame_pause");
     Unit unit{.id = declared.id,
               .name = declared.name,
               .document = declared.document,
@@ -360,6 +381,7 @@ struct Descriptor {
               .timing = declared.timing,
               .streams = declared.streams,
               .is_answered = declared.is_answered,
+              .services_carry_position = carries_position,
               .conditions = declared.conditions,
               .control_bit = declared.control_bit,
               .remembered = declared.remembered,
@@ -368,6 +390,7 @@ struct Descriptor {
     if constexpr (declared.report.explain != nullptr) unit.explain = explain;
     if constexpr (has_requests && declared.is_answered == nullptr) unit.is_answered = is_answered;
     if constexpr (has_requests) unit.pause = pause;
+    if constexpr (requires { P::host_times(Format{}).silence; }) unit.rest = rest;
     if constexpr (compiles_formats) {
       unit.decoder = decoder;
       unit.decoder_storage = sizeof(Decoder<>);

@@ -23,7 +23,7 @@ struct ChainFormat {
   StopBit stop_bit = StopBit::next;  ///< The bit P that a virtual encoder sends after each register.
   // ---- The following members mean the same as in Format.
   std::uint32_t ma_khz = 1000;  ///< Clock MA in kHz.
-  /// Longest time that the encoders need for their positions; it decides the number of clocks.
+  /// Longest time until the positions are ready, with the line's delay; the number of clocks depends on it.
   Time latency = 10us;
   Time ready{};  ///< Time that a virtual encoder needs for a position; 0: as `latency`, at most 10 us.
   std::uint32_t line_delay_ns = 0;  ///< Delay of a virtual encoder's line, there and back, in nanoseconds.

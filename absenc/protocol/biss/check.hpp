@@ -34,7 +34,7 @@ inline constexpr Check crc6{};  ///< Check of most encoders: a CRC of 6 bits.
 /// Check of the safety position word: polynomial 0x190D9, with a life counter.
 inline constexpr Check crc16{16, 0x90D9, 0, true, true};
 
-/// Returns the CRC of `check` in the form that the functions of crc.hpp use.
+/// Returns the parameters of the CRC of `check`, as the functions of crc.hpp take them.
 [[nodiscard]] constexpr CrcParameters parameters_of(const Check& check) {
   const auto mask = static_cast<std::uint16_t>(low_mask(check.width));
   return {check.width, check.poly, check.init, false, false, check.inverted ? mask : std::uint16_t{0}};

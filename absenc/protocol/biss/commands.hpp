@@ -151,7 +151,7 @@ template <const auto& report, class F>
   };
 }
 
-/// Returns the cause of an error of a frame; empty if no cause is known.
+/// Returns cause and advice for an error of a frame; either may be empty.
 template <class F>
 [[nodiscard]] Explanation explain_frame(const F& format, Error error, Bytes = {}, Bytes reply = {}) {
   switch (error) {

@@ -41,7 +41,7 @@ class CompiledChannel {
   /// The bits of a word with its check.
   struct Bits {
     std::uint64_t covered = 0;  ///< Word and life counter.
-    std::uint16_t crc = 0;      ///< CRC as the encoder sent it; 0: there is none.
+    std::uint16_t crc = 0;      ///< CRC as the encoder sent it; 0 if the format has none.
   };
   /// Returns the bits of the word that begins at index `first` of `samples`.
   [[nodiscard, gnu::always_inline]] constexpr Bits load(const BitView& samples, std::size_t first) const {

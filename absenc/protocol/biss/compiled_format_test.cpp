@@ -35,7 +35,7 @@ ChannelData random_data(sim::Random& random) {
   return {.word = random_values(random), .life_counter = static_cast<std::uint8_t>(random.next() & 0x3F)};
 }
 
-// Returns the samples as a line may change them.
+// Returns the samples, at random unchanged, cut, extended, or with one to three flipped bits.
 Samples disturbed(const Samples& samples, sim::Random& random) {
   Samples changed;
   const std::uint64_t kind = random.below(8);
@@ -128,7 +128,7 @@ TEST(BissCompiledSafetyFormat, EqualsFormatForRandomFormatsAndFrames) {
     const CompiledSafetyFormat compiled(format);
     for (unsigned j = 0; j < 8; ++j) {
       SafetyReply sent{.ack_bits = random_ack(random), .cpw = random_data(random), .spw = random_data(random)};
-      // Makes the words agree, and mostly the counter follow: random ones hardly ever do.
+      // Makes the words agree, and mostly the life counter follow the previous one.
       const unsigned spw_bits = format.spw.word.bits_of(Meaning::position);
       const unsigned cpw_bits = format.cpw.word.bits_of(Meaning::position);
       const std::uint64_t upper = sent.cpw.word.position & low_mask(cpw_bits);
@@ -154,7 +154,7 @@ TEST(BissCompiledSafetyFormat, EqualsFormatForRandomFormatsAndFrames) {
   EXPECT_GT(good, 5'000u);
 }
 
-// A CRC that is not inverted is right for zeros, but a word of zeros is refused.
+// A CRC with start value 0 that is not inverted fits zeros, but BiSS Safety refuses a word of zeros.
 TEST(BissCompiledSafetyFormat, RefusesZerosInPlaceOfEitherWord) {
   constexpr Check plain{.width = 8, .poly = 0x07, .init = 0, .inverted = false};
   constexpr SafetyFormat format{.cpw = {.word = "position:16"_word, .check = plain},

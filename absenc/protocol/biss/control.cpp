@@ -111,7 +111,7 @@ bool ControlMaster::direction(bool cds) {
         state_ = State::start;
         return true;
       }
-      // The lock bits show whether a slave with this ID exists and refuses the access.
+      // The lock bits show whether a slave with this ID exists; if so, it refused the access.
       return end(frame_.request.slave < frame_.slaves ? Error::request_rejected : Error::timeout);
   }
 }

@@ -80,7 +80,7 @@ struct ControlFrame {
   std::uint8_t slaves = 0;        ///< Number of slaves with an ID, from the lock bits.
   bool more_slaves = false;       ///< Whether there are also slaves without an ID on the line.
   ByteBuffer<control_most> data;  ///< Values of the registers that were read or written.
-  /// For each byte of `data`, the number of frames by which the encoder delayed it.
+  /// For each byte, the number of frames by which the encoder delayed it; empty if decoded without CDS bits.
   Buffer<std::uint16_t, control_most> start_delay;
   /// Whether the encoder permits access to the register after the last one (P = 0).
   bool next_address_accepted = false;
@@ -89,7 +89,7 @@ struct ControlFrame {
 };
 
 /// Decodes a control frame from the bits of CDM and CDS, one of each per position frame. The start bit is the first
-/// bit, or follows at least 14 zeros. Without CDS bits only the request is decoded.
+/// bit, or follows at least 14 zeros. Without CDS bits only the request and written bytes are decoded.
 [[nodiscard]] Result<ControlFrame> decode_control(BitView cdm, BitView cds);
 
 /// The host's side of control frames, without a line.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decodes a control frame from all its CDM and CDS bits, and makes the CDM bits of a request.
+// Decodes a control frame from its recorded bits, and makes the CDM bits of a request.
 #include "absenc/protocol/biss/control.hpp"
 
 #include "absenc/protocol/biss/control_bits.hpp"

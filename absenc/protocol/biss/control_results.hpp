@@ -66,12 +66,12 @@ struct ControlResults {
   std::optional<std::string_view> operation{};  ///< Operation of the request: read, write or command.
   /// ID of the slave whose register was accessed, 0 to 7; 0 is the farthest from the host.
   std::optional<std::uint8_t> slave_id{};
-  std::optional<std::uint8_t> bank{};     ///< Selected bank of registers, 0 to 255.
+  std::optional<std::uint8_t> bank{};     ///< Bank that was accessed or is selected; 0 for registers outside banks.
   std::optional<std::uint8_t> address{};  ///< Address of the first register that was accessed, 0 to 127.
   std::optional<std::uint8_t> value{};    ///< Value of the only or first register that was accessed.
   ByteBuffer<control_most> bytes;         ///< Values of successive registers.
   bool has_data = false;                  ///< Whether `bytes` is reported.
-  /// For each byte, the number of frames by which the encoder delayed it.
+  /// Numbers of frames by which the encoder delayed each byte; empty if they are not known.
   NumberList start_delay;
   std::optional<bool> next_address_accepted{};  ///< Whether the register after the last one may be accessed (P = 0).
   std::optional<std::uint8_t> command{};        ///< Number of the command, 0 to 3.

@@ -88,7 +88,7 @@ TEST(BissControl, DecodesWrittenDataFromCdmAlone) {
 }
 
 TEST(BissControl, DetectsEachFlippedBitOfAnAnswer) {
-  // Flips the bits of CDS from the answer to R to the CRC of the byte.
+  // Flips one bit of CDS at a time, from the answer to R to the CRC of the byte.
   for (std::size_t i = 14 + 17; i < 14 + 32; ++i) {
     std::string cds(read_44_answer);
     cds[i] = cds[i] == '1' ? '0' : '1';

@@ -16,7 +16,7 @@ struct Behaviour {
   Time latency = 10us;  ///< Time that the encoder needs for a position, from the second rising edge of MA.
   /// Delay of the line, there and back.
   Time line_delay{};
-  Time edge_noise = 20ns;       ///< A sample closer than this to a delayed edge reads the old or new bit, at random.
+  Time edge_noise = 20ns;       ///< A sample closer than this to a delayed edge may read the old or the new bit.
   Time register_delay{};        ///< Time from the request for a register until it is ready.
   bool start_sequence = false;  ///< Whether SLO stays idle after power on until the start sequence.
 };
@@ -111,7 +111,7 @@ class VirtualRegisters final : public ControlTarget {
   void set_time(Time at, Time delay);
   /// Returns the memory of all slaves, one after the other.
   [[nodiscard]] MutableBytes memory() { return MutableBytes(memory_).first(std::size_t{slaves_} * slave_size); }
-  /// Returns the number of writes to `memory` since construction; selecting a bank is none.
+  /// Returns how often the host wrote a register since construction, not counting bank select.
   [[nodiscard]] std::uint32_t written() const { return written_; }
   /// Returns the slaves whose process data are switched off: bit n is slave n.
   [[nodiscard]] std::uint8_t silent() const { return data_off_; }
@@ -212,7 +212,7 @@ class VirtualEncoderOf final : public author::ClockedDevice {
     clocked_before_ = false;
     start_sequence_received_ = false;
   }
-  // Eight clocks count too, because an SPI controller can only clock whole bytes.
+  // Eight clocks count too, because many SPI controllers only clock whole bytes.
   static bool is_start_sequence(std::size_t clocks) { return clocks == start_pulses || clocks == 8; }
 
   EncoderOf<F> encoder_;
@@ -221,7 +221,7 @@ class VirtualEncoderOf final : public author::ClockedDevice {
   unsigned needed_ = 0;  // clocks that the present frame needs; 0: no frame was sent
   Time timeout_{};       // BiSS timeout after the present frame
   Time period_{};
-  Time free_at_{};  // earliest time of the next frame: the BiSS timeout after the last clock
+  Time free_at_{};  // earliest time of the next frame: the BiSS timeout after the last rising edge
   bool clocked_before_ = false;
   bool start_sequence_received_ = false;  // whether the host has sent the start sequence since power on
 };

@@ -57,7 +57,7 @@ TEST(BissDevice, ReportsBrokenTimingRules) {
   EXPECT_EQ(soon.last_rule(), "clocked before the BiSS timeout has passed");
   EXPECT_EQ(soon.encoder.answer_count(), 1u);
   EXPECT_EQ(soon.clock(16, 20us, 1'000'000), "1100000000001000");
-  // The clock before the timeout, and the frame of only 16 clocks after it.
+  // Two violations: the clock before the timeout, and the frame of only 16 clocks after it.
   EXPECT_EQ(soon.encoder.violation_count(), 2u);
 }
 

@@ -40,16 +40,9 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
   /// Returns whether no explanation of the last reply is added to the outcome's texts.
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
   [[nodiscard]] ChangeSent change_sent() const final { return this->change(); }
+  [[nodiscard]] Reading carried() const final { return has_position_ ? this->position() : Reading{}; }
   /// Makes the dialog accept frames without process data; the CDS of such frames is valid.
   void accept_empty_frames() { accepts_empty_ = true; }
-  /// Makes the conversation emit each valid position before the next frame begins.
-  void emit_positions() { emits_ = true; }
-
-  /// Returns what the port must do next, such as send or wait.
-  Step<std::uint8_t> next(Time now) final {
-    if (std::exchange(emitting_, false)) return {.kind = Step<std::uint8_t>::Kind::emit};
-    return Base::next(now);
-  }
 
  protected:
   /// Creates the conversation; the coroutines of the procedure are stored in `arena`.
@@ -70,6 +63,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
     this->clock(extended_ ? ProtocolOf<F>::all_clocks(format) : ProtocolOf<F>::clocks(format), cdm_);
   }
   void clocked(BitView samples) final {
+    has_position_ = false;
     if (start_.was_given()) return go_on();
     last_ = detail::decoded(this->format(), samples, Cds::any);
     if (start_.is_due(last_.error())) return this->clock(start_pulses);
@@ -91,7 +85,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
     }
     if (last_) {
       this->keep(*last_);
-      emitting_ = emits_;
+      has_position_ = true;
     } else {
       ++bad_frames_;
     }
@@ -118,9 +112,8 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
   int life_counter_ = -1;
   bool cdm_ = false;
   bool extended_ = false;
-  bool emits_ = false;
   bool accepts_empty_ = false;
-  bool emitting_ = false;
+  bool has_position_ = false;  // whether the last frame had a valid position
 };
 
 }  // namespace absenc::biss

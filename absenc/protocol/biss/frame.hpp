@@ -69,7 +69,7 @@ class Timeout {
   std::uint8_t code_ = 0;  // timeout in units of 0.5 us; 0: unknown, 1: adaptive
 };
 
-/// The bit P that the virtual encoder sends after each register: by the next register, 0, or 1.
+/// Bit P of the virtual encoder after a register: 1 if the next one is refused, always 0, or always 1.
 enum class StopBit : std::uint8_t { next, zero, one };
 /// Values of the option `stop_bit`, in the order of StopBit.
 inline constexpr std::array<std::string_view, 3> stop_bit_choices{"next", "zero", "one"};
@@ -96,7 +96,7 @@ struct Format {
   /// Virtual encoder: whether SLO stays idle after power on until the start sequence.
   bool start_sequence = false;
   Timeout timeout{};  ///< BiSS timeout: how long the encoder holds SLO low after the last clock.
-  /// The longest time that the encoder needs for a position, up to 1 ms.
+  /// Longest time until the position is ready, with the delay of the line; up to 1 ms.
   Time latency = 10us;
   // ---- Members for the virtual encoder
   StopBit stop_bit = StopBit::next;  ///< The bit P that the virtual encoder sends after each register.
@@ -125,7 +125,7 @@ struct Format {
   return std::max(1u, static_cast<unsigned>((needed + clock - 1) / clock));
 }
 
-/// Returns 0: no slave delays the start bit on its way to the host.
+/// Returns 0: in frames other than those of a chain, no slave delays the start bit.
 template <class AnyFormat>
 [[nodiscard]] constexpr unsigned relay_bits(const AnyFormat&) {
   return 0;
@@ -341,7 +341,7 @@ constexpr void show(const Format& format, const ShaftState& state, std::uint32_t
 template <const Format& known>
 struct KnownFormat {
   static constexpr std::uint16_t ma_khz = known.ma_khz;  ///< Clock MA in kHz.
-  static constexpr Time latency = known.latency;         ///< Longest time that the encoder needs for a position.
+  static constexpr Time latency = known.latency;         ///< Longest time until a position is ready, line included.
   static constexpr Timeout timeout = known.timeout;      ///< BiSS timeout after the last clock.
   /// Returns the period of MA.
   [[nodiscard]] static constexpr Time period() { return known.period(); }

@@ -68,7 +68,7 @@ TEST(BissFrame, DecodesAtEveryOffsetInSixtyFourSamples) {
 
 bool skips(const Format& format) { return format.word.find(Meaning::skip) != nullptr; }
 
-// Expects that both decoders give the same results for noise and for whole and damaged frames.
+// Expects equal results with the format at compile time and run time, for noise, whole and damaged frames.
 template <const Format& format>
 void agree(std::uint64_t seed) {
   sim::Random random(seed);
@@ -93,7 +93,7 @@ void agree(std::uint64_t seed) {
     ASSERT_EQ(known.error(), given.error());
     if (!given) continue;
     ++good;
-    // Skipped bits are not stored, so formats with such bits are not compared.
+    // Skipped bits are not stored, so with such bits the encoded frame is not compared.
     Reply at_hand = *given;
     at_hand.delay_bits = 0;
     BitBuffer<512> again;

@@ -37,7 +37,8 @@ struct ProtocolOf {
   using Reply = std::remove_cvref_t<decltype(*detail::decoded(F{}, BitView{}))>;
   /// Interface by which procedures clock frames.
   using Dialog = ControlDialog<F>;
-  static constexpr unsigned most_clocks = 512;  ///< Greatest number of clocks in one transfer.
+  static constexpr unsigned most_clocks = 512;          ///< Greatest number of clocks in one transfer.
+  static constexpr bool replies_carry_position = true;  ///< Frames carry the position, also during control frames.
 
   /// Returns the rate of MA and the pause before each frame.
   static constexpr author::ClockedHostTimes host_times(const F& format) {
@@ -49,7 +50,7 @@ struct ProtocolOf {
   static constexpr unsigned all_clocks(const F& format) {
     return std::min(most_clocks, biss::clocks(format, format.latency + longest_delay, format.period()));
   }
-  /// Decodes a frame with all checks. `AnyFormat`: F, or F compiled.
+  /// Decodes a frame whose CDS must be 0. `AnyFormat`: F, or F compiled.
   template <class AnyFormat>
   static constexpr Result<Reply> decode(const AnyFormat& format, const BitView& samples) {
     return detail::decoded(format, samples);
@@ -73,7 +74,7 @@ template <const Format& format>
 /// Confirms a late frame by the delay of the next: a single one may have lost its start bit.
 class LateFrames {
  public:
-  /// Returns whether the delay differs by at most one clock from that of the call before.
+  /// Returns whether the delay differs by at most one clock from that of the call before; first call: false.
   [[nodiscard]] bool is_again(unsigned head) {
     const unsigned before = std::exchange(seen_, head);
     return before != 0 && head + 1 - before <= 2;
@@ -156,7 +157,7 @@ class ReadKnownPosition final : public PositionReader<KnownFormat<format>, false
  public:
   ReadKnownPosition() : PositionReader<KnownFormat<format>, false>({}) {}
 };
-/// Reads a frame that may be later than expected, as the first frame from an unknown line is.
+/// Reads the position from a line whose delay may be longer than expected.
 template <class F>
 using FindPosition = PositionReader<F, true>;
 

@@ -18,7 +18,7 @@ inline constexpr unsigned bank_select = 0x40;  ///< Address of the register that
 inline constexpr unsigned eds_bank = 0x41;
 inline constexpr unsigned profile = 0x42;        ///< Address of the profile of the encoder, two registers.
 inline constexpr unsigned serial_number = 0x44;  ///< Address of the serial number, four registers.
-/// Address of the first register that the maker defines; the last one is 0x77.
+/// Address of the first register outside the banks that the maker defines; the last one is 0x77.
 inline constexpr unsigned device = 0x48;
 inline constexpr unsigned device_id = 0x78;     ///< Address of the device ID, six registers.
 inline constexpr unsigned manufacturer = 0x7E;  ///< Address of the manufacturer's two characters.

@@ -59,7 +59,6 @@ struct HostRecord {
 
 template <class F>
 Procedure work_on_a_bank(ControlDialog<F>& dialog, HostRecord& record) {
-  dialog.emit_positions();
   ControlMaster master;
   auto& known = record.known;
   auto& is_known = record.is_known;
@@ -101,6 +100,21 @@ struct Host {
   Machine machine;
 };
 
+/// Passes the position of each valid frame of a conversation to `compare`.
+template <class Conversation, class Compare>
+struct Watched final : absenc::Machine<std::uint8_t> {
+  Watched(Conversation& one, const Compare& with) : conversation(one), compare(with) {}
+  void feed(const Event<std::uint8_t>& event) override {
+    conversation.feed(event);
+    if (event.kind != Event<std::uint8_t>::Kind::received) return;
+    if (const Reading reading = conversation.carried(); reading.singleturn_bits != 0) compare(reading);
+  }
+  Step<std::uint8_t> next(Time now) override { return conversation.next(now); }
+
+  Conversation& conversation;
+  Compare compare;
+};
+
 struct Outcome {
   std::uint64_t positions = 0;
   std::uint64_t wrong = 0;
@@ -123,19 +137,18 @@ Outcome run(Host<F>& host, const F& format, const sim::FaultRates& rates) {
   sim::Line<std::uint8_t> line(LinkKind::clocked, line_settings);
   line.attach(sim::NodeRole::device, faulty);
   Outcome outcome;
-  const auto on_emit = [&] {
-    const Reading& reading = host.machine.position();
+  const auto compare = [&](const Reading& reading) {
     const Word truth = word_of(WordFormat(format.word), motion.at(reading.latched), 0);
     ++outcome.positions;
     if (reading.singleturn_valid() && reading.singleturn != truth.position) ++outcome.wrong;
-    return true;
   };
   Time last_end = -1s;
   line.observe_transfers([&](const sim::Line<std::uint8_t>::Transfer& seen) {
     if (last_end >= Time{} && seen.start != last_end + timeout_maximum) ++outcome.gaps;
     last_end = seen.end;
   });
-  const auto node = line.attach(sim::NodeRole::host, host.machine, on_emit);
+  Watched<decltype(host.machine), decltype(compare)> watched(host.machine, compare);
+  const auto node = line.attach(sim::NodeRole::host, watched);
   EXPECT_TRUE(line.run(node, std::chrono::hours(24)));
   outcome.damaged = faulty.damaged_replies();
   outcome.faults = faulty.counts();

@@ -41,7 +41,7 @@ struct SafetyFormat {
   std::int8_t previous_life_counter = -1;  ///< Life counter of the previous frame; -1: unknown.
   // ---- The following members mean the same as in Format.
   std::uint32_t ma_khz = 1000;  ///< Clock MA in kHz.
-  /// Longest time that the encoder needs for a position; it decides the number of clocks.
+  /// Longest time until the position is ready, with the line's delay; the number of clocks depends on it.
   Time latency = 10us;
   Time ready{};  ///< Time that a virtual encoder needs for a position; 0: as `latency`, at most 10 us.
   std::uint32_t line_delay_ns = 0;      ///< Delay of a virtual encoder's line, there and back, in nanoseconds.
@@ -73,7 +73,7 @@ struct SafetyReply {
 
 namespace detail {
 
-// Zeros are no word, although a CRC may be valid for them: SLO is low after a frame.
+// With a CRC, zeros are no word, even if the CRC fits them: SLO is low after a frame.
 constexpr Error take_channel(const Channel& channel, BitView samples, std::size_t first, ChannelData& data) {
   const std::size_t end = first + data_bits(channel);
   if (channel.check.width != 0 && !samples[first] && samples.end_of_run(first) >= end) return Error::line_stuck;
@@ -97,7 +97,7 @@ constexpr std::uint64_t compared_bits(const Channel& channel, const WordWith<siz
          format.compare_bits <= format.spw.word.bits_of(Meaning::position);
 }
 
-/// Returns whether the compared bits of both words, with common turns, differ by at most one.
+/// Returns whether position and the turns that both words have differ by at most one, with wrap-around.
 template <std::size_t size>
 [[nodiscard]] constexpr bool positions_agree(const SafetyFormat& format, const WordWith<size>& cpw,
                                              const WordWith<size>& spw) {

@@ -105,7 +105,7 @@ struct Bench : author::testing::UnitBench<19> {
                     const OnEmit& on_emit = {}) {
     return UnitBench::run(name, arguments, on_emit);
   }
-  /// Runs a command while `tamper` makes replies; `answering.log` has the received commands.
+  /// Runs a command while `tamper` may replace replies; `answering.log` has the received commands.
   CommandResult run_tampered(const Tamper& tamper, std::string_view name,
                              const std::vector<std::int64_t>& arguments = {}) {
     answering.tamper = tamper;

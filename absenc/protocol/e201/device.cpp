@@ -44,7 +44,7 @@ void VirtualInterface::stopped(Time) {
   zero_ = 0;
 }
 
-// Without CR, because it is unknown whether `M` and `B` need one.
+// Returns the length without a CR, because it is unknown whether `M` and `B` need one.
 std::size_t VirtualInterface::request_size(Bytes begin) const {
   return begin[0] == letter::set_clock ? 2 : begin[0] == letter::set_width ? 3 : 1;
 }

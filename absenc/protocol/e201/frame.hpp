@@ -44,7 +44,7 @@ inline constexpr std::uint8_t width = 'b';
 /// Command that sets the width of the position in bits.
 inline constexpr std::uint8_t set_width = 'B';
 inline constexpr std::string_view all = "4vse?>mbnfza01MB";  ///< Letters of all commands.
-/// Letters of the commands whose reply is a line of text.
+/// Letters of the commands, apart from `4`, whose reply is one line of text.
 inline constexpr std::string_view answered_by_a_line = "vse?>mb";
 
 /// Returns whether `letters` contains the letter `one`.

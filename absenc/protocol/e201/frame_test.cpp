@@ -159,6 +159,7 @@ TEST(E201Frame, FindsVersionAnywhereInText) {
 
 TEST(E201Frame, FindsNumbersInUndocumentedTexts) {
   EXPECT_EQ(find_milli(bytes("4.98V 62mA"), 'V'), 4980u);
+  EXPECT_EQ(find_milli(bytes("5000000 V"), 'V'), ~0u) << "more than the number holds";
   EXPECT_EQ(find_milli(bytes("4.98V 62mA"), 'A'), 62u);
   EXPECT_EQ(find_milli(bytes("U = 5012 mV, I = 0.0625 A"), 'V'), 5012u);
   EXPECT_EQ(find_milli(bytes("U = 5012 mV, I = 0.0625 A"), 'A'), 62u);

@@ -109,7 +109,7 @@ bool is_near(const Dialog& dialog, std::int64_t counts, std::int64_t other) {
 }  // namespace
 
 Procedure set_zero(Dialog& dialog, InterfaceResults& found) {
-  // `4` is read too, because `?` reports no errors; firmware before 1.16 does not answer it.
+  // `4` is read too, because `?` reports no errors; firmware before 1.16 does not answer `4`.
   const Result<Reply> samples = co_await dialog.attempt({letter::samples});
   if (samples) {
     const Reading look = Protocol::reading(dialog.format(), {letter::samples}, *samples);
@@ -150,7 +150,7 @@ unsigned InterfaceResults::recommended() const {
 
 namespace {
 
-// Called at once, because more exchanges follow before the procedure ends.
+// Explains the last exchange at once, because more exchanges follow before the procedure ends.
 Outcome failure(const Dialog& dialog, Error error) {
   const Explanation what = explain(dialog.format(), error, dialog.exchange().sent, dialog.reply());
   return {error, dialog.is_noisy() ? endless_noise.detail : what.detail,
@@ -190,6 +190,7 @@ Procedure sweep_clocks(Dialog& dialog, InterfaceResults& found, Arguments argume
   if (is_too_old(version)) co_return too_old;
   const Reply clock = co_await dialog.ask({letter::clock}).or_say("the interface does not say which clock it has");
   found.previous = static_cast<unsigned>(clock.number);
+  dialog.hold_line(true);  // no other conversation must read positions at a clock of the sweep
   const Outcome outcome = co_await try_clocks(dialog, found);
   found.left = found.previous;
   const Error error = co_await switch_clock(dialog, found.previous);

@@ -78,7 +78,7 @@ author::Procedure sweep_clocks(Dialog& dialog, InterfaceResults& found, Argument
 inline constexpr std::string_view check_stream =
     "check that it is an E201-9S and does not stream (`absenc run ... stream-off` ends it)";
 
-/// Returns cause and advice for an error, empty if there are none. An empty request is `4`.
+/// Returns cause and advice for an error, empty if there are none. An empty request counts as `4`.
 [[nodiscard]] Explanation explain(const Format& format, Error error, Bytes request, Bytes reply);
 
 }  // namespace absenc::e201

@@ -2,6 +2,7 @@
 // Finds numbers and versions in reply texts of the E201-9S that no document describes.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <limits>
@@ -130,8 +131,9 @@ struct Version {
     std::size_t after = at;
     while (after < text.size() && text[after] == ' ') ++after;
     const bool thousandths = after + 1 < text.size() && text[after] == 'm' && text[after + 1] == symbol;
-    if (thousandths) return static_cast<unsigned>(milli / 1000);
-    if (after < text.size() && text[after] == symbol) return static_cast<unsigned>(milli);
+    const bool is_whole = after < text.size() && text[after] == symbol;
+    if (thousandths) milli /= 1000;
+    if (thousandths || is_whole) return static_cast<unsigned>(std::min<std::uint64_t>(milli, ~0U));
   }
   return std::nullopt;
 }

@@ -156,7 +156,7 @@ TEST_P(EncolinkRegister, StopsAfterTwoSecondsOfBusy) {
   EXPECT_LT(read.took, busy_limit + 10ms);
 }
 
-// A damaged key byte, so that no access is detected; a damaged address with a wrong checksum.
+// A damaged key byte hides the access; a damaged address makes its checksum wrong.
 TEST_P(EncolinkRegister, RepeatsAccessThatArrivedDamaged) {
   for (const auto& [right, wrong, error, words] :
        std::to_array<std::tuple<std::uint8_t, std::uint8_t, Error, std::string_view>>(
@@ -231,7 +231,7 @@ TEST_P(EncolinkRegister, ReadsBackBeforeRepeatingWrite) {
   EXPECT_EQ(written, 1u);
 }
 
-// The unknown operation is ignored, so the register keeps its value.
+// The encoder ignores an unknown operation, so the register keeps its value.
 TEST_P(EncolinkRegister, RepeatsWriteThatWasNotExecuted) {
   for (const auto& [times, error] :
        std::to_array<std::pair<int, Error>>({{2, Error::none}, {3, Error::cross_check_failed}})) {

@@ -51,7 +51,7 @@ void ChannelFollower::take_byte(const Format& format, std::uint64_t number, cons
   if (frames_.size() < size) return;
   ByteBuffer<longest_cycle> bytes;
   for (const Position& one : frames_.view()) bytes.push_back(one.channel2);
-  const Result<Cycle> cycle = decode_cycle(format, bytes);
+  const Result<ChannelCycle> cycle = decode_cycle(format, bytes);
   const bool same = cycle && same_place(cycle->position, frames_[0]);
   if (!same && !in_step_) return;
   cycle_bytes_ = bytes;

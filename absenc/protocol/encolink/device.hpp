@@ -23,7 +23,7 @@ inline constexpr std::array<Condition, 3> conditions{{
 /// Index of a condition in `conditions`.
 enum ConditionIndex : std::size_t { condition_temperature, condition_busy, condition_channels_disagree };
 
-/// A virtual AksIM-2 encoder.
+/// A virtual AksIM-2 encoder, or an AksIM-4 without registers.
 class VirtualEncoder final : public author::Responder {
  public:
   /// Creates an encoder that is off; unknown members of `format` are those of virtual_format. `shaft` must outlive it.
@@ -93,7 +93,7 @@ class VirtualEncoder final : public author::Responder {
 
   bool identity_next_ = false;
   ReplyBytes cycle_;
-  Cycle cycle_content_{};
+  ChannelCycle cycle_content_{};
   std::size_t cycle_index_ = 0;
   AccessBytes access_;
   ByteBuffer<access_capacity + 2> answer_;

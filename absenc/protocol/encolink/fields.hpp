@@ -91,7 +91,7 @@ struct Values {
   Maybe<std::uint32_t> address{};  ///< Address of the accessed register.
   Maybe<std::size_t> length{};     ///< Number of bytes of the accessed register.
   Maybe<Bytes> data{};             ///< Bytes of the accessed register, most significant first.
-  /// Fewer than 8 bytes as a number.
+  /// `data` as a number, if it has fewer than 8 bytes and no field with the name of the register.
   Maybe<std::int64_t> value{};
 };
 
@@ -168,7 +168,7 @@ inline constexpr auto register_fields = [] {
 
 /// Values of procedures that are neither in frames nor in registers.
 struct ProcedureValues {
-  std::uint8_t calibrations;        ///< Number of self-calibrations that ended, modulo 4.
+  std::uint8_t calibrations;        ///< Counter of self-calibrations in the encoder, modulo 4.
   bool running;                     ///< Whether a self-calibration is running.
   author::AsciiText not_described;  ///< Text that explains why no register was read.
 };
@@ -322,7 +322,7 @@ constexpr Error decode(const Format& format, Bytes request, Bytes reply, FieldSi
   }
   const Format known = assumed(format, reply);
   if (known.has_ch2 && reply.size() == known.cycle_bytes()) {
-    const Result<Cycle> cycle = decode_cycle(known, reply);
+    const Result<ChannelCycle> cycle = decode_cycle(known, reply);
     if (cycle) put_position(sink, known, cycle->position, cycle->status, cycle->channel3);
     return cycle.error();
   }

@@ -19,7 +19,7 @@ namespace absenc::encolink {
 
 using namespace std::chrono_literals;
 
-// ---- Times that hosts keep and the virtual encoder checks
+// ---- Times of hosts and of the virtual encoder
 
 inline constexpr LineSettings uart_settings{.rate = 1'000'000};  ///< Settings of the line of interface variant L.
 inline constexpr Time spi_lead = 5us;  ///< Time t_s: shortest time from NCS low to the first edge of SCK.
@@ -57,7 +57,7 @@ inline constexpr CrcParameters crc_parameters{8, 0x97, 0, false, false, 0xFF};
   return !bytes.empty() && checksum(bytes.first(bytes.size() - 1)) == bytes.back();
 }
 
-/// First byte of a request. Every request asks for a position; some have a further effect.
+/// First byte of a request. The encoder answers each request with a frame; some have a further effect.
 enum class Config : std::uint8_t {
   position = 0x00,
   reset_channels = 0xAA,  ///< Channels 2 and 3 restart in the next frame.
@@ -85,7 +85,7 @@ enum class OffsetUnit : std::uint8_t { counts, turn_fraction };
 /// Generation of the encoder, on which its registers depend.
 enum class Generation : std::uint8_t { aksim2, aksim4 };
 
-/// Layout of an encoder's frames. What is unknown follows from the encoder's identity.
+/// Layout of an encoder's frames; unknown members follow from the encoder's identity.
 struct Format {
   unsigned resolution = 0;                      ///< Number of bits of the position in a turn, 1 to 22; 0: unknown.
   int multiturn_bits = -1;                      ///< Number of bits of the turn counter, 0 to 16; -1: unknown.
@@ -142,7 +142,7 @@ struct Position {
 };
 
 /// A cycle of channel 2. Each position frame carries one byte of it.
-struct Cycle {
+struct ChannelCycle {
   Position position{};       ///< Position of the frame that carried the first byte; the member `channel2` is unused.
   std::uint16_t status = 0;  ///< Detailed status: bits of `status`.
   /// Byte of channel 3: state of the encoder, or a byte of its answer to a register access.
@@ -238,7 +238,7 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
 }
 
 /// Returns the bytes of a whole cycle of channel 2.
-[[nodiscard]] constexpr ReplyBytes encode_cycle(const Format& format, const Cycle& cycle) {
+[[nodiscard]] constexpr ReplyBytes encode_cycle(const Format& format, const ChannelCycle& cycle) {
   ReplyBytes bytes = detail::position_bytes(format, cycle.position);
   bytes.push_back(static_cast<std::uint8_t>(cycle.status >> 8));
   bytes.push_back(static_cast<std::uint8_t>(cycle.status));
@@ -248,13 +248,13 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
 }
 
 /// Decodes a channel 2 cycle of a known format. Errors: wrong_length, bad_checksum, out_of_range.
-[[nodiscard]] constexpr Result<Cycle> decode_cycle(const Format& format, Bytes bytes) {
+[[nodiscard]] constexpr Result<ChannelCycle> decode_cycle(const Format& format, Bytes bytes) {
   if (bytes.size() != format.cycle_bytes()) return Error::wrong_length;
   if (!is_sealed(bytes)) return Error::bad_checksum;
   const Result<Position> position = detail::load_position(format, bytes);
   if (!position) return position.error();
   const Bytes rest = bytes.subspan(format.position_bytes());
-  return Cycle{*position, static_cast<std::uint16_t>(load_big_endian(rest.first(2))), rest[2]};
+  return ChannelCycle{*position, static_cast<std::uint16_t>(load_big_endian(rest.first(2))), rest[2]};
 }
 
 /// Returns the identity frame.
@@ -336,7 +336,8 @@ constexpr Result<Position> load_position(const Format& format, Bytes bytes) {
   return reading;
 }
 
-/// Returns `now` with the alarms of `before`, if its error and warning bits agree with them.
+/// Returns `now` with the alarms of `before` that `now` leaves open, if the error and warning bits of `now` agree with
+/// them.
 [[nodiscard]] constexpr Reading remembered(const Reading& before, Reading now) {
   const std::uint32_t unknown = before.alarms_reported & ~now.alarms_reported;
   if (unknown == 0 || now.singleturn_bits == 0) return now;

@@ -44,7 +44,7 @@ void Channels::take(const author::HostOf<Frames>& host) {
     if (bytes_.empty()) first_ = position;
     bytes_.push_back(position.channel2);
     if (bytes_.size() == format.cycle_bytes()) {
-      const Result<Cycle> cycle = decode_cycle(format, bytes_);
+      const Result<ChannelCycle> cycle = decode_cycle(format, bytes_);
       const Bytes all = bytes_;
       silent = std::all_of(all.begin(), all.end(), [](std::uint8_t byte) { return byte == 0; });
       ended = cycle && !same_place(cycle->position, first_) ? Error::cross_check_failed : cycle.error();

@@ -36,8 +36,10 @@ struct Frames {
   static constexpr author::HostTimes host_times(const Format& format) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit, .silence = pause(format)};
   }
-  /// Returns how a host sends a request; all requests are sent in the same manner.
-  static constexpr author::Manner manner(const Format&, const Request&) { return {}; }
+  /// Returns how a host sends a request.
+  static constexpr author::Manner manner(const Format&, const Request& request) {
+    return {.holds_line = request.ask == Ask::identify};  // the next request must be the one for the identity
+  }
   /// Returns the bytes of `request` as they are sent.
   static std::array<std::uint8_t, request_bytes> encode(const Format&, const Request& request);
   /// Returns the length of the reply to `request` in bytes; 0 if only silence ends the reply.
@@ -46,6 +48,14 @@ struct Frames {
   static Result<Position> decode(const Format& format, const Request& request, Bytes reply);
   /// Returns whether an invalid reply is complete, as on SPI, where a transfer has a fixed length.
   static bool is_whole(const Format& format, Error) { return format.interface == Interface::spi; }
+  static constexpr bool replies_carry_position = true;  ///< Each frame but the identity has the position.
+  /// Returns the position of a frame; an empty reading without one.
+  static Reading reading(const Format& format, const Request& request, const Reply& reply) {
+    const bool has_position = request.ask == Ask::position || request.ask == Ask::reset;
+    return has_position && format.known() ? to_reading(format, reply) : Reading{};
+  }
+  /// Returns `sent_at`, the assumed time of the position.
+  static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
   /// Returns the shortest time between two frames.
   static constexpr Time pause(const Format& format) { return format.interface == Interface::spi ? spi_pause : Time{}; }
 };

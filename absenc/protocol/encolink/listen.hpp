@@ -18,9 +18,9 @@ class Listen final : public Conversation<std::uint8_t> {
   /// Creates a conversation that receives an encoder of this format, which must be known.
   explicit Listen(const Format& format);
 
-  /// Processes an event of the port, such as received data or silence.
+  /// Processes received data or a damaged character; ignores other events.
   void feed(const Event<std::uint8_t>& event) override;
-  /// Returns what the port must do next, such as send or wait.
+  /// Returns what the port must do next: wait, deliver a result, or end.
   Step<std::uint8_t> next(Time now) override;
   [[nodiscard]] const StreamCounts* stream() const override { return &counts_; }
   [[nodiscard]] Error error() const override { return error_; }

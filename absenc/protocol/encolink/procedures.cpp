@@ -390,7 +390,7 @@ Procedure preset_multiturn(Dialog& dialog, ProcedureState& found, Arguments argu
   co_return done;
 }
 
-// It has ended when its counter changes or a new failure is reported.
+// The self-calibration has ended when its counter changes or a new failure is reported.
 Procedure self_calibrate(Dialog& dialog, ProcedureState& found) {
   co_await read(dialog, found, calibration_status);
   const std::uint8_t before = found.data[0];

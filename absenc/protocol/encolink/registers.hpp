@@ -143,7 +143,7 @@ inline constexpr std::size_t largest_register = 20;  ///< Number of bytes of the
 /// Values that a host writes to the command register.
 namespace commands {
 inline constexpr std::uint8_t save = 0x63;            ///< Stores the configuration in the non-volatile memory.
-inline constexpr std::uint8_t reset = 0x72;           ///< Restores the configuration at shipping.
+inline constexpr std::uint8_t reset = 0x72;           ///< Restores shipping values, until power off unless saved.
 inline constexpr std::uint8_t self_calibrate = 0x41;  ///< Starts the self-calibration.
 }  // namespace commands
 

@@ -68,7 +68,9 @@ struct Protocol {
   using Request = encolink::Request;
   using Reply = Position;
   using Dialog = encolink::Dialog;
+  static constexpr bool replies_carry_position = Frames::replies_carry_position;
 
+  static constexpr author::HostTimes host_times(const Format& format) { return Frames::host_times(format); }
   static author::Manner manner(const Format&, const Request&) { return {}; }
   static AccessBytes encode(const Format&, const Request& request) {
     if (request.access) return encode_access(*request.access);

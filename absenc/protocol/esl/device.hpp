@@ -151,7 +151,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   [[nodiscard]] bool has_wrong_checksum(Bytes request) const {
     return request.size() > 1 && !has_checksum8(profile_, request);
   }
-  // Returns whether `heard` ends with a complete request for this encoder, after its first byte.
+  // Returns whether the last bytes of `heard`, but not all, are a complete request for this encoder.
   [[nodiscard]] bool contains_own_request(Bytes heard) const {
     for (std::size_t begin = 1; begin < heard.size(); ++begin) {
       const Bytes rest = heard.subspan(begin);

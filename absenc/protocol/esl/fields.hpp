@@ -80,7 +80,7 @@ struct Shown {
   std::optional<std::string_view> trouble{};       ///< Sentence about the error of a complete reply in a scan.
   std::optional<std::uint8_t> page{};              ///< Page of a memory access.
   std::optional<std::uint8_t> memory_address{};    ///< Address of a memory access (ADF).
-  std::optional<std::uint8_t> busy{};              ///< 1: the memory is busy, and the request was not executed.
+  std::optional<std::uint8_t> busy{};              ///< 1: the memory is busy; no byte was read or written.
   std::optional<std::uint8_t> value{};             ///< Value of the memory byte (EDF).
   std::optional<Bytes> data{};                     ///< Values of several memory bytes, from `memory_address` on.
   std::optional<bool> written{};                   ///< Whether the byte was written; false: it had the value already.
@@ -93,7 +93,7 @@ struct Shown {
 };
 
 namespace detail {
-// Returns the member of the reply that `part` carries in this channel, if it does.
+// Returns the member of the reply that `part` carries in this channel; no value if the reply lacks it.
 template <Channel channel, unsigned part, auto member>
 constexpr auto in(const Shown& all) {
   const Reply reply = all.reply.value_or(Reply{});

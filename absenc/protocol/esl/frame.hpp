@@ -81,7 +81,7 @@ inline constexpr CrcParameters crc8_msb{8, 0x2F, 0, false, false, 0};
 [[nodiscard]] constexpr std::uint16_t initial_value(Channel channel) { return channel == Channel::two ? 0xFFFF : 0; }
 
 namespace detail {
-// Returns the 16-bit CRC of 16-bit words; `swapped`: the second byte of each enters it first.
+// Returns the 16-bit CRC of 16-bit words; `swapped`: the second byte of each word enters the CRC first.
 template <CrcParameters parameters>
 constexpr std::uint16_t crc_of_pairs(Channel channel, Bytes bytes, bool swapped) {
   Crc<parameters, CrcTable::nibble> crc(initial_value(channel));
@@ -325,7 +325,7 @@ struct Reply {
   std::uint16_t redundant = 0;
   std::int8_t temperature = 0;      ///< temperature in degC; that it is signed is assumed
   std::uint8_t memory_address = 0;  ///< Address of the memory byte (ADF).
-  bool busy = false;                ///< Whether the memory is busy, so that the request was not executed.
+  bool busy = false;                ///< Whether the memory is busy; if so, no byte was read or written.
   std::uint8_t value = 0;           ///< Value of the memory byte (EDF).
   bool unused_bits = false;         ///< in a decoded reply: a bit that must be 0 was set
 };

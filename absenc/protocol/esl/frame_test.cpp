@@ -227,7 +227,7 @@ TEST(EslFrame, RepliesReportTheFlagsThatTheyCarry) {
   }
 }
 
-// Table 5: with led_or_lissajous_error, a non-safety error means the Lissajous signals.
+// Table 5: with led_or_lissajous_error, a non-safety error alone means the Lissajous signals.
 TEST(EslFrame, LedAndLissajousErrorsCountForEveryId) {
   for (const auto& [error, validity] :
        {std::pair{status::safety_error, Validity::invalid}, std::pair{status::non_safety_error, Validity::valid}}) {
@@ -241,7 +241,7 @@ TEST(EslFrame, LedAndLissajousErrorsCountForEveryId) {
       EXPECT_NE(to_reading(reply).multiturn_validity(), Validity::invalid) << static_cast<int>(id);
     }
   }
-  // The alarm is in another channel than the non-safety error; LED and Lissajous errors at once.
+  // Two cases: alarm and non-safety error are in different channels; SF has both errors at once.
   Reply reply = sample(DataId::position);
   reply.one = {.status = status::ready | status::non_safety_error};
   reply.two = {.status = status::channel_2 | status::ready, .alarms = alarms::led_or_lissajous_error};

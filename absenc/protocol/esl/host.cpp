@@ -140,7 +140,7 @@ constexpr Time busy_limit = 2 * page_time;
 
 constexpr std::string_view unknown_area = "Table 11 lists no such page and address; nothing was sent";
 
-// `after_busy`: the temporary register may hold a byte that another host requested.
+// `after_busy`: a byte counts only after a busy reply, because another host may have requested it.
 author::Part<Result<Reply>> when_ready(Dialog& dialog, const Request& request, bool after_busy = false) {
   const bool writes = request.id == DataId::write_memory && !selects_page(request);
   return author::until_ready<Protocol>(dialog, request,

@@ -41,7 +41,7 @@ TEST(EslHost, Id8IsNeverSentEightTimesInARow) {
   ASSERT_EQ(bench.violations(), 1u);  // the virtual encoder reports the broken rule
 }
 
-// At least one bit is between two frame sets.
+// The host pauses for at least two bits between a reply and its next request.
 TEST(EslHost, EachRequestBeginsTwoBitsAfterTheReplyBeforeInEveryConversation) {
   const std::vector<std::pair<const char*, std::vector<std::int64_t>>> commands{{"position", {}},
                                                                                 {"position", {}},
@@ -159,7 +159,7 @@ TEST(EslHost, DetectsStoppedSequenceCounter) {
   EXPECT_EQ((*made).reading(), nullptr);
 }
 
-// Each value of each option that the document leaves open, at address 5.
+// Tests each value of each option for a property that the document leaves open, at address 5.
 TEST(EslHost, HostAndEncoderAgreeInEveryProfile) {
   for (std::size_t option = 0; option < open_options; ++option) {
     for (std::size_t value = 0; value < options.infos[option].choices.size(); ++value) {

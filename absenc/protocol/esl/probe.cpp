@@ -41,7 +41,7 @@ Profile with_other_parity(Profile profile) {
   return profile;
 }
 
-// The request of a capture, decoded as far as a profile permits.
+// The request of a capture, or the one that its reply echoes, decoded as far as a profile permits.
 struct SentRequest {
   Request request{};
   bool parity_wrong = false;

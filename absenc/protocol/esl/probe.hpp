@@ -9,7 +9,7 @@
 
 namespace absenc::esl {
 
-/// Finds the options that fit all captures, as Unit::probe. For sequence_step they must be consecutive.
+/// Finds the options that fit all captures, as Unit::probe. For sequence_step the captures must be consecutive.
 bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sink);
 
 /// Returns new values of one or two options that explain an invalid reply; empty if none do.

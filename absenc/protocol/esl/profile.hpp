@@ -47,8 +47,9 @@ struct Profile {
   CrcByteOrder crc16_byte_order = CrcByteOrder::low;  ///< Order of the bytes of 16-bit CRCs.
   RedundantBit rs1_sc2 = RedundantBit::b7;            ///< Place of RS1 in the byte that it shares with SC2.
   SequenceStep sequence_step = SequenceStep::change;  ///< How the sequence counters move.
-  ParityScope parity_scope = ParityScope::command;    ///< Bits that the parity bit of CF covers.
-  FieldOrder status_order = FieldOrder::document;     ///< Order of the bits in SF.
+  ParityScope parity_scope =
+      ParityScope::command;  ///< Which bits of CF its parity bit covers: the data ID, or the encoder address too.
+  FieldOrder status_order = FieldOrder::document;  ///< Order of the bits in SF.
   /// Order of the bits in ADF, the memory address with the busy bit.
   FieldOrder memory_address_order = FieldOrder::document;
   bool request_crc = true;                      ///< whether every request has a CRC; false: only memory requests

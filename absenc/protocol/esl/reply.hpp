@@ -57,7 +57,7 @@ enum class Check : std::uint8_t {
 /// Error and texts that report a failed check.
 struct CheckText {
   Error error;                ///< Error that the failed check gives.
-  std::string_view sentence;  ///< What is wrong with the reply, as a sentence.
+  std::string_view sentence;  ///< Sentence that states the flaw of the reply.
   std::string_view advice{};  ///< Advice that replaces the advice of the error; empty: none.
 };
 

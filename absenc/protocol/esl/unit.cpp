@@ -60,7 +60,7 @@ constexpr std::string_view no_turns(const Profile& profile) {
 
 // ---- Errors
 
-// Returns the request of an exchange; without `request`, the one that the reply suggests.
+// Returns the request of an exchange; without `request`, the one that the reply echoes; or an error.
 constexpr Result<Request> request_behind(const Profile& profile, Bytes request, Bytes reply) {
   if (!request.empty()) return decode_request(profile, request);
   const auto id = data_id(reply[0]);

@@ -1,0 +1,423 @@
+// SPDX-License-Identifier: Apache-2.0
+// A position in each cycle of a drive, and other commands in the time between: one machine of many conversations.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <utility>
+
+#include "absenc/protocol/conversation.hpp"
+
+namespace absenc::host {
+
+/// A command that a CyclicHost runs beside its positions. It must live until it is over.
+template <class Item>
+class Service {
+ public:
+  /// How far a service is.
+  enum class State : std::uint8_t {
+    waiting,  ///< not begun
+    running,  ///< the conversation has begun
+    done,     ///< the conversation has ended; its error tells how
+    refused,  ///< a request does not fit between two positions, and the service may not take cycles
+  };
+
+  /// Makes a service of `conversation`, which must outlive it. `takes_cycles`: a request that does not fit between two
+  /// positions takes the place of positions, and one that must be alone on the line takes all cycles.
+  explicit Service(Conversation<Item>& conversation, bool takes_cycles = false)
+      : conversation_(&conversation), takes_cycles_(takes_cycles) {}
+  Service(const Service&) = delete;
+  Service& operator=(const Service&) = delete;
+
+  /// Returns how far the service is.
+  [[nodiscard]] State state() const { return state_; }
+  /// Returns whether the service is done or refused.
+  [[nodiscard]] bool is_over() const { return state_ >= State::done; }
+  /// Returns the time that a request refused as too long needs, `never` if unknown; 0 in other cases.
+  [[nodiscard]] Time needs() const { return needs_; }
+  /// Returns the conversation.
+  [[nodiscard]] Conversation<Item>& conversation() const { return *conversation_; }
+
+ private:
+  template <class, class>
+  friend class CyclicHost;
+
+  Conversation<Item>* conversation_;
+  Service* next_ = nullptr;
+  Time needs_{};
+  State state_ = State::waiting;
+  bool takes_cycles_;
+};
+
+/// Times of a CyclicHost.
+struct CyclePlan {
+  Time period{};        ///< time from one cycle to the next
+  LineSettings line{};  ///< settings of the line, from which the durations of requests and replies follow
+  Time answer{};        ///< longest time from a request to its reply, if shorter than the protocol's limit; 0: that one
+  Time rest{};          ///< shortest silence between a reply and the next request
+  Time latency{};       ///< delay of the port, the same that its carrier has
+  /// Whether a reply to a service has the position, too, so that services replace the requests of positions.
+  bool carried = false;
+};
+
+/// What one cycle gave.
+struct Cycle {
+  /// Kinds of cycles.
+  enum class Kind : std::uint8_t {
+    fresh,     ///< a valid position was read
+    invalid,   ///< a good reply whose position the encoder marks as not valid, or not ready
+    missing,   ///< no good reply with a position in this cycle
+    repeated,  ///< a service took this cycle
+  };
+  Kind kind = Kind::missing;  ///< kind of this cycle
+  Error error = Error::none;  ///< missing: the error of the reading; busy: the reading had not ended
+  Time begun{};               ///< time at which the cycle began
+  Reading reading{};          ///< the last reading of a fresh or invalid cycle
+  std::uint32_t stale = 0;    ///< number of cycles since the last fresh one; 0: this one is fresh
+  /// Returns the time from the latch of `reading` to `at`.
+  [[nodiscard]] Time age(Time at) const { return at - reading.latched; }
+};
+
+/// Asks for a position in each cycle and runs services in the remaining time: a machine that never ends and emits a
+/// Cycle for each period. Call all members in the context in which the machine runs.
+///
+///     cycle begins      reply          service fits?            next cycle
+///     |--- position ----|--- service's request and reply ---|---|--- position ...
+///
+/// A service's request is sent only if the longest reply that may follow ends before the next cycle. Services rest as
+/// long as they want while positions are read. If the plan says `carried`, a service's request takes the place of the
+/// position's, and its reply gives both.
+///
+/// Item is the link's, `Read` a callable that returns the Conversation of one position each time that it is called; the
+/// conversation is used until the next call. It must end by itself.
+template <class Item, class Read>
+class CyclicHost final : public Machine<Item> {
+ public:
+  /// Constructs a host whose first cycle begins at `first`.
+  CyclicHost(Read read, const CyclePlan& plan, Time first) : read_(read), plan_(plan), due_(first) {}
+  CyclicHost(const CyclicHost&) = delete;
+  CyclicHost& operator=(const CyclicHost&) = delete;
+
+  /// Queues a service. It is begun when those before it are over.
+  void add(Service<Item>& service) {
+    service.next_ = nullptr;
+    service.state_ = Service<Item>::State::waiting;
+    (last_ != nullptr ? last_->next_ : service_) = &service;
+    last_ = &service;
+  }
+  /// Returns the cycle that the last `emit` reported.
+  [[nodiscard]] const Cycle& cycle() const { return cycle_; }
+  /// Returns how many items were received while neither a reading nor a service awaited any.
+  [[nodiscard]] std::uint32_t unasked() const { return unasked_; }
+  /// Moves the next cycle to `at`, for drives whose PWM begins the cycles; Carrier::wake must follow. A cycle that a
+  /// carried service has begun ahead stays where it is.
+  void begin_next_at(Time at) { due_ = at; }
+
+  void feed(const Event<Item>& event) override;
+  Step<Item> next(Time now) override;
+
+ private:
+  using Kind = typename Step<Item>::Kind;
+  using State = typename Service<Item>::State;
+  static constexpr bool is_can = sizeof(Item) != 1;
+  /// Whose exchange is on the line.
+  enum class User : std::uint8_t { nobody, position, service };
+
+  void begin_cycle();
+  void conclude(Cycle::Kind kind, Error error);
+  bool continue_position(Step<Item>& step, Time now);
+  void conclude_position(Time now);
+  void conclude_with(const Reading& reading);
+  void run_service(Time now);
+  bool continue_service(Step<Item>& step, Time now);
+  void take_service_step(const Step<Item>& step, Time now);
+  bool begin_service(Step<Item>& step, Time now);
+  void end_service(State state);
+  void begin_transfer(Step<Item>& step);
+  void limit(Step<Item>& step, Time now) const;
+  // Returns whether the position of the next cycle may come with the service's reply.
+  [[nodiscard]] bool may_carry() const {
+    const bool is_alone = is_row_ || step_.holds_line;
+    const bool fits = step_.kind != Kind::configure && step_.at < due_ && transfer_time(step_) < plan_.period;
+    return plan_.carried && wants_ && !is_alone && fits;
+  }
+  [[nodiscard]] Time transfer_time(const Step<Item>& step) const;
+  [[nodiscard]] Time duration(const Step<Item>& step) const;
+
+  Read read_;
+  CyclePlan plan_;
+  Time due_;  // begin of the next cycle
+  Cycle cycle_{};
+  Conversation<Item>* position_ = nullptr;  // reading that has not ended
+  Service<Item>* service_ = nullptr;        // first of the queue
+  Service<Item>* last_ = nullptr;
+  Step<Item> step_{};        // transfer, pulse or change of the rate that the service wants, if `wants_`
+  Time wake_ = Time::min();  // time at which the service wants to continue, if not `wants_`
+  Time rested_at_{};         // earliest time of a service's request
+  Time free_since_ = never;  // end of the last reading
+  std::uint32_t unasked_ = 0;
+  User user_ = User::nobody;
+  bool wants_ = false;
+  bool is_row_ = false;       // no position may be requested before the service's next request
+  bool is_too_long_ = false;  // `step_` did not fit behind a position
+  bool takes_ = false;        // the running cycle belongs to the service
+  bool carries_ = false;      // the position of the running cycle comes with the service's reply
+  bool is_concluded_ = true;  // the running cycle was emitted
+  bool emitting_ = false;
+  bool in_transfer_ = false;    // the transfer has not ended
+  bool ends_by_items_ = false;  // the transfer ends when its items are received: on SPI and clocked links
+};
+
+// ---- Events
+
+template <class Item, class Read>
+void CyclicHost<Item, Read>::feed(const Event<Item>& event) {
+  using Of = typename Event<Item>::Kind;
+  if (event.kind == Of::sent || event.kind == Of::received || event.kind == Of::line_error) {
+    rested_at_ = event.at + plan_.rest;
+  }
+  if (event.kind == (ends_by_items_ ? Of::received : Of::sent)) in_transfer_ = false;
+  if (user_ == User::nobody) unasked_ += static_cast<std::uint32_t>(event.items.size());
+  // On CAN identifiers tell whose a frame is.
+  const bool is_for_both = is_can && event.kind == Of::received;
+  if (user_ == User::position || (is_for_both && position_ != nullptr)) position_->feed(event);
+  const bool is_running = service_ != nullptr && service_->state_ == State::running;
+  const bool wakes = is_running && event.kind == Of::timer && !wants_ && event.at >= wake_;
+  if (user_ == User::service || wakes || (is_for_both && is_running && !wants_)) {
+    service_->conversation_->feed(event);
+    if (user_ == User::nobody || user_ == User::position) wake_ = event.at;
+  }
+}
+
+// ---- Steps
+
+template <class Item, class Read>
+Step<Item> CyclicHost<Item, Read>::next(Time now) {
+  Step<Item> step;
+  for (;;) {
+    if (std::exchange(emitting_, false)) return {.kind = Kind::emit};
+    if (now >= due_) {
+      if (is_concluded_) {
+        begin_cycle();
+      } else {
+        conclude(Cycle::Kind::missing, Error::busy);  // the reading takes longer than a cycle
+      }
+    } else if (user_ == User::service) {
+      if (continue_service(step, now)) return step;
+    } else if (user_ == User::position) {
+      if (continue_position(step, now)) return step;
+    } else {
+      run_service(now);
+      if (user_ == User::service) continue;  // it listens
+      if (begin_service(step, now)) return step;
+      const Time service_due = service_ == nullptr ? never : wants_ ? step_.at : wake_;
+      return {.at = service_due > now ? std::min(due_, service_due) : due_};
+    }
+  }
+}
+
+template <class Item, class Read>
+void CyclicHost<Item, Read>::begin_cycle() {
+  cycle_.begun = due_;
+  due_ += plan_.period;
+  is_concluded_ = false;
+  if (position_ != nullptr) return;
+  carries_ = user_ == User::nobody && may_carry();
+  if (carries_) return;
+  takes_ = is_row_ || (is_too_long_ && wants_);
+  if (takes_ || user_ == User::service) return conclude(Cycle::Kind::repeated, Error::none);
+  position_ = &read_();
+  user_ = User::position;
+}
+
+template <class Item, class Read>
+void CyclicHost<Item, Read>::conclude(Cycle::Kind kind, Error error) {
+  cycle_.kind = kind;
+  cycle_.error = error;
+  if (kind == Cycle::Kind::fresh) {
+    cycle_.stale = 0;
+  } else if (cycle_.stale != ~std::uint32_t{0}) {
+    ++cycle_.stale;
+  }
+  is_concluded_ = emitting_ = true;
+}
+
+// ---- Positions
+
+// Returns whether `step` is to be taken.
+template <class Item, class Read>
+bool CyclicHost<Item, Read>::continue_position(Step<Item>& step, Time now) {
+  step = position_->next(now);
+  switch (step.kind) {
+    case Kind::emit:
+      return false;
+    case Kind::done:
+      conclude_position(now);
+      return false;
+    case Kind::configure:
+      return true;
+    case Kind::wait:
+      limit(step, now);
+      return true;
+    case Kind::transfer:
+    case Kind::pulse:
+      break;
+  }
+  step.at = std::max(step.at, cycle_.begun);
+  begin_transfer(step);
+  return true;
+}
+
+template <class Item, class Read>
+void CyclicHost<Item, Read>::conclude_position(Time now) {
+  const Error error = position_->error();
+  const Reading* const reading = error == Error::none ? position_->reading() : nullptr;
+  position_ = nullptr;
+  user_ = User::nobody;
+  free_since_ = now;
+  reading != nullptr ? conclude_with(*reading) : conclude(Cycle::Kind::missing, error);
+}
+
+template <class Item, class Read>
+void CyclicHost<Item, Read>::conclude_with(const Reading& reading) {
+  cycle_.reading = reading;
+  const bool is_valid = reading.ready && reading.singleturn_valid();
+  conclude(is_valid ? Cycle::Kind::fresh : Cycle::Kind::invalid, Error::none);
+}
+
+// ---- Services
+
+// Lets the service decide what it wants, while it does not use the line.
+template <class Item, class Read>
+void CyclicHost<Item, Read>::run_service(Time now) {
+  while (service_ != nullptr && user_ == User::nobody && !wants_ && now >= wake_) {
+    service_->state_ = State::running;
+    take_service_step(service_->conversation_->next(now), now);
+  }
+  // The next cycle begins early, because a clock line that is held low in the pause is a bit for the encoder.
+  if (user_ == User::nobody && !carries_ && may_carry()) begin_cycle();
+}
+
+// Returns whether the service still uses the line; `step` is the step to be taken then.
+template <class Item, class Read>
+bool CyclicHost<Item, Read>::continue_service(Step<Item>& step, Time now) {
+  step = service_->conversation_->next(now);
+  const bool awaits = in_transfer_ || step.expect != 0 || step.answer != Time{} || step.gap != Time{};
+  if (step.kind == Kind::wait && (awaits || (step.holds_line && service_->takes_cycles_))) {
+    limit(step, now);
+    return true;
+  }
+  user_ = User::nobody;
+  if (std::exchange(carries_, false)) {
+    const Reading reading = service_->conversation_->carried();
+    reading.singleturn_bits != 0 ? conclude_with(reading) : conclude(Cycle::Kind::missing, Error::none);
+  }
+  take_service_step(step, now);
+  return false;
+}
+
+template <class Item, class Read>
+void CyclicHost<Item, Read>::take_service_step(const Step<Item>& step, Time now) {
+  is_too_long_ = takes_ = false;
+  switch (step.kind) {
+    case Kind::wait:
+      if (step.holds_line && !service_->takes_cycles_) return end_service(State::refused);
+      wake_ = step.at > now ? step.at : never;
+      if (step.holds_line) user_ = User::service;
+      return;
+    case Kind::emit:
+      wake_ = now;
+      return;
+    case Kind::done:
+      return end_service(State::done);
+    case Kind::transfer:
+    case Kind::pulse:
+    case Kind::configure:
+      if (step.holds_line && !service_->takes_cycles_) return end_service(State::refused);
+      step_ = step;
+      wants_ = true;
+      return;
+  }
+}
+
+// Returns whether the step that the service wants begins now; `step` is that step then.
+template <class Item, class Read>
+bool CyclicHost<Item, Read>::begin_service(Step<Item>& step, Time now) {
+  if (!wants_) return false;
+  Time start = std::max({now, step_.at, rested_at_});
+  if (carries_) start = std::max(start, cycle_.begun);
+  const bool fits = step_.kind == Kind::configure || duration(step_) <= due_ - start;
+  if (!fits && !is_row_ && !takes_ && !carries_) {
+    // It is too long if only the position was in its way.
+    is_too_long_ = is_too_long_ || (now == free_since_ && step_.at <= std::max(now, rested_at_));
+    if (is_too_long_ && !service_->takes_cycles_) {
+      service_->needs_ = duration(step_);
+      end_service(State::refused);
+    }
+    return false;
+  }
+  step = step_;
+  wants_ = takes_ = false;
+  if (step.kind == Kind::configure) {
+    wake_ = now;
+    return true;
+  }
+  step.at = start;
+  is_row_ = step.holds_line;
+  user_ = User::service;
+  begin_transfer(step);
+  return true;
+}
+
+template <class Item, class Read>
+void CyclicHost<Item, Read>::end_service(typename Service<Item>::State state) {
+  service_->state_ = state;
+  service_ = service_->next_;
+  if (service_ == nullptr) last_ = nullptr;
+  wants_ = takes_ = carries_ = is_row_ = is_too_long_ = false;
+  wake_ = Time::min();
+}
+
+// ---- The line
+
+template <class Item, class Read>
+void CyclicHost<Item, Read>::begin_transfer(Step<Item>& step) {
+  if (plan_.answer != Time{}) step.answer = std::min(step.answer, plan_.answer);
+  in_transfer_ = true;
+  ends_by_items_ = step.answer == Time{} && step.gap == Time{} && step.expect != 0;
+}
+
+// Limits a wait to the answer of the plan and the begin of the next cycle.
+template <class Item, class Read>
+void CyclicHost<Item, Read>::limit(Step<Item>& step, Time now) const {
+  if (plan_.answer != Time{}) step.answer = std::min(step.answer, plan_.answer);
+  step.at = std::min(step.at > now ? step.at : never, due_);
+}
+
+// Returns the duration of the items of a transfer and its reply, or of a pulse.
+template <class Item, class Read>
+Time CyclicHost<Item, Read>::transfer_time(const Step<Item>& step) const {
+  const LineSettings line = plan_.line.with_some_rate();
+  if (step.kind == Kind::pulse) return step.width;
+  if (step.bits != 0) return line.bits(step.bits + line.idle_clocks);
+  if constexpr (is_can) {
+    constexpr unsigned longest_frame = 160;  // bits of an extended CAN frame of 8 bytes with stuff bits
+    return line.bits(longest_frame * (step.out.size() + step.expect));
+  } else {
+    if (step.answer == Time{} && step.expect != 0) {  // SPI
+      return line.select_lead + line.bits(8 * std::max(step.out.size(), step.expect));
+    }
+    const Time pauses = step.frame != 0 ? static_cast<int>(step.out.size() / step.frame) * step.width : Time{};
+    return static_cast<int>(step.out.size() + step.expect) * line.byte_time() + pauses;
+  }
+}
+
+// Returns the longest time that the transfer or pulse and its reply can take; `never`: its reply has no known length.
+template <class Item, class Read>
+Time CyclicHost<Item, Read>::duration(const Step<Item>& step) const {
+  if (step.answer != Time{} && step.expect == 0) return never;
+  const Time answer = plan_.answer != Time{} ? std::min(step.answer, plan_.answer) : step.answer;
+  return transfer_time(step) + answer + step.gap + plan_.latency;
+}
+
+}  // namespace absenc::host

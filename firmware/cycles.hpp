@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: Apache-2.0
+// A drive that reads a position in every cycle while commands run beside it, and its encoder, on one machine. A timer
+// stands for the line: it delivers characters, or the bits of a transfer, at the times at which a line would.
+//
+//   cycles-... CYCLES: number of cycles
+//
+// The shaft accelerates to 6000 rpm and back, in both directions. One of a hundred replies is damaged, late or missing.
+// Every position is compared with the shaft at its instant.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <new>
+
+#include "absenc/host/carrier.hpp"
+#include "absenc/host/cyclic_host.hpp"
+#include "absenc/host/extrapolation.hpp"
+#include "absenc/host/first_reading.hpp"
+#include "absenc/protocol/unit.hpp"
+#include "firmware/machine/machine.hpp"
+
+namespace absenc::firmware {
+
+using namespace std::chrono_literals;
+using machine::print;
+
+inline void print_count(std::string_view name, std::uint64_t number) {
+  print(name);
+  print(" ");
+  print(number);
+  print("\n");
+}
+
+/// A generator of pseudo-random numbers, the same in each run.
+class Random {
+ public:
+  std::uint32_t below(std::uint32_t limit) {
+    state_ ^= state_ << 13;
+    state_ ^= state_ >> 17;
+    state_ ^= state_ << 5;
+    return state_ % limit;
+  }
+
+ private:
+  std::uint32_t state_ = 0x2545'F491;
+};
+
+/// A shaft that accelerates for a second at 100 revolutions/s^2, brakes, does the same in the other direction, and
+/// rests for a second.
+class AcceleratingShaft final : public Shaft {
+ public:
+  static constexpr Time period = 5s;         ///< Duration of one such motion.
+  static constexpr Time begin_of_rest = 4s;  ///< Begin of the rest in each period.
+
+  /// Returns the position in 2^-32 revolution.
+  [[nodiscard]] static std::int64_t position(Time time) {
+    constexpr std::int64_t second = 1'000'000'000;
+    const auto phase = static_cast<std::int64_t>(time.count() % period.count());
+    if (phase < second) return start + curve(phase);
+    if (phase < 3 * second) return start + 2 * curve(second) - curve(phase - 2 * second);
+    return start + (phase < 4 * second ? curve(phase - 4 * second) : 0);
+  }
+  [[nodiscard]] ShaftState at(Time time) const override { return {.position = position(time)}; }
+
+ private:
+  static constexpr std::int64_t start = (std::int64_t{1000} << 32) + (std::int64_t{1} << 30);
+  // Returns 50 revolutions/s^2 * t^2 in 2^-32 revolution; t is `ns`, which is within 1 s of 0.
+  [[nodiscard]] static constexpr std::int64_t curve(std::int64_t ns) {
+    constexpr std::int64_t factor = 944'473;  // 50 * 2^32 * 1e-18 * 2^42
+    return (ns * ns >> 20) * factor >> 22;
+  }
+};
+
+/// Compares cycles with the shaft, and counts them by their kind.
+class CycleCheck {
+ public:
+  /// `jitter`: greatest time by which the machine may note the time of an event late.
+  explicit CycleCheck(Time jitter) : jitter_(jitter) {}
+
+  void take(const host::Cycle& cycle, Time next) {
+    ++counts_[static_cast<std::size_t>(cycle.kind)];
+    longest_stale_ = std::max(longest_stale_, cycle.stale);
+    if (cycle.kind != host::Cycle::Kind::fresh) return;
+    const Reading& reading = cycle.reading;
+    // The drive does not believe a position that the shaft cannot have reached: checks miss some damage.
+    if (!first_.confirms(reading)) {
+      ++implausible_;
+      return;
+    }
+    if (!is_near(counts_of(reading), reading, reading.latched, 1, 1)) ++wrong_;
+    constexpr Time longest_gap = 500us;  // longest time between two readings from which the check extrapolates
+    if (reading.latched - latched_ > longest_gap) extrapolation_.restart();
+    latched_ = reading.latched;
+    extrapolation_.add(reading);
+    if (!extrapolation_.valid()) return;
+    if (extrapolation_.bits() != reading.singleturn_bits + reading.multiturn_bits) return;
+    // Two readings are known to a count and to the jitter of their times.
+    if (!is_near(extrapolation_.at(next), reading, next, 6, 3)) ++far_;
+  }
+  [[nodiscard]] bool is_right() const { return wrong_ == 0 && far_ == 0; }
+  [[nodiscard]] std::uint32_t count(host::Cycle::Kind kind) const { return counts_[static_cast<std::size_t>(kind)]; }
+  [[nodiscard]] std::uint32_t all() const { return counts_[0] + counts_[1] + counts_[2] + counts_[3]; }
+  void print_counts() const {
+    constexpr std::array<std::string_view, 4> names{"fresh", "invalid", "missing", "repeated"};
+    for (std::size_t i = 0; i < names.size(); ++i) print_count(names[i], counts_[i]);
+    print_count("longest_stale", longest_stale_);
+    print_count("implausible", implausible_);
+    print_count("wrong", wrong_);
+    print_count("far", far_);
+  }
+
+ private:
+  [[nodiscard]] static std::uint64_t counts_of(const Reading& reading) {
+    return (reading.multiturn_valid ? reading.multiturn << reading.singleturn_bits : 0) | reading.singleturn;
+  }
+  // Returns whether the shaft was at `position` at `time`, or between `jitters` jitters before and behind it, give or
+  // take `counts`.
+  [[nodiscard]] bool is_near(std::uint64_t position, const Reading& reading, Time time, std::int64_t counts,
+                             int jitters) const {
+    const unsigned bits = reading.singleturn_bits + (reading.multiturn_valid ? reading.multiturn_bits : 0);
+    const auto apart = [&](Time at) {
+      const std::int64_t wanted = AcceleratingShaft::position(at) >> (32 - reading.singleturn_bits);
+      return with_sign(position - static_cast<std::uint64_t>(wanted), bits);
+    };
+    const std::int64_t before = apart(time - jitters * jitter_);
+    const std::int64_t behind = apart(time + (jitters - 1) * jitter_);
+    return std::min(before, behind) <= counts && std::max(before, behind) >= -counts;
+  }
+
+  Time jitter_;
+  host::Extrapolation extrapolation_{};
+  Time latched_{};  // of the last fresh reading
+  std::array<std::uint32_t, 4> counts_{};
+  host::FirstReading first_{6000};
+  std::uint32_t longest_stale_ = 0;
+  std::uint32_t implausible_ = 0;  // fresh cycles whose position is too far from the one before
+  std::uint32_t wrong_ = 0;
+  std::uint32_t far_ = 0;  // extrapolated positions that are too far from the shaft
+};
+
+/// Handles the events of the line that are due, in the order of time, and sets the alarm of the timer to the next one.
+/// `Wire` has `next()`, the time of its next event, and `pass(Time)`, which handles that event.
+template <class Wire>
+void run_line(Wire& wire) {
+  Time next = wire.next();
+  while (next <= machine::now()) {
+    wire.pass(next);
+    next = wire.next();
+  }
+  machine::set_alarm(std::max(next - machine::now(), Time{}));
+}
+
+/// A command beside the cycles, made by the unit.
+class ServiceRunner {
+ public:
+  explicit ServiceRunner(const Unit& unit, const Options& options) : unit_(unit), options_(options) {}
+
+  /// Runs the command to its end; `add` queues the service. Returns its error.
+  template <class Add>
+  Error run(std::string_view name, Arguments arguments, bool takes_cycles, const Add& add) {
+    auto* const conversation = unit_.host(options_, *find_command(unit_, name), arguments, storage_).bytes;
+    if (conversation == nullptr) return Error::invalid_argument;
+    host::Service<std::uint8_t> service(*conversation, takes_cycles);
+    {
+      const machine::InterruptLock lock;
+      add(service);
+    }
+    for (bool over = false; !over;) {
+      asm volatile("wfi");
+      const machine::InterruptLock lock;
+      over = service.is_over();
+    }
+    if (service.state() == host::Service<std::uint8_t>::State::refused) return Error::busy;
+    struct Value final : FieldSink {
+      void put(const FieldValue& value) override {
+        if (value.info->role == Role::value) number = value.number;
+      }
+      std::int64_t number = -1;
+    } value;
+    if (conversation->error() == Error::none) conversation->report(value);
+    value_ = value.number;
+    return conversation->error();
+  }
+  /// Returns the value that the last command reported, -1 if none.
+  [[nodiscard]] std::int64_t value() const { return value_; }
+
+ private:
+  const Unit& unit_;
+  const Options& options_;
+  std::int64_t value_ = -1;
+  alignas(std::max_align_t) std::array<std::byte, 3072> storage_;
+};
+
+/// How the two programs differ.
+struct Plan {
+  std::string_view temperature{};  ///< command that is run every second; "": none
+  std::uint32_t alarm = 0;         ///< alarm that rises in each rest of the shaft; 0: none
+  std::string_view clear{};        ///< command that clears the alarm; "": no command is run
+  std::int64_t page = 0;           ///< page of the memory that is written and read
+  std::int64_t addresses = 0;      ///< addresses on each page
+  std::int64_t bytes = 0;          ///< number of bytes that are written and read
+  bool takes_cycles = false;       ///< whether commands may take cycles
+};
+
+/// Runs commands until `cycles` cycles are over. `Bench` has `axis()`, the CyclicHost, `device()` and `check()`.
+template <class Bench>
+bool run_commands(Bench& bench, ServiceRunner& command, const Plan& plan, std::uint32_t cycles) {
+  const auto add = [&](host::Service<std::uint8_t>& service) { bench.add(service); };
+  std::uint32_t written = 0;
+  std::uint32_t failed = 0;
+  std::uint32_t temperatures = 0;
+  std::uint32_t cleared = 0;
+  Time second = 1s;
+  Time alarm_at = AcceleratingShaft::begin_of_rest + 100ms;
+  const auto is_running = [&] {
+    const machine::InterruptLock lock;
+    return bench.check().all() < cycles;
+  };
+  const auto run = [&](std::string_view name, Arguments arguments) {
+    const Error error = command.run(name, arguments, plan.takes_cycles, add);
+    if (error != Error::none) ++failed;
+    return error == Error::none;
+  };
+  const auto do_regular_work = [&] {
+    if (!plan.temperature.empty() && machine::now() >= second) {
+      second += 1s;
+      if (run(plan.temperature, {})) ++temperatures;
+    }
+    if (plan.alarm == 0 || machine::now() < alarm_at) return;
+    alarm_at += AcceleratingShaft::period;
+    {
+      const machine::InterruptLock lock;
+      bench.device().raise_alarms(plan.alarm);
+    }
+    if (!plan.clear.empty()) {
+      if (run(plan.clear, {})) ++cleared;
+    }
+  };
+  for (std::int64_t i = 0; is_running(); ++i) {
+    do_regular_work();
+    if (i >= plan.bytes) {
+      asm volatile("wfi");
+      continue;
+    }
+    const std::int64_t address = i % plan.addresses;
+    const std::int64_t page = plan.page + i / plan.addresses;
+    const std::int64_t value = (i * 37 + 11) & 0xFF;
+    const std::array<std::int64_t, 4> write{address, value, page, 0};
+    const std::array<std::int64_t, 3> read{address, page, 1};
+    const std::size_t write_count = find_command(bench.unit(), "memory-write")->arguments.size();
+    // A damaged reply may end a command, which is then run again: writing the same byte twice does no harm.
+    for (unsigned attempt = 0; attempt < 20 && is_running(); ++attempt) {
+      if (!run("memory-write", Arguments(write).first(write_count))) continue;
+      if (!run("memory-read", read)) continue;
+      if (command.value() == value) ++written;
+      break;
+    }
+  }
+  const machine::InterruptLock lock;
+  bench.check().print_counts();
+  print_count("bytes", written);
+  print_count("temperatures", temperatures);
+  print_count("cleared", cleared);
+  print_count("failed", failed);
+  print_count("faults", bench.faults());
+  print_count("rules", bench.device().violation_count());
+  print_count("stack", machine::stack_used());
+  return bench.check().is_right() && bench.device().violation_count() == 0;
+}
+
+}  // namespace absenc::firmware

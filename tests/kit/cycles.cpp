@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: Apache-2.0
+// Checks that commands run beside the positions of a drive's cycles, and take no cycle unless they may.
+#include <algorithm>
+#include <optional>
+
+#include "absenc/host/cyclic_host.hpp"
+#include "absenc/sim/place.hpp"
+#include "tests/kit/kit.hpp"
+#include "tests/kit/world.hpp"
+
+namespace absenc::kit {
+namespace {
+
+/// Result of a run of cycles with at most one service.
+struct Ride {
+  bool is_over = false;     // whether the service is over
+  bool is_refused = false;  // whether the service was refused
+  Time needs{};             // time that the refused request of the service needs
+  Error error = Error::none;
+  ReportedFields seen{};
+  unsigned fresh = 0;
+  unsigned repeated = 0;
+  unsigned unanswered = 0;  // cycles in which the encoder did not answer
+  unsigned others = 0;      // cycles that are neither fresh, repeated nor unanswered
+  std::string other{};      // kind or error of the first of the `others`
+  unsigned wrong = 0;       // fresh cycles whose position is not the shaft's
+  std::uint32_t violations = 0;
+  std::uint32_t changes = 0;  // changes of the encoder's memory
+};
+
+template <class Item>
+class Rides {
+ public:
+  Rides(const Unit& unit, const Configuration& configuration, Findings& findings)
+      : unit_(unit),
+        configuration_(configuration),
+        findings_(findings),
+        read_(*find_command(unit, Verb::read)),
+        plan_{.line = line_settings(unit, configuration.options).with_some_rate(),
+              .rest = unit.rest != nullptr ? unit.rest(configuration.options) : Time{},
+              .carried = unit.services_carry_position} {}
+
+  void run() {
+    World<Item> world(unit_, configuration_.options, 1);
+    if (!world.made()) return;
+    world.move(place);
+    world.run(read_, {});
+    const Time begin = world.line().now();
+    const ConversationResult read = world.run(read_, {});
+    // A drive reads with one request a cycle.
+    if (!read.good() || (read.request_count > 1 && !read.sent.empty())) return;
+    position_time_ = world.line().now() - begin;
+    // While an alarm is reported, a reading may take another request.
+    world.device().raise_alarms(~std::uint32_t{0});
+    const Time again = world.line().now();
+    world.run(read_, {});
+    position_time_ = std::max(position_time_, world.line().now() - again);
+    ++runs;
+    ride_alone();
+    for (const Command& command : unit_.commands) {
+      if (is_service(command)) run_service(command);
+    }
+  }
+
+ private:
+  [[nodiscard]] static bool is_service(const Command& command) {
+    const bool other = command.verb == Verb::read || command.verb == Verb::scan;
+    return !other && command.verb != Verb::config_set;
+  }
+
+  void ride_alone() {
+    plan_.period = position_time_ + position_time_ / 4;
+    World<Item> world(unit_, configuration_.options, 1);
+    const Ride alone = ride(world, nullptr, false);
+    is_right(read_, alone, configuration_.text + ", alone: ");
+    findings_.require(alone.repeated == 0, [&] { return configuration_.text + ", alone: cycles are repeated"; });
+  }
+
+  void run_service(const Command& command) {
+    const Values arguments = least_arguments(command);
+    std::vector<std::byte> storage(unit_.host_storage);
+    auto* const made = unit_.host(configuration_.options, command, arguments, storage).template of<Item>();
+    if (made == nullptr || made->streams()) return;
+    World<Item> alone(unit_, configuration_.options, 1);
+    alone.move(place);
+    alone.run(read_, {});
+    const ConversationResult wanted = alone.run(command, arguments);
+    if (!wanted.made || !wanted.ended || alone.device().violation_count() != 0) return;
+    const auto what = [&](const char* pace) {
+      return configuration_.text + ", " + std::string(command.name) + " " + pace + ": ";
+    };
+    // A refused command gets the time that it asks for; a row of requests is refused with any time.
+    plan_.period = 2 * position_time_;
+    Ride wide = ride(command, arguments, false);
+    for (int i = 0; i < 4 && wide.is_refused && wide.needs < std::chrono::hours(1); ++i) {
+      plan_.period = position_time_ + position_time_ / 4 + wide.needs + plan_.rest;
+      wide = ride(command, arguments, false);
+    }
+    costs_nothing(command, wide, what("with time"));
+    findings_.require(wide.is_refused || wide.error == wanted.error, [&] {
+      return what("with time") + "ends with " + std::string(text_of(wide.error).name) + " instead of " +
+             std::string(text_of(wanted.error).name);
+    });
+    if (wide.is_refused) {
+      findings_.require(wide.changes == 0, [&] { return what("with time") + "refused, but the encoder has changed"; });
+    } else if (!command.changes_encoder && wanted.good()) {
+      findings_.require(names_of(wide.seen) == names_of(wanted.seen),
+                        [&] { return what("with time") + "reports " + to_text(wide.seen.fields); });
+    }
+    plan_.period = position_time_ + position_time_ / 4;
+    costs_nothing(command, ride(command, arguments, false), what("without time"));
+    const Ride tight = ride(command, arguments, true);
+    is_right(command, tight, what("taking cycles"));
+    findings_.require(tight.is_over && tight.error == wanted.error, [&] {
+      return what("taking cycles") +
+             (tight.is_over ? "ends with " + std::string(text_of(tight.error).name) : "does not end");
+    });
+    took_cycles += tight.repeated;
+    ++services;
+  }
+
+  [[nodiscard]] static std::vector<std::string> names_of(const ReportedFields& seen) {
+    std::vector<std::string> names;
+    for (const auto& [name, value] : seen.fields) names.push_back(name);
+    return names;
+  }
+
+  void is_right(const Command& command, const Ride& ride, const std::string& what) {
+    findings_.require(ride.wrong == 0,
+                      [&] { return what + std::to_string(ride.wrong) + " positions are not the shaft's"; });
+    // A command that changes the encoder may end the positions, for example by other contents of frames.
+    const bool may_end_positions = command.changes_encoder && command.verb == Verb::run;
+    findings_.require(ride.others == 0 || may_end_positions, [&] {
+      return what + std::to_string(ride.others) + " cycles have no valid position: " + ride.other;
+    });
+    // An encoder that restarts, or is switched off, does not answer.
+    findings_.require(ride.unanswered == 0 || command.changes_encoder,
+                      [&] { return what + std::to_string(ride.unanswered) + " cycles are not answered"; });
+    findings_.require(ride.violations == 0, [&] { return what + "the host broke a rule: " + rule_; });
+    findings_.require(ride.fresh > 3 || command.changes_encoder, [&] { return what + "hardly any cycle is fresh"; });
+  }
+  void costs_nothing(const Command& command, const Ride& ride, const std::string& what) {
+    is_right(command, ride, what);
+    findings_.require(ride.repeated == 0,
+                      [&] { return what + std::to_string(ride.repeated) + " cycles are repeated"; });
+    findings_.require(ride.is_over, [&] { return what + "does not end"; });
+  }
+
+  // Runs cycles with a command as their service.
+  Ride ride(const Command& command, const Values& arguments, bool takes_cycles) {
+    World<Item> world(unit_, configuration_.options, 1);
+    std::vector<std::byte> storage(unit_.host_storage);
+    auto* const conversation = unit_.host(configuration_.options, command, arguments, storage).template of<Item>();
+    host::Service<Item> service(*conversation, takes_cycles);
+    Ride result = ride(world, &service, command.changes_encoder);
+    result.is_over = service.is_over();
+    result.is_refused = service.state() == host::Service<Item>::State::refused;
+    result.needs = service.needs();
+    result.error = conversation->error();
+    if (result.error == Error::none && !result.is_refused) conversation->report(result.seen);
+    return result;
+  }
+
+  // Runs cycles until five have ended after the service (without one: five in all), for 200 s at most.
+  Ride ride(World<Item>& world, host::Service<Item>* service, bool changes) {
+    world.move(place);
+    world.run(read_, {});
+    std::vector<std::byte> storage(unit_.host_storage);
+    const auto read = [&]() -> Conversation<Item>& {
+      return *unit_.host(configuration_.options, read_, {}, storage).template of<Item>();
+    };
+    host::CyclicHost<Item, decltype(read)> host(read, plan_, world.line().now() + plan_.period);
+    Ride result;
+    const std::uint32_t version = world.device().memory_version();
+    const std::uint32_t violations = world.device().violation_count();
+    unsigned cycles = 0;
+    unsigned after = 0;
+    const auto on_emit = [&] {
+      using Kind = host::Cycle::Kind;
+      const host::Cycle& cycle = host.cycle();
+      const bool is_unanswered =
+          cycle.kind == Kind::missing && (cycle.error == Error::timeout || cycle.error == Error::busy ||
+                                          cycle.error == Error::line_stuck || cycle.error == Error::none);
+      (cycle.kind == Kind::fresh      ? result.fresh
+       : cycle.kind == Kind::repeated ? result.repeated
+       : is_unanswered                ? result.unanswered
+                                      : result.others) += 1;
+      if (result.others == 1 && result.other.empty()) {
+        result.other = cycle.kind == Kind::invalid ? "invalid" : std::string(text_of(cycle.error).name);
+      }
+      // A command that changes the encoder may change the position, for example to zero.
+      const bool is_known = !changes || service == nullptr || service->state() == host::Service<Item>::State::waiting;
+      if (cycle.kind == Kind::fresh && is_known && !sim::is_at(cycle.reading, world.place())) ++result.wrong;
+      if (++cycles == 2 && service != nullptr) host.add(*service);
+      if (service == nullptr || service->is_over()) ++after;
+      return after < 5;
+    };
+    world.run(host, std::chrono::seconds(200), on_emit);
+    result.violations = world.device().violation_count() - violations;
+    if (!world.device().violations().empty()) rule_ = world.device().violations().back().rule;
+    result.changes = world.device().memory_version() - version;
+    return result;
+  }
+
+  static constexpr std::int64_t place = 0x1234'5678'9ABC;  // 4660 turns and about a third
+
+  const Unit& unit_;
+  const Configuration& configuration_;
+  Findings& findings_;
+  const Command& read_;
+  host::CyclePlan plan_;
+  Time position_time_{};
+  std::string rule_;
+
+ public:
+  unsigned runs = 0;
+  unsigned services = 0;
+  unsigned took_cycles = 0;
+};
+
+/// Returns the configurations in which the unit has vectors.
+std::vector<Configuration> configurations_of_vectors(const Unit& unit) {
+  std::vector<Configuration> all;
+  for (const Vector& vector : unit.vectors) {
+    const bool known = std::any_of(all.begin(), all.end(), [&](const auto& one) { return one.text == vector.options; });
+    const std::optional<Options> options = known ? std::nullopt : options_of(unit, vector.options);
+    if (options) all.push_back({std::string(vector.options), *options});
+  }
+  return all;
+}
+
+}  // namespace
+
+Findings check_cycles(const Unit& unit) {
+  Findings findings;
+  unsigned runs = 0;
+  unsigned services = 0;
+  unsigned took = 0;
+  // The configurations of models; if none of them is read with one request, those of vectors.
+  for (const bool of_models : {true, false}) {
+    for (const Configuration& configuration : of_models ? configurations(unit) : configurations_of_vectors(unit)) {
+      const bool streams = unit.streams != nullptr && unit.streams(configuration.options);
+      if ((of_models && !configuration.is_model) || streams) continue;
+      const auto run = [&](auto rides) {
+        rides.run();
+        runs += rides.runs;
+        services += rides.services;
+        took += rides.took_cycles;
+      };
+      if (unit.link == LinkKind::can) {
+        run(Rides<CanFrame>(unit, configuration, findings));
+      } else {
+        run(Rides<std::uint8_t>(unit, configuration, findings));
+      }
+    }
+    if (runs != 0) break;
+  }
+  findings.note(std::to_string(services) + " services, which took " + std::to_string(took) + " cycles");
+  return findings;
+}
+
+}  // namespace absenc::kit
