@@ -1,10 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// A plugin for QEMU that counts the instructions between calls of count_begin and count_end, whose addresses are the
-// arguments begin and end. Debian's QEMU lacks the header of plugins, so the functions in use are declared here.
+// A plugin for QEMU that counts instructions between marks: pairs of functions NAME_begin and NAME_end. Its arguments
+// are NAME_begin=ADDRESS and NAME_end=ADDRESS, and core=m0plus or core=m4f. For the mark `count` the plugin prints each
+// count; for other marks the greatest counts so far of instructions and of cycles, when one rises. Cycles are upper
+// limits. The plugin also prints the targets of each indirect call, each target once. Debian's QEMU lacks the header of
+// plugins, so the functions in use are declared here.
+#include <bit>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <map>
+#include <set>
+#include <string>
+#include <utility>
 #include <vector>
 
 extern "C" {
@@ -18,6 +26,8 @@ enum CallbackFlags { no_registers = 0 };
 void qemu_plugin_register_vcpu_tb_trans_cb(PluginId, TranslateCallback);
 std::size_t qemu_plugin_tb_n_insns(const TranslationBlock*);
 Instruction* qemu_plugin_tb_get_insn(const TranslationBlock*, std::size_t index);
+const void* qemu_plugin_insn_data(const Instruction*);
+std::size_t qemu_plugin_insn_size(const Instruction*);
 std::uint64_t qemu_plugin_insn_vaddr(const Instruction*);
 void qemu_plugin_register_vcpu_insn_exec_cb(Instruction*, ExecuteCallback, CallbackFlags, void* data);
 
@@ -27,25 +37,124 @@ const int qemu_plugin_version = 1;
 
 namespace {
 
-std::uint64_t begin_address = 0, end_address = 0, count = 0;
-std::vector<std::uint64_t> begin_counts;  // instruction counts at each count_begin that has no count_end yet
+struct Cost {
+  unsigned long long instructions = 0;
+  unsigned long long cycles = 0;
+};
 
-void count_instruction(unsigned, void*) { ++count; }
-void begin(unsigned, void*) { begin_counts.push_back(count); }
-void end(unsigned, void*) {
-  const unsigned long long counted = count - begin_counts.back();
-  begin_counts.pop_back();
-  std::printf("count %zu %llu\n", begin_counts.size(), counted);
+struct Mark {
+  std::string name;
+  std::vector<Cost> begins;  // costs at each begin that has no end yet
+  Cost greatest;
+};
+
+struct Executed {
+  std::uint64_t address;
+  unsigned cycles;
+  bool calls;  // calls or jumps to the address in a register
+};
+
+bool is_m4f = false;
+Cost cost;
+const Executed* caller = nullptr;  // the last instruction, if it was an indirect call; else null
+std::map<std::string, Mark> marks;
+std::map<std::uint64_t, Mark*> begin_addresses, end_addresses;
+std::map<std::uint64_t, Executed> executed;
+std::set<std::pair<std::uint64_t, std::uint64_t>> calls;
+
+// Cycles of a taken branch: the Cortex-M4 refills its pipeline in 1 to 3.
+unsigned branch() { return is_m4f ? 4 : 2; }
+
+// Returns the most cycles of a 16-bit instruction, by the tables of ARM's manuals (DDI 0484, DDI 0439), for memory
+// without wait states and the multiplier of one cycle.
+unsigned cycles_of_short(unsigned code) {
+  const auto registers = static_cast<unsigned>(std::popcount(code & 0xFF));
+  if (code >> 11 == 0b01001 || (code >= 0x5000 && code < 0xA000)) return 2;   // load, store
+  if (code >> 9 == 0b1011010) return 1 + registers + (code >> 8 & 1);         // push
+  if (code >> 8 == 0b10111101) return (is_m4f ? 5 : 4) + registers;           // pop with return
+  if (code >> 8 == 0b10111100 || code >> 12 == 0b1100) return 1 + registers;  // pop, multiple loads and stores
+  if (code >> 12 == 0b1101 || code >> 11 == 0b11100) return branch();         // b
+  if (code >> 8 == 0b01000111) return branch();                               // bx, blx
+  if ((code >> 8 == 0b01000110 || code >> 8 == 0b01000100) && (code & 0x87) == 0x87) return branch();  // to the pc
+  if (code >> 12 == 0b1011 && (code >> 8 & 0b0101) == 0b0001) return branch();                         // cbz, cbnz
+  return 1;
+}
+
+unsigned cycles_of_long(unsigned first, unsigned second) {
+  const auto registers = static_cast<unsigned>(std::popcount(second & 0xFFFF));
+  if (first >> 11 == 0b11110 && (second >> 15) != 0) return is_m4f ? 4 : 3;  // b, bl; barriers and mrs take 3
+  if (first >> 6 == 0b1110100010 || first >> 6 == 0b1110100100) {            // multiple loads and stores
+    return 1 + registers + ((second >> 15) != 0 ? 3 : 0);
+  }
+  if (first >> 9 == 0b1110100) return (first & 0xFFF0) == 0xE8D0 ? 6 : 3;                 // tbb, tbh; two registers
+  if (first >> 9 == 0b1111100) return second >> 12 == 15 && (first & 0x10) != 0 ? 5 : 2;  // load (of the pc), store
+  if (first >> 4 == 0xFB9 || first >> 4 == 0xFBB) return 12;                              // division
+  if (first >> 9 == 0b1110110) return 1 + (second & 0xFF);                                // loads and stores of the FPU
+  if (first >> 8 == 0b11101110) return 14;                                                // arithmetic of the FPU
+  return first >> 5 == 0b11111011101 ? 2 : 1;                                             // long multiplication
+}
+
+void execute(unsigned, void* data) {
+  const auto& one = *static_cast<const Executed*>(data);
+  if (caller != nullptr && calls.emplace(caller->address, one.address).second) {
+    std::printf("call %llx %llx\n", static_cast<unsigned long long>(caller->address),
+                static_cast<unsigned long long>(one.address));
+    std::fflush(stdout);
+  }
+  caller = one.calls ? &one : nullptr;
+  ++cost.instructions;
+  cost.cycles += one.cycles;
+}
+
+void begin(unsigned, void* data) {
+  Mark& mark = *static_cast<Mark*>(data);
+  if (mark.name != "count") mark.begins.clear();
+  mark.begins.push_back(cost);
+}
+
+void end(unsigned, void* data) {
+  Mark& mark = *static_cast<Mark*>(data);
+  if (mark.begins.empty()) return;
+  const Cost since{cost.instructions - mark.begins.back().instructions, cost.cycles - mark.begins.back().cycles};
+  mark.begins.pop_back();
+  if (mark.name == "count") {
+    std::printf("count %zu %llu\n", mark.begins.size(), since.instructions);
+  } else if (since.instructions > mark.greatest.instructions || since.cycles > mark.greatest.cycles) {
+    if (since.instructions > mark.greatest.instructions) mark.greatest.instructions = since.instructions;
+    if (since.cycles > mark.greatest.cycles) mark.greatest.cycles = since.cycles;
+    std::printf("%s %llu %llu\n", mark.name.c_str(), mark.greatest.instructions, mark.greatest.cycles);
+  }
   std::fflush(stdout);
 }
 
-void translated(PluginId, TranslationBlock* block) {
-  for (std::size_t i = 0; i < qemu_plugin_tb_n_insns(block); ++i) {
-    Instruction* const instruction = qemu_plugin_tb_get_insn(block, i);
-    const std::uint64_t address = qemu_plugin_insn_vaddr(instruction);
-    const ExecuteCallback what = address == begin_address ? begin : address == end_address ? end : count_instruction;
-    qemu_plugin_register_vcpu_insn_exec_cb(instruction, what, no_registers, nullptr);
+void translate(Instruction* instruction) {
+  const std::uint64_t address = qemu_plugin_insn_vaddr(instruction);
+  if (const auto found = begin_addresses.find(address); found != begin_addresses.end()) {
+    return qemu_plugin_register_vcpu_insn_exec_cb(instruction, begin, no_registers, found->second);
   }
+  if (const auto found = end_addresses.find(address); found != end_addresses.end()) {
+    return qemu_plugin_register_vcpu_insn_exec_cb(instruction, end, no_registers, found->second);
+  }
+  std::uint16_t code[2]{};
+  std::memcpy(code, qemu_plugin_insn_data(instruction), qemu_plugin_insn_size(instruction));
+  const bool is_long = qemu_plugin_insn_size(instruction) == 4;
+  const bool calls_register = !is_long && code[0] >> 8 == 0x47 && (code[0] >> 3 & 15) != 14;  // bx, blx, but not to lr
+  Executed& one = executed[address];
+  one = {address, is_long ? cycles_of_long(code[0], code[1]) : cycles_of_short(code[0]), calls_register};
+  qemu_plugin_register_vcpu_insn_exec_cb(instruction, execute, no_registers, &one);
+}
+
+void translated(PluginId, TranslationBlock* block) {
+  for (std::size_t i = 0; i < qemu_plugin_tb_n_insns(block); ++i) translate(qemu_plugin_tb_get_insn(block, i));
+}
+
+void take_argument(const std::string& name, const std::string& value) {
+  if (name == "core") is_m4f = value == "m4f";
+  const std::size_t bar = name.find('_');
+  if (bar == std::string::npos) return;
+  Mark& mark = marks[name.substr(0, bar)];
+  mark.name = name.substr(0, bar);
+  (name.substr(bar) == "_begin" ? begin_addresses : end_addresses)[std::strtoull(value.c_str(), nullptr, 0)] = &mark;
 }
 
 }  // namespace
@@ -53,8 +162,9 @@ void translated(PluginId, TranslationBlock* block) {
 extern "C" [[gnu::visibility("default")]] int qemu_plugin_install(PluginId id, const void*, int count_of,
                                                                   char** texts) {
   for (int i = 0; i < count_of; ++i) {
-    if (std::strncmp(texts[i], "begin=", 6) == 0) begin_address = std::strtoull(texts[i] + 6, nullptr, 0);
-    if (std::strncmp(texts[i], "end=", 4) == 0) end_address = std::strtoull(texts[i] + 4, nullptr, 0);
+    const std::string text = texts[i];
+    const std::size_t equals = text.find('=');
+    if (equals != std::string::npos) take_argument(text.substr(0, equals), text.substr(equals + 1));
   }
   qemu_plugin_register_vcpu_tb_trans_cb(id, translated);
   return 0;

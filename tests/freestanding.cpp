@@ -34,7 +34,7 @@ template class host::Statistics<CanFrame>;
 template class host::Session<std::uint8_t>;
 template class host::Session<CanFrame>;
 
-// These functions are not static, because the compiler would drop unused static ones.
+// drive_bytes and drive_frames are not static, because the compiler would drop unused static functions.
 bool drive_bytes(Machine<std::uint8_t>& machine, Port<std::uint8_t>& port) {
   return host::drive(machine, port, [] { return true; });
 }
@@ -43,10 +43,10 @@ bool drive_frames(Machine<CanFrame>& machine, Port<CanFrame>& port) {
   return host::drive(machine, port, [] { return true; });
 }
 
-double speed(const Reading& reading, host::Unwrapper& unwrapper, host::Velocity& velocity) {
+host::MilliSpeed speed(const Reading& reading, host::Unwrapper& unwrapper, host::Velocity& velocity) {
   if (unwrapper.add(reading) != host::Unwrapper::Joined::continued) velocity.restart();
   velocity.add(unwrapper.position(), reading.latched);
-  return velocity.counts_per_second();
+  return velocity.speed();
 }
 
 std::uint64_t helpers(Bytes bytes, MutableBytes out) {

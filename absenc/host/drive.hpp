@@ -40,7 +40,7 @@ void catch_up(Machine<Item>& machine, Port<Item>& port) {
   for (Time now = port.now();;) {
     Step<Item> step = machine.next(now);
     if (step.kind == Step<Item>::Kind::emit) continue;
-    if (step.kind != Step<Item>::Kind::wait) return;  // the machine is done, and returns `done` again to `drive`
+    if (step.kind != Step<Item>::Kind::wait) return;  // a machine that is done returns `done` again to `drive`
     const Time due = step.at;
     // A port delivers items that have already arrived before it reports the timer at this time.
     step.at = port.now() + Time{1};

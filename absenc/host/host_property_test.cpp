@@ -73,7 +73,7 @@ RC_GTEST_PROP(UnwrapProperty, TheLongestGapKeepsWithinThatLimit, ()) {
   RC_ASSERT(counts * static_cast<double>(gap.count() + 2) >= half * 0.9);
 }
 
-// The integer arithmetic of Reach rounds up by at most 0.02 %.
+// The integer arithmetic of Reach rounds up by at most 2^-29.
 RC_GTEST_PROP(ReachProperty, EqualsDistanceAtHighestSpeed, ()) {
   const auto bits = *rc::gen::inRange(1u, 65u);
   const auto speed = *rc::gen::inRange<std::uint32_t>(1, 1'000'001);
@@ -85,7 +85,120 @@ RC_GTEST_PROP(ReachProperty, EqualsDistanceAtHighestSpeed, ()) {
   const double wanted = each * static_cast<double>(time);
   constexpr double most = 0x1p64;
   RC_ASSERT(static_cast<double>(counts) >= std::min(wanted, most) * (1 - 1e-9) - 1);
-  RC_ASSERT(static_cast<double>(counts) <= wanted * 1.0002 + 1);
+  RC_ASSERT(static_cast<double>(counts) <= wanted * (1 + 0x1p-29) + 1);
+}
+
+/// Returns any number of `bits` bits or fewer, in which small and great numbers are equally frequent.
+std::uint64_t any_number(unsigned bits) {
+  const auto shift = *rc::gen::inRange(64 - bits, 64u);
+  return *rc::gen::weightedOneOf<std::uint64_t>(
+             {{8, rc::gen::arbitrary<std::uint64_t>()}, {1, rc::gen::just(~std::uint64_t{0})}}) >>
+         shift;
+}
+
+RC_GTEST_PROP(ReachProperty, EqualsDistanceAtExtremeSpeedsAndUnits, ()) {
+  const auto speed = static_cast<std::uint32_t>(any_number(32));
+  const auto time = static_cast<std::int64_t>(any_number(63));
+  const auto bits = *rc::gen::inRange(1u, 65u);
+  const double unit_um = *rc::gen::element(0.0, 1e-200, 1e-30, 1e-9, 0.3, 1e9, 1e30, 1e200);
+  const std::uint64_t counts = Reach::of({.rpm = speed, .mm_s = speed}, {bits, 0, unit_um}).counts(Time(time), bits);
+  const double each = unit_um > 0 ? speed / unit_um / 1e6 : std::ldexp(speed / 60e9, static_cast<int>(bits));
+  const double wanted = std::min(each * static_cast<double>(time), 0x1p64);
+  RC_ASSERT(static_cast<double>(counts) >= wanted * (1 - 1e-14) - 1);
+  RC_ASSERT(static_cast<double>(counts) <= wanted * (1 + 0x1p-29));
+}
+
+RC_GTEST_PROP(UnwrapProperty, JoinsWithinTheLongestGap, ()) {
+  const double unit_um = *rc::gen::element(0.0, 0.001, 0.05, 1.0, 10.0);
+  const auto bits = *rc::gen::inRange(1u, 33u);
+  const unsigned turn_bits = unit_um > 0 ? 0 : *rc::gen::inRange(0u, 17u);
+  const auto speed = static_cast<std::uint32_t>(any_number(32));
+  const SpeedLimit limit{.rpm = speed, .mm_s = speed};
+  const Time gap = longest_gap({bits, turn_bits, unit_um}, limit);
+  const auto joins = [&](double pause) {
+    Unwrapper unwrapper(limit);
+    Reading reading = shown(0, bits, turn_bits, Time{});
+    reading.unit_um = unit_um;
+    unwrapper.add(reading);
+    reading.latched = Time(static_cast<std::int64_t>(std::min(pause, 0x1p58)));
+    return unwrapper.add(reading) == Unwrapper::Joined::continued;
+  };
+  const auto longest = static_cast<double>(gap.count());
+  RC_ASSERT(joins(longest * (1 - 0x1p-27) - 2));
+  if (longest < 0x1p57) RC_ASSERT(!joins(longest * (1 + 0x1p-27) + 2));
+}
+
+// The jumps of the calculation with floating point, which the integers must find.
+RC_GTEST_PROP(UnwrapProperty, JumpsFromFourTimesTheSpeedLimitOn, ()) {
+  const auto bits = *rc::gen::inRange(8u, 64u);
+  const auto speed = static_cast<std::uint32_t>(any_number(32));
+  const double unit_um = *rc::gen::element(0.0, 0.001, 0.05, 1.0, 10.0);
+  const SpeedLimit limit{.rpm = speed, .mm_s = speed};
+  const Resolution resolution{bits, 0, unit_um};
+  const std::int64_t longest = longest_gap(resolution, limit).count() / 2;
+  const Time pause(*rc::gen::inRange<std::int64_t>(0, std::min<std::int64_t>(longest, 100'000'000) + 1));
+  const double most =
+      4 * counts_per_second(resolution, limit) * std::chrono::duration<double>(pause + Time(1'000'000)).count() + 4;
+  const double half = std::ldexp(0.5, static_cast<int>(bits));
+  const auto jumps = [&](double distance) {
+    Unwrapper unwrapper(limit);
+    Reading reading = shown(0, bits, 0, Time{});
+    reading.unit_um = unit_um;
+    unwrapper.add(reading);
+    reading.singleturn = static_cast<std::uint64_t>(distance) & low_mask(bits);
+    reading.latched = pause;
+    return unwrapper.jumps(reading);
+  };
+  if (most < half - 1) {
+    RC_ASSERT(!jumps(std::floor(most * (1 - 1e-14))));
+    const double beyond = most * (1 + 0x1p-28) + 1;
+    if (beyond < half) RC_ASSERT(jumps(beyond));
+  } else {
+    RC_ASSERT(!jumps(half - 1));
+  }
+}
+
+/// Expects that the integers and the real numbers of `velocity` agree within the rounding that `speed` states.
+void expect_same_speed(const Velocity& velocity) {
+  const MilliSpeed speed = velocity.speed();
+  const auto whole = static_cast<double>(speed.speed), around = static_cast<double>(speed.uncertainty);
+  const double real = velocity.counts_per_second() * 1000, real_around = velocity.uncertainty() * 1000;
+  if (speed.uncertainty == MilliSpeed::most) {
+    RC_ASSERT((std::abs(whole) == 0x1p63 || whole == 0));
+    RC_ASSERT(std::abs(real) + real_around >= 0x1p63 * (1 - 0x1p-29));
+    return;
+  }
+  constexpr double exact = 1e-14;  // rounding of the real numbers
+  const double greatest = std::abs(real) + real_around;
+  // The interval of the integers contains that of the real numbers.
+  RC_ASSERT(whole - around <= real - real_around + greatest * exact);
+  RC_ASSERT(whole + around >= real + real_around - greatest * exact);
+  RC_ASSERT(std::abs(whole - real) <= greatest * 0x1p-29 + 2);
+  RC_ASSERT(around - real_around <= greatest * 0x1p-29 + 2);
+}
+
+RC_GTEST_PROP(VelocityProperty, IntegersEqualRealNumbers, ()) {
+  Velocity velocity(Time(static_cast<std::int64_t>(any_number(63))));
+  auto at = static_cast<std::int64_t>(any_number(61));
+  if (*rc::gen::arbitrary<bool>()) at = -at;
+  const std::int64_t end = at + (std::int64_t{1} << 58);
+  for (int i = 0; i < 60; ++i) {
+    const auto width = static_cast<std::int64_t>(*rc::gen::arbitrary<bool>() ? 0 : any_number(57));
+    const std::uint64_t position = any_number(64);
+    velocity.add(static_cast<std::int64_t>(position), {Time(at), Time(std::min(at + width, end))});
+    expect_same_speed(velocity);
+    at = std::min(at + static_cast<std::int64_t>(any_number(55)), end);
+  }
+}
+
+RC_GTEST_PROP(VelocityProperty, IntegersEqualRealNumbersInOneWindow, ()) {
+  Velocity velocity(Time(1));
+  const auto from = static_cast<std::int64_t>(any_number(64)), to = static_cast<std::int64_t>(any_number(64));
+  const auto pause = 1 + static_cast<std::int64_t>(any_number(57));
+  const Time open(pause / 50);
+  velocity.add(from, {-open, open});
+  velocity.add(to, {Time(pause) - open, Time(pause) + open});
+  expect_same_speed(velocity);
 }
 
 RC_GTEST_PROP(VelocityProperty, EqualsSpeedInMiddleOfWindow, ()) {

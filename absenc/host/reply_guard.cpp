@@ -246,7 +246,7 @@ void ReplyGuard<Item>::feed_forwarding(const Event<Item>& event) {
     exchange.received = exchange.received || outstanding_.may_answer(last_.items, event.items);
   }
   if constexpr (is_can) {
-    // A frame that answers an outstanding request is taken for its late reply.
+    // No exchange is open now: a frame that answers an outstanding request is taken for its late reply.
     if (event.kind == Kind::received && !exchange.answerable && !outstanding_.empty()) {
       if (Entry* const entry = outstanding_.find_by_reply(event.items)) return count_late(entry, event.at);
     }

@@ -80,7 +80,7 @@ class ReplyGuard final : public Machine<Item> {
   };
   struct Delaying {
     Time until{};            // earliest time at which the delayed request is sent
-    Time received_at{};      // when the last item was received while delaying; at first, `gap` before
+    Time received_at{};      // when the last item was received while delaying; if none was, `gap` before delaying began
     Time noise_end = never;  // when the request is sent even if items still arrive
   };
   struct Matching {

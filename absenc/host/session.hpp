@@ -72,7 +72,7 @@ class Session {
         apart_(times()) {}
 
   /// Runs one command; `on_emit(conversation)` returns whether to continue after a result. The returned conversation is
-  /// valid until the next command; null: it cannot be run.
+  /// valid until the next command; null: the command cannot be run.
   template <class OnEmit>
   const Conversation<Item>* run(const Command& command, Arguments arguments, OnEmit&& on_emit) {
     streaming_ = false;
@@ -80,7 +80,7 @@ class Session {
     streaming_ = false;  // `run` always begins anew; only `next` and `read` continue a stream
     return conversation;
   }
-  /// Runs `command` as above and ignores the results before the end.
+  /// Runs `command` and ignores the results before the end.
   const Conversation<Item>* run(const Command& command, Arguments arguments = {}) {
     return run(command, arguments, [](const Conversation<Item>&) { return true; });
   }
@@ -116,7 +116,7 @@ class Session {
       if (number == most || (known_ && !FirstReading::has_position(*reading))) return conversation;
     }
   }
-  /// Reads the position with `command` as above.
+  /// Reads the position with `command`, without a callback for each reading.
   const Conversation<Item>* read(const Command& command, Take take = Take::newest) {
     return read(command, take, [](const Reading&) {});
   }
@@ -128,7 +128,7 @@ class Session {
     if (current_ != nullptr) current_->report_left(sink);
   }
 
-  /// Returns whether the last conversation sent a request that changes the encoder.
+  /// Returns whether the last conversation sent a request that changes the encoder, and whether it was refused.
   [[nodiscard]] ChangeSent change_sent() const {
     return current_ != nullptr ? current_->change_sent() : ChangeSent::no;
   }

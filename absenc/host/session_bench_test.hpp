@@ -28,7 +28,7 @@ struct Still final : Shaft {
   std::int64_t wrong_position = 0;
 };
 
-/// A virtual encoder with faults, a port to it, and a session.
+/// A virtual encoder with faults at given rates, by default none, a port to it, and a session.
 struct Bench {
   explicit Bench(EchoMode mode, sim::FaultRates rates = {}, unsigned attempts = 3,
                  const std::vector<OptionText>& settings = {}) {

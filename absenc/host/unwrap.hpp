@@ -2,6 +2,7 @@
 // Continuous position: a counter of 64 bits from consecutive readings.
 #pragma once
 
+#include <bit>
 #include <cstdint>
 
 #include "absenc/core/angle.hpp"
@@ -11,20 +12,22 @@
 
 namespace absenc::host {
 
-/// A continuous position, from readings in which the encoder's own counter wraps.
+/// A continuous position, from readings in which the encoder's own counter wraps. It uses integers only. Times must lie
+/// within 2^62 ns of the clock's start, and within 2^58 ns (9 years) of each other. The position wraps after 2^63
+/// counts.
 class Unwrapper {
  public:
   /// How a reading joins the positions before it.
   enum class Joined : std::uint8_t {
     ignored,    ///< the reading has no valid position
     started,    ///< the first position, which is the encoder's own
-    continued,  ///< the distance since the reading before was added
-    restarted,  ///< the pause was too long to know the distance: the position starts again with the encoder's own
+    continued,  ///< the distance since the last valid position was added
+    restarted,  ///< the distance is not sure after the pause: the position starts again with the encoder's own
   };
 
   /// Makes a continuous position within `limit`. `times` is the meaning of Reading::latched.
   explicit constexpr Unwrapper(const SpeedLimit& limit = {}, Times times = Times::latched)
-      : limit_(limit), times_(times), apart_(times) {}
+      : limit_(limit), reach_(Reach::of_shaft(limit.rpm)), times_(times), apart_(times) {}
 
   /// Adds `reading` with the latch interval that its own times allow. Returns how it was joined.
   constexpr Joined add(const Reading& reading) { return add(reading, latch_time(reading)); }
@@ -36,6 +39,7 @@ class Unwrapper {
     if (!joins) counts_turns_ = turn_bits(reading) != 0;
     position_ = joins ? position_ + static_cast<std::uint64_t>(way(reading)) : absolute(reading);
     apart_.add(reading.latched);
+    reach_ = reach_of(reading);
     last_ = reading;
     last_at_ = at;
     started_ = true;
@@ -45,12 +49,12 @@ class Unwrapper {
   /// Returns whether `reading` is a jump from the last added one; false if that is not known.
   [[nodiscard]] constexpr bool jumps(const Reading& reading) const {
     if (!started_ || !has_position(reading) || !is_near(reading)) return false;
-    constexpr Time vague{1'000'000};  // uncertainty of the latch time: 1 ms
-    constexpr double noise = 4;       // noise of a position, in counts
-    const double seconds = static_cast<double>((apart(reading) + vague).count()) / 1e9;
-    const auto moved = static_cast<double>(way(reading));
-    return (moved < 0 ? -moved : moved) >
-           most_excess * counts_per_second(resolution_of(reading), limit_) * seconds + noise;
+    constexpr Time vague{1'000'000};    // uncertainty of the latch time: 1 ms
+    constexpr std::uint64_t noise = 4;  // noise of a position, in counts
+    const Reach reach = reach_of(reading).at_excess(most_excess);
+    const auto step = static_cast<std::uint64_t>(way(reading));
+    const std::uint64_t moved = way(reading) < 0 ? 0 - step : step;
+    return moved > noise && moved - noise > reach.counts(apart(reading) + vague, reading.singleturn_bits);
   }
 
   /// Returns the continuous position in counts of the single-turn resolution.
@@ -82,14 +86,25 @@ class Unwrapper {
   [[nodiscard]] constexpr Resolution resolution_of(const Reading& reading) const {
     return {reading.singleturn_bits, have_turns(reading) ? reading.multiturn_bits : 0, reading.unit_um};
   }
+  // Calculates the reach only if the unit changes, because that takes long.
+  [[nodiscard]] constexpr Reach reach_of(const Reading& reading) const {
+    const bool same = std::bit_cast<std::uint64_t>(reading.unit_um) == std::bit_cast<std::uint64_t>(last_.unit_um);
+    return same ? reach_ : Reach::of(limit_, {.unit_um = reading.unit_um});
+  }
+  // Returns which part of the counted range the position can have moved in the time `between`, times 2^32.
+  [[nodiscard]] constexpr std::uint64_t share(const Reading& reading, Time between) const {
+    return reach_of(reading).share(between, resolution_of(reading));
+  }
+  static constexpr std::uint64_t half = std::uint64_t{1} << 31;  // half the counted range, times 2^32
+
+  // Judges as `longest_gap` does.
   [[nodiscard]] constexpr bool is_near(const Reading& reading) const {
-    return apart(reading) < longest_gap(resolution_of(reading), limit_);
+    return share(reading, apart(reading)) < half / 16 * 15;
   }
 
-  // Adds the margin of `longest_gap` again: the intervals state the unknown latch times.
+  // Leaves out the margin of `longest_gap`, because the intervals state the unknown latch times.
   [[nodiscard]] constexpr bool are_surely_near(const Reading& reading, const LatchTime& at) const {
-    const Time gap = longest_gap(resolution_of(reading), limit_);
-    return times_ == Times::arrived || gap == never || at.latest - last_at_.earliest < gap / 15 * 16;
+    return times_ == Times::arrived || share(reading, at.latest - last_at_.earliest) < half;
   }
 
   [[nodiscard]] constexpr Time apart(const Reading& reading) const { return apart_.since_last(reading.latched); }
@@ -103,6 +118,7 @@ class Unwrapper {
   }
 
   SpeedLimit limit_;
+  Reach reach_;  // reach within `limit_`, in the unit of `last_`
   Times times_;
   Apart apart_;
   bool started_ = false;

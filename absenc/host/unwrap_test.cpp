@@ -9,7 +9,7 @@ namespace {
 using Joined = Unwrapper::Joined;
 using namespace std::chrono_literals;
 
-Reading singleturn(std::uint64_t counts, Time at, unsigned bits = 10) {
+constexpr Reading singleturn(std::uint64_t counts, Time at, unsigned bits = 10) {
   return {.singleturn = counts, .singleturn_bits = bits, .singleturn_valid_bits = bits, .latched = at};
 }
 
@@ -175,6 +175,30 @@ TEST(Unwrapper, TakesPositionsOf64Bits) {
   unwrapper.add(singleturn(~std::uint64_t{0}, 0ms, 64));
   unwrapper.add(singleturn(3, 1ms, 64));
   EXPECT_EQ(unwrapper.position(), 3);
+}
+
+// The compiler refuses an overflow in a constant.
+TEST(Unwrapper, TakesExtremeSpeedsTimesAndUnits) {
+  constexpr Time begin{-(std::int64_t{1} << 62)};
+  constexpr Time years{std::int64_t{1} << 58};
+  constexpr auto joined = [](const SpeedLimit& limit, Time from, Time to, double unit_um) {
+    Unwrapper unwrapper(limit);
+    Reading reading = singleturn(std::uint64_t{1} << 63, from, 64);
+    reading.unit_um = unit_um;
+    unwrapper.add(reading);
+    reading.singleturn = 0;
+    reading.latched = to;
+    static_cast<void>(unwrapper.jumps(reading));
+    return unwrapper.add(reading);
+  };
+  constexpr std::uint32_t fastest = 0xFFFF'FFFF;
+  static_assert(joined({.rpm = 0}, begin, begin + years, 0) == Joined::continued);
+  static_assert(joined({.rpm = fastest}, begin, begin + years, 0) == Joined::restarted);
+  static_assert(joined({.rpm = fastest}, Time{}, Time(1), 0) == Joined::continued);
+  static_assert(joined({.rpm = fastest}, years, Time{}, 0) == Joined::continued);
+  static_assert(joined({.mm_s = fastest}, begin, begin + years, 1e-300) == Joined::restarted);
+  static_assert(joined({.mm_s = fastest}, begin, begin + years, 1e300) == Joined::continued);
+  static_assert(joined({.mm_s = 0}, begin, begin + years, 1) == Joined::continued);
 }
 
 TEST(LongestGap, IsNearlyHalfOfTheRangeAtFullSpeed) {

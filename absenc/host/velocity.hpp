@@ -3,25 +3,40 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 #include "absenc/core/time.hpp"
 #include "absenc/host/latch_time.hpp"
 
 namespace absenc::host {
 
+/// A speed with its uncertainty, both in thousandths of a count per second. The true speed is within `uncertainty` of
+/// `speed`. An uncertainty of `most` states that the speed may be greater than can be represented.
+struct MilliSpeed {
+  static constexpr std::int64_t most = std::numeric_limits<std::int64_t>::max();  ///< Greatest number of either.
+  std::int64_t speed = 0;        ///< Speed in counts per 1000 s, -`most` to `most`.
+  std::int64_t uncertainty = 0;  ///< Uncertainty of `speed` in counts per 1000 s, 0 to `most`.
+};
+
 /// Mean speed between the newest position and an older one: at constant acceleration the speed in the middle of that
-/// time. `uncertainty` covers the latch times and one count of each position, but no noise of the encoder.
+/// time. `uncertainty` covers the latch times and one count of each position, but no noise of the encoder. Firmware
+/// uses `speed`, which needs integers only. Times must lie within 2^62 ns of the clock's start, and within 2^58 ns (9
+/// years) of each other.
 class Velocity {
  public:
   static constexpr std::size_t most_positions = 48;  ///< Greatest number of positions that are stored.
-  static constexpr int longest_windows = 20;         ///< Longest window, as a multiple of the shortest one.
+  static constexpr int longest_windows = 20;         ///< Multiple of `window` from which a less certain speed counts.
 
-  /// `window`: desired time over which the speed is measured.
-  explicit constexpr Velocity(Time window = std::chrono::milliseconds(50)) : window_(window) {}
+  static constexpr Time longest_window = std::chrono::minutes(2);  ///< A longer `window` counts as this one.
 
-  /// Adds a position of `Unwrapper`. One that was not latched after the last one is ignored.
+  /// `window`: desired time over which the speed is measured, above 0.
+  explicit constexpr Velocity(Time window = std::chrono::milliseconds(50))
+      : window_(window < longest_window ? window : longest_window) {}
+
+  /// Adds a position of `Unwrapper`. One not latched after the last one is not stored, and has no speed.
   constexpr void add(std::int64_t position, const LatchTime& at) {
     start_ = none;
     if (size_ != 0 && at.middle() <= newest().at.middle()) return;
@@ -41,17 +56,29 @@ class Velocity {
 
   /// Returns whether a speed is known for the last added position.
   [[nodiscard]] constexpr bool valid() const { return start_ != none; }
-  /// Returns the mean speed in counts per second; 0 while `valid()` is false.
+  /// Returns the mean speed and its uncertainty; 0 and 0 while `valid()` is false. The uncertainty includes the
+  /// rounding of both, which is below 2^-29 of their sum plus 0.002 counts/s.
+  [[nodiscard]] constexpr MilliSpeed speed() const {
+    if (!valid()) return {};
+    const std::uint64_t way = moved_from(start_);
+    const std::int64_t fast = rate(way + 1, shortest_time(), Rounding::up);
+    if (way == 0) return {0, fast};
+    if (fast == MilliSpeed::most) return {moved() < 0 ? -fast : fast, MilliSpeed::most};
+    const std::int64_t uncertainty = (fast - rate(way - 1, longest_time(), Rounding::down) + 1) / 2;
+    const std::int64_t middle = fast - uncertainty;
+    return {moved() < 0 ? -middle : middle, uncertainty};
+  }
+  /// Returns the mean speed in counts per second; 0 while `valid()` is false. Needs floating point.
   [[nodiscard]] constexpr double counts_per_second() const {
-    if (!valid()) return 0;
+    if (!valid() || moved() == 0) return 0;
     const double middle = (fastest() + slowest()) / 2;
     return moved() < 0 ? -middle : middle;
   }
-  /// Returns the uncertainty of `counts_per_second` in counts/s; 0 while `valid()` is false.
+  /// Returns the uncertainty of `counts_per_second` in counts/s; 0 while `valid()` is false. Needs floating point.
   [[nodiscard]] constexpr double uncertainty() const { return valid() ? (fastest() - slowest()) / 2 : 0; }
   /// Returns the latch interval of the position that begins the window. Requires `valid()`.
   [[nodiscard]] constexpr const LatchTime& since() const { return positions_[start_].at; }
-  /// Returns half the time between the two positions; 0 while `valid()` is false.
+  /// Returns half the duration of the window; 0 while `valid()` is false.
   [[nodiscard]] constexpr Time delay() const { return valid() ? span(start_) / 2 : Time{}; }
 
  private:
@@ -60,7 +87,7 @@ class Velocity {
     LatchTime at;
   };
   static constexpr std::size_t none = ~std::size_t{0};
-  // So many counts, and a window of so many times its uncertainty, are enough.
+  // Number of counts, and ratio of a window to its time uncertainty, that are enough.
   static constexpr int enough = 20;
   static constexpr int least = 4;  // least ratio of the longest window to its uncertainty
 
@@ -73,19 +100,53 @@ class Velocity {
         static_cast<std::uint64_t>(newest().position) - static_cast<std::uint64_t>(positions_[start].position);
     return static_cast<std::int64_t>(way) < 0 ? 0 - way : way;
   }
-  [[nodiscard]] constexpr std::int64_t moved() const { return newest().position - positions_[start_].position; }
+  [[nodiscard]] constexpr std::int64_t moved() const {
+    return static_cast<std::int64_t>(static_cast<std::uint64_t>(newest().position) -
+                                     static_cast<std::uint64_t>(positions_[start_].position));
+  }
+  [[nodiscard]] constexpr Time shortest_time() const { return newest().at.earliest - positions_[start_].at.latest; }
+  [[nodiscard]] constexpr Time longest_time() const { return newest().at.latest - positions_[start_].at.earliest; }
+
+  enum class Rounding : bool { down, up };
+  [[nodiscard]] static constexpr std::uint64_t halved(std::uint64_t value, Rounding rounding) {
+    return (value >> 1) + (rounding == Rounding::up ? value & 1 : 0);
+  }
+  // Returns the speed in counts per 1000 s, at most MilliSpeed::most. A number of more than 31 bits is rounded by 2^-30
+  // of its value at most.
+  [[nodiscard]] static constexpr std::int64_t rate(std::uint64_t counts, Time time, Rounding rounding) {
+    const Rounding opposite = rounding == Rounding::up ? Rounding::down : Rounding::up;
+    constexpr std::uint64_t five_to_the_12th = 244'140'625;  // 1000 s are 10^12 ns: 5^12 * 2^12
+    const std::uint64_t carry = rounding == Rounding::up ? 1 : 0;
+    if (counts == 0) return 0;
+    if (time <= Time{}) return MilliSpeed::most;
+    int shift = 12;
+    auto divisor = static_cast<std::uint64_t>(time.count());
+    for (; divisor >> 32 != 0; --shift) divisor = halved(divisor, opposite);
+    for (; counts >> 36 != 0; ++shift) counts = halved(counts, rounding);
+    std::uint64_t product = counts * five_to_the_12th;
+    const int zeros = std::countl_zero(product);
+    product <<= zeros;
+    shift -= zeros;
+    // With Rounding::up, (a - 1) / b + 1 is a / b rounded up.
+    const std::uint64_t quotient = (product - carry) / divisor + carry;
+    constexpr auto most = static_cast<std::uint64_t>(MilliSpeed::most);
+    std::uint64_t whole = most;
+    if (shift < 0) whole = (shift > -64 ? (quotient - carry) >> -shift : 0) + carry;
+    if (shift >= 0 && shift < 63 && quotient <= most >> shift) whole = quotient << shift;
+    return static_cast<std::int64_t>(whole < most ? whole : most);
+  }
 
   [[nodiscard]] static constexpr double per_second(double counts, Time time) {
     return counts * 1e9 / static_cast<double>(time.count());
   }
   // A distance may be one count longer or shorter than measured.
   [[nodiscard]] constexpr double fastest() const {
-    return per_second(static_cast<double>(moved_from(start_)) + 1, newest().at.earliest - positions_[start_].at.latest);
+    return per_second(static_cast<double>(moved_from(start_)) + 1, shortest_time());
   }
   [[nodiscard]] constexpr double slowest() const {
     const std::uint64_t way = moved_from(start_);
     if (way == 0) return -fastest();
-    return per_second(static_cast<double>(way) - 1, newest().at.latest - positions_[start_].at.earliest);
+    return per_second(static_cast<double>(way) - 1, longest_time());
   }
 
   // Drops old positions, but keeps one that is as old as the longest window or older.
@@ -98,8 +159,15 @@ class Velocity {
   // Removes one position, so that old ones are stored at longer intervals than new ones.
   constexpr void thin_out() {
     std::size_t closest = 1;
+    std::int64_t closest_gap = gap(1);
+    std::int64_t closest_age = age(1);
     for (std::size_t i = 2; i + 1 < size_; ++i) {
-      if (gap(i) * age(closest) < gap(closest) * age(i)) closest = i;
+      const std::int64_t one_gap = gap(i);
+      const std::int64_t one_age = age(i);
+      if (one_gap * closest_age >= closest_gap * one_age) continue;
+      closest = i;
+      closest_gap = one_gap;
+      closest_age = one_age;
     }
     const bool drops_first = positions_[closest].at.width() > positions_[closest + 1].at.width();
     remove(drops_first || closest + 2 == size_ ? closest : closest + 1, 1);
@@ -117,15 +185,18 @@ class Velocity {
 
   // Selects the shortest window whose speed has a low enough uncertainty.
   constexpr void choose_start() {
+    Time longer = size_ > 1 ? span(size_ - 2) : Time{};
     for (std::size_t i = size_ - 1; i-- > 0;) {
-      const bool fills_window = span(i) >= window_ || (i > 0 && span(i - 1) > window_);
+      const Time length = longer;
+      longer = i > 0 ? span(i - 1) : length;  // length of the window that begins one position earlier, if there is one
+      const bool fills_window = length >= window_ || longer > window_;
       if (!fills_window && i > 0) continue;
       const std::uint64_t way = moved_from(i);
       const bool is_resolved = way == 0 ? fills_window : way >= enough;
       // Uncertainty of the length of the window, to either side.
       const Time open = (newest().at.width() + positions_[i].at.width()) / 2;
-      const bool is_longest = span(i) >= longest_windows * window_;
-      if ((is_resolved && enough * open <= span(i)) || (is_longest && least * open <= span(i))) {
+      const bool is_longest = length >= longest_windows * window_;
+      if ((is_resolved && enough * open <= length) || (is_longest && least * open <= length)) {
         start_ = i;
         return;
       }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <map>
 #include <random>
 
@@ -125,6 +126,54 @@ TEST(Velocity, IsInvalidIfLongestWindowIsTooUncertain) {
   }
   ASSERT_TRUE(good.valid());
   EXPECT_LE(good.uncertainty(), 0.26e6);
+}
+
+TEST(Velocity, SpeedIsInCountsPer1000Seconds) {
+  Velocity velocity;
+  EXPECT_EQ(velocity.speed().speed, 0);
+  EXPECT_EQ(velocity.speed().uncertainty, 0);
+  velocity.add(100, 1ms);
+  velocity.add(0, 2ms);
+  EXPECT_EQ(velocity.speed().speed, -100'000'000);
+  EXPECT_EQ(velocity.speed().uncertainty, 1'000'000);
+  velocity.restart();
+  velocity.add(100, 0s);
+  velocity.add(107, 3s);
+  EXPECT_EQ(velocity.speed().speed, 2333) << "8 counts in 3 s are rounded up, 6 counts down, so 2333.5 is the middle";
+  EXPECT_EQ(velocity.speed().uncertainty, 334);
+}
+
+// The compiler refuses an overflow in a constant.
+constexpr MilliSpeed speed_between(std::int64_t from, std::int64_t to, Time pause) {
+  Velocity velocity(1ns);
+  velocity.add(from, Time{});
+  velocity.add(to, pause);
+  return velocity.speed();
+}
+
+TEST(Velocity, SaturatesAtExtremes) {
+  constexpr std::int64_t least = std::numeric_limits<std::int64_t>::min();
+  static constexpr Time years{std::int64_t{1} << 58};
+  constexpr MilliSpeed fast = speed_between(0, MilliSpeed::most, 1ns);
+  EXPECT_EQ(fast.speed, MilliSpeed::most);
+  EXPECT_EQ(fast.uncertainty, MilliSpeed::most);
+  constexpr MilliSpeed backwards = speed_between(0, least, 1ns);
+  EXPECT_EQ(backwards.speed, -MilliSpeed::most);
+  EXPECT_EQ(backwards.uncertainty, MilliSpeed::most);
+  constexpr MilliSpeed around = speed_between(MilliSpeed::most, least, 1s);
+  EXPECT_EQ(around.speed, 1000) << "a position that wraps moves by one count";
+  constexpr MilliSpeed standing = speed_between(5, 5, years);
+  EXPECT_EQ(standing.speed, 0);
+  EXPECT_EQ(standing.uncertainty, 1) << "one count in 9 years, rounded up";
+  constexpr MilliSpeed long_way = speed_between(0, MilliSpeed::most, years);
+  EXPECT_NEAR(static_cast<double>(long_way.speed), 32e12, 32e12 * 0x1p-29);
+  constexpr Velocity late = [] {
+    constexpr Time start{-(std::int64_t{1} << 62)};
+    Velocity velocity(Time::max());
+    for (int i = 0; i <= 100; ++i) velocity.add(i, {start, start + (years / 100) * i});
+    return velocity;
+  }();
+  EXPECT_FALSE(late.valid());
 }
 
 // Position of a shaft in counts as a function of seconds.

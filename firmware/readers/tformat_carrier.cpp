@@ -9,25 +9,55 @@
 namespace absenc::firmware {
 namespace {
 
+constexpr auto reply = std::to_array<std::uint8_t>({0x1A, 0x00, 0x45, 0x23, 0x01, 0x11, 0x34, 0x12, 0x00, 0x00, 0x4A});
+
+#ifdef ABSENC_UNIT
+
+// Stores the last transfer or result.
+struct Line {
+  void begin(const ByteStep& step) { last = step.kind; }
+  void result(bool over) { last = over ? ByteStep::Kind::done : ByteStep::Kind::emit; }
+  ByteStep::Kind last = ByteStep::Kind::wait;
+};
+using Carrier = host::Carrier<std::uint8_t, Line>;
+
+// A carrier with its conversation as a reader: `feed` is an interrupt, the first `next` starts the conversation.
+class CarriedReader {
+ public:
+  void feed(const ByteEvent& event) {
+    line_.last = ByteStep::Kind::wait;
+    if (event.kind == ByteEvent::Kind::sent) return carrier_.sent(event.at);
+    if (event.kind == ByteEvent::Kind::received) return carrier_.received(event.items, event.at);
+    carrier_.tick(event.at);
+  }
+  ByteStep next(Time now) {
+    if (!started_) carrier_.start(conversation_, now);
+    started_ = true;
+    return {.kind = line_.last, .at = carrier_.due()};
+  }
+  [[nodiscard]] const Reading* reading() const { return conversation_.reading(); }
+
+ private:
+  Line line_;
+  Carrier carrier_{line_};
+  tformat::ReadPosition conversation_{tformat::Format{}};
+  bool started_ = false;
+};
+
+#else
+
 struct Line {
   void begin(const ByteStep&) {}
   void result(bool) {}
 };
 using Carrier = host::Carrier<std::uint8_t, Line>;
 
-constexpr auto reply = std::to_array<std::uint8_t>({0x1A, 0x00, 0x45, 0x23, 0x01, 0x11, 0x34, 0x12, 0x00, 0x00, 0x4A});
-
 // Stands in for an interrupt handler, which gets the received character in a register.
 [[gnu::noinline]] void interrupt(Carrier& carrier, std::uint8_t character, Time now) {
   carrier.received({&character, 1}, now);
 }
 
-}  // namespace
-}  // namespace absenc::firmware
-
-int main() {
-  using namespace absenc;
-  using namespace absenc::firmware;
+[[noreturn]] void measure() {
   static Line line;
   static Carrier carrier(line);
   static tformat::ReadPosition whole{tformat::Format{}}, by_character{tformat::Format{}};
@@ -50,4 +80,17 @@ int main() {
     if (i == 1) count_end();
   }
   machine::end(whole.reading() != nullptr && by_character.reading() != nullptr);
+}
+
+#endif
+
+}  // namespace
+}  // namespace absenc::firmware
+
+int main() {
+#ifdef ABSENC_UNIT
+  absenc::firmware::run<std::uint8_t, absenc::firmware::CarriedReader>(absenc::firmware::reply, true);
+#else
+  absenc::firmware::measure();
+#endif
 }

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+// Finds the greatest costs of a reader's calls: gives it every reply of the vectors of the unit ABSENC_UNIT, whole and
+// damaged.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "absenc/protocol/all.hpp"
+#include "absenc/protocol/vector_check.hpp"
+#include "firmware/machine/machine.hpp"
+#include "firmware/readers/conversation.hpp"
+#include "firmware/readers/counted.hpp"
+#include "firmware/vectors.hpp"
+
+namespace absenc::firmware {
+
+/// The items of a reply, of which all must fit.
+template <class Item>
+class LineContent {
+ public:
+  void set(std::span<const Item> items) {
+    items_.clear();
+    add(items);
+  }
+  void add(std::span<const Item> items) {
+    for (const Item& item : items) {
+      if (!items_.push_back(item)) machine::end(false);
+    }
+  }
+  [[nodiscard]] std::span<const Item> view() const { return items_.view(); }
+  Item& operator[](std::size_t index) { return items_[index]; }
+
+ private:
+  Buffer<Item, 512> items_;
+};
+
+/// Calls `visit` with each bit of `byte` inverted.
+template <class Visit>
+void damage(std::uint8_t& byte, const Visit& visit) {
+  const std::uint8_t sound = byte;
+  for (unsigned bit = 0; bit < 8; ++bit) {
+    byte = static_cast<std::uint8_t>(sound ^ 1u << bit);
+    visit();
+  }
+  byte = sound;
+}
+
+/// Calls `visit` with each bit of `frame` inverted, and with every size.
+template <class Visit>
+void damage(CanFrame& frame, const Visit& visit) {
+  const CanFrame sound = frame;
+  for (std::uint8_t& byte : frame.data) damage(byte, visit);
+  for (unsigned bit = 0; bit < 29; ++bit) {
+    frame.id = sound.id ^ 1u << bit;
+    visit();
+  }
+  frame = sound;
+  for (frame.size = 0; frame.size <= frame.data.size(); ++frame.size) visit();
+  frame = sound;
+  frame.remote = !sound.remote;
+  visit();
+  frame = sound;
+  frame.extended = !sound.extended;
+  visit();
+  frame = sound;
+}
+
+/// Calls `visit` with `reply`, with its damaged and truncated forms, with items before and behind it, and with two
+/// replies.
+template <class Item, class Visit>
+void vary(std::span<const Item> reply, const Visit& visit) {
+  static LineContent<Item> line;
+  const auto visit_line = [&visit] { visit(line.view()); };
+  line.set(reply);
+  visit_line();
+  for (std::size_t size = 0; size < reply.size(); ++size) visit(line.view().first(size));
+  for (std::size_t i = 0; i < reply.size(); ++i) damage(line[i], visit_line);
+  if (reply.empty()) return;
+  for (const Item& extra : {Item{}, reply.front(), reply.back()}) {
+    line.set({&extra, 1});
+    line.add(reply);
+    visit_line();
+    line.set(reply);
+    line.add({&extra, 1});
+    visit_line();
+  }
+  line.set(reply);
+  line.add(reply);
+  visit_line();
+}
+
+inline void set_frame(LineContent<CanFrame>& line, const Unit&, Bytes text) {
+  const CanFrame frame = can_frame_of_text(text);
+  line.set({&frame, 1});
+}
+inline void set_frame(LineContent<std::uint8_t>& line, const Unit& unit, Bytes bytes) {
+  line.set(unit.link == LinkKind::clocked ? bits_of_text(bytes).bytes() : bytes);
+}
+
+/// Calls `visit` with every reply in the vectors of the unit ABSENC_UNIT, and each of its variations.
+template <class Item, class Visit>
+void vary_vectors(const Visit& visit) {
+  static LineContent<Item> reply;
+  const Unit* const unit = find_unit(ABSENC_UNIT);
+  if (unit == nullptr) machine::end(false);
+  const auto vary_reply = [&](Bytes bytes) {
+    if (bytes.empty()) return;
+    set_frame(reply, *unit, bytes);
+    vary<Item>(reply.view(), visit);
+  };
+  for (const Vector& vector : unit->vectors) vary_reply(vector.reply);
+  for (const ReferenceVector& vector : reference_vectors()) {
+    if (vector.unit == unit->id) vary_reply(vector.reply);
+  }
+}
+
+/// Counts the calls of a reader, then ends the emulator; `reply` must be read.
+template <class Item, class Reader, class... Parameters>
+[[noreturn]] void find_bounds(std::span<const Item> reply, bool by_character, const Parameters&... parameters) {
+  static Counted<Reader> reader;
+  std::uint32_t conversations = 0;
+  const auto read = [&](std::span<const Item> items, Delivery delivery) {
+    ++conversations;
+    reader.make(parameters...);
+    return converse<Item>(reader, items, delivery);
+  };
+  bool good = read(reply, Delivery::whole);
+  if (by_character) good = read(reply, Delivery::by_character) && good;
+  const auto visit = [&](std::span<const Item> items) {
+    static_cast<void>(read(items, Delivery::whole));
+    if (by_character) static_cast<void>(read(items, Delivery::by_character));
+  };
+  vary<Item>(reply, visit);
+  vary_vectors<Item>(visit);
+  machine::print(conversations);
+  machine::end(good);
+}
+
+}  // namespace absenc::firmware
