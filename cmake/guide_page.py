@@ -81,7 +81,7 @@ def paragraphs(head, body, page):
 
 
 def table(lines, page):
-    """Returns a Markdown table as a table of tbl whose columns wrap; the first line is its head."""
+    """Returns a Markdown table, whose first line is its head, as a table of tbl, or as paragraphs if it is too wide."""
     rows = [[cell.strip().replace("\0", "|") for cell in line.strip().strip("|").replace("\\|", "\0").split("|")] for line in lines]
     head, body = rows[0], rows[2:]
     if sum(max(longest_word(row[i]) for row in [head, *body] if i < len(row)) + 4 for i in range(len(head))) > NARROWEST:

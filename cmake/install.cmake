@@ -80,6 +80,6 @@ if(TARGET absenc-command)
 endif()
 
 if(PROJECT_IS_TOP_LEVEL)
-  file(TOUCH "${CMAKE_BINARY_DIR}/install_manifest.txt")  # keeps the file writable for the user when root installs
+  file(TOUCH "${CMAKE_BINARY_DIR}/install_manifest.txt")  # stays writable for the user when root installs
   include(package)
 endif()

@@ -6,7 +6,8 @@ get_filename_component(absenc_root "${CMAKE_CURRENT_LIST_DIR}/.." ABSOLUTE)
 set(absenc_firmware_folders absenc/core absenc/link absenc/protocol absenc/host)
 set(absenc_firmware_flags -ffunction-sections -fdata-sections -fno-exceptions -fno-rtti -fno-threadsafe-statics)
 
-# Returns the sources in folders and the given ones, without tests, fuzzers and benchmarks.
+# Returns the sources in folders and the given ones, without tests, fuzzers and benchmarks; those in absenc/os/cuse only
+# if that folder is given.
 function(absenc_sources result)
   set(found)
   foreach(path IN LISTS ARGN)

@@ -27,7 +27,7 @@ foreach(name IN ITEMS kit client capture host)
   list(JOIN absenc_long_${name}_tests ":" absenc_long_${name}_tests)
 endforeach()
 
-# Tests are not optimised, so that they compile in half the time.
+# Most tests are not optimised, so that they compile in half the time.
 function(absenc_test_settings target)
   absenc_settings(${target})
   target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}")
@@ -46,7 +46,7 @@ add_library(test_headers OBJECT "${CMAKE_CURRENT_BINARY_DIR}/test_headers.cpp")
 absenc_test_settings(test_headers)
 target_precompile_headers(test_headers PRIVATE <gtest/gtest.h>)
 
-# The programs of tests that are not long; ./dev test builds nothing else.
+# All that `./dev test` builds without --all: the command, the Python package, GoogleTest programs, examples.
 add_custom_target(change-tests)
 foreach(target IN ITEMS absenc-command absenc-manual absenc-python)
   if(TARGET ${target})
@@ -133,6 +133,13 @@ if(TARGET absenc-client)
   target_sources(client_test PRIVATE tests/kit/frames.cpp)
   target_link_libraries(client_test PRIVATE absenc::client ${hdf5_LIBRARIES})
   target_include_directories(client_test SYSTEM PRIVATE ${hdf5_INCLUDE_DIRS})
+  if(NOT ABSENC_UNITS)  # a program of its own, because it replaces malloc
+    absenc_test(reading_allocations tests/reading_allocations.cpp)
+    target_link_libraries(reading_allocations_test PRIVATE absenc::client)
+    if(NOT ABSENC_SANITIZE AND NOT ABSENC_FUZZ)  # sanitizers replace malloc themselves
+      target_compile_definitions(reading_allocations_test PRIVATE ABSENC_COUNTS_MALLOC)
+    endif()
+  endif()
 endif()
 if(TARGET absenc-serve AND NOT ABSENC_UNITS)
   absenc_folder_test(serve absenc/serve GLOB)
@@ -195,7 +202,7 @@ if(ABSENC_COMMAND AND NOT ABSENC_UNITS)
     set_tests_properties(${name}.py PROPERTIES
       # Busy time limits are relaxed, because other tests run at the same time.
       ENVIRONMENT "ABSENC=${absenc_bin_dir}/absenc;ABSENC_SOURCE_DIR=${PROJECT_SOURCE_DIR};ABSENC_BUSY_SECONDS=2"
-      COST 100  # start first, because they mostly wait
+      COST 100  # Python tests start first, because they mostly wait
       TIMEOUT 900)  # enough for a busy machine
     if(name IN_LIST absenc_long_python_tests)
       set_tests_properties(${name}.py PROPERTIES LABELS long)

@@ -107,7 +107,7 @@ class Encoder {
   Encoder& operator=(Encoder&&) noexcept;
   ~Encoder();
 
-  /// Opens the port, or shares that of another encoder on the line. Throws os::Failure, UsageError.
+  /// Opens the port, or shares that of another encoder on the line. Throws os::Failure, UsageError, Failure.
   void connect();
   /// Releases the port; counters and statistics remain.
   void disconnect();
@@ -172,7 +172,7 @@ class Encoder {
   [[nodiscard]] const host::Latencies& latencies() const;
   /// Returns the stored bad exchanges, the newest first, with times of os::now.
   [[nodiscard]] std::vector<BadExchangeText> bad_exchanges() const;
-  /// Returns the number of good readings since the encoder was opened.
+  /// Returns how many readings `read`, `next` and `samples` took without an error since the encoder was opened.
   [[nodiscard]] std::uint64_t readings() const;
   /// Returns how often the port was lost since the encoder was opened.
   [[nodiscard]] std::uint64_t losses() const;
@@ -180,7 +180,7 @@ class Encoder {
   [[nodiscard]] std::uint64_t restarts() const;
   /// Returns the number of readings per second, averaged over about the last second.
   [[nodiscard]] double rate() const;
-  /// Returns a warning if the rate is too low to follow the turns of a fast shaft; "" if not.
+  /// Returns a warning if the rate of `samples` is too low to follow the turns of a fast shaft; "" if not.
   [[nodiscard]] std::string rate_note() const;
 
  private:
@@ -190,7 +190,9 @@ class Encoder {
 };
 
 /// Opens and connects an encoder and returns it. `text` is an address, as "tformat:/dev/ttyUSB0?model=23-bit" or
-/// "sim:esl", or a name of absenc.toml; `settings` ("name=value") are added to it. Throws os::Failure, UsageError.
+/// "sim:esl", or a name of absenc.toml; `settings` ("name=value") are added to it. With the setting realtime=PRIORITY,
+/// 1 to 99, each thread that uses the encoder becomes a real-time thread (SCHED_FIFO) and stays one, and the memory of
+/// the process is locked. Throws os::Failure, UsageError, and Failure if the kernel refuses that.
 [[nodiscard]] Encoder open(std::string_view text, std::span<const std::string> settings = {});
 
 /// An input range of samples. With a rate they are due at equal distances in time, without drift.

@@ -17,10 +17,10 @@ namespace absenc::client {
 /// Settings of a tap: protocol and options for decoding, duration, and file of the record.
 struct TapChoices {
   std::string protocol{};  ///< Identifier of the protocol's unit; "": the protocol is detected from the received bytes.
-  std::string model{};     ///< Name of a model of the unit; empty: the default model.
+  std::string model{};     ///< Name of a model; "": the default one. Received bytes may correct its options.
   std::vector<std::string> options{};  ///< Options of the unit, as "name=value".
   Time duration{};                     ///< Time after which the tap ends; 0: no limit.
-  /// File to which all received frames are written, in a format that `decode` reads; "": no file.
+  /// File to which received bytes are written, in a format that `decode` reads; "": no file.
   std::string record{};
   bool replaces = false;  ///< Whether an existing file `record` may be replaced.
 };
@@ -53,7 +53,7 @@ class Tap {
   [[nodiscard]] const Row* current() const { return row_; }
   /// Waits until the next row is complete or the range ends, and moves there.
   void advance();
-  /// Cancels from any thread: the caller soon gets the exception Cancelled.
+  /// Cancels from any thread: the thread that waits for rows soon gets the exception Cancelled.
   void cancel();
 
   /// Returns the identifier of the unit with which the tap decodes.

@@ -6,7 +6,8 @@
 
 namespace absenc::os {
 
-/// Appends `line`, with its line end, to the file at `path` with a single write. Returns 0 or a value of errno.
+/// Appends `line`, which ends with a line feed, to the file at `path` in one write; creates a missing file. Returns 0
+/// or a value of errno.
 [[nodiscard]] int append_line(const std::string& path, std::string_view line);
 
 }  // namespace absenc::os

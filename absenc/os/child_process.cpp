@@ -46,7 +46,7 @@ struct SpawnSteps {
     }
     ::posix_spawn_file_actions_adddup2(&files, channel, channel_of_child);
     ::posix_spawn_file_actions_addclosefrom_np(&files, channel_of_child + 1);
-    // Signals such as Ctrl-C reach all processes at once, but the parent still needs the child.
+    // Ctrl-C in a terminal signals parent and child at once, but the parent still needs the child.
     sigset_t blocked;
     ::sigemptyset(&blocked);
     for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE}) ::sigaddset(&blocked, signal);

@@ -48,14 +48,14 @@ TEST(DelayWatch, MeasuresHowLongTheProcessStoodStill) {
 std::set<std::string> open_slaves() {
   std::set<std::string> paths;
   for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
-    std::error_code closed;  // the directory's own descriptor is closed when its link is read
+    std::error_code closed;  // a descriptor may be closed before its link is read
     const std::string path = std::filesystem::read_symlink(entry.path(), closed);
     if (path.starts_with("/dev/pts/")) paths.insert(path);
   }
   return paths;
 }
 
-/// Takes a byte away from one of the terminals: it is on its way for ever.
+/// Takes a byte away from one of the terminals, so that the watch waits for this byte for ever.
 TEST(DelayWatch, ByteThatDoesNotArriveIsLate) {
   const std::set<std::string> before = open_slaves();
   const DelayWatch watch(true);

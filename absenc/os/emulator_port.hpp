@@ -46,7 +46,7 @@ class EmulatorPort final : public StreamPort {
   void write_terminal(Bytes bytes);
 
   TerminalPair terminal_;     // the slave is kept open: the master fails while no program has it open
-  Descriptor in_use_marker_;  // bound socket that marks the link as in use
+  Descriptor in_use_marker_;  // socket whose name marks the link as in use; empty without a link or after an error
   Descriptor watch_;          // inotify descriptor: reports programs that open or close the slave
   Descriptor listener_;
   std::vector<Descriptor> clients_;

@@ -18,9 +18,9 @@ class Failure : public std::runtime_error {
     not_found,      ///< the port, host, listener, file, folder or GPIO line does not exist or cannot be reached
     no_permission,  ///< this user may not open or create the port or file
     in_use,         ///< another program uses the port or file, or a new file would replace another
-    unsupported,    ///< the port, file or kernel is of a kind that cannot do what was requested
+    unsupported,    ///< the port, file or kernel cannot do what was requested, or a name is invalid
     bad_rate,       ///< this port does not support the requested baud rate
-    lost,           ///< the port, connection or file has disappeared, or the file was cut
+    lost,           ///< the port, connection or file has disappeared or works no more, or the file was cut
     system,         ///< any other error of the operating system
   };
 

@@ -13,6 +13,8 @@
 #include <cstring>
 #include <deque>
 #include <map>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "absenc/os/signals.hpp"
@@ -58,11 +60,19 @@ class FakeCan final : public CanKernel {
     written_at = now();
     return sizeof frame;
   }
-  ssize_t read(int descriptor, can_frame& frame, Time& at) override {
+  ssize_t read(int descriptor, can_frame& frame, std::optional<Time>& stamp) override {
     if (read_error != 0) return refuse(read_error);
     const ssize_t size = ::recv(descriptor, &frame, sizeof frame, 0);
-    at = now() - age;
+    stamp.reset();
+    if (has_stamps) stamp = now() - age + lead;
+    lead += std::exchange(clock_step, Time{});
     return size;
+  }
+  ClockPair clocks() override {
+    ClockPair clocks{.before = now()};
+    clocks.after = now();
+    clocks.calendar = clocks.after + lead;
+    return clocks;
   }
 
   /// Puts a frame on the bus.
@@ -76,7 +86,10 @@ class FakeCan final : public CanKernel {
   short flags = IFF_UP;
   std::deque<int> write_errors;
   bool keep_last_error = false;
-  Time age{};  // age that `read` gives every frame: time since the kernel received it
+  Time age{};  // age of each frame with a stamp: time since the kernel received it
+  bool has_stamps = true;
+  Time lead = std::chrono::hours(500'000);  // lead of the calendar clock over `now`
+  Time clock_step{};                        // change of the calendar clock after the next read
   int bound = 0;
   std::map<std::pair<int, int>, std::uint32_t> options;
   std::vector<can_frame> written;

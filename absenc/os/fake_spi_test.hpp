@@ -30,7 +30,7 @@ class FakeSpi final : public SpiKernel {
     connect(LinkKind::spi, {.rate = 500'000, .spi_mode = 1}, nobody_);
   }
 
-  /// Connects `device` to the controller; before this call no device is connected.
+  /// Connects `device` to the controller; before the first call no device is connected.
   void connect(LinkKind kind, const LineSettings& settings, Machine<std::uint8_t>& device) {
     const SpidevSettings before = spidev_ ? spidev_->settings() : SpidevSettings{0, 16, 500'000, ~0u};
     device_ = std::make_unique<SpiDevice>(kind, settings, device);
@@ -38,7 +38,7 @@ class FakeSpi final : public SpiKernel {
     spidev_->settings() = before;
   }
 
-  // Each call opens a new file description, as for a device, so that locks work.
+  // Each successful call opens a new file description, as for a device, so that locks work.
   int open(const std::string& name) override {
     if (name == path && open_error == 0) return ::open(file_.c_str(), O_RDWR | O_CLOEXEC);
     errno = open_error != 0 ? open_error : ENOENT;

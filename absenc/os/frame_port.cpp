@@ -11,17 +11,17 @@ namespace absenc::os {
 using namespace std::chrono_literals;
 
 namespace {
-// If as many events wait to be reported, the next received one displaces the oldest.
+// If this many events wait to be reported, the next one displaces the oldest.
 constexpr std::size_t most_pending = 4096;
 }  // namespace
 
-void FramePort::push(const CanFrame& frame, Time at) { push_event({EventKind::received, at, frame}); }
+void FramePort::push(const CanFrame& frame, Time at, Time late) { push_event({EventKind::received, at, late, frame}); }
 
-void FramePort::push_error(Time at) { push_event({EventKind::line_error, at}); }
+void FramePort::push_error(Time at, Time late) { push_event({EventKind::line_error, at, late}); }
 
 void FramePort::push_event(const PendingEvent& pending) {
-  if (pending_events_.size() == most_pending) pending_events_.pop_front();
-  pending_events_.push_back(pending);
+  if (pending_events_.size() == most_pending) pending_events_.pop();
+  pending_events_.push(pending);
 }
 
 Time FramePort::now() {
@@ -59,7 +59,7 @@ void FramePort::transfer(const Step<CanFrame>& step) {
     at = os::now();
     send(frame);
   }
-  push_event({EventKind::sent, at});
+  push_event({.kind = EventKind::sent, .at = at});
 }
 
 Event<CanFrame> FramePort::wait(const Step<CanFrame>& step) {
@@ -76,16 +76,18 @@ Event<CanFrame> FramePort::wait(const Step<CanFrame>& step) {
 }
 
 Event<CanFrame> FramePort::report_first() {
-  const PendingEvent first = pending_events_.front();
-  pending_events_.pop_front();
+  const PendingEvent first = pending_events_.pop();
   if (first.kind == EventKind::sent) {
     waiting_.silence.sent(first.at);
   } else {
     waiting_.silence.received(first.at);
   }
-  if (first.kind != EventKind::received) return waiting_.report({.kind = first.kind, .at = first.at});
-  reported_frame_ = first.frame;
-  return waiting_.report({.kind = EventKind::received, .at = first.at, .items = {&reported_frame_, 1}});
+  Event<CanFrame> event{.kind = first.kind, .at = first.at, .late = first.late};
+  if (first.kind == EventKind::received) {
+    reported_frame_ = first.frame;
+    event.items = {&reported_frame_, 1};
+  }
+  return waiting_.report(event);
 }
 
 }  // namespace absenc::os

@@ -2,7 +2,9 @@
 // Steps and events (link/step.hpp) on any port that carries CAN frames.
 #pragma once
 
-#include <deque>
+#include <cstddef>
+#include <utility>
+#include <vector>
 
 #include "absenc/link/port.hpp"
 #include "absenc/os/waiting.hpp"
@@ -29,7 +31,7 @@ class FramePort : public Port<CanFrame> {
   /// Sets the slack: a transfer due within `slack` is sent at once. Default 0.
   void set_send_slack(Time slack) { send_slack_ = slack; }
 
-  /// Sets the time from which the port throws Ended. Default `never`.
+  /// Sets the time at which a wait of the port ends with Ended. Default `never`.
   void set_end(Time end) { end_ = end; }
 
  protected:
@@ -38,9 +40,10 @@ class FramePort : public Port<CanFrame> {
   virtual void send(const CanFrame& frame) = 0;
   virtual void apply(const LineSettings& settings) = 0;
 
-  void push(const CanFrame& frame, Time at);
+  /// Queues a received frame with its time, which may have been earlier by up to `late`; 0: not known.
+  void push(const CanFrame& frame, Time at, Time late = {});
   /// Queues a `line_error`: a frame was destroyed on the bus or could not be sent.
-  void push_error(Time at);
+  void push_error(Time at, Time late = {});
   [[nodiscard]] Time end() const { return end_; }
 
  private:
@@ -48,7 +51,35 @@ class FramePort : public Port<CanFrame> {
   struct PendingEvent {
     EventKind kind;
     Time at;
+    Time late{};
     CanFrame frame{};
+  };
+
+  /// A queue that keeps its memory, so that a port in use seldom allocates any.
+  class Queue {
+   public:
+    Queue() { events_.reserve(usual); }
+    [[nodiscard]] bool empty() const { return first_ == events_.size(); }
+    [[nodiscard]] std::size_t size() const { return events_.size() - first_; }
+    void push(const PendingEvent& event) {
+      if (events_.size() == events_.capacity() && first_ >= events_.size() / 2) {
+        events_.erase(events_.begin(), events_.begin() + static_cast<std::ptrdiff_t>(std::exchange(first_, 0)));
+      }
+      events_.push_back(event);
+    }
+    PendingEvent pop() {
+      const PendingEvent event = events_[first_++];
+      if (!empty()) return event;
+      events_.clear();
+      first_ = 0;
+      return event;
+    }
+
+   private:
+    static constexpr std::size_t usual = 512;  // number of events for which memory is reserved at first
+
+    std::vector<PendingEvent> events_;
+    std::size_t first_ = 0;  // index of the oldest event; those before it were popped
   };
 
   Event<CanFrame> report_first();
@@ -59,7 +90,7 @@ class FramePort : public Port<CanFrame> {
   Time send_slack_{};
   Time end_ = never;
 
-  std::deque<PendingEvent> pending_events_;
+  Queue pending_events_;
   CanFrame reported_frame_{};
   Waiting<CanFrame> waiting_;
 };

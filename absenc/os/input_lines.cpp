@@ -30,8 +30,11 @@ std::vector<std::string> InputLines::take() {
   ended_ = size <= 0;
   for (ssize_t i = 0; i < size; ++i) {
     const char c = read[static_cast<std::size_t>(i)];
-    if (c != '\n') begun_ += c;
-    if (c == '\n' || begun_.size() == longest_line) lines.push_back(std::exchange(begun_, {}));
+    const bool ends = c == '\n';
+    if (!ends) begun_ += c;
+    // A line feed behind a line that was cut here begins no other line.
+    const bool was_cut = std::exchange(cut_, begun_.size() == longest_line);
+    if (cut_ || (ends && !was_cut)) lines.push_back(std::exchange(begun_, {}));
   }
   if (ended_ && !begun_.empty()) lines.push_back(std::exchange(begun_, {}));
   return lines;

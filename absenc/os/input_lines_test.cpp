@@ -62,6 +62,19 @@ TEST(InputLines, CutsInputWithoutLines) {
   EXPECT_FALSE(lines.ended());
 }
 
+TEST(InputLines, LongestLineIsOneLine) {
+  const Pipe pipe;
+  InputLines lines(pipe.out.get());
+  pipe.write(std::string(4096, 'x') + "\n");
+  std::vector<std::string> taken = lines.take();
+  pipe.write("\nhelp\n");
+  for (std::string& line : lines.take()) taken.push_back(std::move(line));
+  if (taken.size() == 2) {
+    for (std::string& line : lines.take()) taken.push_back(std::move(line));
+  }
+  EXPECT_THAT(taken, ElementsAre(SizeIs(4096), "", "help"));
+}
+
 TEST(InputLines, UnreadableInputHasEnded) {
   const Descriptor folder(::open("/", O_RDONLY | O_CLOEXEC));
   InputLines lines(folder.get());

@@ -38,7 +38,7 @@ class OutputFile {
   Descriptor file_;
   std::uint64_t size_ = 0;
   bool appeared_ = false;
-  std::string temporary_name_;  // temporary name of the file until `appear`, on file systems without nameless files
+  std::string temporary_name_;  // temporary name until `appear`, on file systems without nameless files; else empty
 };
 
 /// An output file of complete lines.
@@ -49,7 +49,7 @@ class LineFile final : public OutputFile {
   void append(std::string_view lines);
 };
 
-/// An output file that is written in blocks at any offset and has no name until `appear`.
+/// An output file that is written in blocks at any offset and gets its name by `appear`.
 class BlockFile final : public OutputFile {
  public:
   explicit BlockFile(const std::string& path) : OutputFile(path, Appears::later) {}

@@ -32,7 +32,7 @@ class LogFile {
   /// Creates the file at `path` (`fresh`) or opens it (`existing`). Throws Failure.
   LogFile(const std::string& path, Open how);
 
-  /// Appends all of `bytes` or, on error, none of them. Returns 0 or a value of errno.
+  /// Appends `bytes`; on an error removes what was written of them, if possible. Returns 0 or a value of errno.
   [[nodiscard]] int append(std::string_view bytes);
   /// Replaces the existing byte at `offset`. Returns 0 or a value of errno.
   [[nodiscard]] int replace(std::size_t offset, char byte) const;

@@ -39,7 +39,7 @@ OwnedFile::OwnedFile(const std::string& path) : path_(path) {
     if (there) require_regular(is_regular(named), path);
     const int make = there ? 0 : O_CREAT | O_EXCL;
     file_ = Descriptor(::open(path.c_str(), O_RDWR | O_NONBLOCK | O_NOCTTY | O_CLOEXEC | make, 0666));
-    // Another process created or removed the file between stat(2) and open(2).
+    // Another process may have created or removed the file between stat(2) and open(2).
     if (!file_ && (errno == EEXIST || (there && errno == ENOENT))) continue;
     if (!file_) throw system_failure("opening " + path, errno);
     made_ = made_ || !there;

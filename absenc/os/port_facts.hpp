@@ -9,7 +9,7 @@
 
 namespace absenc::os {
 
-/// Numbers of damaged characters that a UART has counted since it was initialised.
+/// Numbers of breaks, and of damaged or lost characters, that a UART has counted since it was initialised.
 struct LineCounts {
   std::uint64_t breaks = 0;   // number of breaks: the line was low for longer than a character
   std::uint64_t framing = 0;  // number of characters without a stop bit

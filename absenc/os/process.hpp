@@ -27,7 +27,7 @@ void protect_standard_streams();
 class RunDelay {
  public:
   RunDelay();
-  /// Returns that time since the last call or the constructor; 0 if the kernel does not report it.
+  /// Returns how long the thread waited since the last call or the constructor; 0 if the kernel does not say.
   [[nodiscard]] Time take();
 
  private:

@@ -16,7 +16,7 @@ struct PulseWire {
   enum class Kind { none, rts, dtr, gpio } kind = Kind::none;
   std::string name{};           // gpio: name of the line as `gpioinfo` lists it
   bool active_high = false;     // whether the wire is high during the pulse; at rest it has the other level
-  std::optional<Time> width{};  // pulse width that replaces the one requested by the protocol
+  std::optional<Time> width{};  // pulse width instead of that of the protocol; empty: the protocol's
 };
 
 /// The wires of ExtraWire::trigger and ExtraWire::clear.

@@ -36,7 +36,7 @@ struct ListedPort {
   std::optional<unsigned> latency_timer{};  // time for which a USB adapter holds back received bytes, in milliseconds
   // highest bit rate of the adapter or the UART, in bits per second; empty if unknown
   std::optional<std::uint32_t> highest_rate{};
-  std::string refusal{};  // reason why this user may not open the port; "" if the user may
+  std::string refusal{};  // reason why this user cannot open the port; "" if none is known
   std::string holder{};   // program that uses the port, as returned by `holder_of`
 };
 

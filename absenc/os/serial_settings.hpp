@@ -33,8 +33,8 @@ std::optional<LineSettings> set_terminal(int descriptor, const LineSettings& set
   return difference * 100 <= requested;
 }
 
-/// Returns the rate to propose when the driver gave `given` instead of `requested`, which is not 0. `base`: input clock
-/// of the baud generator, 0 if unknown.
+/// Returns the rate to propose when the driver gave `given` instead of `requested`, which is not 0. `base`: highest
+/// rate of the baud generator, which divides it by whole numbers; 0 if unknown.
 [[nodiscard]] constexpr std::uint32_t nearest_rate(std::uint32_t requested, std::uint32_t given, std::uint32_t base) {
   const auto distance = [requested](std::uint32_t rate) {
     return rate > requested ? rate - requested : requested - rate;

@@ -23,7 +23,7 @@ namespace {
 
 // A signal handler may use only lock-free variables.
 static_assert(std::atomic<int>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
-std::atomic<int> wake{-1};  // the eventfd that a signal makes readable
+std::atomic<int> wake{-1};  // eventfd that SIGINT and SIGTERM make readable; -1 before `catch_interrupts`
 std::atomic<bool> signal_received{false};
 
 void on_signal(int) {

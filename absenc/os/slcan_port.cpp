@@ -69,7 +69,7 @@ SlcanPort::SlcanPort(std::shared_ptr<Port<std::uint8_t>> bytes, std::string name
 SlcanPort::~SlcanPort() {
   try {
     write(bytes_of("C\r"));
-  } catch (const Failure&) {  // the port has disappeared, so the adapter cannot be closed
+  } catch (const Failure&) {  // the port may have disappeared, so the adapter cannot be closed
   } catch (const Interrupted&) {
   } catch (const Ended&) {
   }

@@ -55,7 +55,7 @@ class SlcanPort final : public SlcanLine {
 
   std::string name_;
   std::vector<std::string> notes_;
-  // A command is outstanding: the next empty line or refusal is the adapter's reply to it.
+  // Whether a command is outstanding: the next empty line or refusal is the adapter's reply to that command.
   bool awaiting_reply_ = false;
   Reply reply_ = Reply::none;
   unsigned garbage_ = 0;
@@ -71,7 +71,7 @@ class SlcanAdapter final : public SlcanLine {
   [[nodiscard]] std::uint64_t lost() const { return lost_; }
   /// Returns the number of frames refused because the queue was full.
   [[nodiscard]] std::uint64_t overflowed() const { return overflowed_; }
-  /// Returns the number of lines of the host that are no known command and no valid frame.
+  /// Returns how often the host sent something other than a known command or a valid frame.
   [[nodiscard]] std::uint64_t garbage() const { return garbage_; }
 
  private:

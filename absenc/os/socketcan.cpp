@@ -9,7 +9,6 @@
 #include <net/if_arp.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
-#include <time.h>
 
 #include <algorithm>
 #include <array>
@@ -37,21 +36,6 @@ constexpr std::size_t most_at_once = 256;
 
 constexpr std::string_view check_bus =
     "check that another node is switched on, CANH and CANL, 120 ohms at both ends, and the bit rate";
-
-Time time_of(const timespec& time) { return std::chrono::seconds(time.tv_sec) + Time(time.tv_nsec); }
-
-// Converts a kernel time stamp, which is calendar time, to a time of os::now.
-Time since_boot(const timespec& stamp) {
-  constexpr Time together = std::chrono::microseconds(20);
-  timespec day{};
-  Time now = os::now();
-  for (int attempt = 0; attempt < 8; ++attempt) {
-    ::clock_gettime(CLOCK_REALTIME, &day);
-    const Time before = std::exchange(now, os::now());
-    if (now - before < together) break;
-  }
-  return std::min(now, now - (time_of(day) - time_of(stamp)));
-}
 
 ifreq request_for(const std::string& interface) {
   ifreq request{};
@@ -92,7 +76,7 @@ int CanKernel::bind(int descriptor, int index) {
 
 ssize_t CanKernel::write(int descriptor, const can_frame& frame) { return ::write(descriptor, &frame, sizeof frame); }
 
-ssize_t CanKernel::read(int descriptor, can_frame& frame, Time& at) {
+ssize_t CanKernel::read(int descriptor, can_frame& frame, std::optional<Time>& stamp) {
   iovec part{&frame, sizeof frame};
   alignas(cmsghdr) std::array<char, 128> control{};
   msghdr message{};
@@ -102,15 +86,17 @@ ssize_t CanKernel::read(int descriptor, can_frame& frame, Time& at) {
   message.msg_controllen = control.size();
   const ssize_t size = ::recvmsg(descriptor, &message, 0);
   if (size < 0) return size;
-  at = os::now();
+  stamp.reset();
   for (cmsghdr* part_of = CMSG_FIRSTHDR(&message); part_of != nullptr; part_of = CMSG_NXTHDR(&message, part_of)) {
     if (part_of->cmsg_level != SOL_SOCKET || part_of->cmsg_type != SO_TIMESTAMPNS) continue;
-    timespec stamp{};
-    std::memcpy(&stamp, CMSG_DATA(part_of), sizeof stamp);
-    at = since_boot(stamp);
+    timespec time{};
+    std::memcpy(&time, CMSG_DATA(part_of), sizeof time);
+    stamp = std::chrono::seconds(time.tv_sec) + Time(time.tv_nsec);
   }
   return size;
 }
+
+ClockPair CanKernel::clocks() { return read_clocks(); }
 
 CanKernel& system_can_kernel() {
   static CanKernel kernel;
@@ -133,7 +119,7 @@ std::vector<std::string> can_interfaces(const std::filesystem::path& sys) {
 // ---- SocketCan
 
 SocketCan::SocketCan(const std::string& interface, const LineSettings& settings, CanKernel& kernel)
-    : interface_(interface), settings_(settings), kernel_(&kernel), socket_(kernel.open()) {
+    : interface_(interface), settings_(settings), kernel_(&kernel), socket_(kernel.open()), stamps_(kernel.clocks()) {
   if (!socket_) {
     if (errno == EPERM || errno == EACCES) throw Failure(Kind::no_permission, "no permission to open a CAN socket");
     throw Failure(Kind::unsupported, "this kernel has no CAN (" + std::generic_category().message(errno) +
@@ -189,12 +175,16 @@ void SocketCan::set_options() {
 void SocketCan::collect(Time deadline) {
   // If the deadline is past, only available frames are read: the socket does not block.
   if (deadline > os::now() && poller_.wait(deadline).empty()) return;
+  ClockPair before = kernel_->clocks();
   for (std::size_t i = 0; i < most_at_once; ++i) {
     can_frame frame{};
-    Time at{};
-    const ssize_t size = kernel_->read(socket_.get(), frame, at);
-    if (size < 0 && (errno == EAGAIN || errno == EINTR)) return;
+    std::optional<Time> stamp;
+    const ssize_t size = kernel_->read(socket_.get(), frame, stamp);
+    if (size < 0 && errno == EINTR) return;
+    if (size < 0 && errno == EAGAIN) return stamps_.found_empty(before);
     if (size < 0) fail("reading from " + interface_, errno);
+    const ClockPair after = kernel_->clocks();
+    const StampedTime at = stamps_.convert(stamp, std::exchange(before, after), after);
     if (size != static_cast<ssize_t>(sizeof frame)) continue;  // a CAN FD frame, which is not enabled
     if ((frame.can_id & CAN_ERR_FLAG) != 0) {
       take_error(frame, at);
@@ -204,17 +194,17 @@ void SocketCan::collect(Time deadline) {
   }
 }
 
-void SocketCan::take(const can_frame& from, Time at) {
+void SocketCan::take(const can_frame& from, const StampedTime& at) {
   CanFrame frame;
   frame.extended = (from.can_id & CAN_EFF_FLAG) != 0;
   frame.remote = (from.can_id & CAN_RTR_FLAG) != 0;
   frame.id = from.can_id & (frame.extended ? CAN_EFF_MASK : CAN_SFF_MASK);
   frame.size = std::min<std::uint8_t>(from.can_dlc, CAN_MAX_DLEN);
   if (!frame.remote) std::copy_n(from.data, frame.size, frame.data.begin());
-  push(frame, at);
+  push(frame, at.at, at.late);
 }
 
-void SocketCan::take_error(const can_frame& frame, Time at) {
+void SocketCan::take_error(const can_frame& frame, const StampedTime& at) {
   if ((frame.can_id & CAN_ERR_BUSOFF) != 0) {
     throw Failure(Kind::lost,
                   interface_ +
@@ -224,7 +214,7 @@ void SocketCan::take_error(const can_frame& frame, Time at) {
                       interface_ + " down` and " + up_command(settings_.rate) + " (`restart-ms 100` does it by itself)",
                   Failure::Bus::off);
   }
-  push_error(at);
+  push_error(at.at, at.late);
 }
 
 void SocketCan::send(const CanFrame& from) {

@@ -3,18 +3,20 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "absenc/os/descriptor.hpp"
 #include "absenc/os/frame_port.hpp"
 #include "absenc/os/poller.hpp"
+#include "absenc/os/stamp_clock.hpp"
 
 struct can_frame;
 
 namespace absenc::os {
 
-/// The system calls of SocketCan, which tests override. On failure each returns a negative number and sets errno.
+/// The system calls of SocketCan, which tests override. A call that fails returns a negative number and sets errno.
 struct CanKernel {
   virtual ~CanKernel() = default;
   /// Calls socket(PF_CAN, SOCK_RAW, CAN_RAW), non-blocking.
@@ -25,12 +27,14 @@ struct CanKernel {
   /// Binds the socket to the interface with this index.
   virtual int bind(int descriptor, int index);
   virtual ssize_t write(int descriptor, const can_frame& frame);
-  /// Reads a frame. `at`: time of os::now at which the kernel received it, or of the read.
-  virtual ssize_t read(int descriptor, can_frame& frame, Time& at);
+  /// Reads a frame. `stamp`: calendar time of the kernel's stamp; empty if there is none.
+  virtual ssize_t read(int descriptor, can_frame& frame, std::optional<Time>& stamp);
+  virtual ClockPair clocks();
 };
 [[nodiscard]] CanKernel& system_can_kernel();
 
-/// A port on a CAN interface. It does not set the bit rate.
+/// A port on a CAN interface. It does not set the bit rate. Received frames have the time of the kernel's stamp,
+/// or of the read if the stamp is missing or doubtful; the adapter's own delay before that is unknown.
 class SocketCan final : public FramePort {
  public:
   /// Opens the CAN interface `interface`. Throws Failure. `kernel` must outlive the port.
@@ -44,8 +48,8 @@ class SocketCan final : public FramePort {
 
   [[nodiscard]] int find_interface();
   void set_options();
-  void take(const can_frame& frame, Time at);
-  void take_error(const can_frame& frame, Time at);
+  void take(const can_frame& frame, const StampedTime& at);
+  void take_error(const can_frame& frame, const StampedTime& at);
   // A virtual interface has no bit rate: every rate is accepted.
   [[nodiscard]] bool is_virtual() const { return interface_.starts_with("vcan") || interface_.starts_with("vxcan"); }
   [[nodiscard]] std::string up_command(std::uint32_t rate) const;
@@ -55,6 +59,7 @@ class SocketCan final : public FramePort {
   LineSettings settings_;
   CanKernel* kernel_;
   Descriptor socket_;
+  StampClock stamps_;
   Poller poller_;
 };
 

@@ -180,7 +180,7 @@ TEST(SocketCan, AnInterfaceThatGoesAway) {
 TEST(SocketCan, DoesNotSetBitRate) {
   FakeCan kernel;
   SocketCan port("can0", line, kernel);
-  // This rate equals the bit rate of the interface, so it is accepted.
+  // This rate equals the bit rate of the port's settings, so the port accepts it.
   port.begin({.kind = FrameStep::Kind::configure, .rate = line.rate});
   const Failure other = failure_of([&] { port.begin({.kind = FrameStep::Kind::configure, .rate = 500'000}); });
   EXPECT_EQ(other.kind(), Failure::Kind::unsupported);
@@ -202,18 +202,69 @@ TEST(SocketCan, KernelStampIsTimeOfReception) {
   ASSERT_EQ(system_can_kernel().set(socket.get(), SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on), 0);
   const can_frame frame = raw(0x120, {1, 2});
   // The kernel enables time stamps some time later; until then a stamp is the time of the read.
-  Time before{}, after{}, at{};
-  for (int attempt = 0; attempt < 100 && (attempt == 0 || at > after + 1ms); ++attempt) {
-    before = now();
+  bool has_good_stamp = false;
+  for (int attempt = 0; attempt < 100 && !has_good_stamp; ++attempt) {
+    const StampClock stamps(read_clocks());
+    const Time before = now();
     ASSERT_EQ(::sendto(socket.get(), &frame, sizeof frame, 0, generic, size), static_cast<ssize_t>(sizeof frame));
-    after = now();
+    const Time after = now();
     reach(after + 10ms);  // the frame waits in the queue
     can_frame received{};
-    ASSERT_EQ(system_can_kernel().read(socket.get(), received, at), static_cast<ssize_t>(sizeof frame));
+    std::optional<Time> stamp;
+    const ClockPair before_read = read_clocks();
+    ASSERT_EQ(system_can_kernel().read(socket.get(), received, stamp), static_cast<ssize_t>(sizeof frame));
     EXPECT_EQ(received.can_id, 0x120u);
+    const StampedTime time = stamps.convert(stamp, before_read, read_clocks());
+    EXPECT_GE(time.at, before);  // true with and without a stamp of the arrival
+    EXPECT_LE(time.at - time.late, after);
+    has_good_stamp = stamp.has_value() && time.late < 1ms;
   }
-  EXPECT_GE(at, before - 1ms);
-  EXPECT_LE(at, after + 1ms);
+  EXPECT_TRUE(has_good_stamp);
+}
+
+TEST(SocketCan, FrameHasTimeOfKernelStamp) {
+  FakeCan kernel;
+  SocketCan port("can0", line, kernel);
+  kernel.put(raw(0x120, {1}));
+  kernel.age = 3ms;
+  const Time before = now();
+  const FrameEvent event = port.wait({.at = never});
+  const Time after = now();
+  EXPECT_GE(event.at, before - 3ms);
+  EXPECT_LE(event.at - event.late, after - 3ms);
+  EXPECT_GT(event.late, Time{});
+  EXPECT_LT(event.late, 2ms);  // mostly below 1 us; the rest allows for a busy machine
+}
+
+TEST(SocketCan, FrameHasTimeOfReadAndItsUncertaintyIfClockWasSet) {
+  for (const Time step : {Time(-1h), Time(-20us), Time(1ms), Time(1h)}) {
+    FakeCan kernel;
+    SocketCan port("can0", line, kernel);
+    const Time opened = now();
+    reach(opened + 5ms);
+    kernel.put(raw(0x120, {1}));
+    kernel.age = 3ms;
+    kernel.clock_step = step;  // between the stamp and the next look at the clocks
+    const Time before = now();
+    const FrameEvent event = port.wait({.at = never});
+    EXPECT_GE(event.at, before) << step.count();
+    EXPECT_LE(event.at - event.late, before - 3ms) << step.count();
+    // Frames after the step have exact times again.
+    kernel.put(raw(0x120, {2}));
+    EXPECT_LT(port.wait({.at = never}).late, 2ms) << step.count();
+  }
+}
+
+TEST(SocketCan, FrameWithoutStampHasTimeOfRead) {
+  FakeCan kernel;
+  kernel.has_stamps = false;
+  SocketCan port("can0", line, kernel);
+  reach(now() + 5ms);
+  kernel.put(raw(0x120, {1}));
+  const Time before = now();
+  const FrameEvent event = port.wait({.at = never});
+  EXPECT_GE(event.at, before);
+  EXPECT_GE(event.late, 5ms);
 }
 
 TEST(SocketCan, ListsInterfaces) {

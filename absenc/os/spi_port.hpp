@@ -76,10 +76,10 @@ class SpiPort final : public Port<std::uint8_t> {
   Time sent_late_{};               // duration of the system call of the last transfer
   bool sent_pending_ = false;      // whether the event `sent` is still to be reported
   bool received_pending_ = false;  // whether the event `received` is still to be reported, after `sent`
-  bool idle_low_ = false;          // whether the data line was low at all idle clocks of the last clocked transfer
+  bool idle_low_ = false;          // whether the last clocked transfer had idle clocks, all with the data line low
 };
 
-/// Returns the chip selects of all SPI controllers, "/dev/spidev0.0" and so on, sorted.
+/// Returns the paths of all spidev devices, "/dev/spidev0.0" and so on, sorted.
 [[nodiscard]] std::vector<std::string> spi_devices(const std::filesystem::path& sys = "/sys/class/spidev");
 
 }  // namespace absenc::os

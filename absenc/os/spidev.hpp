@@ -24,8 +24,8 @@ struct SpidevReply {
   bool again = false;
   std::vector<UserMemory> in{};
   std::vector<UserMemory> out{};
-  std::vector<std::uint8_t> bytes{};  // content for the memory ranges in `out`
-  Time at{};                          // earliest time for the reply to the program: the end of its message
+  std::vector<std::uint8_t> bytes{};  // bytes that were read, for the program
+  Time at{};                          // earliest time for the reply to the program: the end of the SPI message, if any
 };
 
 /// Settings of the simulated controller, and the mode flags that it supports.

@@ -71,7 +71,7 @@ ByteEvent StreamPort::wait(const ByteStep& step) {
     if (!ready.empty()) {
       // Received bytes are reported before a silence or timer: this program may look late.
       if (const std::size_t size = read_some(buffer_, ready); size > 0) {
-        const Time at = std::max(time, sent_at_);  // an echo is received before the computed end of sending
+        const Time at = std::max(time, sent_at_);  // an echo may be received before the computed end of sending
         waiting_.silence.received(at);
         return waiting_.report(
             {.kind = ByteEvent::Kind::received, .at = at, .items = {buffer_.data(), size}, .late = lateness()});

@@ -36,7 +36,7 @@ class StreamPort : public Port<std::uint8_t> {
   /// Sets the slack: a transfer due within `slack` is sent at once. Default 0.
   void set_send_slack(Time slack) { send_slack_ = slack; }
 
-  /// Sets the time from which the port throws Ended. Default `never`.
+  /// Sets the time at which a wait of the port ends with Ended. Default `never`.
   void set_end(Time end) { end_ = end; }
 
   /// Returns the duration of a character on the line; 0 if it is unknown or there is no line.
@@ -57,7 +57,7 @@ class StreamPort : public Port<std::uint8_t> {
   [[nodiscard]] Poller& poller() { return poller_; }
   /// Reads bytes from the `ready` descriptors into `into`, and returns their number.
   virtual std::size_t read_some(MutableBytes into, std::span<const int> ready) = 0;
-  /// Returns how long this program may have been unable to read these bytes; 0 if unknown.
+  /// Returns how long the bytes read last may have waited for this program to run; 0 if unknown.
   virtual Time lateness() { return {}; }
   virtual void write_all(Bytes bytes) = 0;
   /// `drive` and `change_rate` throw Failure `unsupported` unless overridden.

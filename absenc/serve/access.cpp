@@ -22,7 +22,7 @@ constexpr Time time_of_guesses = std::chrono::seconds(60);
 constexpr std::size_t most_addresses = 1000;
 constexpr std::string_view wrong_token = "the token is wrong: the server's token file has no such token";
 
-// Returns whether two texts are equal as HTTP defines it: ASCII, ignoring case.
+// Returns whether two texts are equal if the case of ASCII letters is ignored.
 bool equals_ignoring_case(std::string_view one, std::string_view other) {
   const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; };
   return std::equal(one.begin(), one.end(), other.begin(), other.end(),
@@ -142,7 +142,7 @@ bool Access::names_this_server(std::string_view host) const {
 
 bool Access::is_from_own_page(const Request& request) const {
   if (!request.fetch_site.empty() && request.fetch_site != "same-origin" && request.fetch_site != "none") return false;
-  if (request.origin.empty()) return true;  // neither header names another site
+  if (request.origin.empty()) return true;  // neither Sec-Fetch-Site nor Origin names another site
   return equals_ignoring_case(request.origin, "http://" + request.host) ||
          equals_ignoring_case(request.origin, "https://" + request.host) ||
          (!public_origin_.empty() && equals_ignoring_case(request.origin, public_origin_));

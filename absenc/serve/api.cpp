@@ -52,7 +52,7 @@ std::int64_t number_in(const Request& request, const std::string& name, std::int
   throw BadRequest(fmt::format("{} must be a whole number from {} to {}", name, least, most));
 }
 
-// Returns the requested range in calendar seconds; the last hour by default.
+// Returns the range in calendar seconds; by default it ends now and begins an hour before its end.
 Range range_in(const Request& request) {
   constexpr std::int64_t latest = 1'000'000'000'000;
   Range range;
@@ -277,7 +277,7 @@ void Api::acknowledge(Watch& watch, const Request& request, const Reply& reply) 
   chronicler_->when_written(server_events_->added(), answer);
 }
 
-// An examination opens the port again; other encoders on the line would lose theirs.
+// An examination opens the port again, which would stop the readings of other encoders on the line.
 void Api::doctor(Watch& watch, const Request& request, const Reply& reply) {
   const std::vector<std::string> others = fleet_->others_on_line(watch);
   if (others.empty()) return give(watch, examination_order(), request, reply);
@@ -287,7 +287,7 @@ void Api::doctor(Watch& watch, const Request& request, const Reply& reply) {
                        watch.name(), fmt::join(others, ", "), watch.name())));
 }
 
-// Queues `order` for its encoder. The response has status 409 if that refuses it.
+// Queues `order` for the encoder of `watch`. The response has status 409 if the order is refused.
 void Api::give(Watch& watch, Order order, const Request& request, const Reply& reply) {
   const std::string who = access_->token_name(request);
   order.who = who.empty() ? request.peer : fmt::format("{} from {}", who, request.peer);

@@ -23,7 +23,8 @@ class ClockWatch {
   // Smallest change of the calendar clock that counts as a jump, in milliseconds.
   static constexpr std::int64_t smallest_jump_ms = 10'000;
 
-  /// Returns the jump of the calendar clock since the last call, in milliseconds; 0: none. `now` is a time of os::now.
+  /// Returns the jump of the calendar clock since the last call, in milliseconds; 0: below `smallest_jump_ms`. `now` is
+  /// a time of os::now.
   std::int64_t check(std::int64_t calendar_ms, Time now);
 
  private:

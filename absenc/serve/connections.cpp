@@ -41,7 +41,7 @@ bool Connections::end_oldest_idle(Id excluded, const std::function<bool(const Op
   return true;
 }
 
-// Closes an ordinary idle connection of the address with the most of them, or returns false.
+// Closes the oldest idle connection, outside the reserve, of the address with the most. Returns false if none is idle.
 bool Connections::end_oldest_idle_of_busiest(Id excluded) {
   std::unordered_map<std::string, std::size_t> idle;
   for (const auto& [id, one] : open_) {

@@ -15,7 +15,7 @@ namespace absenc::serve {
 class Connections {
  public:
   static constexpr std::size_t most = 480;  // greatest number of connections that may carry any request
-  // The same for one address, so that one client or proxy leaves room for others.
+  // Greatest number of connections of one address that may carry any request: others need room, too.
   static constexpr std::size_t most_of_address = 384;
   static constexpr std::size_t reserve = 32;  // number of additional connections, which carry vital requests only
   // Time limit for waiting for a request and receiving it whole, even if bytes still arrive.

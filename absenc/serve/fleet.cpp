@@ -10,6 +10,7 @@
 
 #include "absenc/client/error.hpp"
 #include "absenc/client/port/named_encoder.hpp"
+#include "absenc/client/port/realtime.hpp"
 #include "absenc/client/port/shared_link.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/signals.hpp"
@@ -41,8 +42,8 @@ struct Fleet::Configured {
   double rate;
 };
 
-Fleet::Fleet(std::vector<std::string> names, double rate, ServerEvents& server_events)
-    : names_(std::move(names)), rate_(rate), server_events_(&server_events) {
+Fleet::Fleet(std::vector<std::string> names, double rate, int realtime, ServerEvents& server_events)
+    : names_(std::move(names)), rate_(rate), realtime_(realtime), server_events_(&server_events) {
   reload();
 }
 
@@ -73,10 +74,12 @@ std::vector<Fleet::Configured> Fleet::configured() const {
     const double rate = named.rate_hz > 0 ? named.rate_hz : rate_;
     all.push_back(
         {name, description_of(named), is_named(name) ? parse_address(name, *file) : parse_address(name), rate});
+    if (all.back().address.realtime == 0) all.back().address.realtime = realtime_;
   }
   std::vector<EncoderAddress> addresses;
   for (const Configured& one : all) addresses.push_back(one.address);
   require_different(addresses, names);
+  check_realtime(addresses);
   std::unordered_set<std::string_view> seen;
   for (const std::string& name : names) {
     if (!seen.insert(name).second) throw UsageError(fmt::format("{} is named twice", name));

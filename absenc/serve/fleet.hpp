@@ -16,9 +16,10 @@ class Fleet {
  public:
   using Watches = std::vector<std::shared_ptr<Watch>>;
 
-  /// `names`: encoder addresses; empty: all encoders of absenc.toml. `rate`: readings per second without `rate_hz` in
-  /// the file; 0: as fast as possible. `server_events` must outlive this object. Throws UsageError, os::Interrupted.
-  Fleet(std::vector<std::string> names, double rate, ServerEvents& server_events);
+  /// `names`: names or addresses of encoders; empty: all of absenc.toml. `rate`: readings per second without `rate_hz`
+  /// in the file; 0: as fast as possible. `realtime`: real-time priority without `realtime` in the file; 0: none.
+  /// `server_events` must outlive this object. Throws UsageError, Failure, os::Interrupted.
+  Fleet(std::vector<std::string> names, double rate, int realtime, ServerEvents& server_events);
   ~Fleet();
   Fleet(const Fleet&) = delete;
   Fleet& operator=(const Fleet&) = delete;
@@ -27,7 +28,7 @@ class Fleet {
   void end();
 
   /// Reads absenc.toml again; encoders with unchanged settings continue. Returns the changes in words. Throws
-  /// UsageError, os::Interrupted. Call it from one thread only.
+  /// UsageError, Failure, os::Interrupted. Call it from one thread only.
   std::string reload();
 
   [[nodiscard]] Watches all() const;
@@ -46,6 +47,7 @@ class Fleet {
 
   std::vector<std::string> names_;
   double rate_;
+  int realtime_;
   ServerEvents* server_events_;
   mutable std::mutex mutex_;
   std::vector<Served> served_;

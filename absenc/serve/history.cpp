@@ -215,7 +215,7 @@ bool HistoryWriter::has_day_of_rows_since(std::int64_t at_s) {
   return false;
 }
 
-// Returns the time in seconds before which about a tenth of the rows, or of the events, lies.
+// Returns the second before which a tenth of the rows of the encoder with most lie; without rows: of the events.
 std::int64_t HistoryWriter::end_of_oldest_tenth() {
   Sqlite& sqlite = file_->sqlite();
   const std::int64_t most = sqlite.number(
@@ -261,7 +261,7 @@ Sqlite& HistoryReader::database() {
 }
 
 Json HistoryReader::seconds(const std::string& encoder, Range range, std::int64_t most) {
-  // Rows are the multiples of the step, so a range may touch one more than its length suggests.
+  // Rows begin at multiples of the step, so a range may touch one more than its length suggests.
   most = std::max<std::int64_t>(1, most);
   std::int64_t step = std::max<std::int64_t>(1, (range.to_s - range.from_s) / most + 1);
   while (range.to_s / step - range.from_s / step >= most) ++step;

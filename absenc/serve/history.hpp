@@ -18,7 +18,8 @@
 namespace absenc::serve {
 
 struct HistoryLimits {
-  std::int64_t seconds = 30LL * 24 * 3600;    // age in seconds above which rows are deleted
+  // Age in seconds above which rows and events are deleted, but only after a day of newer rows.
+  std::int64_t seconds = 30LL * 24 * 3600;
   std::int64_t bytes = 1024LL * 1024 * 1024;  // used bytes of the file above which the oldest rows are deleted
 };
 

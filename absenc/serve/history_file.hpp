@@ -50,7 +50,7 @@ class HistoryFile {
   [[nodiscard]] bool passes_quick_check() const;
 
   std::string path_;
-  // Stays open until the database is closed: closing it would release SQLite's locks.
+  // The owned file stays open until the database is closed: closing the file would release SQLite's locks.
   std::unique_ptr<os::OwnedFile> owned_file_;
   std::optional<Sqlite> sqlite_;
   os::FileIdentity log_;    // identity of the write-ahead log of SQLite

@@ -29,7 +29,7 @@ std::string label(std::string_view text) {
 
 class Page {
  public:
-  /// The format requires all lines of a metric together.
+  /// Begins a metric. Its lines must follow at once: the Prometheus format requires them together.
   void metric(std::string_view name, std::string_view kind, std::string_view help) {
     fmt::format_to(std::back_inserter(text), "# HELP {} {}\n# TYPE {} {}\n", name, help, name, kind);
   }

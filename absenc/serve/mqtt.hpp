@@ -21,7 +21,7 @@ struct MqttHealth {
   bool connected = false;
   // Known trouble with the broker or the spool; "" if there is none.
   std::string trouble{};
-  bool failing = false;       // whether new readings cannot be spooled, or readings were dropped within the last 30 s
+  bool failing = false;       // whether the disk refuses new readings, or readings were dropped within the last 30 s
   std::uint64_t waiting = 0;  // number of messages in the spool
   std::int64_t waiting_bytes = 0;
   std::uint64_t sent = 0;           // spooled messages that the broker has accepted since the start

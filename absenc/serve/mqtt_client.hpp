@@ -47,7 +47,7 @@ class MqttClient {
   enum class State : std::uint8_t { connecting, connected, lost };
   /// Queues a request to connect to `host`, a name or an address. `try_all`: each address of the name is tried in turn.
   void connect(const std::string& host, bool try_all);
-  /// Waits at most `longest`, then sends and receives. Returns the state of the connection.
+  /// Waits at most `longest`, then receives and sends. Returns the state of the connection.
   State work(Time longest);
   /// Returns why the connection to the broker is lost; "" if it is not.
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
@@ -61,11 +61,11 @@ class MqttClient {
 
   struct Acknowledgement {
     int number = 0;
-    std::string refused{};  // reason why the broker refused the message; "": the broker has accepted it
+    std::string refused{};  // why the message was refused; "": the broker has accepted it
   };
   [[nodiscard]] std::vector<Acknowledgement> take_acknowledgements();
 
-  /// Sends a DISCONNECT packet, so that the broker does not publish the will.
+  /// Has a DISCONNECT packet sent, so that the broker does not publish the will; waits at most 0.5 s for the end.
   void end();
 
  private:

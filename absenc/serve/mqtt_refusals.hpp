@@ -48,7 +48,7 @@ class MqttRefusals {
     Time pause{};
     Time retry{};
     bool ends_connection = false;
-    bool is_due = false;    // whether the pause of the topic has ended and a message may be sent
+    bool is_due = false;    // whether `take_due` has reported the end of the pause
     bool is_tried = false;  // whether one message of the refused topic was sent as a trial and is not acknowledged
   };
 

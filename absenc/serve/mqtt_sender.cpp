@@ -25,7 +25,7 @@ using namespace std::chrono_literals;
 constexpr std::size_t most_messages_out = 500;  // greatest number of spooled messages without acknowledgement
 constexpr Time one_wait = 20ms;
 constexpr Time state_interval = 200ms;
-constexpr Time many_state_interval = 1s;  // time between two publications of the states, with more than `many` encoders
+constexpr Time many_state_interval = 1s;  // usual time between two checks of the states, with more than `many` encoders
 constexpr std::size_t many = 50;
 constexpr Time value_interval = 1s;  // time between two publications of values for Home Assistant
 constexpr Time first_pause = 500ms;  // first pause between attempts to connect; it doubles up to `longest_pause`
@@ -34,7 +34,7 @@ constexpr Time time_to_connect = 10s;
 constexpr Time time_to_finish = 1s;
 // A connection that lasted this long may reset the pause.
 constexpr Time stable_time = 10s;
-// Shortest time between two events about connections, unless the later one is stable.
+// Shortest time between two events that report a connection, unless the later connection is stable.
 constexpr Time connection_report_interval = 60s;
 
 }  // namespace

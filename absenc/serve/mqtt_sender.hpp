@@ -71,9 +71,9 @@ class MqttSender {
 
   // Used by one thread at a time, up to `mutex_`: the constructor, then the sender thread.
   MqttVersion version_ = MqttVersion::v5;
-  std::unordered_map<int, Outstanding> outstanding_;  // messages without acknowledgement, by their number at MqttClient
+  std::unordered_map<int, Outstanding> outstanding_;  // QoS 1 messages without acknowledgement, by number
   std::set<std::int64_t> messages_out_;               // ids of the spooled messages in `outstanding_`
-  std::int64_t last_checked_id_ = 0;  // last message id that was sent, or skipped because its topic is refused
+  std::int64_t last_checked_id_ = 0;  // messages up to this id were sent or skipped; 0: the search begins anew
   MqttRefusals refusals_;
   std::set<std::string> served_;                 // names of encoders that may have retained messages at the broker
   std::map<std::string, std::string> retained_;  // by topic: condition of the retained message that was sent last

@@ -62,7 +62,7 @@ class OptionalReads {
     return std::nullopt;
   }
 
-  /// Returns why the last request of this object failed.
+  /// Returns the reason of the last request that failed.
   [[nodiscard]] const std::string& reason() const { return last_; }
   /// Returns whether the options of the encoder permitted the last request.
   [[nodiscard]] bool was_sent() const { return was_sent_; }

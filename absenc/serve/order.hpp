@@ -53,7 +53,7 @@ struct Order {
 /// encoder, its port and `between`.
 [[nodiscard]] OrderResult carry_out(client::Encoder& encoder, const Order& order, const std::function<void()>& between);
 
-/// Returns the fields of a reply for people, as a list of {"field","value","meaning"}.
+/// Returns the fields of a reply for people, without Role::exchange, as a list of {"field","value","meaning"}.
 [[nodiscard]] client::Json shown_values(const client::Answer& answer);
 
 /// Returns what can be read from a unit: {"settings":[names],"memory":[areas],"registers":count}.

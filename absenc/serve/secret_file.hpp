@@ -13,7 +13,7 @@ struct Secret {
 };
 
 /// Reads a file of lines NAME SECRET. `least`: minimum length of a secret; `title`: name of the secrets in errors.
-/// Throws Failure, also if users outside the file's group may access it.
+/// Throws Failure, also if the file's group may write it, or others may access it.
 [[nodiscard]] std::vector<Secret> read_secrets(const std::string& title, const std::string& path, std::size_t least);
 
 /// Returns the first user name and password in a file. Throws Failure.

@@ -43,7 +43,7 @@ struct Server::Parts {
         url(url_of(choices.host, listener.port)),
         served_ports(url),
         access({choices.token_file, choices.public_url, listener.on_loopback}, server_events),
-        fleet(choices.encoders, choices.rate, server_events),
+        fleet(choices.encoders, choices.rate, choices.realtime, server_events),
         sending(fleet, server_events) {
     sending.change_to(read_outlets(choices.outlets));
     if (!choices.history.empty()) chronicler.emplace(choices.history, choices.limits, fleet, server_events);
@@ -65,7 +65,7 @@ struct Server::Parts {
     sending.change_to({});
   }
 
-  // A program that finds a port busy can then name this server.
+  // Publishes the paths of the ports, so that a program that finds one busy can name this server.
   void publish_ports() {
     std::vector<std::string> ports;
     for (const std::shared_ptr<Watch>& watch : fleet.all()) {

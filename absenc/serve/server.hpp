@@ -17,6 +17,7 @@ struct Choices {
   // Addresses of encoders as for `absenc read`; empty: all encoders of absenc.toml.
   std::vector<std::string> encoders{};
   double rate = 50;  // readings per second of encoders without rate_hz in absenc.toml; 0: as fast as possible
+  int realtime = 0;  // real-time priority of encoders without realtime in absenc.toml, 1 to 99; 0: none
   std::string host = "127.0.0.1";
   std::uint16_t port = 8420;  // TCP port; 0: any free one
   std::string public_url{};   // URL at which a proxy on this computer shows the page; "": no proxy

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Approximate size of a write in bytes; a nearly full disk may still accept a small one.
+// Approximate greatest size of a write in bytes; a nearly full disk may still accept a small one.
 constexpr std::size_t write_size = 65536;
 
 std::int64_t memory_bytes(std::int64_t most) { return std::clamp<std::int64_t>(most / 16, 64'000, 4'000'000); }
@@ -218,7 +218,7 @@ void Spool::remove_one(std::int64_t id, const Place& place) {
   part->waiting_bytes -= place.bytes;
   try {
     if (file_of(*part).mark_arrived(place.offset) == 0) return;
-  } catch (const os::Failure&) {  // the file is gone, so the mark of acknowledgement is not needed
+  } catch (const os::Failure&) {  // the file cannot be opened, so the acknowledgement is noted in memory only
   }
   unmarked_.insert(id);
 }

@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::string_view part_suffix = ".part";
 
-// The limit depends on the free space, because only deleting a whole file frees space.
+// The greatest size of a file depends on the free space, because only deleting a whole file frees space.
 std::size_t part_bytes(std::int64_t most, const std::string& folder) {
   std::error_code error;
   const std::uintmax_t free = fs::space(folder, error).available;

@@ -86,7 +86,7 @@ Json arguments_json(const Command& command) {
   });
 }
 
-// Returns the name of a verb for which the page shows a hint; "" for the others.
+// Returns the name of a verb that the page distinguishes; "" for the others.
 std::string_view name_of(Verb verb) {
   switch (verb) {
     case Verb::clear_alarms:

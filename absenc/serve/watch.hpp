@@ -24,7 +24,7 @@
 namespace absenc::serve {
 
 enum class State : std::uint8_t {
-  opening,   // no attempt to read yet; the port may be missing
+  opening,   // nothing was read yet; the port may be missing
   live,      // the last reading is recent
   silent,    // no reading was received for a while
   failing,   // the last attempt to read failed

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/sim/can_bits.hpp"
 
+#include <array>
 #include <cstdint>
 
 namespace absenc::sim {
@@ -10,6 +11,9 @@ namespace {
 /// The bits of a frame that are covered by the CRC and, together with the CRC, by bit stuffing.
 class StuffedBits {
  public:
+  /// Also writes the bits to `bits`, if it is not null.
+  explicit StuffedBits(std::vector<bool>* bits) : bits_(bits) {}
+
   /// Appends the lower `count` bits of `value`, most significant first.
   void append(std::uint32_t value, unsigned count) {
     while (count-- > 0) append((value >> count & 1) != 0);
@@ -20,27 +24,36 @@ class StuffedBits {
     put(bit);
   }
   [[nodiscard]] std::uint16_t crc() const { return crc_; }
-
-  std::vector<bool> bits;
+  [[nodiscard]] std::size_t count() const { return count_; }
 
  private:
   // Behind five equal bits follows a stuff bit of the other level.
   void put(bool bit) {
-    run_ = !bits.empty() && bits.back() == bit ? run_ + 1 : 1;
-    bits.push_back(bit);
+    run_ = run_ != 0 && last_ == bit ? run_ + 1 : 1;
+    write(bit);
     if (run_ < 5) return;
-    bits.push_back(!bit);
+    write(!bit);
     run_ = 1;
   }
+  void write(bool bit) {
+    last_ = bit;
+    ++count_;
+    if (bits_ != nullptr) bits_->push_back(bit);
+  }
 
+  std::vector<bool>* bits_;
+  std::size_t count_ = 0;
   std::uint16_t crc_ = 0;
-  unsigned run_ = 0;
+  unsigned run_ = 0;  // number of equal bits at the end; 0: there is no bit
+  bool last_ = false;
 };
 
-}  // namespace
+// CRC delimiter, acknowledge slot, acknowledge delimiter; the end of frame has seven recessive bits.
+constexpr std::array<bool, 10> end_bits{true, false, true, true, true, true, true, true, true, true};
 
-std::vector<bool> can_bits(const CanFrame& frame) {
-  StuffedBits stuffed;
+// Returns the number of bits before `end_bits`.
+std::size_t put_stuffed(const CanFrame& frame, std::vector<bool>* bits) {
+  StuffedBits stuffed(bits);
   stuffed.append(false);
   if (frame.extended) {
     stuffed.append(frame.id >> 18, 11);
@@ -56,10 +69,18 @@ std::vector<bool> can_bits(const CanFrame& frame) {
   stuffed.append(frame.size, 4);
   for (const std::uint8_t byte : frame.remote ? Bytes() : frame.bytes()) stuffed.append(byte, 8);
   stuffed.append(stuffed.crc(), 15);
-  std::vector<bool> bits = std::move(stuffed.bits);
-  bits.insert(bits.end(), {true, false, true});  // CRC delimiter, acknowledge slot, acknowledge delimiter
-  bits.insert(bits.end(), 7, true);              // the end of frame has seven recessive bits
+  return stuffed.count();
+}
+
+}  // namespace
+
+std::vector<bool> can_bits(const CanFrame& frame) {
+  std::vector<bool> bits;
+  put_stuffed(frame, &bits);
+  bits.insert(bits.end(), end_bits.begin(), end_bits.end());
   return bits;
 }
+
+std::size_t can_bit_count(const CanFrame& frame) { return put_stuffed(frame, nullptr) + end_bits.size(); }
 
 }  // namespace absenc::sim

@@ -61,8 +61,8 @@ void flip_bits(std::span<std::uint8_t> bytes, Random& random);
 
 /// A machine between a line and a device machine that injects faults. The device must outlive it.
 ///
-/// The faults strike each transfer of the device: on character links a reply, on clocked links the bits that the device
-/// drives. A reply that a fault makes longer or later does not follow the device's own timing.
+/// All faults but `request_corrupt` strike what the device sends: on character links a reply, on clocked links the bits
+/// that the device drives. A reply that a fault makes longer or later does not follow the device's own timing.
 class FaultyDevice final : public Machine<std::uint8_t> {
  public:
   /// Injects faults between `device` and its line. The same seed gives the same faults.

@@ -9,8 +9,8 @@
 
 namespace absenc::sim {
 
-/// Several nodes on one CAN bus, without bit timing, arbitration or collisions. A node with another bit rate than the
-/// bus neither receives nor sends.
+/// Several nodes on one CAN bus, without bit timing and collisions: frames go one by one, in order of their times. A
+/// node with another bit rate than the bus neither receives nor sends.
 class FrameBus final : public Machine<CanFrame> {
  public:
   /// The machines in `nodes` must outlive the bus. `rate`: first bit rate of the port and the nodes.

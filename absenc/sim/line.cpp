@@ -229,7 +229,7 @@ void Line<Item>::accept_step(Node node, const Step<Item>& step) {
   state.hold_low = step.hold_low;
   state.accepted_at = now_;
   ++state.begin_generation;
-  // Scheduled, so that a node that is attached next, at the same time, takes part.
+  // The begin is scheduled, so that a node that is attached next, at the same time, takes part.
   if (!driven) schedule(ScheduledEvent::Kind::begin, step.at, node);
 }
 

@@ -82,7 +82,7 @@ class Line {
 
   /// Handles the next event and advances `now` to it. Returns false if no event is scheduled.
   bool step();
-  /// Handles all events up to and including `limit`; then `now` is `limit`.
+  /// Handles all events up to and including `limit`; then `now` is at least `limit`.
   void run_until(Time limit);
   /// Runs until the node is done. Returns false when `limit` is reached first or no event is left.
   bool run(Node node, Time limit = never);
@@ -135,6 +135,10 @@ class Line {
   TransferObserver transfer_observer_;
   PulseObserver pulse_observer_;
   bool frame_on_bus_ = false;
+  // Items of the transfer, and senders of the frame, that ends now; kept here, so that a line in use allocates nothing.
+  std::vector<Item> transferred_in_{};
+  std::vector<Item> transferred_out_{};
+  std::vector<Node> frame_senders_{};
 };
 
 extern template class Line<std::uint8_t>;

@@ -26,7 +26,7 @@ std::uint32_t arbitration_field(const CanFrame& frame) {
   return (frame.id >> 18) << 21 | 3u << 19 | (frame.id & 0x3FFFF) << 1 | remote;
 }
 
-std::size_t frame_bits(const CanFrame& frame) { return can_bits(frame).size() + can_intermission_bits; }
+std::size_t frame_bits(const CanFrame& frame) { return can_bit_count(frame) + can_intermission_bits; }
 
 }  // namespace
 
@@ -156,7 +156,8 @@ template <class Item>
 void Line<Item>::end_transfer(Node node) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
     State& host = *nodes_[node];
-    std::vector<Item> in(host.expect, 0xFF);  // a line that no device drives is pulled up
+    std::vector<Item>& in = transferred_in_;
+    in.assign(host.expect, 0xFF);  // a line that no device drives is pulled up
     Time low_after{};
     for (const auto& other : nodes_) {
       if (other->role == NodeRole::host) continue;
@@ -166,7 +167,8 @@ void Line<Item>::end_transfer(Node node) {
     }
     const std::size_t unclocked = in.size() * 8 - host.bits;
     if (unclocked != 0) in.back() = static_cast<Item>(in.back() >> unclocked << unclocked);
-    std::vector<Item> out = host.out;
+    std::vector<Item>& out = transferred_out_;
+    out.assign(host.out.begin(), host.out.end());
     out.resize(host.expect, 0);
     const std::size_t bits = host.bits;
     if (transfer_observer_ && bits > 0) {
@@ -217,8 +219,9 @@ void Line<Item>::end_frame(Node node) {
     State& sender = *nodes_[node];
     const CanFrame frame = sender.out[sender.index];
     if (observer_) observer_(node, sender.start, now_, frame);
-    // Frames of the same identifier that began together are all lost if they differ.
-    std::vector<Node> senders;
+    // Frames with the same arbitration field that began together are all lost if they differ.
+    std::vector<Node>& senders = frame_senders_;
+    senders.clear();
     bool clash = false;
     for (Node other = 0; other < nodes_.size(); ++other) {
       const State& state = *nodes_[other];

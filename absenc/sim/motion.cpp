@@ -150,7 +150,7 @@ ShaftState Motion::at(Time time) const {
 ShaftState Motion::offset_at(const Still&, Time) { return {}; }
 
 ShaftState Motion::offset_at(const ConstantSpeed& speed, Time time) {
-  // position = micro_rpm * ns * 2^32 / (60 * 1e6 * 1e9); both are divided by 2^17.
+  // position = micro_rpm * ns * 2^32 / (60 * 1e6 * 1e9), numerator and denominator divided by 2^17.
   constexpr std::int64_t numerator = std::int64_t{1} << 15;
   constexpr std::uint64_t denominator = 457'763'671'875;  // 60e15 / 2^17, exact
   return {scale(speed.micro_rpm * numerator, time.count(), denominator),

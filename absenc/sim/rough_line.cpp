@@ -13,7 +13,7 @@ namespace absenc::sim {
 
 namespace {
 
-// The sizes of both are mostly equal, so resize rarely allocates.
+// Mostly `to` had as many items before, so resize rarely allocates.
 template <class Item>
 void copy(std::span<const Item> items, std::vector<Item>& to) {
   to.resize(items.size());
@@ -62,7 +62,7 @@ void RoughLine<Item>::begin(const Step<Item>& step) {
     copy(step.out, request_);
     if constexpr (std::is_same_v<Item, CanFrame>) {
       for (const CanFrame& frame : request_) {
-        run_until(time_ + settings_.bits(can_bits(frame).size() + can_intermission_bits));
+        run_until(time_ + settings_.bits(can_bit_count(frame) + can_intermission_bits));
         deliver_request({&frame, 1});
       }
     } else if (!request_.empty()) {
@@ -124,7 +124,7 @@ Event<Item> RoughLine<Item>::wait(const Step<Item>& step) {
   for (;;) {
     Time quiet = silence_.due(step.answer, step.gap);
     const Time arrival = front_ != back_ ? in_transit_[front_].at : never;
-    // an item arrives by then, so the line is not silent
+    // an item arrives before the silence would be reported, so the line is not silent
     if (arrival != never && in_transit_[front_].first <= quiet) quiet = never;
     const Time mine = std::min(timer, quiet);
     const Time next = due();
@@ -254,7 +254,7 @@ void RoughLine<Item>::send(const Step<Item>& step) {
   if constexpr (std::is_same_v<Item, CanFrame>) {
     for (const CanFrame& frame : out_) {
       const Time begun = side_.end;
-      side_.end += settings_.bits(can_bits(frame).size() + can_intermission_bits);
+      side_.end += settings_.bits(can_bit_count(frame) + can_intermission_bits);
       enqueue(begun, side_.end, side_.end, {&frame, 1});
     }
   } else {
@@ -368,7 +368,7 @@ template <class Item>
 void RoughLine<Item>::damage(std::vector<Item>& items) {
   if (items.empty()) return;
   std::size_t count = items.size() * 8;
-  if constexpr (std::is_same_v<Item, CanFrame>) count = can_bits(items.front()).size();
+  if constexpr (std::is_same_v<Item, CanFrame>) count = can_bit_count(items.front());
   if (kind_ == LinkKind::clocked) count = bits_;
   if (count == 0) return;
   bool struck = flip_bits(items, count);

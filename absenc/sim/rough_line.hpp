@@ -15,13 +15,13 @@ namespace absenc::sim {
 /// Probabilities, 0 to 1, of damage to data for the host: `bit` per bit, the others per frame.
 struct RoughRates {
   double bit = 0;  ///< probability that a data bit is flipped
-  /// Up to 16 adjacent bits are damaged.
+  /// Probability that some of 2 to 16 adjacent bits are flipped.
   double burst = 0;
-  /// One byte or CAN frame arrives twice; on SPI and clocked links one bit, and the last is lost.
+  /// Probability that a byte or CAN frame arrives twice; on SPI and clocked links a bit, and the last one is lost.
   double doubled = 0;
-  /// Another sender sends random bytes during a part of the frame.
+  /// Probability that another sender sends random bytes during the frame, perhaps past its end.
   double talker = 0;
-  double late = 0;  ///< the frame is 10 us to 10 s late, each decade equally likely; later frames do not overtake it
+  double late = 0;  ///< probability of a delay of 10 us to 10 s, each decade equally likely; frames stay in order
 };
 
 /// Counts of the requests, the replies and the disturbances of a rough line.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/sim/sim_port.hpp"
 
+#include <algorithm>
 #include <stdexcept>
 #include <utility>
 
@@ -9,7 +10,43 @@ namespace absenc::sim {
 template <class Item>
 void SimPort<Item>::HostEnd::feed(const Event<Item>& event) {
   if (event.kind == Event<Item>::Kind::sent) sending = false;
-  queue.push_back({event, {event.items.begin(), event.items.end()}});
+  push(event);
+}
+
+template <class Item>
+auto SimPort<Item>::HostEnd::queued(std::size_t number) -> QueuedEvent& {
+  return ring_[(first_ + number) % ring_.size()];
+}
+
+template <class Item>
+void SimPort<Item>::HostEnd::push(const Event<Item>& event) {
+  if (queued_ == ring_.size()) {
+    std::rotate(ring_.begin(), ring_.begin() + static_cast<std::ptrdiff_t>(first_), ring_.end());
+    first_ = 0;
+    ring_.emplace_back();
+  }
+  QueuedEvent& last = queued(queued_++);
+  last.event = event;
+  last.items.assign(event.items.begin(), event.items.end());
+}
+
+template <class Item>
+Event<Item> SimPort<Item>::HostEnd::pop(std::vector<Item>& items) {
+  QueuedEvent& oldest = queued(0);
+  std::swap(items, oldest.items);
+  first_ = (first_ + 1) % ring_.size();
+  --queued_;
+  return oldest.event;
+}
+
+template <class Item>
+void SimPort<Item>::HostEnd::drop_sent() {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < queued_; ++i) {
+    if (queued(i).event.kind == Event<Item>::Kind::sent) continue;
+    std::swap(queued(kept++), queued(i));
+  }
+  queued_ = kept;
 }
 
 template <class Item>
@@ -45,8 +82,7 @@ void SimPort<Item>::begin(const Step<Item>& step) {
   using Kind = typename Step<Item>::Kind;
   if (step.kind == Kind::transfer || step.kind == Kind::pulse) {
     run_until([&] { return !host_end_.sending; });
-    std::erase_if(host_end_.queue,
-                  [](const QueuedEvent& queue) { return queue.event.kind == Event<Item>::Kind::sent; });
+    host_end_.drop_sent();
     host_end_.sending = true;
   }
   host_end_.beginning = &step;
@@ -57,12 +93,10 @@ template <class Item>
 Event<Item> SimPort<Item>::wait(const Step<Item>& step) {
   // With a real-time clock the line may already have passed the time of the requested timer.
   const bool is_past = step.at > last_event_at_ && step.at <= line_.now();
-  if (host_end_.queue.empty() && is_past) host_end_.feed({.kind = Event<Item>::Kind::timer, .at = step.at});
-  if (host_end_.queue.empty()) advance(step);
-  Event<Item> event = host_end_.queue.front().event;
+  if (host_end_.empty() && is_past) host_end_.feed({.kind = Event<Item>::Kind::timer, .at = step.at});
+  if (host_end_.empty()) advance(step);
+  Event<Item> event = host_end_.pop(items_);
   last_event_at_ = event.at;
-  items_ = std::move(host_end_.queue.front().items);
-  host_end_.queue.pop_front();
   event.items = items_;
   return event;
 }
@@ -80,7 +114,7 @@ void SimPort<Item>::advance(const Step<Item>& step) {
   host_end_.waiting = step;
   line_.wake(host_node_);
   const Disarm disarm{*this};
-  run_until([&] { return !host_end_.queue.empty(); });
+  run_until([&] { return !host_end_.empty(); });
 }
 
 template <class Item>

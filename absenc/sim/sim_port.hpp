@@ -2,7 +2,7 @@
 // The host's end of a simulated line as a Port.
 #pragma once
 
-#include <deque>
+#include <cstddef>
 #include <functional>
 #include <vector>
 
@@ -49,10 +49,24 @@ class SimPort final : public Port<Item> {
     void feed(const Event<Item>& event) override;
     Step<Item> next(Time now) override;
 
+    [[nodiscard]] bool empty() const { return queued_ == 0; }
+    void push(const Event<Item>& event);
+    /// Takes out the oldest event and swaps its items with `items`.
+    Event<Item> pop(std::vector<Item>& items);
+    /// Removes all events `sent`.
+    void drop_sent();
+
     Step<Item> waiting{};
     const Step<Item>* beginning = nullptr;
     bool sending = false;
-    std::deque<QueuedEvent> queue;
+
+   private:
+    QueuedEvent& queued(std::size_t number);
+
+    // A ring, whose elements keep their memory, so that a port in use allocates none.
+    std::vector<QueuedEvent> ring_;
+    std::size_t first_ = 0;
+    std::size_t queued_ = 0;
   };
 
   void keep_pace();

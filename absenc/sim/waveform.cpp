@@ -103,7 +103,7 @@ std::size_t Waveform::data_wire(NodeRole sender) const {
   return kind_ == LinkKind::half_duplex ? line : sender == NodeRole::host ? host : device;
 }
 
-// Draws a byte. Of a character of two bytes it stores the first, and draws both at the second.
+// Draws a byte; the two bytes of one character are drawn with the second one.
 void Waveform::byte(NodeRole sender, Time start, Time end, std::uint8_t byte) {
   if (settings_.character_bytes() == 1) return character(sender, start, end, byte);
   FirstByte& first = first_bytes_[data_wire(sender)];

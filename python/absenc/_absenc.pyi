@@ -13,16 +13,16 @@ class Reading:
 
     @property
     def angle_deg(self) -> Optional[float]:
-        """Position in degrees, 0 to below 360; None: invalid, or the encoder is linear."""
+        """Position in degrees, 0 to below 360; None: not known to be valid, or the encoder is linear."""
     @property
     def position_mm(self) -> Optional[float]:
-        """Position of a linear encoder in millimetres; None: invalid, or the encoder is rotary."""
+        """Position of a linear encoder in mm; None: not known to be valid, or the encoder is rotary."""
     @property
     def singleturn(self) -> Optional[int]:
-        """Single-turn position in counts; None: invalid."""
+        """Single-turn position in counts; None: not known to be valid."""
     @property
     def multiturn(self) -> Optional[int]:
-        """Number of revolutions; None: not reported, or invalid."""
+        """Number of revolutions; None: not known to be valid, or the encoder has none."""
     @property
     def singleturn_bits(self) -> int: ...
     @property
@@ -38,10 +38,10 @@ class Reading:
         """Whether the position is known to be valid."""
     @property
     def singleturn_valid(self) -> Optional[bool]:
-        """Whether the single-turn position is valid; None: not reported."""
+        """Whether the single-turn position is valid; None: unknown."""
     @property
     def multiturn_valid(self) -> Optional[bool]:
-        """Whether the revolutions are valid; None: not reported, or the encoder has none."""
+        """Whether the revolutions are valid; None: unknown, or the encoder has none."""
     @property
     def alarms(self) -> Optional[list[str]]:
         """Names of the raised alarms; []: all are reported clear; None: not known."""
@@ -53,7 +53,7 @@ class Reading:
         """Time at which the position was latched, in seconds of time.monotonic()."""
 
 class Sample:
-    """Result of one attempt to read."""
+    """A reading, a failed attempt to read, or an event of the port."""
 
     @property
     def kind(self) -> str:
@@ -65,7 +65,7 @@ class Sample:
     def reading(self) -> Optional[Reading]: ...
     @property
     def position(self) -> Optional[int]:
-        """Position in counts, continued past the end of the counter."""
+        """Position in counts, continued past the end of the counter; None: no valid position."""
     @property
     def speed(self) -> Optional[float]:
         """Speed in rpm, for linear encoders mm/s: `speed_rpm` or `speed_mm_s`."""
@@ -89,7 +89,8 @@ class Sample:
         set."""
     @property
     def joint_mm(self) -> Optional[float]:
-        """Position of the joint of a linear encoder: direction * (position - offset_mm)."""
+        """Position of the joint of a linear encoder in mm: direction * (continued mm - offset_mm); None: unknown, or
+        not set."""
     @property
     def joint_speed_rpm(self) -> Optional[float]:
         """Speed of the joint."""

@@ -146,7 +146,7 @@ class Encoder:
         self._encoder.close()
 
     def read(self) -> Reading:
-        """Reads the position with its alarms; an unconfirmed position is invalid. Raises EncoderError, PortError,
+        """Reads the position with its alarms; an unconfirmed position is None. Raises EncoderError, Failure, PortError,
         Cancelled or UsageError."""
         return self._encoder.read()
 
@@ -169,7 +169,7 @@ class Encoder:
         """Writes readings to a new file for `load`: "log.csv", "log.jsonl" (JSON lines), "log.h5" (HDF5). `rate`:
         readings per second, 0: as fast as possible. Writes every `every`th reading, and each change of the alarms. Ends
         after `count` readings or `seconds`, or by `close` in another thread. After `part_bytes` or `part_seconds` the
-        next file is started: "log-0001.csv", "log-0002.csv". Raises UsageError, PortError."""
+        next file is started: "log-0001.csv", "log-0002.csv". Raises UsageError, Failure, PortError."""
         size = None if part_bytes is None else natural("part_bytes", part_bytes, most=2**63 - 1)
         recorded = self._encoder.record(
             os.fspath(path), rate, natural("every", every, least=1), natural("count", count), seconds, size, part_seconds
@@ -177,7 +177,7 @@ class Encoder:
         return Recorded(*recorded)
 
     def run(self, command: str, *values: int, **arguments: int) -> dict[str, Field]:
-        """Runs a command of the unit and returns the fields of its reply. It does not ask for confirmation."""
+        """Runs a command of the unit, without asking for confirmation, and returns the fields of its reply."""
         return self._encoder.run(command, *values, **arguments)
 
     def alarms(self) -> Optional[list[Alarm]]:
@@ -249,8 +249,9 @@ class Encoder:
 
 
 def open(text: str, **options: Value) -> Encoder:
-    """Opens "tformat:/dev/ttyUSB0?model=23-bit", "sim:esl", or a name in absenc.toml. Keywords are options. Raises
-    PortError or UsageError."""
+    """Opens "tformat:/dev/ttyUSB0?model=23-bit", "sim:esl", or a name in absenc.toml. Keywords are options. With
+    realtime=PRIORITY, 1 to 99, each thread that uses the encoder becomes a real-time thread (SCHED_FIFO) and stays one,
+    and the memory of the process is locked. Raises PortError, UsageError, or Failure if the kernel refuses that."""
     return Encoder(text, texts(options))
 
 

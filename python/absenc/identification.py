@@ -31,7 +31,7 @@ class Identified(NamedTuple):
 
 
 def identify(place: str, *, limit_s: float = 60) -> Identified:
-    """Finds the encoder on a line; it only reads. `place` is a port: "/dev/ttyUSB0", ``tcp:HOST:PORT``,
+    """Finds the encoder on a line, by reading only. `place` is a port: "/dev/ttyUSB0", ``tcp:HOST:PORT``,
     "spi:/dev/spidev0.0", "can0". Raises PortError, UsageError."""
     found, notes, is_complete = _absenc.identify(place, limit_s)
     return Identified([Found(**one) for one in found], notes, is_complete)

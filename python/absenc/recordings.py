@@ -18,7 +18,7 @@ from .captures import Column, Masked, Table
 from .errors import Failure, UsageError
 from .protocols import Protocol, protocol
 
-FLAG_WORDS = "names, separated by spaces"  # with these words begins the meaning of a column of flags
+FLAG_WORDS = "names, separated by spaces"  # first words of the meaning of a column of flags
 ALL_CLEAR = "none"  # cell of a flags column in CSV: all are reported clear; an empty cell: not all are reported
 NOT_ENDED = "18446744073709551615"  # attribute `rows` in HDF5 while the recording is written
 
@@ -30,9 +30,9 @@ class Recording(Table):
     """Readings and events: `recording["angle_deg"]` is a column, `rows` has all columns as one structured masked array.
     A number that is missing or invalid is masked (and NaN in floats); a missing text is "".
 
-    `event` is "" for a reading and "restarted" for one whose `position` starts again; "lost" and "back" concern the
-    port; "gap" counts in `missed` the readings that were due but not taken. Flags are numbers: `Protocol.flag_names`
-    names them.
+    `event` is "" for a reading and "restarted" for one whose `position` starts again; the name of an error for a failed
+    reading; "lost" and "back" concern the port; "gap" counts in `missed` the readings that were due but not taken.
+    Flags are numbers: `Protocol.flag_names` names them.
 
     `is_whole`: the file has an end mark and as many rows as this states. `damage` describes an omitted last line that
     was truncated; it is "" otherwise."""
@@ -139,7 +139,7 @@ def _parse_json_lines(lines: list[str]) -> _Parsed:
     names: list[str] = []
     for name in meanings:
         names.append(name)
-        if name in ("singleturn", "multiturn"):  # only these columns have a column for their validity
+        if name in ("singleturn", "multiturn"):  # no other column has a column for its validity
             names.append(name + "_valid")
     for row in rows:
         for name, value in row.items():

@@ -32,9 +32,9 @@ class Examination(NamedTuple):
     complete: bool  #: False: the examination was interrupted
     seconds: float  #: time from the first to the last reading
     failures_below: float  #: upper limit of the share of failures, at 95 % confidence
-    verdict: str  #: "good: ..." with the checks, or "first: ..." with what to fix first
+    verdict: str  #: "good: ..." with the checks, "first: ..." with what to fix first, or "interrupted: ..."
     readings_per_second: Optional[float] = None
-    echo: Optional[str] = None  #: whether the adapter receives its own transmission
+    echo: Optional[str] = None  #: text: whether the adapter receives its own transmission; None: unknown
     latency_ms: Optional[float] = None  #: latency that adapter and driver add, if known
     computer_late_ms: Optional[float] = None  #: greatest delay of this computer itself, if measured
     quickest_reply_ms: Optional[float] = None  #: shortest time from a request to the end of its reply
@@ -81,7 +81,7 @@ class Probed(NamedTuple):
     protocol: str
     ok: bool  #: a combination of options explains all frames
     evidence: list[OptionEvidence]
-    settled: list[str]  #: "name=value": options that the frames require; empty: the defaults
+    settled: list[str]  #: "name=value": options that the frames require; empty: the defaults, or not `ok`
 
 
 class Waved(NamedTuple):
@@ -160,7 +160,7 @@ def wave(
 ) -> Waved:
     """Writes a conversation with a virtual encoder ("tformat", "sim:esl?fault=corrupt=0.1") as a waveform: .vcd, .sr
     (sigrok) or .csv (Saleae Logic 2), by the end of the name. Without commands it reads `count` results at `rate` per
-    second. `replaces` permits an existing file. Raises UsageError."""
+    second. `replaces` permits an existing file. Raises UsageError, Failure, PortError."""
     return Waved(
         *_absenc.wave(
             text,

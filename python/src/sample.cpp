@@ -65,12 +65,15 @@ PyReading reading_of(const py::tuple& state) {
 
 void bind_sample(py::module_& module) {
   py::class_<PyReading>(module, "Reading", "One position as an encoder reported it.")
-      .def_property_readonly("angle_deg", &PyReading::angle_deg,
-                             "Position in degrees, 0 to below 360; None: invalid, or the encoder is linear.")
-      .def_property_readonly("position_mm", &PyReading::position_mm,
-                             "Position of a linear encoder in millimetres; None: invalid, or the encoder is rotary.")
-      .def_property_readonly("singleturn", &PyReading::singleturn, "Single-turn position in counts; None: invalid.")
-      .def_property_readonly("multiturn", &PyReading::multiturn, "Revolutions; None: not reported, or invalid.")
+      .def_property_readonly(
+          "angle_deg", &PyReading::angle_deg,
+          "Position in degrees, 0 to below 360; None: not known to be valid, or the encoder is linear.")
+      .def_property_readonly(
+          "position_mm", &PyReading::position_mm,
+          "Position of a linear encoder in millimetres; None: not known to be valid, or the encoder is rotary.")
+      .def_property_readonly("singleturn", &PyReading::singleturn,
+                             "Single-turn position in counts; None: not known to be valid.")
+      .def_property_readonly("multiturn", &PyReading::multiturn, "Revolutions; None: none, or not known to be valid.")
       .def_property_readonly(
           "singleturn_bits", [](const PyReading& one) { return one.reading.singleturn_bits; },
           "Bits of the single-turn position; 0: the reply has no position.")

@@ -16,7 +16,7 @@ using SettingTexts = std::vector<std::string>;
 
 Time duration_of(double seconds) { return std::chrono::duration_cast<Time>(std::chrono::duration<double>(seconds)); }
 
-/// Runs `work` without the GIL. It gets a function that says whether a signal handler ends it.
+/// Runs `work` without the GIL. Its argument returns whether a signal handler raised an exception.
 template <class Work>
 std::string watched(const Work& work) {
   SignalWatch watch;

@@ -73,7 +73,7 @@ def test_refuses_invalid_numbers_and_options():
     with absenc.open("sim:tformat", model=None) as encoder:
         for numbers in [(0, 10**9), (0, 2**31), (10**6, 1)]:
             with pytest.raises(absenc.UsageError):
-                encoder.memory.read(*numbers)  # such a read is refused before memory for all bytes is allocated
+                encoder.memory.read(*numbers)  # a read of too many bytes is refused before memory is allocated
         for argument in (2**80, -(2**80), "five", None, 1.5):
             with pytest.raises(absenc.UsageError, match="address is .*must be a whole number"):
                 encoder.run("memory-read", argument)
@@ -81,6 +81,54 @@ def test_refuses_invalid_numbers_and_options():
                 encoder.run("memory-read", address=argument)
         with pytest.raises(absenc.UsageError, match="arguments"):
             encoder.run("memory-read", 1, 2, 3, 4, 5)
+
+
+def policies_of_reading_threads(priority):
+    """Reads in a thread that is not the one that opened the encoder. Returns the policies of both, or the failure."""
+    policies = []
+
+    def policy():
+        policies.append(os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK)
+
+    def read(encoder):
+        policy()
+        encoder.read()
+        policy()
+
+    def work():
+        try:
+            with absenc.open("sim:tformat", realtime=priority) as encoder:
+                policy()
+                other = threading.Thread(target=read, args=(encoder,))
+                other.start()
+                other.join()
+        except absenc.Failure as failure:
+            policies.append(str(failure))
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    return policies
+
+
+def test_threads_that_use_an_encoder_become_real_time():
+    policies = policies_of_reading_threads(7)
+    if policies == [os.SCHED_FIFO, os.SCHED_OTHER, os.SCHED_FIFO]:
+        return
+    # If the kernel refuses a real-time thread, `open` fails instead of reading without one.
+    assert len(policies) == 1 and "the kernel refuses" in policies[0] and "Try: " in policies[0]
+
+
+def test_refused_real_time_is_a_failure():
+    script = ("import absenc\n"
+              "try:\n    absenc.open('sim:tformat', realtime=7)\n"
+              "except absenc.Failure as failure:\n    print(failure)\n")
+    capabilities = ["setpriv", "--bounding-set=-sys_nice"] if os.geteuid() == 0 else []
+    command = [*capabilities, "prlimit", "--rtprio=0:0", sys.executable, "-c", script]
+    printed = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout
+    assert "the kernel refuses" in printed and "Try: " in printed
+    with pytest.raises(absenc.UsageError, match="realtime"):
+        absenc.open("sim:tformat", realtime=100)
 
 
 def test_copies_and_pickles_readings():
@@ -124,7 +172,7 @@ def test_sample_has_repr_and_invalid_rates_are_refused():
 
 
 def test_reports_alarm_once(absenc_emulate):
-    """The protocol tformat has a status flag with the name of this alarm."""
+    """The protocol tformat has a status flag of the same name as the alarm counting_error."""
     virtual = absenc_emulate("tformat")
     with absenc.open(virtual.address, latency=PATIENCE_MS) as encoder:
         virtual.raise_alarm("counting_error")

@@ -51,7 +51,7 @@ def test_info_has_no_failures(address):
 
 
 def test_encodes_and_decodes_requests(unit):
-    """Encodes requests and decodes them, also changed ones."""
+    """Encodes requests and decodes them; requests with changed bytes must be refused."""
     requests = []
     for command in unit.commands.values():
         if command.arguments:

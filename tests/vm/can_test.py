@@ -186,7 +186,27 @@ class Verbs(VirtualBus):
         emulator = self.emulator("--motion", "rpm=30")
         log = self.file("log.csv")
         self.assert_good(absenc("record", ENCODER, "--output", log, "--count", "40", "--rate", "40"))
-        rows = read_csv(log)[1]
+        self.assert_follows_shaft(read_csv(log)[1])
+        self.assert_no_rule_broken(emulator)
+
+    def test_record_follows_shaft_while_clock_is_set(self):
+        """The kernel stamps frames with the calendar clock, which this test sets an hour forward and back again."""
+        emulator = self.emulator("--motion", "rpm=30")
+        log = self.file("log.csv")
+        recording = self.start("record", ENCODER, "--output", log, "--count", "100", "--rate", "50")
+        step = 3600
+        steps = 0
+        while recording.poll() is None:
+            time.clock_settime(time.CLOCK_REALTIME, time.time() + step)
+            step = -step
+            steps += 1
+            time.sleep(0.013)
+        self.assertEqual(recording.returncode, 0, recording.stderr.read())
+        self.assertGreater(steps, 20)
+        self.assert_follows_shaft(read_csv(log)[1])
+        self.assert_no_rule_broken(emulator)
+
+    def assert_follows_shaft(self, rows):
         self.assertLessEqual({row["event"] for row in rows}, {"", "gap"})
         rows = [row for row in rows if row["event"] == ""]
         counts = [int(row["position"]) for row in rows]
@@ -195,7 +215,6 @@ class Verbs(VirtualBus):
         # The shaft makes half a turn (of 16384 counts) per second.
         for moment, count in zip(moments, counts):
             self.assertAlmostEqual(count - counts[0], 8192 * (moment - moments[0]), delta=8192 * 0.02)
-        self.assert_no_rule_broken(emulator)
 
     def test_settings(self):
         emulator = self.emulator("--singleturn", "1000")

@@ -73,7 +73,7 @@ def field_of(package, pattern):
 
 
 def download(package, path):
-    """Downloads the package to `path`, and deletes older kernels from the cache."""
+    """Downloads the package to `path`, and deletes the other kernels from the cache."""
     former = [old for old in glob.glob(os.path.join(CACHE, "linux-image-*"))
               if re.search(r"_amd64\.(deb|[0-9a-f]{8})$", old) and old != path]
     with own_folder(path) as folder:

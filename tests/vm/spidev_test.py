@@ -189,7 +189,7 @@ class Command(SpidevCase):
         self.assertAlmostEqual((turned[-1][0] - turned[0][0]) / (turned[-1][1] - turned[0][1]), 1, delta=0.05)
 
     def test_wrong_mode_is_detected(self):
-        """In a wrong SPI mode every bit arrives one clock late, which the CRC of the word must reveal."""
+        """A read in a wrong SPI mode must fail by the CRC, because bits arrive shifted."""
         for mode in (0, 2, 3):
             with self.subTest(mode):
                 process = self.serve("encolink", "--singleturn", "12345")

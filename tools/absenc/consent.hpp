@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Asks the user before a command changes an encoder or disturbs a bus.
+// Asks the user, unless --yes or sim: makes it unnecessary, before a command changes an encoder or disturbs a bus.
 #pragma once
 
 #include <string_view>
@@ -11,17 +11,17 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// Returns whether the user must be asked before the action `what`. Throws UsageError.
+/// Returns whether the user must be asked before the action `what`. Throws UsageError if nobody can be asked.
 [[nodiscard]] bool must_ask(const Invocation& invocation, const EncoderAddress& uri, std::string_view what,
                             std::string_view meaning);
 
 /// Asks the user to confirm, and returns whether the answer was y or yes. Throws os::Interrupted.
 [[nodiscard]] bool confirmed(const EncoderAddress& uri, std::string_view meaning);
 
-/// Prints how the requests of `command` may disturb other devices on the line, if they may.
+/// Prints how requests of `command` may disturb other devices on a real line, if they may.
 void tell_disturbance(const EncoderAddress& uri, const Command& command);
 
-/// Asks, if necessary, whether `command` may disturb others. Throws UsageError, os::Interrupted.
+/// Returns whether to run `command`; asks first if it may disturb others. Throws UsageError, os::Interrupted.
 [[nodiscard]] bool may_disturb(const Invocation& invocation, const EncoderAddress& uri, const Command& command);
 
 }  // namespace absenc::tool

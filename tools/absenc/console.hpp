@@ -37,7 +37,7 @@ class Console {
   const Unit& unit_;
   std::vector<VirtualDevice*> devices_;
   os::InputLines lines_;
-  bool unheard_ = false;  // standard output is closed, so nobody reads the replies
+  bool unheard_ = false;  // whether standard output was found closed, so that nobody reads the answers
 };
 
 }  // namespace absenc::tool

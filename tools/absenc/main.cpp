@@ -240,7 +240,7 @@ Json failure(std::string_view name, const std::exception& failed) {
   return json;
 }
 
-// Runs the verb and returns its exit status; with --json also for a failure.
+// Runs the verb and returns its exit status. With --json, prints a Failure or os::Failure as JSON.
 int run(const Subcommand& subcommand, const Invocation& invocation) {
   const bool json = invocation.has("--json");
   try {

@@ -15,6 +15,11 @@ inline constexpr Parameter option{
 /// The option --command of verbs that read repeatedly.
 inline constexpr Parameter read_command{
     "--command", "COMMAND", "what to read, instead of the position with all alarms: a command that yields positions"};
+/// The option --realtime of verbs that read repeatedly.
+inline constexpr Parameter realtime{
+    "--realtime", "PRIORITY",
+    "read in a real-time thread (SCHED_FIFO) of this priority, 1 to 99, with the memory of the program locked; an "
+    "error if the kernel refuses"};
 inline constexpr Parameter yes{"--yes", "", "do not ask before the encoder is changed"};
 inline constexpr Parameter force{"--force", "", "write also what the protocol protects, as calibration"};
 inline constexpr Parameter json{"--json", "", "one JSON object"};
@@ -25,7 +30,7 @@ inline constexpr Parameter model{"--model", "NAME", "which model of the protocol
                                  "the first that agrees with the options"};
 inline constexpr Parameter protocol_option{"--option", "NAME=VALUE", "sets an option of the protocol", "", false, true};
 
-// The parameters `command` and `arguments` are for verbs that run a command of a protocol.
+// The parameters `command` and `arguments` name a command of a protocol and its arguments.
 inline constexpr Parameter command{"command", "", "a command of the protocol: see `absenc list <protocol>`", "", true};
 inline constexpr Parameter arguments{
     "arguments", "", "those of the command: decimal numbers, or hexadecimal with 0x", "", false, true};

@@ -29,6 +29,7 @@ std::vector<std::string> reading_settings(const Invocation& invocation) {
   const auto options = invocation.texts("--option");
   std::vector<std::string> settings(options.begin(), options.end());
   if (invocation.has("--command")) settings.push_back(fmt::format("command={}", invocation.text("--command")));
+  if (invocation.has("--realtime")) settings.push_back(fmt::format("realtime={}", invocation.text("--realtime")));
   return settings;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The options --rate and --command of verbs that read repeatedly.
+// The options --rate, --command and --realtime of verbs that read repeatedly.
 #pragma once
 
 #include <string>
@@ -12,7 +12,7 @@ namespace absenc::tool {
 /// Returns --rate in readings per second (0: as fast as possible), or `fallback`. Throws UsageError.
 [[nodiscard]] double readings_a_second(const Invocation& invocation, double fallback);
 
-/// Returns the settings of --option, and "command=NAME" if --command was given.
+/// Returns the settings of --option, "command=NAME" of --command and "realtime=PRIORITY" of --realtime.
 [[nodiscard]] std::vector<std::string> reading_settings(const Invocation& invocation);
 
 }  // namespace absenc::tool

@@ -61,7 +61,7 @@ Common common_parts(std::span<const std::string> names) {
   return common;
 }
 
-// Returns the names without their common beginning and common end; ".." replaces each.
+// Returns the names with ".." in place of their common beginning and common end, if they have any.
 Names middles(std::span<const std::string> names) {
   const auto [front, back] = common_parts(names);
   Names cuts;
@@ -72,7 +72,7 @@ Names middles(std::span<const std::string> names) {
   return cuts;
 }
 
-// Returns the names cut to `width` bytes, each after its number, as "3 tfo..=7".
+// Returns each name after its number, both cut to `width` bytes: "3 tfo..=7". Equal names have one number.
 Names numbered(std::span<const std::string> names, std::size_t width) {
   Names cuts;
   for (const std::string& name : names) {

@@ -25,7 +25,7 @@ Frame to_frame(std::span<const CanFrame> frames, std::size_t = 0) {
   return {.can = frames.empty() ? nullptr : &frames.front()};
 }
 
-// Returns "" if the address has not changed.
+// Returns how the encoder is reached after the command, in words; "" if as before.
 std::string new_way(const EncoderAddress& before, const Command& command, Arguments arguments) {
   if (command.changes_option.empty()) return {};
   const Options behind = options_behind(*before.unit, before.options, command, arguments.front());
@@ -380,7 +380,7 @@ class ConnectionOn final : public Connection {
   ArrivalSpread arrivals_;
   host::LatchTime latch_time_{};  // bounds of the time at which the encoder latched the last position
   Change change_{};
-  std::uint64_t requests_before_ = 0;  // number of requests before the last command that `run` ran
+  std::uint64_t requests_before_ = 0;  // number of requests that preceded the last conversation of `run`
 };
 
 }  // namespace

@@ -36,7 +36,7 @@ class Connection {
   [[nodiscard]] static std::unique_ptr<Connection> open(const EncoderAddress& uri);
   virtual ~Connection() = default;
 
-  /// Opens the port, or shares that of another connection. Throws os::Failure, UsageError.
+  /// Opens the port, or shares that of another connection. Throws os::Failure, UsageError, Failure.
   virtual void connect() = 0;
   virtual void disconnect() = 0;
   [[nodiscard]] virtual bool connected() const = 0;
@@ -46,7 +46,7 @@ class Connection {
 
   /// Reads the position. Throws UsageError and the exceptions of the port.
   virtual Outcome read(host::Take take = host::Take::newest) = 0;
-  /// Calls `on_emit` at intermediate results, which `report` then passes on.
+  /// Runs a command; calls `on_emit` at intermediate results, which `report` then passes on.
   virtual Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit = {}) = 0;
   /// Stores the value that the next changing command overwrites, for the journal.
   void know_before(std::int64_t value) { known_before_ = value; }
@@ -58,7 +58,7 @@ class Connection {
   virtual void report_left(FieldSink& sink) const = 0;
   /// Returns a description of the failure `outcome`, which must be the last outcome.
   [[nodiscard]] virtual Trouble trouble(const Outcome& outcome) const = 0;
-  /// Returns times of the port's clock.
+  /// Returns bounds of the time at which the last position was latched, by the port's clock.
   [[nodiscard]] virtual host::LatchTime latch_time() const = 0;
   /// Returns whether the last position agrees with the one before.
   [[nodiscard]] virtual bool confirmed() const = 0;
@@ -91,10 +91,10 @@ class Connection {
   EncoderAddress uri_;
 };
 
-/// Throws EncoderFailure, Failure, and as Connection::run.
+/// Returns a reading with the alarms. Throws EncoderFailure, Failure, and as Connection::run.
 [[nodiscard]] Reading read_alarms(Connection& connection);
 
-/// Throws EncoderFailure, and as Connection::run.
+/// Runs a command and passes its result to `sink`. Throws EncoderFailure, and as Connection::run.
 void run_into(Connection& connection, const Command& command, Arguments arguments, FieldSink& sink);
 
 }  // namespace absenc::client

@@ -11,7 +11,7 @@
 
 namespace absenc::client {
 
-/// Returns the bounds; `character` is the duration of a character, or 0.
+/// Returns the bounds for a requested reading; `character` is the duration of a character, or 0.
 template <class Item>
 [[nodiscard]] host::LatchTime asked_latch_time(const LineExchange<Item>& exchange, Time latched, Time character) {
   // The encoder latches before the end of the request if the host clocks or triggered it.

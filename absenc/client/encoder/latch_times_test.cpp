@@ -237,7 +237,7 @@ TEST_P(LatchTimes, MakeNoSpeedThatIsFartherOffThanItSays) {
   }
 }
 
-// The measured speed is the mean between both instants, even if the shaft accelerates.
+// The measured speed is the mean between two latch times, even if the shaft accelerates.
 TEST_P(LatchTimes, MakeTheMeanSpeedOfAShaftThatSwings) {
   const double swing = revolutions_a_second(GetParam()) / 5;
   for (const Time most : most_late) {

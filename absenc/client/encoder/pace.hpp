@@ -26,7 +26,7 @@ class Pace {
     return next_;
   }
 
-  /// Does not sleep without a rate.
+  /// Sleeps until the next time, or until `end` if that is earlier; does nothing without a rate.
   template <class SleepUntil>
   void wait(Time end, SleepUntil sleep_until) {
     if (period_ == Time{}) return;

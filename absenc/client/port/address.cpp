@@ -12,6 +12,7 @@
 #include "absenc/client/port/setting_value.hpp"
 #include "absenc/client/port/settings_file.hpp"
 #include "absenc/client/text/unit_text.hpp"
+#include "absenc/os/realtime.hpp"
 #include "absenc/os/serial_ports.hpp"
 #include "absenc/os/socketcan.hpp"
 #include "absenc/protocol/all.hpp"
@@ -90,6 +91,8 @@ void set_link_parameter(EncoderAddress& uri, const OptionText& setting) {
     uri.maximum_rpm = static_cast<std::uint32_t>(number_of(setting, 1, 1'000'000));
   } else if (setting.name == "max_mm_s") {
     uri.maximum_mm_s = static_cast<std::uint32_t>(number_of(setting, 1, 1'000'000));
+  } else if (setting.name == "realtime") {
+    uri.realtime = static_cast<int>(number_of(setting, os::lowest_realtime, os::highest_realtime));
   } else if (setting.name == "command") {
     uri.reads = &reading_command(*uri.unit, setting.value);
   } else if (setting.name == "motion") {

@@ -34,7 +34,7 @@ struct LinkParameter {
   bool repeatable = false;
 };
 
-inline constexpr std::array<LinkParameter, 30> link_parameters{{
+inline constexpr std::array<LinkParameter, 31> link_parameters{{
     {rate_setting, "RATE", "bits a second, instead of the protocol's own; slcan: of the adapter's port, 115200",
      "serial, slcan"},
     {"parity", "none|odd|even", "of each character, instead of the protocol's own", "serial, sim"},
@@ -66,6 +66,10 @@ inline constexpr std::array<LinkParameter, 30> link_parameters{{
     {"pole_pair_mm", "MM", "length of a pole pair of a linear motor, for its electrical angle",
      "serial, tcp, spi, can, slcan, sim"},
     {"command", "NAME", "what is read, instead of the position with all alarms: a command that yields positions",
+     "serial, tcp, spi, can, slcan, sim"},
+    {"realtime", "PRIORITY",
+     "use the port in real-time threads (SCHED_FIFO) of this priority, 1 to 99, with the memory of the program locked; "
+     "an error if the kernel refuses",
      "serial, tcp, spi, can, slcan, sim"},
     {"motion", "MOTION", "still, rpm=R, sine=DEGREES,HZ or file=CSV", "sim"},
     {"singleturn", "COUNTS", "position within the turn at the start", "sim"},
@@ -105,18 +109,19 @@ struct EncoderAddress {
   std::uint32_t maximum_rpm = 0;   // speed limit of the shaft in rpm; 0: that of the model, or the default
   std::uint32_t maximum_mm_s = 0;  // speed limit of a linear encoder in mm/s; 0: the default
   Joint joint;                     // how the encoder is mounted in its drive
+  int realtime = 0;                // real-time priority, 1 to 99, of threads that use the port; 0: none
   const Command* reads = nullptr;  // command for repeated readings; null: the first command with Verb::read
   DeviceSettings device;
-  std::string written;  // address as the user wrote it, with all settings: "elbow?baud=57600"
+  std::string written;  // address as the user wrote it, with the settings given beside it: "elbow?baud=57600"
 };
 
 /// Returns the user's speed limit, or else that of host::speed_limit.
 [[nodiscard]] host::SpeedLimit speed_limit(const EncoderAddress& uri);
 
-/// Returns a port that was written without a protocol; nothing: it is none.
+/// Returns a port that was written without a protocol; nothing: `text` is no such port.
 [[nodiscard]] std::optional<std::string> bare_port(std::string_view text);
 
-/// Appends `settings` ("name=value") to the address. Throws UsageError.
+/// Parses an address and further `settings` ("name=value"). Throws UsageError.
 [[nodiscard]] EncoderAddress parse_address(std::string_view text, std::span<const std::string> settings = {});
 
 class NamedEncoders;

@@ -14,7 +14,7 @@ namespace absenc::client {
 struct Diagnosis {
   std::string finding;    // what the received bytes really are
   std::string advice;     // what the user can try
-  std::string setting{};  // setting "NAME=VALUE" with which the reply would be good; "": there is none
+  std::string setting{};  // model or option "NAME=VALUE" with which the reply would be good; "": none was found
 };
 
 /// Explains a bad reply, as by an echo, further bytes, or another model.

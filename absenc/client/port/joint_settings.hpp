@@ -9,7 +9,7 @@
 
 namespace absenc::client {
 
-/// Returns false if it is no joint setting. Throws UsageError.
+/// Sets one setting of `joint`; returns false if `setting` is no joint setting. Throws UsageError.
 bool set_joint(Joint& joint, const OptionText& setting);
 
 /// Throws UsageError if a setting of linear encoders is given to a rotary one, or the reverse.

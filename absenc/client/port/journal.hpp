@@ -11,7 +11,7 @@
 namespace absenc::client {
 
 struct JournalEntry {
-  std::string time{};  // time of the change in UTC, "2026-11-24T13:27:47.123Z"
+  std::string time{};  // time of the entry in UTC, "2026-11-24T13:27:47.123Z"
   std::string encoder{};
   std::string what{};
   std::string before{};
@@ -20,10 +20,10 @@ struct JournalEntry {
   std::string put_back{};  // command that restores the old value; "": there is none
 };
 
-/// Returns the path of the journal; "" if there is none.
+/// Returns the path of the journal, which may not exist yet; "": no journal is kept.
 [[nodiscard]] std::string journal_path();
 
-/// Returns "" or the reason of a failure.
+/// Appends the entry, with the present time, to the journal; returns "", or why that failed.
 [[nodiscard]] std::string append_to_journal(const std::string& path, JournalEntry entry);
 
 struct Journal {

@@ -9,6 +9,7 @@
 
 #include "absenc/client/error.hpp"
 #include "absenc/client/port/can_log.hpp"
+#include "absenc/client/port/realtime.hpp"
 #include "absenc/os/serial.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/os/slcan_port.hpp"
@@ -116,7 +117,7 @@ Link open_slcan(const EncoderAddress& uri) {
   return link;
 }
 
-// After a loss of the port the log continues in the same file. Takes no lock.
+// After a loss of the port the log continues in the same file. Not safe for calls from several threads.
 std::shared_ptr<os::LineFile> log_file(const std::string& path) {
   static std::map<std::string, std::shared_ptr<os::LineFile>> files;
   std::shared_ptr<os::LineFile>& file = files[path];
@@ -172,12 +173,16 @@ Link open_link(const EncoderAddress& uri) {
     }
     return open_sim(uri);
   };
+  require_realtime(uri.realtime);
   Link link = open();
+  link.realtime = uri.realtime;
   if (!uri.log.empty()) keep_log(link, uri);
   return link;
 }
 
-Link open_receiving(const EncoderAddress& uri) {
+namespace {
+
+Link open_port_for_receiving(const EncoderAddress& uri) {
   switch (uri.port_kind) {
     case PortKind::serial:
       return open_serial_receiving(uri);
@@ -195,6 +200,14 @@ Link open_receiving(const EncoderAddress& uri) {
       break;
   }
   throw UsageError("a virtual encoder inside this command has no line: `absenc emulate` makes one");
+}
+
+}  // namespace
+
+Link open_receiving(const EncoderAddress& uri) {
+  Link link = open_port_for_receiving(uri);
+  link.realtime = uri.realtime;
+  return link;
 }
 
 }  // namespace absenc::client

@@ -18,14 +18,17 @@ struct Link {
   Port<std::uint8_t>* bytes = nullptr;  // the open port for bytes; either this or `frames` is set
   Port<CanFrame>* frames = nullptr;
   Time latency{};                  // delay that the connection between this computer and the line adds to a reply
+  int realtime = 0;                // real-time priority, 1 to 99, of threads that use the port; 0: none
   Time character{};                // duration of a character on the line; 0: unknown, or bytes take no time
   std::string place;               // port in words, "/dev/ttyUSB0 at 2500000 baud"
-  std::vector<std::string> notes;  // hints on how to improve the settings of the port
+  std::vector<std::string> notes;  // hints for the user about the port, as on a setting that slows it
 };
 
-/// Opens the port of the address and returns it. Throws os::Failure, UsageError.
+/// Opens the port of the address and returns it; the setting `realtime` makes the calling thread a real-time thread
+/// first. Throws os::Failure, UsageError, Failure.
 [[nodiscard]] Link open_link(const EncoderAddress& uri);
-/// Opens a port for receiving only. Throws os::Failure, UsageError.
+/// Opens a port for receiving only. The calling thread stays as it is: the one that receives calls `require_realtime`.
+/// Throws os::Failure, UsageError.
 [[nodiscard]] Link open_receiving(const EncoderAddress& uri);
 /// Type of open_link, and of functions that tests use instead.
 using OpenLink = std::function<Link(const EncoderAddress&)>;

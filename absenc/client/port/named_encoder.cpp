@@ -19,7 +19,7 @@ namespace {
 
 using Names = std::vector<std::string_view>;
 
-// readings per second of `serve`
+// name of the setting for the readings per second of `serve`
 constexpr std::string_view rate_name = "rate_hz";
 
 void add_options(Names& names, const Unit& unit) {

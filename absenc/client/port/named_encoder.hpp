@@ -34,7 +34,7 @@ class NamedEncoders {
   ~NamedEncoders() = default;
 
   [[nodiscard]] const SettingsFile& file() const { return file_; }
-  /// Throws UsageError.
+  /// Returns the encoder of this name with its settings. Throws UsageError.
   [[nodiscard]] NamedEncoder require(std::string_view name) const;
 
  private:

@@ -20,10 +20,10 @@ struct FoundPort {
   [[nodiscard]] std::string next_command() const;
 };
 
-/// Opens no port, because opening would reset some boards.
+/// Returns the ports of this computer; opens none, because opening would reset some boards.
 [[nodiscard]] std::vector<FoundPort> ports();
 
-/// Returns a JSON object, in which unknown values are null.
+/// Returns the port as a JSON object; unknown details of a serial port are null.
 [[nodiscard]] Json to_json(const FoundPort& port);
 
 }  // namespace absenc::client

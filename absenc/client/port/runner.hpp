@@ -27,18 +27,18 @@ struct Attempted {
   std::string advice{};                  // the unit's advice on the error; "": it has none
   Time began{};                          // time at which the command began, by the port's clock
   capture::ObservedExchange exchange{};  // last request and its reply, without echo
-  std::vector<std::uint8_t> raw{};       // all bytes received in the last exchange, including the echo
+  std::vector<std::uint8_t> raw{};       // bytes of the last exchange, with echo; of a stream: its frame; CAN: none
   bool heard = false;                    // whether anything was received after the last request, even only an echo
   bool answered = false;                 // whether something other than an echo was received
-  std::uint64_t unanswered = 0;          // number of earlier requests without reply; the last request is not counted
-  // number of damaged frames since the previous result
+  std::uint64_t unanswered = 0;          // number of requests of this command without reply, except the last request
+  // number of damaged frames that this command discarded
   std::uint64_t discarded = 0;
-  Time answered_after{};  // time from the end of the request to the beginning of the reply
+  Time answered_after{};  // time from the end of the request to the beginning of the reply; 0 without one
   Time limit{};           // limit of `answered_after` by protocol and connection; 0: there is no limit
-  Time after{};           // time from the end of the request to the end of the reply
+  Time after{};           // time from the end of the request to the end of the reply; meaningless without a reply
   Time allowed{};         // greatest `after` that protocol and length of the reply allow
   std::optional<Reading> reading{};
-  // value of the reply's first field that counts replies; nothing if it has none
+  // value of the first reported field that counts replies; nothing: none was reported
   std::optional<std::int64_t> counter{};
   const FieldInfo* counter_field = nullptr;
   bool possible = true;  // whether the unit can run the command with these options
@@ -85,11 +85,11 @@ class CounterSink final : public FieldSink {
 /// Limits of a series of runs of the same command.
 struct Series {
   std::size_t count = 0;
-  Time limit = never;                       // longest duration of the series
-  Time patience = std::chrono::seconds(2);  // longest time without a good reply
+  Time limit = never;                       // time after which no further run begins
+  Time patience = std::chrono::seconds(2);  // time without a good reply that ends the series
   std::size_t most_silent = 8;              // number of runs after which the series ends if none received anything
   Time least{};                             // shortest time before `most_silent` can end the series
-  std::size_t most_bad = 24;                // number of runs after which the series ends if none got a good reply
+  std::size_t most_bad = 24;                // number of runs after which the series ends if no reply was good
 };
 
 template <class Item>
@@ -146,10 +146,10 @@ class Runner {
     session_->set_options(options);
   }
 
-  /// Returns null if the unit cannot run the command.
+  /// Calls `use` with the session and returns the conversation; null if the unit cannot run the command.
   template <class Use>
   const Conversation<Item>* converse(const Use& use) {
-    // Without a request, the stored exchange is an older one.
+    // If the previous command sent no request, the stored exchange is older than that command.
     if (requests_before_ == port_.requests) port_.last.clear();
     requests_before_ = port_.requests;
     received_before_ = port_.last.received.size();
@@ -166,7 +166,7 @@ class Runner {
     answered_ = ended != nullptr && ended->error() == Error::none ? port_.last.received.size() : 0;
     return ended;
   }
-  /// Returns null if the unit cannot run the command.
+  /// Runs a command and returns its conversation; null if the unit cannot run the command.
   const Conversation<Item>* run(const Command& command, Arguments arguments = {}) {
     return converse([&](host::Session<Item>& session) { return session.next(command, arguments); });
   }
@@ -199,7 +199,7 @@ class Runner {
   void repeat(const Series& series, const Attempt& attempt, std::vector<Attempted>& into) {
     const Time begin = port_.now();
     const Time end = series.limit == never ? never : begin + series.limit;
-    // Sets a deadline for attempts on a line that is never silent.
+    // Limits each attempt, too: on a line that is never silent it might not end.
     const Time outer = port_.deadline;
     const Time latest = end == never ? never : begin + 2 * series.limit;
     port_.deadline = std::min(outer, latest);
@@ -269,7 +269,7 @@ class Runner {
   /// Returns the longest time between a request and its late reply; 0 if no reply was late.
   [[nodiscard]] Time lateness() const { return std::max({lateness_, lateness_of(last()), session_->lateness()}); }
 
-  /// Returns how many good replies had further bytes after them.
+  /// Returns how many good replies were followed by further bytes before the next request.
   [[nodiscard]] std::uint64_t overfull() const { return overfull_; }
   /// Returns the greatest number of further items that followed a good reply.
   [[nodiscard]] std::size_t most_behind() const { return most_behind_; }
@@ -357,11 +357,11 @@ class Runner {
     open_ = true;
     opened_at_ = port_.requests;
   }
-  // Without a request since, the last exchange was passed already.
+  // If no request followed begin_exchange, the last exchange was passed already.
   void close_exchange() {
     if (std::exchange(open_, false) && opened_at_ != port_.requests && on_exchange) on_exchange(last());
   }
-  // A new session has not seen that echo, so the greater length counts.
+  // A new session has not seen the echo of an older request, so the greater length counts.
   void keep_echo() {
     if constexpr (!is_can) port_.last.echo = std::max(port_.last.echo, session_->echo().echoed());
   }
@@ -390,7 +390,7 @@ class Runner {
   std::uint64_t late_ = 0;         // number of late replies before the last exchange
   std::uint64_t late_before_ = 0;  // number of late replies that earlier sessions discarded
   Time lateness_{};
-  std::size_t answered_ = 0;  // number of items when the last command ended well; else 0
+  std::size_t answered_ = 0;  // number of received items when the last command ended without an error; else 0
   std::uint64_t overfull_ = 0;
   std::size_t most_behind_ = 0;
   std::vector<Item> overfull_example_;

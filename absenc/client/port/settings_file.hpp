@@ -12,7 +12,7 @@ namespace absenc::client {
 /// A setting of the file. Its values are texts, as behind ? in an address.
 struct FileSetting {
   std::string name;
-  std::vector<std::string> values;  // the value of the setting; several if it is a list
+  std::vector<std::string> values;  // the value of the setting; any number of values if it is a list
   std::string place;                // position of the setting's name, "absenc.toml:3:1": file, line and column
   bool is_list = false;
 };
@@ -34,10 +34,10 @@ struct SettingsFile {
   std::vector<FileSection> services;  // the sections [serve.NAME], in the order of the file
 };
 
-/// Throws UsageError.
+/// Parses the text of absenc.toml; `path` is its name in errors. Throws UsageError.
 [[nodiscard]] SettingsFile parse_settings_file(std::string_view text, const std::string& path);
 
-/// Returns the paths in order of priority.
+/// Returns the paths at which absenc.toml may be, in order of priority.
 [[nodiscard]] std::vector<std::string> settings_file_paths();
 
 /// Reads the first file that exists; nothing: there is none. Throws UsageError.

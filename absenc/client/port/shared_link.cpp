@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Returns the device file to which a link of udev leads.
+// Returns the file to which symbolic links lead, such as those of udev; `path` if that fails.
 fs::path device(const std::string& path) {
   std::error_code error;
   const fs::path canonical = fs::weakly_canonical(path, error);
@@ -91,6 +91,7 @@ bool share_line(const EncoderAddress& one, const EncoderAddress& other) {
   if (one.line != other.line) refuse("their protocols must have the same characters");
   if (one.adapter_rate != other.adapter_rate) refuse("they must have the same baud");
   if (one.log != other.log) refuse("they must have the same log");
+  if (one.realtime != other.realtime) refuse("they must have the same realtime");
   if (one.rs485 != other.rs485) refuse("they must have the same rs485");
   if (one.latency != other.latency) {
     refuse(fmt::format("they must have the same latency, not {} and {}", latency_text(one.latency),

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "absenc/client/port/link.hpp"
+#include "absenc/client/port/realtime.hpp"
 #include "absenc/host/reply_guard.hpp"
 #include "absenc/os/error.hpp"
 
@@ -45,9 +46,11 @@ class SharedLink {
  public:
   explicit SharedLink(Link link) : link_(std::move(link)) {}
 
-  /// Has exclusive use of the line. An os::Failure of `work` closes the port.
+  /// Runs `work` with exclusive use of the line. An os::Failure of `work` closes the port. Throws Failure if the port
+  /// needs a real-time thread and the kernel refuses.
   template <class Work>
   auto take_turn(const Work& work) {
+    require_realtime(link_.realtime);
     const std::lock_guard turn(turns_);
     if (loss_) throw os::Failure(loss_->kind, loss_->sentence);
     try {
@@ -89,13 +92,13 @@ class SharedLink {
   std::optional<Loss> loss_;
 };
 
-/// Throws UsageError for different settings of a shared port.
+/// Returns whether both use one line; false on SPI and sim. Throws UsageError if their line settings differ.
 [[nodiscard]] bool share_line(const EncoderAddress& one, const EncoderAddress& other);
 
 /// Throws UsageError if the encoders cannot be read at the same time.
 void require_different(std::span<const EncoderAddress> encoders, std::span<const std::string> names);
 
-/// Returns the open link of the same line, if any. Throws os::Failure, UsageError.
+/// Returns the open link of the same line, or opens a new one. Throws os::Failure, UsageError, Failure.
 [[nodiscard]] std::shared_ptr<SharedLink> connect_link(const EncoderAddress& uri, const OpenLink& open = open_link);
 
 }  // namespace absenc::client

@@ -41,7 +41,7 @@ class VirtualDevice {
   VirtualDevice(const VirtualDevice&) = delete;
   VirtualDevice& operator=(const VirtualDevice&) = delete;
 
-  /// Starts the motion of the shaft at `now`.
+  /// Switches the encoder on, with its conditions and alarms, and starts the motion at `now`.
   void power_on(Time now);
 
   // ---- Only the thread of the encoder's machine may call these functions.
@@ -58,7 +58,7 @@ class VirtualDevice {
   void set_condition(std::size_t index, std::int64_t value, Time now);
   [[nodiscard]] std::int64_t condition(std::size_t index) const { return conditions_[index]; }
 
-  /// Sets the counter of rules, which must outlive the device; null: none.
+  /// Sets the observer of rule checks, which must outlive the device; null: none.
   void watch_rules(RuleWatch* watch);
 
   /// Sets the rates of all faults from now on. Requires `faults_may_come`, or faults at the start.
@@ -71,7 +71,7 @@ class VirtualDevice {
   [[nodiscard]] Machine<CanFrame>* frames() const;
   /// Returns how often each fault was injected; null if faults were never enabled.
   [[nodiscard]] const sim::FaultCounts* faults() const;
-  /// Returns nothing for CAN, or without faults.
+  /// Returns the number of replies with a fault, as a delay; nothing on CAN, or if faults were never enabled.
   [[nodiscard]] std::optional<std::uint64_t> damaged_replies() const;
 
  private:

@@ -25,8 +25,8 @@ struct VirtualClock {
 /// The properties of the port between the host and the virtual encoder.
 struct VirtualPort {
   bool echo = false;                      // whether the adapter echoes requests
-  std::optional<std::uint64_t> pauses{};  // seed of random delays before each request; nothing: no delays
-  // fault rates of a line of whole frames; without a value it carries bits
+  std::optional<std::uint64_t> pauses{};  // seed of random delays before requests; nothing: no delays
+  // fault rates of a sim::RoughLine; nothing: the port is a sim::SimPort
   std::optional<sim::RoughRates> rough{};
   std::uint64_t seed = 1;         // seed of the faults of `rough`
   VirtualClock* clock = nullptr;  // clock of the port; null: time begins with the link and jumps from event to event

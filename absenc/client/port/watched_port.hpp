@@ -16,14 +16,14 @@
 
 namespace absenc::client {
 
-/// A request and what was received until the next one; long ones are cut.
+/// A request and what was received until the next one; of many received items the last are dropped.
 template <class Item>
 struct LineExchange {
   std::vector<Item> request{};
   std::vector<Item> received{};  // received items, including the adapter's echo
   std::size_t echo = 0;          // number of items at the beginning of `received` that are echo
   std::size_t clocks = 0;        // number of clocks of the transfer; only on a clocked line
-  Time answer{};                 // timeout for the beginning of a reply; 0: no reply is expected
+  Time answer{};                 // limit of the time until a reply begins; 0: no limit
   Time sent_at{};                // time at which the request ended
   Time sent_late{};              // uncertainty of `sent_at`: the request may have ended earlier by up to this time
   Time received_at{};            // time at which the last received item ended
@@ -37,7 +37,7 @@ struct LineExchange {
   [[nodiscard]] std::span<const Item> reply() const {
     return std::span<const Item>(received).subspan(std::min(echo, received.size()));
   }
-  /// Returns 0 without a reply.
+  /// Returns the time from the end of the request to the beginning of the reply; 0 without one.
   [[nodiscard]] Time answered_after(Time character) const {
     const auto first = std::find_if(marks.begin(), marks.end(), [this](const Mark& one) { return one.items > echo; });
     if (first == marks.end()) return {};
@@ -59,6 +59,12 @@ struct OutOfTime {};
 template <class Item>
 class WatchedPort final : public Port<Item> {
  public:
+  /// Reserves memory for received items, so that most exchanges allocate none for them.
+  WatchedPort() {
+    last.received.reserve(most_kept);
+    last.marks.reserve(most_kept);
+  }
+
   /// Sets the port to use from now on.
   void attach(Port<Item>& port) {
     port_ = &port;
@@ -116,7 +122,7 @@ class WatchedPort final : public Port<Item> {
   std::function<bool()> abort;
   Time deadline = never;  // time by the port's clock; a wait that reaches it throws OutOfTime
   LineExchange<Item> last;
-  Time nothing_until{};  // time at which the last wait ended without a received item
+  Time nothing_until{};  // time at which a wait last ended by its time or by silence
   std::uint64_t requests = 0;
   std::uint64_t items_sent = 0;
   std::uint64_t items_received = 0;
@@ -135,7 +141,7 @@ class WatchedPort final : public Port<Item> {
       }
     }
   }
-  // The time of the step may pass before its wait.
+  // Compares with the time read last, because the time of the step may pass before its wait.
   [[nodiscard]] Step<Item> bounded(const Step<Item>& step) const {
     if (deadline == never) return step;
     if (deadline <= looked_at_) throw OutOfTime{};

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <utility>
 
+#include "absenc/client/port/realtime.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/input.hpp"
 #include "absenc/os/signals.hpp"
@@ -14,7 +15,9 @@ namespace absenc::client {
 
 using namespace std::chrono_literals;
 
-Receiver::Receiver(const EncoderAddress& uri) : link_(open_receiving(uri)), place_(link_.place) {}
+Receiver::Receiver(const EncoderAddress& uri) : link_(open_receiving(uri)), place_(link_.place) {
+  check_realtime({&uri, 1});
+}
 
 Receiver::Receiver() : place_("standard input") {
   link_.latency = 20ms;  // assumed delay of a pipe between two programs on a busy computer
@@ -22,7 +25,7 @@ Receiver::Receiver() : place_("standard input") {
 
 Receiver::~Receiver() { cancel(); }
 
-// A busy computer may delay a part of a frame for longer than its latency.
+// A busy computer may delay a part of a frame for longer than the latency of the link.
 Time Receiver::quiet() const { return 500ms + 2 * link_.latency; }
 
 void Receiver::start(Time end) {
@@ -92,6 +95,7 @@ void Receiver::receive() {
 
 // Receives bytes, and reports silence.
 void Receiver::receive_from_port() {
+  require_realtime(link_.realtime);
   Time quiet_at = link_.bytes->now() + quiet();
   for (;;) {
     const ByteEvent event = link_.bytes->wait({.at = std::min(quiet_at, end_time_)});

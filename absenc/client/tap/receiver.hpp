@@ -30,7 +30,7 @@ class Receiver {
  public:
   enum class ReceiveEnd : std::uint8_t { none, input, time, interrupted, lost };
 
-  /// Opens the port of the address for receiving. Throws os::Failure, UsageError.
+  /// Opens the port of the address for receiving. Throws os::Failure, UsageError, Failure.
   explicit Receiver(const EncoderAddress& uri);
   /// Receives raw bytes from standard input.
   Receiver();
@@ -38,9 +38,9 @@ class Receiver {
   Receiver(const Receiver&) = delete;
   Receiver& operator=(const Receiver&) = delete;
 
-  /// Starts the receiving thread, which ends at the time `end`. Called once.
+  /// Starts the receiving thread, which ends at the time `end` at the latest. Called once.
   void start(Time end = never);
-  /// Returns nothing at `deadline` or at the end.
+  /// Waits for bytes or silence and returns them; nothing at `deadline` or at the end.
   [[nodiscard]] std::optional<Received> next(Time deadline = never);
   /// Ends receiving: `next` returns nothing from now on. May be called from any thread.
   void cancel();

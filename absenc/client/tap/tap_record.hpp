@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes all received bytes to a file that `decode` reads.
+// Writes requests and replies of a tap to a file that `decode` reads.
 #pragma once
 
 #include <fmt/format.h>

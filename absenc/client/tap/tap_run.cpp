@@ -27,7 +27,7 @@ using namespace std::chrono_literals;
 
 namespace {
 
-// number of bytes before the first search; each further search waits for twice as many
+// number of bytes that start the first search; it doubles for each further one
 constexpr std::size_t first_search = 64;
 constexpr std::size_t last_search = 8192;    // number of bytes after which further bytes do not improve the search
 constexpr std::size_t most_at_other = 2048;  // number of bytes to try at a rate that may be wrong

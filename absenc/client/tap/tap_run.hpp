@@ -30,18 +30,18 @@ struct TapOutcome {
 
 class TapRun {
  public:
-  /// Opens a port with settings, or "-" for standard input. Throws UsageError, os::Failure.
+  /// Opens a port with settings, or "-" for standard input. Throws UsageError, os::Failure, Failure.
   TapRun(std::string_view place, TapChoices choices);
   ~TapRun();
 
-  /// Returns whether protocol and options are known.
+  /// Waits until protocol and options are known; returns false if the protocol was not found.
   bool settle(const std::function<void(const std::string&)>& progress);
   /// Starts decoding: exchanges are passed to `sink`, which must outlive the object. Called once.
   void begin(capture::AnnotationSink& sink);
-  /// Returns false at the end.
+  /// Decodes the next received bytes; returns false at the end.
   bool advance();
   [[nodiscard]] TapOutcome outcome() const;
-  /// Makes `advance` return false. May be called from any thread after `settle`.
+  /// Makes `advance` soon return false. May be called from any thread after `settle`.
   void cancel();
 
   [[nodiscard]] bool is_protocol_given() const { return !choices_.protocol.empty(); }
@@ -49,7 +49,7 @@ class TapRun {
   [[nodiscard]] const Unit& unit() const { return *unit_; }
   [[nodiscard]] const Options& options() const { return options_; }
   [[nodiscard]] const Receiver& receiver() const { return *receiver_; }
-  /// Returns the likeliest first; none if the protocol was given.
+  /// Returns the candidates of the last search, the likeliest first; none if the protocol was given.
   [[nodiscard]] const std::vector<Candidate>& candidates() const { return candidates_; }
   [[nodiscard]] std::uint64_t received_bytes() const { return bytes_; }
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
@@ -79,7 +79,7 @@ class TapRun {
   std::vector<LineToTry> lines_;
   std::unique_ptr<Receiver> receiver_;
   std::unique_ptr<TapRecord> record_;
-  std::deque<Received> collected_;  // bytes that were received before the protocol was identified
+  std::deque<Received> collected_;  // received bytes that `settle` has kept and `advance` has not decoded yet
   std::optional<Time> first_at_;    // arrival time of the first byte; nothing: no byte has arrived
   capture::Tick now_ = 0;
   std::unique_ptr<Sinks> sinks_;

@@ -65,7 +65,7 @@ std::vector<iovec> ranges(const std::vector<UserMemory>& memory) {
 
 }  // namespace
 
-/// Callbacks of libfuse, which throw nothing, because libfuse is C.
+/// Callbacks of libfuse. They must not throw, because libfuse is C.
 struct SpidevNodeCalls {
   using Operation = SpidevNode::Operation;
 

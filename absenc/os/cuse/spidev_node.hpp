@@ -46,7 +46,7 @@ class SpidevNode {
   Spidev* spidev_;
   std::string path_;
   bool made_ = false;
-  std::optional<Pending> pending_;  // request of a program that is answered when its SPI message is over
+  std::optional<Pending> pending_;  // request of a program that `answer` answers at `reply.at`
   std::unique_ptr<fuse_session, CloseSession> session_;
 };
 

@@ -64,7 +64,7 @@ export async function askAcknowledge(name, alarm) {
   return ask(`Acknowledge ${plain(alarm)}: ${name}`, "Acknowledge", nodes, async () => (who === null ? tryToken(token.value.trim()) : ""));
 }
 
-/** Resolves to the arguments, or null without consent. `now`, `then`: value before and after. */
+/** Resolves to the arguments, or null without consent. `now` and `then` return the value before and after. */
 export async function askCommand(name, command, now, then) {
   const {name: who} = await tokenInfo();
   const fields = command.arguments.map((argument) => element("input", {

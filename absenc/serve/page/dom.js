@@ -22,7 +22,7 @@ export function setText(node, text) {
   }
 }
 
-/** The next three functions write only changes: a write makes the browser compute styles again. */
+/** Sets the class only if it differs: a write makes the browser compute styles again. */
 export function setClass(node, name) {
   if (node.className !== name) node.className = name;
 }

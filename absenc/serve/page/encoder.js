@@ -19,7 +19,7 @@ const RANGES = {live: ["Live", 0], "10m": ["10 min", 600], "1h": ["1 h", 3600], 
 const TABS = {history: "History", exchanges: "Exchanges", settings: "Settings", memory: "Memory", doctor: "Doctor"};
 const AWAY = ["opening", "lost", "examined"];
 const SHOWN_COMMANDS = 3;
-const LEAST_MS = 12;      // minimum time between two stored points of the plot, in milliseconds
+const LEAST_MS = 12;      // minimum time between two points taken from the event stream, in milliseconds
 
 const byteText = (byte) => (Number.isNaN(byte) ? "?" : `0x${byte.toString(16).toUpperCase().padStart(2, "0")} (${byte})`);
 
@@ -44,7 +44,7 @@ export class EncoderPage {
     this.trace = name;
     this.points = [];     // points of the live plot as [at_ms, position, speed, uncertainty of the speed]
     this.events = [];
-    this.loss = 0;        // number of connection losses: a response to a request from before a loss is ignored
+    this.loss = 0;        // number of losses: refresh() ignores a response to a request from before one
     this.hasHistory = true;
     this.values = new Map(values);
     this.build(main, bar);
@@ -219,7 +219,7 @@ export class EncoderPage {
     if (scaled) this.scale.move(encoder.position_mm === null ? null : encoder.position_mm / encoder.length_mm, `${numberText(encoder.length_mm)} mm`);
     const counts = encoder.counts === null ? [] : [`${numberText(encoder.counts)} ${encoder.counts_in_all === null ? "counts" : `of ${numberText(encoder.counts_in_all)} counts`}`];
     showParts(this.below, [...belowFigure(encoder, state.at_ms), ...counts]);
-    // In these states no command can reach the encoder.
+    // Commands are disabled while the port is missing, lost, or used by an examination.
     for (const button of this.commands.querySelectorAll("[data-command]")) button.disabled = AWAY.includes(encoder.state);
     this.showWrong();
     this.showChoices();
@@ -434,7 +434,7 @@ export class EncoderPage {
     return alarms || (this.encoder.alarms === null ? "alarms not reported" : "no alarms");
   }
 
-  /** Resolves to a text; "" if there is no value. */
+  /** Resolves to a text of the value that `command` would change; "" if the command changes none. */
   async now(command, values) {
     if (command.verb === "zero") {
       const {text, unit} = figure(this.encoder);

@@ -152,7 +152,7 @@ export class Examine {
     this.has = {settings: false, memory: false};  // whether the encoder has readable settings and memory; set by `describe`
   }
 
-  /** Sets which settings and memory the encoder has. */
+  /** Sets whether the encoder has readable settings and memory; later calls do nothing. */
   describe(readable) {
     if (this.described) return;
     this.described = true;

@@ -274,7 +274,7 @@ export class Overview {
     this.list.append(...nodes.slice(kept ? nodes.indexOf(kept) + 1 : 0));
   }
 
-  /** No old value may be shown as current. */
+  /** Shows every encoder as not known, so that no old value looks current. */
   lose() {
     clearTimeout(this.later);
     for (const card of this.cards.values()) {

@@ -8,7 +8,7 @@ const style = (name) => getComputedStyle(document.documentElement).getPropertyVa
 const scaled = (pixels) => pixels * parseFloat(getComputedStyle(document.documentElement).fontSize) / 16;
 const NONE = [NaN, NaN, NaN];
 
-/** `past`: only from the history. */
+/** Returns the quantities that a plot can show, by name. `past`: only the history has the quantity. */
 export function quantities(encoder) {
   if (encoder.linear) {
     return {

@@ -120,7 +120,7 @@ export const GROUP_WORDS = {
   waiting: (count) => `${count} waiting`, live: (count) => `${count} live`, good: (count) => `${count} good`,
 };
 
-/** Text after the number, on wide screens only. */
+/** Additions to the texts of GROUP_WORDS, on wide screens only. */
 export const MORE_WORDS = {live: ", alarms not reported"};
 
 /** Returns lines [kind, bold text, text]. */

@@ -194,7 +194,7 @@ void draw_position(Screen& screen, int row, const MonitoredEncoder& shown) {
   const Snapshot& snapshot = shown.snapshot;
   const Unit& unit = *shown.watch->uri().unit;
   if (is_live(snapshot)) {
-    // The flags of an encoder with two channels do not fit here: they are among the fields.
+    // The flags of an encoder with two channels do not fit into this line: they are among the fields.
     const bool has_room = unit.second_status == nullptr && unit.second_alarms == nullptr;
     const Reading& reading = snapshot.last.reading;
     const Doubt doubt = doubt_of(snapshot.last);
@@ -266,7 +266,7 @@ int draw_alarms(Screen& screen, int row, int end, const MonitoredEncoder& shown)
   return row;
 }
 
-// Draws the last reply's fields in columns. Returns the row after the fields.
+// Draws the fields of a live reading in columns, as far as they fit. Returns the row after them.
 int draw_fields(Screen& screen, int row, int end, const Snapshot& snapshot) {
   if (!is_live(snapshot)) return row;
   constexpr int between = 3;

@@ -33,7 +33,7 @@ struct Snapshot {
   Time age{};  // age of the last reading; without a reading, time since the watch started
   bool has_reading = false;
   Sample last{};          // last reading; valid if `has_reading`, and the present position only in the state `live`
-  std::string message{};  // reason of the states failing, lost, opening and ended
+  std::string message{};  // reason of the states failing, lost and ended; in opening "" before the first attempt failed
   std::string notice{};   // message to the user, such as the result of the last command
   host::Counters counters{};
   std::uint64_t readings = 0;
@@ -55,7 +55,7 @@ struct Snapshot {
 /// Watches one encoder in a thread of its own, because its port blocks.
 class Watch {
  public:
-  /// The first reading is `offset` after the start; `rate` is in readings per second.
+  /// The first reading is `offset` after the start; `rate`: readings per second, 0: as fast as possible.
   Watch(std::string name, const EncoderAddress& uri, double rate, Time offset);
   Watch(const Watch&) = delete;
   Watch& operator=(const Watch&) = delete;
@@ -65,7 +65,7 @@ class Watch {
 
   [[nodiscard]] Snapshot snapshot(bool details) const;
   void pause(bool paused);
-  /// Lets the thread run a command without arguments; Snapshot::notice gets its result.
+  /// Lets the thread, if it has not ended, run a command without arguments. Snapshot::notice gets the result.
   void run(const Command& command);
   /// Sets Snapshot::notice to `text`.
   void notify(std::string text);

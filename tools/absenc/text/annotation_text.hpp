@@ -16,13 +16,13 @@ namespace absenc::tool {
 using namespace client;
 
 enum class AnnotationFormat : std::uint8_t { text, json, csv };
-// Whether to print after each reply which of its bits each field occupies.
+// Whether text and JSON show the bits of each field of a frame.
 enum class ShowBits : std::uint8_t { no, yes };
 
-// Whether to print ! after the time of a line that has an error or a raised alarm.
+// Whether a line of text with an error or a raised alarm has a ! after its time.
 enum class MarkAlarms : std::uint8_t { no, yes };
 
-/// Returns whether the annotated reply reports a raised alarm.
+/// Returns whether the annotation has a reading with a raised alarm.
 [[nodiscard]] bool raises_alarm(const capture::Annotation& annotation);
 
 /// Prints annotations to standard output; `flush` prints those that are still buffered.

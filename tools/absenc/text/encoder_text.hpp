@@ -14,7 +14,7 @@ using namespace client;
 
 /// Opens the encoder's port and prints notes about it. Throws as Connection::open does.
 [[nodiscard]] std::unique_ptr<Connection> open_connection(const EncoderAddress& uri);
-/// Opens an encoder and prints notes about its port. `period`: see make_encoder.
+/// Opens an encoder and prints notes about its port. `period`: intended time between readings, 0: none.
 [[nodiscard]] Encoder open_encoder(const EncoderAddress& uri, Time period = {});
 
 /// Returns a trouble as {"ok":false,"error":...}.

@@ -51,7 +51,7 @@ void FieldTable::put(const FieldValue& value) {
   if (info.kind == FieldInfo::Kind::flags) put_flags(info, static_cast<std::uint64_t>(value.number));
 }
 
-// Makes a row for each set flag. Rows of alarms replace the advice to read the alarms.
+// Makes a row for each set flag. If alarms have rows, no row advises to read the alarms.
 void FieldTable::put_flags(const FieldInfo& field, std::uint64_t bits) {
   const auto sums_up = [](const FlagInfo& flag) { return flag.action == read_the_alarms; };
   if (bits != 0 && std::none_of(field.flags.begin(), field.flags.end(), sums_up)) {

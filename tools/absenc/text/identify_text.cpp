@@ -58,7 +58,7 @@ void show_table(std::span<const Candidate> candidates) {
   print_line(table(rows));
 }
 
-// Prints the identity of each candidate, as "1 says: serial_number 12, device_id 41 62".
+// Prints the identity of each candidate that has one, as "1 says: serial_number 12, device_id 41 62".
 void show_identities(std::span<const Candidate> candidates) {
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     const Answer& identity = candidates[i].identity;
@@ -75,7 +75,7 @@ bool same_encoder(const Candidate& one, const Candidate& other) {
   return one.unit != other.unit || one.encoder == other.encoder || one.encoder.empty() || other.encoder.empty();
 }
 
-// Returns the likeliest found candidate, and those of its protocol with other addresses.
+// Returns the likeliest found candidate, and found ones of its protocol with other addresses.
 std::vector<const Candidate*> encoders(std::span<const Candidate> candidates) {
   std::vector<const Candidate*> all;
   for (const Candidate& one : candidates) {

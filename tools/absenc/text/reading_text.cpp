@@ -78,7 +78,7 @@ std::vector<Flags> flags_in_line(const Unit& unit, const Reading& reading) {
   return flags_of(unit, reading);
 }
 
-// Returns whether two channels report all flags and no set flag requires an action.
+// Returns whether a ready encoder with two channels reports all flags, and no set one requires an action.
 bool both_channels_are_well(const Unit& unit, const Reading& reading) {
   if (unit.second_status == nullptr || unit.second_alarms == nullptr || !reading.ready) return false;
   const std::vector<Flags> all = flags_of(unit, reading);

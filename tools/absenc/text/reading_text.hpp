@@ -43,7 +43,7 @@ enum class Doubt : std::uint8_t {
 /// Sets the keys of validity and of alarms; null means unknown.
 void set_state(Json& json, const Unit& unit, const Reading& reading);
 
-/// Returns millimetres as text "0.125"; a count of `unit_um` micrometres limits the decimals.
+/// Returns millimetres as text "0.125", with the decimals (at most 9) that one count of `unit_um` micrometres needs.
 [[nodiscard]] std::string millimetres_text(double millimetres, double unit_um);
 
 }  // namespace absenc::tool

@@ -5,12 +5,14 @@
 #include <array>
 #include <vector>
 
+#include "absenc/client/encoder/pace.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/error.hpp"
 #include "absenc/os/process.hpp"
 #include "absenc/os/signals.hpp"
 #include "tools/absenc/error.hpp"
 #include "tools/absenc/parameters.hpp"
+#include "tools/absenc/rate.hpp"
 #include "tools/absenc/text/encoder_text.hpp"
 #include "tools/absenc/text/output.hpp"
 #include "tools/absenc/verbs/run.hpp"
@@ -21,23 +23,42 @@ namespace {
 
 struct Measurement {
   std::vector<Time> latencies;  // latencies of all good readings, the shortest first
+  // Deviations of the times between the beginnings of two readings from the period, the least first; without a rate
+  // none.
+  std::vector<Time> deviations;
+  Time period{};
   std::uint64_t failed = 0;
   Time duration{};
   Time processor{};
   std::uint64_t items = 0;
 };
 
-Measurement measure(Connection& encoder, double seconds) {
+// With `rate` 0, one reading follows the other.
+Measurement measure(Connection& encoder, double seconds, double rate) {
   Measurement measurement;
+  // Allocations during the measurement would disturb the cycle.
+  const auto expected = static_cast<std::size_t>(std::min(rate * seconds, 1e7));
+  measurement.latencies.reserve(expected);
+  measurement.deviations.reserve(expected);
   encoder.read();  // not measured: the first readings confirm the position and detect echo
   const Time start = os::now();
   const Time end = start + Time(static_cast<std::int64_t>(seconds * 1e9));
   const Time processor_before = os::processor_time();
   const std::uint64_t items_before = encoder.items();
+  Pace pace(rate);
+  measurement.period = pace.period();
+  const host::Take which = rate > 0 ? host::Take::newest : host::Take::every;
   Time before = start;
+  Time last_begun = start;
   try {
     while (before < end && !os::interrupted()) {
-      const Outcome outcome = encoder.read(host::Take::every);
+      if (rate > 0) {
+        os::sleep_until(pace.next());
+        const Time begun = os::now();
+        if (before != start) measurement.deviations.push_back(abs(begun - last_begun - pace.period()));
+        before = last_begun = begun;
+      }
+      const Outcome outcome = encoder.read(which);
       const Time after = os::now();
       if (outcome.error == Error::none) {
         measurement.latencies.push_back(after - before);
@@ -52,10 +73,11 @@ Measurement measure(Connection& encoder, double seconds) {
   measurement.processor = os::processor_time() - processor_before;
   measurement.items = encoder.items() - items_before;
   std::sort(measurement.latencies.begin(), measurement.latencies.end());
+  std::sort(measurement.deviations.begin(), measurement.deviations.end());
   return measurement;
 }
 
-// Returns the latency that the fraction `share` of the sorted latencies does not exceed.
+// Returns the time that the fraction `share` of the sorted times does not exceed.
 Time percentile(const std::vector<Time>& sorted, double share) {
   const auto rank = static_cast<std::size_t>(share * static_cast<double>(sorted.size()));
   return sorted[std::min(rank, sorted.size() - 1)];
@@ -90,17 +112,24 @@ Json measurement_json(const Connection& encoder, const Measurement& measurement)
   }
   latency.set("max", microseconds(measurement.latencies.back()));
   const auto count = static_cast<double>(measurement.latencies.size());
-  return Json::object()
-      .set("protocol", encoder.unit().id)
-      .set("seconds", std::chrono::duration<double>(measurement.duration).count())
-      .set("readings", measurement.latencies.size())
-      .set("failed", measurement.failed)
-      .set("readings_per_s", readings_a_second(measurement))
-      .set("latency_us", latency)
-      .set("cpu_us_per_reading", microseconds(measurement.processor) / count)
-      .set("line_share", line_share(encoder, measurement))
-      .set("errors", errors_to_json(encoder.counters()))
-      .set("ok", true);
+  Json json = Json::object()
+                  .set("protocol", encoder.unit().id)
+                  .set("seconds", std::chrono::duration<double>(measurement.duration).count())
+                  .set("readings", measurement.latencies.size())
+                  .set("failed", measurement.failed)
+                  .set("readings_per_s", readings_a_second(measurement))
+                  .set("latency_us", latency)
+                  .set("cpu_us_per_reading", microseconds(measurement.processor) / count)
+                  .set("line_share", line_share(encoder, measurement))
+                  .set("errors", errors_to_json(encoder.counters()))
+                  .set("ok", true);
+  if (!measurement.deviations.empty()) {
+    json.set("cycle_us", Json::object()
+                             .set("period", microseconds(measurement.period))
+                             .set("deviation_p99.9", microseconds(percentile(measurement.deviations, 0.999)))
+                             .set("deviation_max", microseconds(measurement.deviations.back())));
+  }
+  return json;
 }
 
 std::string measurement_text(const Connection& encoder, const Measurement& measurement) {
@@ -116,6 +145,12 @@ std::string measurement_text(const Connection& encoder, const Measurement& measu
       {"processor", fmt::format("{} a reading", to_text(measurement.processor / count))},
       {"exchanges", summary(encoder.counters())},
   };
+  if (!measurement.deviations.empty()) {
+    rows.push_back(
+        {"cycle", fmt::format("every {}; deviation of 99.9 % of the readings {} at most, greatest {}",
+                              to_text(measurement.period), to_text(percentile(measurement.deviations, 0.999)),
+                              to_text(measurement.deviations.back()))});
+  }
   const double share = line_share(encoder, measurement);
   if (share > 0) {
     rows.push_back({"line", fmt::format("what was sent and received fills {:.1f} % of the time at {} baud", 100 * share,
@@ -126,12 +161,13 @@ std::string measurement_text(const Connection& encoder, const Measurement& measu
 
 int run_bench(const Invocation& invocation) {
   os::catch_interrupts();
-  const EncoderAddress uri = parse_address(invocation.text("encoder"), invocation.texts("--option"));
+  const EncoderAddress uri = parse_address(invocation.text("encoder"), reading_settings(invocation));
   const double seconds = invocation.real("--seconds", 5, 0.01, 86400);
+  const double rate = readings_a_second(invocation, 0);
   const std::unique_ptr<Connection> encoder = open_connection(uri);
   const Outcome first = encoder->read();
   if (first.error != Error::none) throw EncoderFailure(encoder->trouble(first));
-  const Measurement measurement = measure(*encoder, seconds);
+  const Measurement measurement = measure(*encoder, seconds, rate);
   if (measurement.latencies.empty()) {
     throw Failure(fmt::format("there was no good reading; exchanges: {}", summary(encoder->counters())));
   }
@@ -140,22 +176,31 @@ int run_bench(const Invocation& invocation) {
   return measurement.failed == 0 ? exit_good : exit_failed;
 }
 
-constexpr std::array<Parameter, 4> bench_parameters{{
+constexpr std::array<Parameter, 6> bench_parameters{{
     parameter::encoder,
     {"--seconds", "S", "how long", "5"},
+    {"--rate", "HZ",
+     "readings a second, and how far the times between two deviate from the period; 0: as many as the line allows",
+     "0"},
+    parameter::realtime,
     parameter::json,
     parameter::option,
 }};
 
-constexpr std::array<Example, 2> bench_examples{{
+constexpr std::array<Example, 3> bench_examples{{
     {"absenc bench tformat:/dev/ttyUSB0", "how fast this adapter is"},
     {"absenc bench tformat:tcp:192.168.1.20:4001 --seconds 60 --json", "a serial server for a minute"},
+    {"absenc bench tformat:/dev/ttyUSB0 --rate 1000 --realtime 40",
+     "how punctual a cycle of 1 ms is in a real-time thread"},
 }};
 
 }  // namespace
 
-const Subcommand bench_subcommand{
-    "bench",  "measure readings a second, latency, errors and processor time", "", bench_parameters, bench_examples,
-    run_bench};
+const Subcommand bench_subcommand{"bench",
+                                  "measure readings a second, latency, punctuality, errors and processor time",
+                                  "",
+                                  bench_parameters,
+                                  bench_examples,
+                                  run_bench};
 
 }  // namespace absenc::tool

@@ -25,7 +25,7 @@ std::string finding_text(const Finding& one) {
                      one.action);
 }
 
-// Returns the address of the likeliest encoder on a port; throws if chance may explain it.
+// Returns the address of the likeliest encoder on a port. Throws if none was found, or if chance may explain it.
 std::string identified(const std::string& port, Progress& progress) {
   LineSearch search = parse_search(port);
   search.limit = std::chrono::seconds(60);

@@ -173,7 +173,7 @@ struct EmulationRun {
     return status;
   }
 
-  // Returns the time at which the verb ends; `never` if only a signal ends it.
+  // Returns the time at which --for ends the verb; `never` without --for.
   [[nodiscard]] Time end() const {
     return seconds > 0 ? os::now() + Time(static_cast<std::int64_t>(seconds * 1e9)) : never;
   }
@@ -238,7 +238,7 @@ int emulate_bytes(const Unit& unit, const Options& options, const Invocation& in
   });
 }
 
-// Emulates the encoder behind an slcan adapter. Returns notes about the line.
+// Serves the virtual encoders behind an emulated slcan adapter. Returns notes about the line.
 Notes serve_adapter(Machine<CanFrame>& machine, const LineSettings& line, const Invocation& invocation, Time end) {
   const auto bytes = std::make_shared<os::EmulatorPort>(std::string(invocation.text("--pty")), tcp_port(invocation));
   bytes->set_end(end);

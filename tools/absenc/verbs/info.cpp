@@ -209,7 +209,7 @@ class Survey {
   void fail(const Command& command, const Trouble& trouble) {
     answers.set(command.name, to_json(trouble));
     const std::string why = fmt::format("{}: {}", text_of(trouble.error).name, trouble.message);
-    // If several settings fail one after another for the same reason, only the first is reported.
+    // If several settings fail one after another for the same reason, only the first gets a row.
     if (command.verb == Verb::config_get && why == std::exchange(failed_setting_, why)) return;
     rows.push_back({std::string(command.name), "FAILED", why});
     const bool is_known = std::any_of(troubles.begin(), troubles.end(),

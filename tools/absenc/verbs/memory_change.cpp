@@ -126,7 +126,7 @@ class MemoryWrite {
     } catch (const os::Interrupted&) {
       words = "interrupted";
       answer.set("message", words);
-    } catch (const OutputClosed&) {  // standard output is closed, so the user has not seen the bytes to be written
+    } catch (const OutputClosed&) {  // standard output is closed, so the user may not have seen the bytes to be written
       words = "nobody reads standard output";
     } catch (const EncoderFailure& failure) {
       words = failure.what();

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 
+#include "absenc/client/port/realtime.hpp"
 #include "absenc/client/port/shared_link.hpp"
 #include "absenc/client/text/unit_text.hpp"
 #include "absenc/os/error.hpp"
@@ -177,9 +178,10 @@ Watches make_watches(const Invocation& invocation, double rate) {
   std::vector<EncoderAddress> uris;
   for (const std::string& name : names) uris.push_back(parse_address(name, reading_settings(invocation)));
   require_different(uris, names);
+  check_realtime(uris);
   Watches watches;
   for (std::size_t i = 0; i < uris.size(); ++i) {
-    // Spreads the first readings, so that the encoders are not read at the same time.
+    // With a rate, the first readings are spread, so that the encoders are not read at the same time.
     const double share = rate > 0 ? static_cast<double>(i) / (rate * static_cast<double>(uris.size())) : 0;
     const Time offset(static_cast<std::int64_t>(1e9 * share));
     watches.push_back(std::make_unique<Watch>(names[i], uris[i], rate, offset));
@@ -207,13 +209,14 @@ int run_monitor(const Invocation& invocation) {
   return summarize(watches, start, used) ? exit_good : exit_failed;
 }
 
-constexpr std::array<Parameter, 7> monitor_parameters{{
+constexpr std::array<Parameter, 8> monitor_parameters{{
     {"encoder", "", "as for `absenc read`; several may be given", "", true, true},
     {"--rate", "HZ", "readings a second of each; 0: as many as the line allows", "50"},
     {"--interval", "SECONDS", "without a screen: how often to print a line for each", "1"},
     {"--for", "SECONDS", "end by itself", "until q or Ctrl-C"},
     {"--json", "", "no screen: one JSON object a line"},
     parameter::read_command,
+    parameter::realtime,
     parameter::option,
 }};
 

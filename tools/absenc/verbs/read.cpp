@@ -26,7 +26,7 @@ namespace {
 
 enum class Format : std::uint8_t { human, json, csv };
 
-// Returns the speed as "   12.0 ± 0.3 rpm", or "" if the shaft may be at rest.
+// Returns the speed as "   12.0 ± 0.3 rpm"; "" if it is unknown, or the shaft may be at rest.
 std::string speed_text(const Sample& sample) {
   if (!sample.speed_valid || std::abs(sample.speed) <= sample.speed_uncertainty) return {};
   return fmt::format("   {} {}", to_text(*sample.measured_speed()), speed_unit(sample.reading));
@@ -163,13 +163,14 @@ int run_read(const Invocation& invocation) {
   return tally.last_good ? exit_good : exit_failed;
 }
 
-constexpr std::array<Parameter, 7> read_parameters{{
+constexpr std::array<Parameter, 8> read_parameters{{
     parameter::encoder,
     {"--count", "N", "how many readings; 0: until Ctrl-C", "1"},
     {"--rate", "HZ", "readings a second; 0: as many as the line allows", "10"},
     {"--json", "", "one JSON object a line, failures too"},
     {"--csv", "", "comma-separated values with a header"},
     parameter::read_command,
+    parameter::realtime,
     parameter::option,
 }};
 

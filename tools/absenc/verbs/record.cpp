@@ -120,7 +120,7 @@ int run_record(const Invocation& invocation) {
   return good ? exit_good : exit_failed;
 }
 
-constexpr std::array<Parameter, 10> record_parameters{{
+constexpr std::array<Parameter, 11> record_parameters{{
     parameter::encoder,
     {"--output", "FILE",
      "where to; the name ends in .csv, in .jsonl for JSON lines or in .h5 for HDF5; it must not exist yet", "", true},
@@ -131,6 +131,7 @@ constexpr std::array<Parameter, 10> record_parameters{{
     {"--part-size", "MEGABYTES", "begin another file when one is this large: NAME-0001.csv, NAME-0002.csv ..."},
     {"--part-time", "SECONDS", "begin another file after this time"},
     parameter::read_command,
+    parameter::realtime,
     parameter::option,
 }};
 

@@ -9,7 +9,7 @@ namespace absenc::tool {
 
 using namespace client;
 
-/// Runs a command and prints its result, as --yes and --json state. Returns the exit status.
+/// Runs a command, asks first if it changes an encoder, and prints its result. Returns the exit status.
 int run_command(const Invocation& invocation, const EncoderAddress& uri, const Command& command, Arguments arguments);
 
 /// Runs a command of Verb::scan and prints its list of encoders; returns the exit status.

@@ -4,10 +4,12 @@
 #include <array>
 
 #include "absenc/os/hangup.hpp"
+#include "absenc/os/realtime.hpp"
 #include "absenc/os/signals.hpp"
 #include "absenc/serve/server.hpp"
 #include "absenc/serve/state_file.hpp"
 #include "tools/absenc/error.hpp"
+#include "tools/absenc/parameters.hpp"
 #include "tools/absenc/rate.hpp"
 #include "tools/absenc/subcommand.hpp"
 #include "tools/absenc/text/output.hpp"
@@ -77,6 +79,8 @@ int run_serve(const Invocation& invocation) {
   const auto names = invocation.texts("encoders");
   choices.encoders.assign(names.begin(), names.end());
   choices.rate = readings_a_second(invocation, 50);
+  choices.realtime =
+      static_cast<int>(invocation.number(parameter::realtime.name, 0, os::lowest_realtime, os::highest_realtime));
   set_place(choices, invocation.text("--listen", usual_host));
   choices.token_file = invocation.text("--token-file");
   choices.public_url = invocation.text("--public-url");
@@ -109,11 +113,14 @@ int run_serve(const Invocation& invocation) {
   return exit_good;
 }
 
-constexpr std::array<Parameter, 16> serve_parameters{{
+constexpr std::array<Parameter, 17> serve_parameters{{
     {"encoders", "", "as for `absenc read`", "all of absenc.toml", false, true},
     {"--listen", "HOST:PORT", "where the page is; beyond this computer only with --token-file", "127.0.0.1:8420"},
     {"--rate", "HZ", "readings a second of each for which absenc.toml has no rate_hz; 0: as many as the line allows",
      "50"},
+    {parameter::realtime.name, parameter::realtime.value,
+     "read each encoder for which absenc.toml has no realtime in a real-time thread (SCHED_FIFO) of this priority, 1 "
+     "to 99, with the memory of the program locked; an error if the kernel refuses"},
     {"--token-file", "FILE", "lines of NAME TOKEN: who may change encoders, and look from other computers"},
     {"--public-url", "URL",
      "where a proxy on this computer shows the page to others, as https://encoders.example: looking then needs a "

@@ -95,7 +95,7 @@ void introduce_tap(const TapRun& run) {
       run.receiver().place(), tool::to_text(run.receiver().latency())));
 }
 
-// Identifies the protocol on the tapped line. Returns whether one was found.
+// Identifies the protocol of the tapped line unless it is given. Returns false if none was found.
 bool settle_tap(TapRun& run, bool is_given) {
   Progress progress;
   const bool settled = run.settle([&](const std::string& text) { progress.show(text); });
