@@ -25,7 +25,7 @@ def run(*command, **settings):
 
 
 class Copy(unittest.TestCase):
-    """Has a copy of the sources in a repository of its own, with a new unit."""
+    """A test with a copy of the sources in a repository of its own, with a new unit."""
 
     @classmethod
     def setUpClass(cls):
@@ -133,9 +133,11 @@ class TestsOfEveryUnit(Copy):
         program = self.root.parent / "own"
         run(*COMPILE, "-I", self.root, self.unit / "my_encoder_test.cpp", "-o", program, self.library, "-lgtest", "-lgtest_main",
             "-lpthread")
-        own = subprocess.run([program], capture_output=True, text=True, check=False)
+        own = subprocess.run([program], capture_output=True, text=True, check=False,
+                             env={**os.environ, "ABSENC_SOURCE_DIR": str(self.root)})
         self.assertEqual(own.returncode, 1)
-        self.assertIn("put the document's own frames in place of the invented ones", own.stdout)
+        for name in ("README.md", "unit.hpp", "unit.cpp", "clauses.cpp"):
+            self.assertRegex(own.stdout, rf'{name} still has "[^"]+": replace what the template invents')
 
 
 if __name__ == "__main__":

@@ -52,6 +52,20 @@ class UnitDeclaration(unittest.TestCase):
         for name in names:
             self.assertIn(f"error: '{name}' is not a member of", result.stderr)
 
+    def test_wrong_times_of_virtual_encoder_do_not_compile(self):
+        character = ".character = format.line().character()"
+        for times, message in ((f"{character} / 2", "DeviceTimes::character is the duration of one byte"),
+                               (f"{character}, .gap = 10us, .frame = 2, .frame_pause = 10us",
+                                "it is longer than DeviceTimes::frame_pause")):
+            result = self.compiled(change_frames=lambda text: self.replaced(
+                text, f"{character}, .answer_time = 10us, .start_time = 100ms", times))
+            self.assertNotEqual(result.returncode, 0, times)
+            self.assertIn(message, result.stderr)
+
+    def replaced(self, text, old, new):
+        self.assertIn(old, text)
+        return text.replace(old, new)
+
     def test_each_member_is_tested(self):
         declared = members("Declaration", "declaration.hpp")
         self.assertGreater(len(declared), 30)

@@ -44,7 +44,7 @@ def main():
         print(f"absenc/protocol/{name}/{target.name}")
     all_cpp.write_text(listed, encoding="utf-8")
     print("absenc/protocol/all.cpp: one line more")
-    print(f"Next: ./dev unit {name} tries it, and fails until the document's own frames are in it; docs/write-a-unit.md "
+    print(f"Next: ./dev unit {name} tries it, and fails until no text of the invented encoder is left; docs/write-a-unit.md "
           "says in which order to write it.")
 
 

@@ -15,7 +15,7 @@ namespace absenc::client {
 /// Verdict on whether the encoder, or a host, complies with a clause.
 enum class Verdict : std::uint8_t {
   kept,      ///< the tested behaviour was observed, and the clause was satisfied
-  broken,    ///< the tested behaviour was observed, and the clause was violated
+  broken,    ///< a violation of the clause was observed
   untested,  ///< nothing was observed that decides
 };
 
@@ -55,7 +55,7 @@ struct ConformChoices {
   bool changes = false;
   /// With `changes`, whether the test may erase a zero, turns or alarms, which nothing restores.
   bool resets = false;
-  /// Polled during the test; once it returns true, the test ends with Cancelled. Empty: never.
+  /// Polled during the test; once it returns true, the test ends with an exception. Empty: never.
   std::function<bool()> over{};
 };
 
@@ -63,8 +63,8 @@ struct ConformChoices {
 [[nodiscard]] std::string_view name_of(Verdict verdict);
 
 /// Tests the encoder of an address and returns the results. `text` and `settings` are those of `open`. Throws
-/// UsageError, Cancelled, os::Interrupted, Failure and exceptions of the port. If changed values cannot be restored,
-/// the text of a Failure contains the commands that restore them.
+/// UsageError, Cancelled, os::Interrupted, Failure and exceptions of the port. If the test ends early and cannot
+/// restore changed values, it throws a Failure whose text contains the commands that restore them.
 [[nodiscard]] Conformance conform(std::string_view text, std::span<const std::string> settings = {},
                                   const ConformChoices& choices = {});
 

@@ -2,6 +2,7 @@
 // A position reading, and functions that convert counts to degrees or micrometres.
 #pragma once
 
+#include <bit>
 #include <cstdint>
 
 #include "absenc/core/bits.hpp"
@@ -12,7 +13,7 @@ namespace absenc {
 /// How far one part of a reading (single-turn position or turns) can be trusted.
 enum class Validity : std::uint8_t {
   absent,   ///< the reply does not carry this part
-  unknown,  ///< no reply so far reports whether this part is valid: do not use it
+  unknown,  ///< it is not known whether this part is valid: do not use it
   invalid,  ///< a reported alarm or state marks this part as invalid
   valid,    ///< every alarm and state that could make this part invalid was reported, and is clear
 };
@@ -32,9 +33,9 @@ struct Reading {
   unsigned multiturn_bits = 0;         ///< width of `multiturn` in bits; 0: the reply carries no revolutions
   unsigned singleturn_valid_bits = 0;  ///< number of valid bits of `singleturn`, counted from the top; 0: do not use it
   bool multiturn_valid = false;        ///< Whether `multiturn` can be trusted.
-  /// false: no reply so far reports whether `singleturn` is valid, so it must not be used.
+  /// false: it is not known whether `singleturn` is valid, so `singleturn` must not be used
   bool singleturn_known = true;
-  bool multiturn_known = true;  ///< false: no reply so far reports whether `multiturn` is valid
+  bool multiturn_known = true;  ///< false: it is not known whether `multiturn` is valid
   /// true: the encoder counts turns below zero, and `multiturn` is in two's complement
   bool multiturn_signed = false;
   double unit_um = 0;                 ///< linear encoders: micrometres per count of `singleturn`; 0: rotary encoder
@@ -75,6 +76,10 @@ struct Reading {
   if (bits > 48) return degrees(counts >> (bits - 48), 48);  // the result for many bits could be rounded up to 360
   return 180.0 * static_cast<double>(counts) / static_cast<double>(std::uint64_t{1} << (bits - 1));
 }
+
+/// Returns whether `unit_um`, in micrometres per count, is above 0: the encoder is linear. Compares the bits of the
+/// number, so that firmware links no floating point.
+[[nodiscard]] constexpr bool is_linear(double unit_um) { return std::bit_cast<std::int64_t>(unit_um) > 0; }
 
 /// Converts counts, or counts per second, of a linear encoder to micrometres (per second).
 [[nodiscard]] constexpr double micrometres(double counts, double unit_um) { return counts * unit_um; }

@@ -51,10 +51,18 @@ struct HexLiteral {
 };
 
 namespace detail {
+inline constexpr std::size_t most_hex_bytes = 256;
+
+template <HexLiteral literal>
+consteval bool is_hex() {
+  std::array<std::uint8_t, most_hex_bytes> buffer{};
+  return parse_hex(literal.view(), buffer).has_value();
+}
+
 template <HexLiteral literal>
 consteval auto hex_bytes() {
   constexpr std::size_t count = [] {
-    std::array<std::uint8_t, 256> buffer{};
+    std::array<std::uint8_t, most_hex_bytes> buffer{};
     return parse_hex(literal.view(), buffer).value();
   }();
   std::array<std::uint8_t, count> bytes{};
@@ -63,8 +71,8 @@ consteval auto hex_bytes() {
 }
 }  // namespace detail
 
-/// Bytes, at most 256, of a literal of hexadecimal text: `hex<"1A 00">` has two bytes.
+/// Bytes, at most 256, of a literal of hexadecimal text: `hex<"1A 00">` has two bytes. Another text does not compile.
 template <HexLiteral literal>
-inline constexpr auto hex = detail::hex_bytes<literal>();
+requires(detail::is_hex<literal>()) inline constexpr auto hex = detail::hex_bytes<literal>();
 
 }  // namespace absenc

@@ -39,7 +39,7 @@ constexpr auto verb_names = std::to_array<VerbName>({{"alarms", Verb::read},
 constexpr std::string_view get_setting = "config get ... ";
 constexpr std::string_view set_setting = "config set ... ";
 constexpr std::string_view run_command = "run ... ";
-/// Verbs of the tool that every unit supports.
+/// Verbs that the advice of any unit may name.
 constexpr std::array<std::string_view, 3> for_all_units{"list", "identify", "doctor"};
 
 const Command* find_setter(const Unit& unit, std::string_view name) {

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <memory>
+#include <set>
 
 #include "tests/kit/frames.hpp"
 #include "tests/kit/kit.hpp"
 
 namespace absenc::kit {
 namespace {
+
+constexpr std::size_t most_open_bits = 16;
 
 class Decoding {
  public:
@@ -18,27 +21,33 @@ class Decoding {
     const Error error = decode(reply_, seen);
     require(error == vector_.error, [&] { return "is " + std::string(text_of(error).name); });
     require(seen.fields == expected_fields(vector_), [&] { return "decodes to " + to_text(seen.fields); });
-    require((seen.readings == 1) == seen.has_position() && seen.readings <= 1,
-            [&] { return "has " + std::to_string(seen.readings) + " readings"; });
+    require((seen.readings == 1) == seen.has_position() && seen.readings <= 1, [&] {
+      return "gives " + std::to_string(seen.readings) + " readings of a position, but its fields show " +
+             (seen.has_position() ? "one" : "none") + ": put a reading exactly where there is a position field";
+    });
     if (seen.reading) reading_shows(seen);
   }
 
-  // Fails for a vector with open bytes, and tells what they must be.
+  // Fails for a vector with open bytes, and says what they must be.
   void complete() {
-    std::vector<std::uint8_t> request(vector_.request.begin(), vector_.request.end());
-    std::vector<std::uint8_t> reply(vector_.reply.begin(), vector_.reply.end());
-    const auto is_valid = [&] {
+    std::vector<Pair> good;
+    const std::vector<Wire> requests = filled(vector_.request, vector_.open_request, [&](const Wire& request) {
       ReportedFields seen;
-      return unit_.decode(options_, frame_of(unit_, request).frame(), {}, seen) == Error::none;
-    };
-    const auto is_as_stated = [&] {
-      ReportedFields seen;
-      const Error error =
-          unit_.decode(options_, frame_of(unit_, request).frame(), frame_of(unit_, reply).frame(), seen);
-      return error == Error::none && seen.fields == expected_fields(vector_);
-    };
-    if (close("request", request, vector_.open_request, is_valid))
-      close("reply", reply, vector_.open_reply, is_as_stated);
+      return vector_.open_request.count == 0 ||
+             unit_.decode(options_, frame_of(unit_, request).frame(), {}, seen) == Error::none;
+    });
+    // A valid request may still be another one than that of the reply.
+    for (const Wire& request : requests) {
+      const std::vector<Wire> replies = filled(vector_.reply, vector_.open_reply, [&](const Wire& reply) {
+        ReportedFields seen;
+        const Error error =
+            unit_.decode(options_, frame_of(unit_, request).frame(), frame_of(unit_, reply).frame(), seen);
+        return error == vector_.error && seen.fields == expected_fields(vector_);
+      });
+      for (const Wire& reply : replies) good.push_back({request, reply});
+    }
+    tell_open("request", vector_.open_request, good, &Pair::request);
+    tell_open("reply", vector_.open_reply, good, &Pair::reply);
   }
 
   // Checks that a request alone does not speak against options that its reply leaves possible.
@@ -101,33 +110,45 @@ class Decoding {
   }
 
  private:
-  // Searches open bytes for a value that makes the frame good, and stores it in `frame`.
+  struct Pair {
+    Wire request;
+    Wire reply;
+  };
+
+  [[nodiscard]] std::size_t open_bits(OpenBytes open) const {
+    return open.count * (unit_.link == LinkKind::clocked ? 1 : 8);
+  }
+
+  // Returns the frame with each value of its open bytes that makes it good; none if there are too many to try.
   template <class IsGood>
-  bool close(std::string_view name, std::vector<std::uint8_t>& frame, OpenBytes open, IsGood is_good) {
-    if (open.count == 0) return true;
+  [[nodiscard]] std::vector<Wire> filled(Bytes frame, OpenBytes open, const IsGood& is_good) const {
     const bool is_bits = unit_.link == LinkKind::clocked;
-    const std::size_t bits = open.count * (is_bits ? 1 : 8);
-    constexpr std::size_t most_bits = 16;
-    std::vector<std::vector<std::uint8_t>> good;
-    for (std::uint32_t value = 0; bits <= most_bits && value >> bits == 0; ++value) {
+    std::vector<Wire> good;
+    Wire one(frame.begin(), frame.end());
+    for (std::uint32_t value = 0; open_bits(open) <= most_open_bits && value >> open_bits(open) == 0; ++value) {
       for (std::size_t i = 0; i < open.count; ++i) {
-        frame[open.first + i] = static_cast<std::uint8_t>(is_bits ? '0' + (value >> i & 1) : value >> 8 * i & 0xFF);
+        one[open.first + i] = static_cast<std::uint8_t>(is_bits ? '0' + (value >> i & 1) : value >> 8 * i & 0xFF);
       }
-      if (is_good()) good.push_back(frame);
+      if (is_good(one)) good.push_back(one);
     }
+    return good;
+  }
+
+  void tell_open(std::string_view name, OpenBytes open, const std::vector<Pair>& good, Wire Pair::*part) {
+    if (open.count == 0) return;
+    std::set<Wire> values;
+    for (const Pair& one : good) values.insert(one.*part);
     require(false, [&] {
       std::string text = std::string(name) + " is not complete: ";
-      if (bits > most_bits) return text + "it has more than 16 open bits, too many to try";
-      if (good.empty()) return text + "with no value of its open bytes does it decode to what the vector states";
-      text += "paste \"" + pasted(good.front()) + "\"";
-      return good.size() == 1 ? text
-                              : text + ", or another of " + std::to_string(good.size()) + " that decode to the same";
+      if (open_bits(open) > most_open_bits) return text + "it has more than 16 open bits, too many to try";
+      if (values.empty()) return text + "with no value of the open bytes does the vector decode to what it states";
+      text += "paste \"" + pasted(*values.begin()) + "\"";
+      return values.size() == 1
+                 ? text
+                 : text + ", or another of " + std::to_string(values.size()) + " that decode to the same";
     });
-    if (good.empty()) return false;
-    frame = good.front();
-    return true;
   }
-  [[nodiscard]] std::string pasted(const std::vector<std::uint8_t>& frame) const {
+  [[nodiscard]] std::string pasted(const Wire& frame) const {
     if (unit_.link == LinkKind::clocked) return {frame.begin(), frame.end()};
     std::string text;
     for (const std::uint8_t byte : frame) {
@@ -174,15 +195,17 @@ class Decoding {
   void ends() {
     const OwnedFrame with_more = reply_.between({}, std::array<std::uint8_t, 1>{0});
     const FrameEnd whole = unit_.frame_end(options_, Direction::reply, with_more.bytes);
-    require(whole.kind == FrameEnd::Kind::complete && whole.size == reply_.bytes.size(),
-            [] { return "ends elsewhere if another byte follows"; });
+    require(whole.kind == FrameEnd::Kind::complete && whole.size == reply_.bytes.size(), [&] {
+      return "ends after " + std::to_string(whole.size) + " instead of " + std::to_string(reply_.bytes.size()) +
+             " bytes if another byte follows: see reply_size";
+    });
     for (std::size_t size = 0; size < reply_.bytes.size(); ++size) {
       require(unit_.frame_end(options_, Direction::reply, reply_.cut(size).bytes).kind == FrameEnd::Kind::incomplete,
               [&] { return "is taken for complete after " + std::to_string(size); });
     }
   }
 
-  // Checks that the decoder refuses other identifiers, extended frames and remote frames.
+  // Checks that the decoder refuses extended and remote frames and, after a request, unknown identifiers.
   void other_frames() {
     for (unsigned bit = 0; bit < 11 && !request_.empty(); ++bit) {
       OwnedFrame other = reply_;

@@ -15,9 +15,13 @@ namespace absenc::kit {
 namespace {
 
 constexpr unsigned places = 8;
-constexpr std::uint64_t exchanges_per_encoder = 4000;  // greatest number of exchanges with each virtual encoder
-// Greatest number of runs of each changing command, with each virtual encoder.
+constexpr std::uint64_t exchanges_per_encoder = 4000;  // exchanges before the next virtual encoder is made
+// Greatest number of runs of each changing command with one virtual encoder.
 constexpr unsigned runs_per_change = 2;
+constexpr std::string_view too_short =
+    "; if it asks too soon: after a reply HostTimes::pause or silence, before a repetition Manner::pause, after an "
+    "error "
+    "Manner::hold is too short (the table in absenc/protocol/author/engine.hpp)";
 
 bool is_repeatable(const Command& command) {
   return !command.changes_encoder &&
@@ -32,21 +36,21 @@ struct Tally {
   std::uint64_t accepted = 0;
   std::uint64_t damaged = 0;                // number of faults that changed bytes
   std::uint64_t wrong = 0;                  // number of wrong results of commands whose replies have a check
-  std::uint64_t rule_violations = 0;        // number of times that the host violated a rule of the protocol
+  std::uint64_t rule_violations = 0;        // violations of rules by the host, only with a model's options
   std::uint64_t damaged_request_bytes = 0;  // number of damaged bytes (CAN: frames) in requests
-  std::uint64_t changes = 0;                // number of conversations with a command that changes the encoder
+  std::uint64_t changes = 0;                // conversations with commands that change the encoder, without refused ones
   std::uint64_t changed = 0;                // number of changes that the host reported as successful
   // Number of changes that the host reported as successful and the encoder did not make.
   std::uint64_t failed_changes = 0;
   std::string broken_promise_text{};
   std::string violated_rule{};
-  /// Counters of all conversations with one command.
+  /// Counters of conversations with one command, and with one configuration unless it is a model's.
   struct Command {
     std::optional<UndetectedDamage> undetected{};
     std::uint64_t damaged_reply_count = 0;  // number of damaged replies
     std::uint64_t wrong_positions = 0;      // part of `wrong` with a wrong position
     std::uint64_t wrong_values = 0;         // part of `wrong` with a right position and another wrong value
-    std::uint64_t cost = 0;                 // greatest number of exchanges in a conversation of its last Query
+    std::uint64_t cost = 0;                 // most exchanges of one run on a good line; 0: not known yet
     std::optional<bool> unchecked;          // true if a reply of the command has no check; empty if not yet determined
   };
   std::map<std::string, Command> commands{};
@@ -88,12 +92,12 @@ class Campaign {
   }
 
  private:
-  /// A command with the results that it reports on an undamaged line at each shaft position.
+  /// A command with its results on an undamaged line by shaft position; no value: not recorded.
   struct Query {
     const Command* command;
     Values arguments;
     std::array<std::optional<ReportedFields>, places> truth{};
-    std::uint64_t cost = 0;              // greatest number of exchanges in a recorded conversation of the command
+    std::uint64_t cost = 0;              // most exchanges of one run of the command on a good line
     std::vector<std::string> varying{};  // names of fields whose values differ between two runs at the same position
   };
 
@@ -331,9 +335,14 @@ class Campaign {
     if (new_violations == 0 || !configuration_.is_model) return;
     tally_.rule_violations += new_violations;
     const std::span<const Violation> rules = world_.device().violations();
-    if (tally_.violated_rule.empty() && !rules.empty())
+    if (tally_.violated_rule.empty() && !rules.empty()) {
       tally_.violated_rule = where(query) + std::string(rules.back().rule);
-    findings_.require(!faultless_, [&] { return "the host broke a rule: " + tally_.violated_rule; });
+      for (const auto& [request, reply] : frames_of(query)) {
+        tally_.violated_rule += "; without faults " + to_text(request) + " is answered by " + to_text(reply);
+      }
+    }
+    findings_.require(!faultless_,
+                      [&] { return "the host broke a rule: " + tally_.violated_rule + std::string(too_short); });
   }
 
   const Unit& unit_;
@@ -411,15 +420,14 @@ void judge_undetected_damage(const Tally& tally, Findings& findings) {
 template <class Item>
 void exchange(const Unit& unit, const ExchangeTest& test, Tally& tally, Findings& findings) {
   const std::vector<Configuration> setups = configurations(unit);
+  const auto models = static_cast<std::size_t>(std::ranges::count_if(setups, &Configuration::is_model));
   for (std::uint64_t round = 0; tally.exchanges < test.count && findings.count() == 0; ++round) {
     if (round > 100 + test.count / 100) {
       findings.add("too few exchanges per round");
       break;
     }
-    // Even rounds prefer the models, which are the first configurations.
-    const Configuration& configuration = round % 2 == 0
-                                             ? setups[round / 2 % std::max<std::size_t>(1, unit.models.size())]
-                                             : setups[round / 2 % setups.size()];
+    // Even rounds use only the models, which are the first configurations.
+    const Configuration& configuration = setups[round / 2 % (round % 2 == 0 ? models : setups.size())];
     Campaign<Item> campaign(unit, configuration, test, 1000 * test.seed + round, tally, findings);
     if (!campaign.is_possible()) continue;
     try {
@@ -442,8 +450,11 @@ Findings check_exchanges(const Unit& unit, const ExchangeTest& test) {
   }
   judge_undetected_damage(tally, findings);
   // A damaged request may itself violate a rule.
-  findings.require(tally.rule_violations <= tally.damaged_request_bytes,
-                   [&] { return std::to_string(tally.rule_violations) + " rules broken: " + tally.violated_rule; });
+  findings.require(tally.rule_violations <= tally.damaged_request_bytes, [&] {
+    return "the host broke rules " + std::to_string(tally.rule_violations) + " times, of which " +
+           std::to_string(tally.damaged_request_bytes) +
+           " damaged request bytes may be the reason; the first: " + tally.violated_rule + std::string(too_short);
+  });
   findings.require(tally.failed_changes == 0, [&] {
     return std::to_string(tally.failed_changes) + " changes were not made: " + tally.broken_promise_text;
   });

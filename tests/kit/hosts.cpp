@@ -318,28 +318,68 @@ void feed_vector(const Unit& unit, const Vector& vector, const Options& options,
   }
 }
 
-// Returns how long `read` waits for a reply after its request, or no value if it does not wait.
+/// A conversation of `read`, as far as it waits for the reply to its request, if it does.
+template <class Item>
+class Asked {
+ public:
+  using Kind = typename Step<Item>::Kind;
+
+  Asked(const Unit& unit, const Options& options) : storage_(unit.host_storage) {
+    const Command& command = *find_command(unit, Verb::read);
+    conversation_ = unit.host(options, command, least_arguments(command), storage_).template of<Item>();
+    if (conversation_ == nullptr) return;
+    Step<Item> step = conversation_->next(now_);
+    // The conversation may first wait for silence on the line.
+    for (unsigned i = 0; i < 10 && (step.kind == Kind::configure || step.kind == Kind::wait); ++i) {
+      now_ += std::chrono::milliseconds(1);
+      if (step.kind == Kind::wait) feed(Event<Item>::Kind::silence);
+      step = conversation_->next(now_);
+    }
+    if (step.kind != Kind::transfer || step.out.empty()) return;
+    now_ = std::max(now_, step.at);
+    feed(Event<Item>::Kind::sent);
+    step = conversation_->next(now_);
+    if (step.kind == Kind::wait) wait_ = step;
+  }
+
+  /// Returns how long the host waits for a reply, or no value if it does not wait.
+  [[nodiscard]] std::optional<Time> patience() const {
+    if (!wait_) return std::nullopt;
+    return wait_->answer != Time{} ? wait_->answer : wait_->gap;
+  }
+
+  /// Returns the time from the end of a reply of one byte, which is cut short, to the next request, or to the end of
+  /// the conversation, after which another one may ask. No value if the host does not wait for a reply.
+  [[nodiscard]] std::optional<Time> rest_after_cut_reply() requires(!std::is_same_v<Item, CanFrame>) {
+    constexpr std::array<std::uint8_t, 1> begin{};
+    if (!wait_) return std::nullopt;
+    const Time end = now_ += std::chrono::microseconds(1);
+    feed(Event<Item>::Kind::received, begin);
+    for (unsigned i = 0; i < 10; ++i) {
+      const Step<Item> step = conversation_->next(now_);
+      if (step.kind == Kind::transfer || step.kind == Kind::done) return std::max(now_, step.at) - end;
+      if (step.kind != Kind::wait) continue;
+      const bool is_silence = step.gap != Time{};
+      now_ = is_silence ? now_ + step.gap : std::max(now_, step.at);
+      feed(is_silence ? Event<Item>::Kind::silence : Event<Item>::Kind::timer);
+    }
+    return std::nullopt;
+  }
+
+ private:
+  void feed(typename Event<Item>::Kind kind, std::span<const Item> items = {}) {
+    conversation_->feed({.kind = kind, .at = now_, .items = items});
+  }
+
+  std::vector<std::byte> storage_;
+  Conversation<Item>* conversation_ = nullptr;
+  Time now_{};
+  std::optional<Step<Item>> wait_{};
+};
+
 template <class Item>
 std::optional<Time> wait_for_reply(const Unit& unit, const Options& options) {
-  using Kind = typename Step<Item>::Kind;
-  const Command& command = *find_command(unit, Verb::read);
-  std::vector<std::byte> storage(unit.host_storage);
-  Conversation<Item>* conversation = unit.host(options, command, least_arguments(command), storage).template of<Item>();
-  if (conversation == nullptr) return std::nullopt;
-  Time now{};
-  Step<Item> step = conversation->next(now);
-  // The conversation may first wait for silence on the line.
-  for (unsigned i = 0; i < 10 && (step.kind == Kind::configure || step.kind == Kind::wait); ++i) {
-    now += std::chrono::milliseconds(1);
-    if (step.kind == Kind::wait) conversation->feed({.kind = Event<Item>::Kind::silence, .at = now});
-    step = conversation->next(now);
-  }
-  if (step.kind != Kind::transfer || step.out.empty()) return std::nullopt;
-  now = std::max(now, step.at);
-  conversation->feed({.kind = Event<Item>::Kind::sent, .at = now});
-  step = conversation->next(now);
-  if (step.kind != Kind::wait) return std::nullopt;
-  return step.answer != Time{} ? step.answer : step.gap;
+  return Asked<Item>(unit, options).patience();
 }
 
 // Compares `turnaround_limit`, which captures use, with the longest timeout of the host.
@@ -355,6 +395,20 @@ void compare_limits(const Unit& unit, Findings& findings) {
     return "captures wait " + std::to_string(limit.count()) + " ns for a reply, hosts " +
            std::to_string(longest->count()) + " ns";
   });
+}
+
+// Checks that captures do not join a reply that was cut short with the host's next request.
+void compare_rests(const Unit& unit, Findings& findings) {
+  if (unit.timing.frame_pause == Time{}) return;
+  for (const Configuration& configuration : configurations(unit)) {
+    const std::optional<Time> rest = Asked<std::uint8_t>(unit, configuration.options).rest_after_cut_reply();
+    findings.require(!rest || *rest >= unit.timing.frame_pause, [&] {
+      return configuration.text + ": " + std::to_string(rest->count()) +
+             " ns after a reply that was cut short the host may ask again, but captures join frames up to " +
+             std::to_string(unit.timing.frame_pause.count()) +
+             " ns apart: HostTimes::gap_limit or Manner::pause must not be shorter than LineTiming::frame_pause";
+    });
+  }
 }
 
 // Checks that every command has a request, unless `encode` calls it unsupported.
@@ -389,6 +443,7 @@ Findings check_hosts(const Unit& unit) {
   findings.require(readings > 0, [] { return "no vector's position is read by a command"; });
   find_requests(unit, findings);
   compare_limits(unit, findings);
+  compare_rests(unit, findings);
   return findings;
 }
 

@@ -17,7 +17,7 @@ void meet_silence(const Unit& unit, const Configuration& configuration, const Co
   constexpr unsigned every_address = 100'000;  // limit of simulator steps, enough for a scan of every address
   const bool ended = player.run(
       *conversation, {}, [](std::size_t) { return typename Player<Item>::Pieces{}; }, [] {}, every_address);
-  // A conversation without a request: the configuration does not support the command.
+  // A command without a request is unsupported here, or only waits for unsolicited frames.
   if (ended && player.request_count() == 0) return;
   const auto where = [&] {
     return std::string(command.name) + " of \"" + configuration.text + "\" without an encoder: ";

@@ -3,6 +3,8 @@
 #include <gmock/gmock-more-matchers.h>
 #include <gtest/gtest.h>
 
+#include <map>
+
 #include "tests/kit/kit.hpp"
 #include "tests/kit/toys.hpp"
 
@@ -88,6 +90,34 @@ TEST(KitToys, FindsTooSmallStorage) {
               Contains(HasSubstr("constructed beyond its storage")));
 }
 
+/// Decodes a request of five bits of data and a checksum above them, and a reply of the same data.
+Error decode_five_bits(const Options&, Frame request, Frame reply, FieldSink& sink) {
+  static constexpr FieldInfo data{"data", FieldInfo::Kind::number, "", "what is asked"};
+  const unsigned value = request.bytes[0] & 31u;
+  if (request.bytes[0] >> 5 != value % 7) return Error::bad_checksum;
+  if (!reply.empty() && reply.bytes[0] != value) return Error::unexpected_reply;
+  sink.put({&data, std::int64_t{value}});
+  return Error::none;
+}
+
+std::vector<std::string> open_bytes_of(Bytes reply, std::int64_t value) {
+  constexpr std::array<std::uint8_t, 1> request{};
+  const std::array<Expected, 1> expected{{{"data", value, 0, {}}}};
+  const std::array<Vector, 1> vectors{{{"open", "", "", "", request, reply, expected, Error::none, {0, 1}, {}}}};
+  Unit unit = toy::unit<Mistake::none>;
+  unit.decode = decode_five_bits;
+  unit.vectors = vectors;
+  return check_decoding(unit).texts();
+}
+
+// Five of the eight open bits are data, so 32 values make a valid request.
+TEST(KitToys, CompletesRequestByWhatVectorStates) {
+  constexpr std::array<std::uint8_t, 1> reply{9};
+  EXPECT_THAT(open_bytes_of({}, 9), ElementsAre("open request is not complete: paste \"49\""));
+  EXPECT_THAT(open_bytes_of(reply, 9), ElementsAre("open request is not complete: paste \"49\""));
+  EXPECT_THAT(open_bytes_of(reply, 8), ElementsAre(HasSubstr("with no value of the open bytes")));
+}
+
 TEST(KitToys, FindsDecoderThatIgnoresByte) {
   EXPECT_THAT(check_decoding(toy::unit<Mistake::ignores_last_byte>).texts(),
               Contains(HasSubstr("bit 31 flipped is accepted")));
@@ -105,6 +135,14 @@ TEST(KitToys, FindsWrongBitPositions) {
 TEST(KitToys, FindsCaptureTimeoutLongerThanHosts) {
   EXPECT_THAT(check_hosts(toy::unit<Mistake::late_capture_timeout>).texts(),
               ElementsAre("captures wait 2000000 ns for a reply, hosts 200000 ns"));
+}
+
+TEST(KitToys, FindsHostThatAsksAgainWithinPauseOfFrames) {
+  Unit unit = toy::unit<Mistake::none>;
+  unit.timing.frame_pause = toy::gap;
+  EXPECT_THAT(check_hosts(unit).texts(), IsEmpty());
+  unit.timing.frame_pause = toy::gap + std::chrono::nanoseconds(1);
+  EXPECT_THAT(check_hosts(unit).texts(), Contains(HasSubstr("30000 ns after a reply that was cut short")));
 }
 
 TEST(KitToys, FindsInvisibleCondition) {
@@ -143,6 +181,25 @@ TEST(KitToys, FindsAcceptedSurplusArguments) {
   const std::vector<std::string> texts = check_requests(toy::unit<Mistake::accepts_all_arguments>, 1).texts();
   EXPECT_THAT(texts, Contains("position 0: has a request"));
   EXPECT_THAT(texts, Contains("position 0: has a conversation"));
+}
+
+// Three models have one configuration, and the option makes a second one. Every other round is for models.
+TEST(KitToys, PrefersConfigurationsOfModels) {
+  static std::map<std::int64_t, unsigned> made;  // number of virtual encoders by the value of the option
+  constexpr std::array<OptionValue, 1> values{{{0, 2}}};
+  constexpr std::array<Option, 1> options{
+      {{.name = "kind", .meaning = "", .default_value = 2, .minimum = 1, .maximum = 2}}};
+  const std::array<Model, 3> models{{{"old", "", 0, values}, {"new", "", 0, values}, {"newest", "", 0, values}}};
+  Unit unit = toy::unit<Mistake::none>;
+  unit.options = options;
+  unit.models = models;
+  unit.device = [](const Options& with, const Shaft& shaft, std::span<std::byte> storage) {
+    ++made[with.values[0]];
+    return toy::unit<Mistake::none>.device(with, shaft, storage);
+  };
+  EXPECT_THAT(check_exchanges(unit, few).texts(), IsEmpty());
+  EXPECT_EQ(made.size(), 2u);
+  EXPECT_GT(made[2], made[1]);
 }
 
 template <Role forgotten>

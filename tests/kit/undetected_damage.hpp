@@ -30,7 +30,7 @@ struct UndetectedDamage {
   DamageCount position{};
   DamageCount others{};
 
-  /// Replaces each rate by that of `other` unless the latter is lower.
+  /// Keeps the higher of each rate and that of `other`.
   void add(const UndetectedDamage& other) {
     if (other.position.chance() >= position.chance()) position = other.position;
     if (other.others.chance() >= others.chance()) others = other.others;

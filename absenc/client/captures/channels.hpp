@@ -16,7 +16,7 @@ namespace absenc::client {
 /// Returns the names of a link's wires; --channel also accepts other names for them.
 [[nodiscard]] std::span<const std::string_view> wires_of(LinkKind link);
 
-/// The channel of each wire, in the order of `wires_of`; nothing if the wire was not recorded.
+/// The channel of each wire, in the order of `wires_of`; nothing if the wire has none.
 struct WireChannels {
   std::vector<std::optional<unsigned>> wires;
   bool assumed = false;  // full duplex: whether a --channel value names no wire, or channels were assigned in order

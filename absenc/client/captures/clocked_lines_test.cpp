@@ -63,7 +63,7 @@ struct Master {
   std::int64_t period;
   std::int64_t timeout;
   std::int64_t falls = 0;  // time from the last rising edge to the falling edge that sends CDM 1; 0: half a period
-  // whether MA rises when the timeout has elapsed; otherwise MA is held low until the next frame
+  // with CDM 1: whether MA rises when the timeout has elapsed; otherwise MA is held low until the next frame
   bool releases = false;
   int clocks = 0;          // number of clocks beyond the bits of `biss_frame`; -1: one less
   std::int64_t pause = 0;  // time after the timeout before the next frame; after a release at least `timeout`

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "absenc/client/captures/stage_test.hpp"
@@ -41,7 +42,7 @@ inline std::string to_text(const Said& said) {
 class Comparison {
  public:
   Comparison(const Unit& unit, const LineSettings& line, bool faulty, const std::vector<Said>& rows)
-      : rows_(rows), faulty_(faulty) {
+      : unit_(unit), rows_(rows), faulty_(faulty) {
     // A live CAN receiver waits until the bus is idle, so its times may be later by that wait.
     tolerance_ = unit.link == LinkKind::can ? line.bits(160) : 2 * line.character();
   }
@@ -84,22 +85,33 @@ class Comparison {
     if (live.reading) {
       if (std::string why = compare_position(live); !why.empty()) return why;
     }
-    std::map<std::string, std::string> told;
+    std::map<std::string, std::vector<std::string>> told;
     for (const Said* row : within_) {
       if (live.exchanges == 0 && live.reading && !is_of(*row, *live.reading)) continue;
       for (std::size_t i = 0; i < row->answer.columns.size(); ++i) {
-        told[std::string(row->answer.columns[i].name)] = client::to_text(row->answer.values[i]);
+        told[std::string(row->answer.columns[i].name)].push_back(client::to_text(row->answer.values[i]));
       }
     }
     for (std::size_t i = 0; i < live.answer.columns.size(); ++i) {
       const std::string name(live.answer.columns[i].name);
       const auto found = told.find(name);
       if (found == told.end() && live.reads && live.exchanges != 0) return "no row has " + name;
-      if (found != told.end() && found->second != client::to_text(live.answer.values[i])) {
-        return "another " + name + ": " + found->second;
+      if (found != told.end() && !agree(name, found->second, client::to_text(live.answer.values[i]))) {
+        return "another " + name + ": " + found->second.back();
       }
     }
     return {};
+  }
+
+  // The last row has the final value. A value of Role::exchange is different in each exchange of a conversation, so
+  // any row may have it.
+  [[nodiscard]] bool agree(std::string_view name, const std::vector<std::string>& of_rows,
+                           const std::string& live) const {
+    const bool is_of_exchange = std::any_of(unit_.fields.begin(), unit_.fields.end(), [&](const FieldInfo& field) {
+      return field.name == name && field.role == Role::exchange;
+    });
+    if (!is_of_exchange) return of_rows.back() == live;
+    return std::find(of_rows.begin(), of_rows.end(), live) != of_rows.end();
   }
 
   [[nodiscard]] bool is_of(const Said& row, const Reading& reading) const {
@@ -149,6 +161,7 @@ class Comparison {
     return to_text(known) == to_text(all) ? "" : "another position: " + to_text(all);
   }
 
+  const Unit& unit_;
   const std::vector<Said>& rows_;
   bool faulty_;
   Time tolerance_{};

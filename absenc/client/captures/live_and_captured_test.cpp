@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -118,7 +119,7 @@ std::vector<Encoder> encoders_of(const Unit& unit) {
 
 constexpr std::uintmax_t long_file = 300'000;  // size in bytes above which a capture is long
 
-/// The commands of one capture: all that change nothing, or one that changes the encoder.
+/// The commands of one capture: those that change nothing, except scans, or one that changes the encoder.
 struct Together {
   std::vector<const Command*> commands;
   // whether the capture of a changing command is long, so that it is not repeated for details
@@ -189,6 +190,34 @@ TEST_P(LiveAndCaptured, Agree) {
   }
   std::printf("%s: %zu results in %zu captures\n", unit.id.data(), compared, captures);
   EXPECT_GT(compared, 0u);
+}
+
+Said said_with(std::string_view column, std::int64_t value) {
+  Said said{.what = "command"};
+  said.end = std::chrono::microseconds(1);
+  said.answer.columns = {{column, "", ColumnType::int64, ""}};
+  said.answer.values = {value};
+  said.exchanges = 2;
+  return said;
+}
+
+// The second request of a conversation has another command code than the first.
+TEST(Comparison, TakesExchangeFieldFromAnyRowAndOthersFromLast) {
+  std::array<FieldInfo, 2> fields{};
+  fields[0].name = "command";
+  fields[0].role = Role::exchange;
+  fields[1].name = "state";
+  Unit unit{};
+  unit.link = LinkKind::half_duplex;
+  unit.fields = fields;
+  const LineSettings line{.rate = 1'000'000};
+  for (const FieldInfo& field : fields) {
+    const std::vector<Said> rows{said_with(field.name, 15), said_with(field.name, 3)};
+    Comparison comparison(unit, line, false, rows);
+    EXPECT_EQ(comparison(said_with(field.name, 15)).empty(), field.role == Role::exchange);
+    EXPECT_EQ(comparison(said_with(field.name, 3)), "");
+    EXPECT_TRUE(comparison(said_with(field.name, 16)).starts_with("another " + std::string(field.name) + ": 3"));
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Units, LiveAndCaptured, ::testing::ValuesIn(all_units()), [](const auto& one) {

@@ -15,7 +15,7 @@ namespace absenc::client {
 struct Probed {
   const Unit* unit = nullptr;
   bool explained = false;                  // whether at least one set of options explains all frames
-  std::vector<OptionEvidence> evidence{};  // evidence for each value of each open option
+  std::vector<OptionEvidence> evidence{};  // evidence for or against values of the open options
   std::vector<std::string> settled{};      // options that later commands need, as "name=value"; may be empty
 };
 

@@ -31,14 +31,14 @@ struct Said {
   std::string words{};
   Answer answer{};
   std::optional<Reading> reading{};
-  bool reads = false;       // whether its verb is `read` or `read_part`: all values come from replies of the encoder
-  bool is_special = false;  // whether its verb is `run`; such a command may try requests that fail
+  bool reads = false;       // whether the verb is `read` or `read_part`: all values come from replies of the encoder
+  bool is_special = false;  // whether the verb is `run`; such a command may try requests that fail
   unsigned exchanges = 0;   // number of requests, pulses or transfers of the conversation
   // whether the error is a verdict over several replies, not an error of the last one
   bool is_verdict = false;
 };
 
-/// Forwards the steps of a host to the port and counts its transfers.
+/// Forwards the steps of a host to the port and counts its transfers and pulses.
 template <class Item>
 class HostEnd final : public Port<Item> {
  public:

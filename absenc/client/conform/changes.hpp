@@ -25,7 +25,7 @@ struct CommandResult {
   bool heard = false;          // whether anything but an echo was received after the last request
   Answer answer{};
   std::optional<std::int64_t> value{};  // byte or word of the memory that the reply carries; nothing: none
-  std::vector<std::uint8_t> data{};     // several bytes that it carries, the low byte of a word first; empty: none
+  std::vector<std::uint8_t> data{};     // several bytes that the reply carries, low byte of a word first; empty: none
   std::optional<Reading> reading{};
 };
 
@@ -58,7 +58,7 @@ struct UnsolicitedFrames {
 /// Access to the line. An end of the test throws os::Interrupted only once, so that values can still be restored.
 struct ChangesLine {
   std::function<CommandResult(const Command&, Arguments)> run;
-  // sends a request, encoded by Unit::encode, and returns the exchange
+  // sends a request in the form that Unit::encode gives, and returns the exchange
   std::function<SingleExchange(const std::vector<std::uint8_t>& request)> send;
   std::function<UnsolicitedFrames(Time)> count_unsolicited;
   std::function<void(Time)> wait_for;
@@ -72,7 +72,7 @@ struct ChangesLine {
 
 class ChangeTester {
  public:
-  /// Takes the encoder's name in commands for the user, its line, and whether it may be reset.
+  /// Takes the encoder's name in commands for the user, its line, and whether values may be erased for good.
   ChangeTester(const Unit& unit, std::string_view name, ChangesLine line, bool resets)
       : unit_(unit), name_(name), line_(std::move(line)), resets_(resets) {}
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "absenc/client/conform/clause_mutants_test.hpp"
+#include "absenc/client/conform/tester.hpp"
 #include "absenc/protocol/all.hpp"
 
 namespace absenc::client {
@@ -32,6 +33,7 @@ void check(const Unit& unit) {
   for (const Clause& clause : clauses_of(unit)) {
     if (changes_encoder(clause.demand)) continue;
     ++clauses;
+    const std::size_t tried_before = tried;
     const EncoderAddress address = parse_address(address_showing(unit, clause));
     const Conformance good = conform_mutant<Item>(address, {}, {.readings = 8});
     EXPECT_EQ(verdict_of(good, clause.id), Verdict::kept) << clause.id << "\n" << good.report();
@@ -49,8 +51,12 @@ void check(const Unit& unit) {
       alone += breaks_only(unit, clause, ids) ? 1 : 0;
       if (alone >= 1 && broken >= 2) break;
     }
-    EXPECT_GE(alone, 1U) << unit.id << " " << clause.id << "\n" << last;
-    EXPECT_GE(broken, 2U) << unit.id << " " << clause.id << "\n" << last;
+    const std::string counts = fmt::format(
+        "{}: {} of {} changed encoders break the clause \"{}\", and two must; {} break it alone, and one "
+        "must. The last verdict:\n{}",
+        unit.id, broken, tried - tried_before, clause.id, alone, last);
+    EXPECT_GE(alone, 1U) << counts;
+    EXPECT_GE(broken, 2U) << counts;
   }
   std::printf("%s: %zu clauses, %zu mutants\n", std::string(unit.id).c_str(), clauses, tried);
 }
@@ -81,7 +87,9 @@ void check_kept(const EncoderAddress& address, std::set<std::string>& seen) {
         broken = verdict_of(conform_mutant<Item>(address, change, {.readings = 3}), clause.id) == Verdict::broken;
         if (broken) break;
       }
-      EXPECT_TRUE(broken) << variation_name(address) << ": " << clause.id << "\n" << good.report();
+      EXPECT_TRUE(broken) << variation_name(address) << ": no changed encoder breaks the clause \"" << clause.id
+                          << "\", which this encoder keeps\n"
+                          << good.report();
     }
   } catch (const UsageError&) {  // skips options with which no host can read the encoder
   }
@@ -123,6 +131,26 @@ TEST(Conformance, EchoOfAdapterIsNoReply) {
       }
     }
   }
+}
+
+// The host of this unit repeats a request without reply, and the encoder answers the repetition.
+TEST(Conformance, ReplyToRepeatedRequestIsNoReaction) {
+  const EncoderAddress address = parse_address("sim:amt21");
+  VirtualDevice device(*address.unit, address.options, address.device);
+  device.power_on(Time{});
+  sim::SimPort<std::uint8_t> port(address.unit->link, address.line.with_some_rate(), *device.bytes());
+  Tester<std::uint8_t> tester(address, port, Time{}, {.readings = 2});
+  tester.read();
+  const Clause clause{.id = "other",
+                      .paragraph = "",
+                      .words = "",
+                      .demand = Demand::reacts,
+                      .ask = {.wire = "90"},
+                      .reaction = Reaction::silent};
+  ClauseResult result;
+  tester.test(clause, result);
+  EXPECT_EQ(result.verdict, Verdict::kept) << result.evidence;
+  EXPECT_EQ(result.evidence, "3 of 3 times; to 90 came nothing");
 }
 
 // A late reply answers its request: at 2400 baud its 7 characters take longer than 20 ms.

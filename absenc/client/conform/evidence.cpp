@@ -29,7 +29,7 @@ void flip(ObservedFrame& frame, std::size_t bit) {
 
 void resize(ObservedFrame& frame, int by) {
   if (frame.can) {
-    frame.can->size = static_cast<std::uint8_t>(std::min(8, frame.can->size + by));
+    frame.can->size = static_cast<std::uint8_t>(std::clamp(frame.can->size + by, 0, 8));
   } else {
     frame.bytes.resize(frame.bytes.size() + static_cast<std::size_t>(by));
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Evidence of a verdict: how often a run observed the behaviour that a clause demands.
+// Functions for verdicts on clauses: requests, errors of replies, and evidence.
 #pragma once
 
 #include <cstddef>

@@ -25,7 +25,7 @@ std::uint64_t HostTrial::counted() const {
   return phase_ == Phase::damage ? seen_.damaged : seen_.answered;
 }
 
-// Returns whether neither a fault nor an earlier one affects the host's requests.
+// Returns whether no fault, present or earlier, affects the host's requests.
 bool HostTrial::is_calm() const {
   return phase_ == Phase::good || phase_ == Phase::over ||
          (phase_ == Phase::last && counted() - phase_begin_ >= requests_to_continue);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Checks clauses for hosts: our own host keeps them, flaws break them, strangers keep none.
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -171,6 +172,7 @@ TEST_P(HostClauses, EachClauseIsBrokenByTwoMutantsAlone) {
   const Unit& unit = *GetParam();
   std::size_t tried = 0;
   std::map<std::string_view, unsigned> found;
+  std::map<std::string_view, std::string> with_others;  // for each clause: all that the last host to break it broke
   const auto left = [&] {
     return std::ranges::any_of(host_clauses_of(unit), [&](const HostClause& one) { return found[one.id] < 2; });
   };
@@ -186,6 +188,8 @@ TEST_P(HostClauses, EachClauseIsBrokenByTwoMutantsAlone) {
       const std::vector<std::string> broken = with_verdict(one, Verdict::broken);
       for (const HostClause& clause : host_clauses_of(unit)) {
         if (is_mistake_of(broken, clause.id)) ++found[clause.id];
+        if (std::ranges::count(broken, clause.id) != 0)
+          with_others[clause.id] = fmt::format("{}", fmt::join(broken, ", "));
       }
     };
     if (unit.link == LinkKind::can) {
@@ -199,7 +203,12 @@ TEST_P(HostClauses, EachClauseIsBrokenByTwoMutantsAlone) {
     }
   }
   for (const HostClause& clause : host_clauses_of(unit)) {
-    EXPECT_GE(found[clause.id], 2U) << clause.id;
+    EXPECT_GE(found[clause.id], 2U) << fmt::format(
+        "{}: {} of {} tried hosts break the clause \"{}\" alone, and two must; the last host that broke it broke: {}.\n"
+        "Add hosts to `breaks` of the clause. If each of them breaks another clause too, both demands have one cause: "
+        "make one clause of them.",
+        unit.id, found[clause.id], tried, clause.id,
+        with_others.contains(clause.id) ? with_others[clause.id] : "none does");
   }
   std::printf("%s: %zu clauses of a host, %zu mutants\n", std::string(unit.id).c_str(), host_clauses_of(unit).size(),
               tried);
@@ -211,8 +220,10 @@ TEST_P(HostClauses, ScriptBreaksItsClause) {
     for (const HostScript script : clause.breaks) {
       if (script.empty()) continue;
       const Conformance found = judged(address, host_that_sends(script));
-      EXPECT_TRUE(is_mistake_of(with_verdict(found, Verdict::broken), clause.id)) << clause.id << "\n"
-                                                                                  << found.report();
+      const std::vector<std::string> broken = with_verdict(found, Verdict::broken);
+      EXPECT_TRUE(is_mistake_of(broken, clause.id)) << fmt::format(
+          "{}: the script that begins with \"{}\" must break \"{}\", and besides it only \"asks\"; it breaks: {}\n{}",
+          GetParam()->id, script.front().what, clause.id, fmt::join(broken, ", "), found.report());
     }
   }
 }

@@ -87,7 +87,7 @@ class Mutant final : public Machine<Item> {
   int special = -1;
   // further condition that a special request must fulfil; empty: none
   std::function<bool(const std::vector<Item>&)> is_meant{};
-  bool is_special = false;  // whether the last request is special
+  bool is_special = false;  // whether the last request differs from `good` and is one of those selected
 
  private:
   // A damaged request has no items.

@@ -35,7 +35,7 @@ void judge_answered(const Readings& readings, ClauseResult& result);
 /// Stores the verdict on whether unsolicited frames were received until the last reading.
 void judge_streamed(const Readings& readings, ClauseResult& result);
 
-/// Stores the verdict; `latency` is the precision of the port's times.
+/// Stores the verdict on whether replies came in time; `latency`: precision of the port's times.
 void judge_time(const Unit& unit, const Options& options, const Readings& readings, Time latency, ClauseResult& result);
 
 void judge_frames(const Unit& unit, const Options& options, const Readings& readings, Errors errors,

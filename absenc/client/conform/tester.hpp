@@ -91,6 +91,9 @@ class Tester {
   }
 
  private:
+  // Thrown instead of sending a request after an edited one: a host would repeat it, and judge the second reply.
+  struct NextRequest {};
+
   // Terms of `listening_`.
   static constexpr Time least_listening = std::chrono::milliseconds(20);
   static constexpr int reply_characters = 16;
@@ -131,7 +134,7 @@ class Tester {
   Attempted once(const Options& options, std::optional<Time> listen_for = {}) {
     runner_.set_options(options);
     if (!is_streamed(options)) runner_.start_again();
-    Attempted one = runner_.once(read_);
+    Attempted one = read_once();
     if (!one.possible || one.error == Error::invalid_argument) {
       throw UsageError(fmt::format("{} cannot be read with these options{}{}", unit_.id, one.detail.empty() ? "" : ": ",
                                    one.detail));
@@ -142,6 +145,17 @@ class Tester {
     runner_.listen(listen_for.value_or(listening_));
     runner_.keep_exchange(one);
     return one;
+  }
+  // Runs a reading once; `NextRequest` ends it after its first exchange.
+  Attempted read_once() {
+    try {
+      return runner_.once(read_);
+    } catch (const NextRequest&) {
+      Attempted first;
+      runner_.keep_exchange(first);
+      first.error = first.answered ? error_of(first.exchange.request, first) : Error::timeout;
+      return first;
+    }
   }
   [[nodiscard]] Readings read_all(const Options& options) {
     Readings readings;
@@ -163,7 +177,7 @@ class Tester {
   [[nodiscard]] bool is_streamed(const Options& options) const {
     return unit_.streams != nullptr && unit_.streams(options);
   }
-  // On the other links the host clocks the bits, so no reply can be late.
+  // On SPI and clocked links the host clocks the bits, so no reply can be late.
   [[nodiscard]] bool is_polled() const { return unit_.link != LinkKind::clocked && unit_.link != LinkKind::spi; }
   // Returns whether a reading succeeds, without which a missing reply proves nothing.
   [[nodiscard]] bool answers() {
@@ -173,13 +187,13 @@ class Tester {
     return false;
   }
 
-  /// Sends an edited request in place of the first one of a reading.
+  /// Sends an edited request in place of the first one of a reading, and no further request.
   std::optional<Attempted> send_instead(const std::function<void(std::vector<Item>&)>& edit, std::uint32_t permille = 0,
                                         std::optional<Time> listen_for = {}) {
     const std::uint64_t before = runner_.port().requests;
     bool edited = false;
     runner_.edit = [&](std::vector<Item>& request) {
-      if (std::exchange(edited, true)) return;
+      if (std::exchange(edited, true)) throw NextRequest{};
       edit(request);
       if (permille != 0) set_rate(rate_ / 1000 * permille);
     };

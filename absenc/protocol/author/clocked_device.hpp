@@ -25,7 +25,7 @@ class ClockedDevice : public EncoderOn<std::uint8_t> {
   [[nodiscard]] MutableBytes memory() override { return {}; }
 
  protected:
-  /// Constructs an encoder that is ready `start_time` after it is switched on.
+  /// Constructs an encoder that is off. `start_time`: duration of its start-up.
   explicit ClockedDevice(Time start_time = {}) : EncoderOn(start_time) {}
   ~ClockedDevice() = default;
 

@@ -53,7 +53,7 @@ class ClockedEngine : public Conversation<std::uint8_t> {
   /// Ends the conversation with `error`; `Error::none`: with success.
   void finish(Error error);
 
-  /// Handles the bits of a complete transfer. Calls `clock` for another transfer, or `finish`.
+  /// Handles the bits of a complete transfer. The conversation then ends, unless this function calls `clock`.
   virtual void clocked(BitView bits) = 0;
 
  private:

@@ -71,11 +71,12 @@ struct Report {
   void (*put_request)(FieldSink&, const Format&, const Request&) = nullptr;
   /// Puts the fields of a valid reply to the request into the sink.
   void (*put_reply)(FieldSink&, const Format&, const Request&, const Reply&) = nullptr;
-  /// Returns the unit's explanation of an invalid or missing reply. Null: none.
+  /// Returns the unit's explanation of an error, by the last request and reply. Null: none.
   Explanation (*explain)(const Format&, Error, Items request, Items reply) = nullptr;
-  /// Returns the explanation of the error of a conversation, which is used instead of `explain`.
+  /// Returns the explanation of the error of a conversation, used instead of `explain`. Null: `explain` is used.
   Explanation (*explain_host)(const Host&) = nullptr;
-  /// Writes the explanation of the error of `host`, which is used instead of the others' details.
+  /// Writes the explanation of the error of `host`, used instead of the details of `explain` and `explain_host`. Null:
+  /// those are used.
   void (*tell)(Sentence&, const Host& host) = nullptr;
   /// Advice for the error that the line is never silent.
   std::string_view noise_advice = endless_noise.advice;

@@ -47,7 +47,9 @@ struct Toy {
   static constexpr bool is_whole(const Format&, Error) { return false; }
   static constexpr Reading reading(const Format&, const Request&, const Reply&) { return {}; }
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
-  static constexpr DeviceTimes device_times(const Format&) { return {.character = 1us, .answer_time = 1us}; }
+  static constexpr DeviceTimes device_times(const Format& format) {
+    return {.character = format.line().byte_time(), .answer_time = 1us};
+  }
 };
 using Format = Toy::Format;
 
@@ -81,6 +83,10 @@ constexpr std::uint8_t ask(const Format&) { return 5; }
 constexpr auto commands = std::array{reading<report, ask>({"position", Verb::read, 0, "position"})};
 constexpr auto vectors = std::array{VectorText{"toy-1", "a reply", "invented", "", "05", "06", "request=5 reply=6"},
                                     VectorText{"toy-2", "another", "invented", "", "05", "07", "bad_checksum"}};
+constexpr VectorParts quoted{{"id", "meaning", "source", "", "", "", "serial=\"0815\" count=7 name=SKM36 empty=\"\""},
+                             false};
+static_assert(quoted.fields[0].text == "0815" && quoted.fields[0].number == 0, "quoted digits are a text");
+static_assert(quoted.fields[1].number == 7 && quoted.fields[2].text == "SKM36" && quoted.fields[3].text.empty());
 constexpr Result<std::uint8_t> guess_request(const Format&, Bytes reply) {
   return static_cast<std::uint8_t>(reply[0] - 1);
 }

@@ -121,7 +121,7 @@ void Responder::check_frame_pause(Time at, Time before) {
   expect(at - times_.character - (before - late_) >= times_.frame_pause, times_.frame_rule, at);
 }
 
-// Searches for a request at the later received bytes: none begins with the first byte.
+// Searches for a request at the later received bytes: none begins at the first byte.
 void Responder::search_again(Time at) {
   refusing_ = is_refused(Flaw::unknown, request_);
   const ByteBuffer<32> heard = request_;

@@ -18,12 +18,15 @@ namespace absenc::author {
 
 /// Times of a virtual encoder: those of its document, or assumed where it states none.
 struct DeviceTimes {
-  Time character{};        ///< duration of a character on the line; of a byte, if two bytes share a character
-  Time answer_time{};      ///< time from the end of a request to the begin of its reply
-  Time start_time{};       ///< time from power on until requests are answered
-  Time gap{};              ///< pause that ends an incomplete request or the reply of another encoder; 0: two characters
-  std::uint8_t frame = 0;  ///< bytes of each frame of a request; 0: a request is one frame
-  Time frame_pause{};      ///< shortest pause between two frames of a request
+  /// Duration of a byte, `format.line().byte_time()`: half a character of more than 8 bits.
+  Time character{};
+  Time answer_time{};  ///< time from the end of a request to the begin of its reply
+  Time start_time{};   ///< time from power on until requests are answered
+  /// Pause that ends an incomplete request, or the reply of another encoder; 0: two bytes. It is
+  /// longer than `frame_pause`.
+  Time gap{};
+  std::uint8_t frame = 0;         ///< bytes of each frame of a request; 0: a request is one frame
+  Time frame_pause{};             ///< shortest pause between two frames of a request
   std::string_view frame_rule{};  ///< rule that hosts must keep this pause
   /// Whether requests received during a transmission are stored and answered afterwards.
   bool keeps_requests = false;
@@ -111,10 +114,10 @@ class Responder : public EncoderOn<std::uint8_t> {
   Time reply_at_{};
   Time longer_{};
   Time turns_{};              // duration of the replies of all encoders to the present request; 0: only one answers
-  Time turns_end_{};          // bytes received before are replies of other encoders
+  Time turns_end_{};          // bytes received before this time are replies of other encoders
   ByteBuffer<64> stored_;     // bytes received during the present transmission, if they are kept
   unsigned interrupted_ = 0;  // number of requests received during the present transmission
-  unsigned interruptions_in_a_row_ = 0;  // consecutive transmissions before the present one with a request
+  unsigned interruptions_in_a_row_ = 0;  // transmissions in a row before the present one in which a request came
   bool reply_pending_ = false;
   bool transmitting_ = false;
   Interruption interruption_;

@@ -37,7 +37,7 @@ class EncoderOn : public Device<Item> {
   [[nodiscard]] std::uint32_t violation_count() const final { return rules_.violation_count(); }
   /// Sets the observer of rule checks; null: none.
   void watch_rules(RuleWatch* watch) final { rules_.watch(watch); }
-  /// Returns how many answers the encoder has given.
+  /// Returns how many requests or transfers the encoder has served; unsolicited frames may count too.
   [[nodiscard]] std::uint64_t answer_count() const final { return answer_count_; }
 
  protected:
@@ -68,7 +68,7 @@ class EncoderOn : public Device<Item> {
   [[nodiscard]] std::uint32_t raised() const { return raised_; }
   /// Increments `memory_version`; to be called after each change of the memory.
   void change_memory() { ++memory_version_; }
-  /// Counts an answer; see `answer_count`.
+  /// Increments `answer_count`.
   void count_answer() { ++answer_count_; }
 
   /// Is called after the start-up of the encoder has ended, with the time of that end.

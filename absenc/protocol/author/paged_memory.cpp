@@ -40,7 +40,7 @@ void PagedMemoryDevice::check_rules(const Access& request, bool immediate, Time 
   if (page_changed_) page_changed_ = !expect(at >= page_ready_at_, memory_->page_rule, at);
 }
 
-// Returns whether a read of `address` is answered as busy, and begins to fetch the byte.
+// Returns whether a read of `address` is answered as busy; if so, begins to fetch the byte.
 bool PagedMemoryDevice::fetches(std::uint8_t address, Time at, Time since) {
   if (memory_->fetch_time == Time{}) return false;
   const bool fetched = fetching_ && at - fetch_begin_ >= memory_->fetch_time;

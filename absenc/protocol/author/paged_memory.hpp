@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Device side of a paged memory with an EEPROM and registers. It knows no protocol.
+// Device side of a paged memory with an EEPROM and registers, for any protocol.
 #pragma once
 
 #include <cstdint>
@@ -19,12 +19,12 @@ struct PagedMemory {
   std::uint8_t select_address;
   std::uint8_t start_page;  ///< Page that is selected after power on.
   Time page_time;           ///< How long the memory is busy after a page change.
-  Time write_time;          ///< How long the memory is busy after a write.
+  Time write_time;          ///< How long the memory is busy after a write, except of an immediate byte.
   /// Shortest time from fetching a byte to reading it; 0: bytes are read without fetching.
   Time fetch_time{};
   /// Whether only the busy time of the last page change or write runs; false: both may run.
   bool exclusive = true;
-  /// Returns whether a byte is accessed without fetching and during writes; null: no byte is.
+  /// Returns whether a byte is immediate: accessed without fetching, and during writes; null: no byte is.
   bool (*is_immediate)(unsigned page, unsigned address) = nullptr;
   std::string_view page_rule;          ///< Rule for the host: access waits for `page_time`.
   std::string_view write_rule;         ///< Rule for the host: a write follows the write before by `write_time`.
@@ -57,8 +57,8 @@ class PagedMemoryDevice : public Responder {
   /// Stores a byte in a writable area of the memory.
   virtual void store(std::uint8_t page, std::uint8_t address, std::uint8_t value) = 0;
 
-  /// Executes a request received at `at`, and returns the content of the reply, if there is one. Busy times begin at
-  /// `since`.
+  /// Executes a request received at `at`, unless the memory is busy. Returns the content of the reply; no value if
+  /// the memory is ready and `exists` is false. Busy times begin at `since`.
   std::optional<MemoryAnswer> access(const Access& request, Time at, Time since);
   /// Returns whether the memory has the byte, or the page to be selected, and permits the access.
   [[nodiscard]] bool exists(const Access& request) const;

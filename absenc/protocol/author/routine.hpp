@@ -33,7 +33,7 @@ struct Outcome {
 /// Outcome of a procedure that succeeded: `co_return done;`.
 inline constexpr Outcome done{};
 
-/// Returns an outcome whose texts replace all others: `co_return only(Error::timeout, "...")`.
+/// Returns an outcome without the explanation of the last reply: `co_return only(Error::timeout, "...")`.
 [[nodiscard]] constexpr Outcome only(Error error, std::string_view detail, std::string_view advice = {}) {
   return {.error = error, .detail = detail, .advice = advice, .alone = true};
 }
@@ -55,7 +55,7 @@ class Routine {
   }
   /// Releases the storage of `frame`, the frame of the coroutine that was begun last.
   void give_back(void* frame) { used_ = static_cast<std::size_t>(static_cast<std::byte*>(frame) - arena_.data()); }
-  /// Sets the coroutine that runs when the present one suspends. Only coroutines call it.
+  /// Sets the coroutine that runs when the present one suspends.
   void go_on_with(std::coroutine_handle<> next) { next_ = next; }
   /// Ends the procedure with this outcome: its coroutines are not resumed again.
   void end_with(const Outcome& outcome) {

@@ -32,7 +32,7 @@ struct Tables {
     return made;
   }();
 
-  /// Bytes of storage that the largest conversation needs, with the frames of its coroutines.
+  /// Bytes of storage that are enough for each conversation, with the frames of its coroutines.
   static constexpr std::size_t host_storage = [] {
     std::size_t most = sizeof(Refusal<ItemOf<P>>);
     for (const CommandOf<P>& one : declared.commands) most = std::max(most, one.size);

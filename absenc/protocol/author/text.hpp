@@ -18,11 +18,13 @@ namespace absenc::author {
 struct VectorText {
   std::string_view id;       ///< Identifier of the vector, unique within the unit.
   std::string_view meaning;  ///< The case that the vector shows, as a phrase.
-  std::string_view source;   ///< Document and paragraph of the frame.
+  std::string_view source;   ///< Source of the frame: a document, or "derived" and the like.
   std::string_view options;  ///< Options of the encoder, as `name=value` separated by blanks.
   std::string_view request;  ///< Bytes of the request in hexadecimal, or plain text; empty: none.
   std::string_view reply;    ///< Bytes of the reply in hexadecimal, or plain text; empty: none.
-  std::string_view fields;  ///< Expected fields as `name=value` separated by blanks, or the name of the expected error.
+  /// Expected fields as `name=value` separated by blanks, or the name of the expected error. A text that looks like a
+  /// number is quoted: `serial="0815"`.
+  std::string_view fields;
 };
 
 /// Is never defined: a call at compile time is an error that names this function.
@@ -34,8 +36,8 @@ void open_bytes_of_a_frame_are_not_consecutive();
 /// Is never defined: a call at compile time is an error that names this function.
 void this_model_has_an_option_or_a_value_that_the_unit_does_not_have();
 
-/// Calls `take(name, value)` for each "name=value" of a text, until one returns false. Returns whether none did and the
-/// text has this form.
+/// Calls `take(name, value)` for each "name=value" of `text`, until a call returns false. Returns whether no call did,
+/// and `text` has this form.
 template <class Take>
 constexpr bool for_each_value(std::string_view text, Take&& take) {
   while (!text.empty()) {
@@ -83,6 +85,8 @@ struct VectorParts {
     }
     if (error != Error::none) return;
     const bool good = for_each_value(text.fields, [&](std::string_view name, std::string_view value) {
+      const bool is_quoted = value.size() >= 2 && value.starts_with('"') && value.ends_with('"');
+      if (is_quoted) return fields.push_back({.field = name, .text = value.substr(1, value.size() - 2)});
       double real = 0;
       if (const auto number = parse_number(value)) return fields.push_back({.field = name, .number = *number});
       if (to_real(value, real)) return fields.push_back({.field = name, .real = real});

@@ -54,7 +54,7 @@ struct RunResult : FieldSink {
   Time received_at{};
   bool finished = false;
   unsigned emits = 0;
-  std::uint64_t frames = 0;  // number of answers that the encoder gave during the command
+  std::uint64_t frames = 0;  // number of requests that the encoder served during the command
   Time took{};
 };
 
