@@ -150,7 +150,7 @@ class RawReader final : public Reader {
   std::vector<Damage> damages_;
 };
 
-// Ends the program if too much is wrong.
+// Decodes the file and returns the cost. Ends the program if more than 20 characters are wrong or missing.
 Cost decode(const File& file, unsigned threads) {
   RawReader reader(file);
   std::uint64_t count = 0;
@@ -282,7 +282,7 @@ void compare_file_sizes(bool quick) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const bool quick = argc > 1;  // any option of Google Benchmark selects the short run
+  const bool quick = argc > 1;  // any argument selects the short run
   static_cast<void>(argv);
   throughput(quick);
   two_threads(quick);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures reading of captures: raw samples against std::fread, sigrok sessions against libzip.
+// Measures reading of captures: raw samples against std::fread, sigrok sessions against libzip; VCD and CSV alone.
 #include <zip.h>
 
 #include <array>
@@ -85,7 +85,7 @@ struct Files {
     }
   }
 
-  // Writes samples in the CSV format of Saleae's Logic 2.
+  // Writes the changes in the first half of `samples` in the CSV format of Saleae's Logic 2.
   void write_csv(const std::vector<char>& samples) const {
     std::ofstream file(csv());
     file << "Time [s],0,1,2,3,4,5,6,7\n";

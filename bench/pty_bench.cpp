@@ -182,7 +182,7 @@ double median(std::vector<double> values) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const bool quick = argc > 1;  // any option of Google Benchmark selects the short run
+  const bool quick = argc > 1;  // any argument selects the short run
   static_cast<void>(argv);
   constexpr int blocks = 40;
   const int exchanges = quick ? 500 : 3000;

@@ -106,7 +106,7 @@ class Streams:
         *lines, self.texts[i] = (self.texts[i] + got).split(b"\n")
         for line in lines:
             if line.startswith(b"data: ") and b'"points":' in line:
-                self.times[i] += [at for at, _, _ in json.loads(line[6:])["points"]]
+                self.times[i] += [at for at, *_ in json.loads(line[6:])["points"]]
 
     def late_ms(self):
         """Returns the lateness of each stored reading in ms, in ascending order."""

@@ -61,7 +61,7 @@ class NamedCommands(unittest.TestCase):
                 self.assertNotIn(quoted.split(" ")[0], verbs)
 
     def test_shell_commands_stand_in_backquotes(self):
-        """Commands with `sudo` must stand in backquotes, unless they are the whole text."""
+        """Commands with `sudo` must stand in backquotes, unless the text begins with one."""
         for source in sources():
             for text in literals(source):
                 rest = re.sub(r"`[^`]*(`|$)", "", text)

@@ -24,7 +24,7 @@ class Conform(EncoderCase):
         answer = json.loads(result.stdout)
         self.assertEqual((answer["ok"], answer["protocol"], answer["left"]), (True, "tformat", []))
         for clause in answer["clauses"]:
-            # The reply arrives before the port has its former rate again, so the clause is untested.
+            # The reply arrives before the port has its former rate again, so the clause bad-delimiter is untested.
             expected = "untested" if clause["id"] == "bad-delimiter" else "kept"
             self.assertEqual(clause["verdict"], expected, clause)
             self.assertTrue(clause["document"] and clause["paragraph"] and clause["evidence"], clause)

@@ -199,7 +199,7 @@ class DataIds(EmulateCase):
     def test_nine_resets_have_no_effect(self):
         client = self.client("--alarm", "over_speed", "--multiturn", "7")
         self.reset(client, 0x7, 9)
-        self.assertEqual(client.exchange(3)[9], 0x01)  # this request, with another data ID, restarts the count of reset requests
+        self.assertEqual(client.exchange(3)[9], 0x01)  # another data ID restarts the count of reset requests
         self.reset(client, 0x7, 9)
         self.assertEqual(client.exchange(3)[9], 0x01)
         self.reset(client, 0xC, 5)

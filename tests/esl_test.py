@@ -306,7 +306,7 @@ class DecodeReasons(EslCase):
         self.assertEqual((second["ok"], second["error"]), (False, "sequence_mismatch"))
 
     def test_reports_refusal(self):
-        """The check of this request is right, but the reply's status reports a refusal."""
+        """The CRC of the request is right, but the reply's status reports a refusal."""
         good = absenc("encode", "esl", "position").stdout.strip()
         field = control_field(POSITION) ^ 0x80
         refused = bytes([field]) + crc8([field])
@@ -501,7 +501,7 @@ class TwoChannels(EslCase):
             "alarms": []}
 
     def fake(self, status_2=READY | CHANNEL_2, alarms_2=0):
-        """Returns the address of a fake encoder with these flags in channel 2 only."""
+        """Returns the address of a fake encoder whose channel 2 alone has the given flags."""
         replies = {}
         for data_id, turns in ((POSITION, b"\x34\x12"), (0x2, b"")):
             field = control_field(data_id)

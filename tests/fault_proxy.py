@@ -31,7 +31,7 @@ class Fault:
 
 
 class FaultProxy(FakeLine):
-    """A pseudo-terminal for the host, with `fault` before the encoder at the path `encoder`."""
+    """A pseudo-terminal for the host, with `fault` before the encoder at the path `encoder`; None: no encoder."""
 
     def __init__(self, fault, encoder=None):
         super().__init__()
@@ -40,7 +40,7 @@ class FaultProxy(FakeLine):
         os.set_blocking(self.master, False)
         self.requests = 0  # number of pieces received from the host
         self.unread = 0  # number of bytes for the host that did not fit into the pseudo-terminal and were dropped
-        self.changed = 0  # number of requests and replies that the fault altered, delayed or added
+        self.changed = 0  # number of pieces that the fault altered, dropped, delayed or added
 
     def __exit__(self, *_):
         super().__exit__(*_)
@@ -163,7 +163,7 @@ class Chatter(Fault):
 
 
 class AlwaysLate(Fault):
-    """Every reply is delayed by longer than a host waits, as by a network."""
+    """Every reply is delayed by `delay`, as by a network."""
 
     whole = True
 

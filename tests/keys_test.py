@@ -46,7 +46,7 @@ class Keys(Case):
         # A recording has the columns of `read` in the same order, and further ones.
         self.assertEqual([name for name in columns if name in shown], shown)
         with open(self.recorded(encoder, "jsonl"), encoding="utf-8") as file:
-            # Rows without `ok` describe events, not readings.
+            # Rows whose `ok` is missing or false are no readings.
             rows = [row for row in map(json.loads, file) if row.get("ok")]
         self.assertEqual(len(rows), 3)
         computed = set(columns) - set(shown) - ONLY_IN_ROWS

@@ -13,7 +13,7 @@ import unittest
 
 from command_support import Emulator, absenc, end
 
-ENCODERS = {  # unit, options, bytes in a position request and in its reply
+ENCODERS = {  # unit, options, bytes in a position request and in its reply; None: not stated
     "tformat": ("tformat", "", 1, 11),
     "esl": ("esl", "", 2, 18),
     "e201": ("e201", "", 1, 17),

@@ -80,7 +80,7 @@ def with_switches(text, numbered):
 
 
 def as_functions(text, names):
-    """Returns `text` with these constants as functions, or None if that is not possible."""
+    """Returns `text` with the constants `names` as functions, or None if that is not possible."""
     source = Source(text)
     inserted = []
     for i, token in enumerate(source.tokens):
@@ -154,7 +154,7 @@ class Finder:
         return Switch(tokens[first].start, tokens[last - 1].end, before, behind)
 
     def _change(self, rule, first, last, after, switch=None, constant=None):
-        """Adds a mutant that replaces the tokens from `first` to `last`, exclusive, by `after`."""
+        """Adds a mutant with `after` in place of the tokens from `first` to `last`, exclusive, unless surplus."""
         tokens = self.source.tokens
         start, end = tokens[first].start, tokens[last - 1].end
         result = (start, end, after)
@@ -304,7 +304,7 @@ class Finder:
     # ---- Constants
 
     def _declared_times(self):
-        """Adds mutants of the times in each declaration `Time name = ...;`."""
+        """Adds mutants of each `constexpr Time name = ...;` and of each `Time name = literal;`."""
         source = self.source
         for i in range(len(source.tokens)):
             if source[i] != "Time" or source[i + 2] != "=" or source.tokens[i + 1].kind != "word" or self.left_alone[i]:
@@ -330,7 +330,7 @@ class Finder:
                 continue
             for j in range(body, source.partner[body]):
                 end = source.right(j + 1, {";"})
-                # The statement returns more than one token, such as a name.
+                # A statement that returns a single token, such as a name, is left alone.
                 if source[j] == "return" and end > j + 2 and not self.left_alone[j]:
                     self._times(j + 1, end)
                     for k in range(j, end):
@@ -404,7 +404,7 @@ class Finder:
         return False
 
     def _around(self, index):
-        """Returns the index of the opening bracket that encloses the token `index`."""
+        """Returns the index of the opening bracket that encloses the token `index`; 0 if there is none."""
         while index > 0:
             index -= 1
             if self.source[index] in OPENING:

@@ -162,7 +162,7 @@ class Tree:
         return None if done.returncode == 0 else done.stdout + done.stderr
 
     def switch_in(self, numbered):
-        """Writes sources with switched mutants. Removes those without a switch from `numbered`."""
+        """Writes sources with switched mutants. Removes from `numbered` those of constants that cannot be functions."""
         self.write(self.source / SWITCH_HEADER, SWITCH.encode())
         functions = self.constants_as_functions(numbered)
         for number, (mutant, path, _) in list(numbered.items()):
@@ -235,7 +235,7 @@ class Tree:
         return program._replace(tests=":".join(chosen)) if is_named else None
 
     def programs(self, unit, folders):
-        """Returns the programs that may kill a unit's mutants, the fastest first."""
+        """Builds the programs that may kill a unit's mutants, and returns them, the fastest first."""
         kit = [Program(name, False) for name in generic_programs()]
         owners = list(folders) if unit == "author" else [unit]
         seeds = [f"{p.stem}_seeds" for owner in owners for p in sorted(folders[owner].rglob("*_fuzz.cpp"))]

@@ -261,7 +261,7 @@ class Spool(MqttCase):
         result = absenc("serve", ONE, "--history", "none", "--listen", "127.0.0.1:0", "--mqtt-spool", self.spool(),
                         env={**os.environ, "ABSENC_CONFIG": path})
         self.assertEqual(result.returncode, 1, result.stderr)
-        # The server ends only because this file is missing, so it accepted all other settings.
+        # The server ends only because the file mqtt-login is missing, so it accepted all other settings.
         self.assertIn("/etc/absenc/mqtt-login", result.stderr)
 
 

@@ -249,7 +249,7 @@ struct Can : testing::Test {
 
 TEST_F(Can, ArbitratesCyclicFramesByIdentifier) {
   CanToy high(cyclic(0x121, 0xB0));
-  // this frame begins at the same nanosecond, and wins the arbitration
+  // the frame of `low` begins at the same nanosecond as that of `high`, and wins the arbitration
   CanToy low(cyclic(0x120, 0xA0));
   CanToy host;
   host.send({frame(0x200, 0x01)});

@@ -50,7 +50,7 @@ class Speed(EncoderCase):
         return pairs
 
     def assert_all(self, busy):
-        """Tests each unit at all speeds at the same time, which also makes the machine busy."""
+        """Tests each unit in turn, at all speeds at the same time, which also makes the machine busy."""
         for protocol in serial_units():
             for options in OPTIONS.get(protocol, ("",)):
                 with Busy(busy), ThreadPoolExecutor() as pool:

@@ -24,7 +24,7 @@ class EveryUnit(Case):
             alarms = next((names for name, names in flags.items() if name.endswith("alarms")), [])
             for alarm in filter(None, alarms):
                 refused = absenc("read", f"sim:{about['protocol']}?alarm={alarm}")
-                # This error message means that a word of the unit cannot carry the alarm.
+                # An error "nothing in what ..." means that a word of the unit cannot carry the alarm.
                 if "nothing in what" not in refused.stderr:
                     yield about, alarm
 

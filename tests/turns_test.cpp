@@ -55,7 +55,7 @@ std::vector<Case> cases() {
     all.push_back(
         {.unit = find_unit(unit), .encoder_options = encoder_options, .host_options = host_options, .take = take});
   };
-  // Here the encoder's identity says that it counts no turns.
+  // The identity of these EncoLink encoders says that they count no turns.
   for (const std::string_view unit : {"encolink", "encolink-spi"})
     add(unit, {{"multiturn_bits", "0"}}, {}, Take::newest);
   for (const Take take : {Take::newest, Take::every}) {

@@ -25,7 +25,7 @@ enum class Content : std::uint8_t {
 struct Layout {
   Content content = Content::samples;
   std::vector<std::string> channels;   // names of the channels; for bytes and frames: of the directions or lines
-  std::uint64_t ticks_per_second = 0;  // rate of the ticks; 0: the file has no times
+  std::uint64_t ticks_per_second = 0;  // number of ticks per second; 0: not known
   std::uint64_t ticks = 0;  // length of the capture in ticks; 0: not known before the capture was read to its end
   // not 0: bytes have arrival times at a program, see Annotator::Settings::gap
   Tick arrival_gap = 0;
@@ -39,10 +39,10 @@ struct Changes {
 
 /// A character of an asynchronous line.
 struct Character {
-  Tick begin = 0;  // time of the falling edge of the start bit
-  Tick end = 0;    // time of the end of the stop bit, or of an earlier falling edge behind the stop bit's middle
+  Tick begin = 0;  // begin of the start bit, as far as known
+  Tick end = 0;    // end of the stop bit, as far as known, or an earlier falling edge behind the stop bit's middle
   std::uint8_t value = 0;
-  std::uint8_t channel = 0;  // index among the decoded channels, not among the file's channels
+  std::uint8_t channel = 0;  // index among the decoded lines, or in a file of bytes among its channels
   // Data bits above the eighth, until decode_async makes two characters of a byte each.
   std::uint8_t high = 0;
   bool bad_parity = false;
@@ -71,7 +71,7 @@ struct Burst {
 struct CanRecord {
   Tick at = 0;
   CanFrame frame{};
-  bool error_frame = false;  // the controller reported an error: `frame` holds the kernel's error class and data
+  bool error_frame = false;  // an error of the bus: `frame` holds class and data of the kernel's error frames
   std::uint8_t channel = 0;  // index into the layout's channels
 };
 
@@ -80,7 +80,7 @@ struct Damage {
   std::uint64_t offset = 0;  // bytes from the beginning of the file
   Tick tick = 0;             // tick up to which data was decoded before the damage
   std::string what;          // description of the problem as a sentence; "": none
-  bool note = false;         // true: no data is missing, but the user should know of the problem
+  bool note = false;         // true: a remark, e.g. that columns are left out; false: data is bad or missing
 };
 
 /// A part of a capture that is decoded on its own; its storage is used again.
@@ -94,7 +94,7 @@ struct Block {
   std::vector<Changes> changes;       // for captures of kind changes: one entry for each channel
   std::vector<Character> bytes;       // for captures of kind bytes: the characters
   std::vector<CanRecord> frames;      // for captures of kind frames: the CAN frames
-  std::uint64_t file_offset = 0;      // place of the block in the file, which only the reader uses, in `fill`
+  std::uint64_t file_offset = 0;      // number by which the reader finds the part in `fill`, such as an offset
   std::uint64_t file_size = 0;
 };
 

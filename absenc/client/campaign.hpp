@@ -44,8 +44,8 @@ struct CheckWorth {
   std::size_t frame_bits = 0;  ///< Length of a reply, in bits.
   unsigned distance = 0;       ///< Hamming distance of the code: fewer wrong covered bits are all detected; 0: over 8.
   double words = 0;            ///< Number of undetected error patterns of `distance` bits.
-  double unseen = 0;           ///< Rate of replies with damage only in covered bits and yet a correct checksum.
-  double taken = 0;            ///< Rate of damaged replies that the decoder accepts with a wrong position.
+  double unseen = 0;           ///< Share of all replies with damage only in covered bits and yet a correct checksum.
+  double taken = 0;            ///< Share of all replies that are damaged, yet accepted with a wrong position.
   double taken_deviation = 0;  ///< Standard deviation of `taken`, which is estimated from random samples.
 };
 
@@ -62,7 +62,7 @@ struct Guarded {
 /// not counted.
 struct CampaignResult {
   std::string protocol{};       ///< Identifier of the unit.
-  std::string model{};          ///< Name of the encoder's model; "" if the unit has none.
+  std::string model{};          ///< Name of the encoder's model; "": none.
   std::uint64_t readings = 0;   ///< Number of readings, failed ones included.
   std::uint64_t exchanges = 0;  ///< Number of requests, or of frames if the encoder sends unsolicited frames.
   std::uint64_t damaged = 0;    ///< Number of replies that a fault damaged.

@@ -55,7 +55,7 @@ class Decoded {
   [[nodiscard]] Iterator begin();
   /// Returns the end of the range, for comparison with an iterator.
   [[nodiscard]] static Iterator::End end() { return {}; }
-  /// Returns the present row, or null at the end of the range. The row is valid until `advance`.
+  /// Returns the present row; null before `begin` and at the end of the range. The row is valid until `advance`.
   [[nodiscard]] const Row* current() const { return row_; }
   /// Moves to the next row and waits until it is decoded, or moves to the end of the range.
   void advance();

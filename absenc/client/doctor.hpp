@@ -109,9 +109,9 @@ struct Finding {
 
 /// How many readings report alarms and validity.
 struct Reported {
-  std::size_t alarms = 0;  ///< Number of readings that report every alarm of the protocol.
+  std::size_t alarms = 0;  ///< Number of readings that report of every alarm whether it is raised.
   std::size_t valid = 0;   ///< Number of readings that report a valid position.
-  std::string missing{};   ///< Names of alarms that no reading reports, as "over_speed, over_heat".
+  std::string missing{};   ///< Names of alarms whose state no reading reports, as "over_speed, over_heat".
 };
 
 /// Times, rates and settings that were measured during the diagnosis.
@@ -126,7 +126,7 @@ struct Measured {
   std::string echo{};
   /// Latency of the connection; without a value: not known.
   std::optional<Time> latency{};
-  bool turned = false;  ///< Whether positions were also read while the user turned the shaft by hand.
+  bool turned = false;  ///< Whether positions were also read while the user was to turn the shaft by hand.
 };
 
 /// Result of `examine`: its findings, and the measurements behind them.

@@ -15,7 +15,7 @@ struct Estimate {
 
 /// Returns value and uncertainty as text, "12.0 ± 0.3"; `sign` is the text between the numbers.
 [[nodiscard]] std::string to_text(const Estimate& estimate, std::string_view sign = "±");
-/// Returns the value alone as text, "12.0", with as many digits as the uncertainty justifies.
+/// Returns the value alone as text, "12.0", with as many decimals as the uncertainty justifies, at most 4.
 [[nodiscard]] std::string value_text(const Estimate& estimate);
 
 }  // namespace absenc::client

@@ -26,12 +26,12 @@ struct FoundEncoder {
   std::string line{};         ///< Line of the encoder, as "RS-485 half duplex, 2.5 Mbit/s".
   std::size_t tried = 0;      ///< Number of exchanges that were checked.
   std::size_t explained = 0;  ///< Number of the checked exchanges that the encoder explains.
-  double log10_chance = 0;    ///< Decimal logarithm of the probability that random bytes are explained as often.
+  double log10_chance = 0;    ///< Decimal logarithm of the probability that chance gives so good an explanation.
   bool sure = false;          ///< Whether `log10_chance` is small enough to exclude chance.
   Answer identity{};          ///< Identity that the encoder on a line reports, such as its serial number.
 };
 
-/// Result of `identify`: the encoders that explain what the port or the capture contains.
+/// Result of `identify` and `identify_capture`: the encoders that explain the received or captured frames.
 struct Identified {
   std::vector<FoundEncoder> found{};  ///< Encoders, the most probable first.
   std::vector<std::string> notes{};   ///< Sentences about impossible attempts, damaged data and contradictions.

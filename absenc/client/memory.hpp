@@ -132,7 +132,7 @@ class MemoryChange {
   [[nodiscard]] const MemoryImage& written() const { return written_; }
   /// Returns the bytes that still have to be written, without the byte of `unknown`.
   [[nodiscard]] MemoryImage not_written() const;
-  /// Returns the state of the change; not_sent before the first write.
+  /// Returns the state of the last write, or `unknown` if `verify` found changed bytes; not_sent before both.
   [[nodiscard]] ChangeState state() const { return state_; }
   /// Returns the byte of which it is unknown whether it was written; empty if there is none.
   [[nodiscard]] MemoryImage unknown() const;

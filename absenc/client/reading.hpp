@@ -13,7 +13,7 @@ namespace absenc::client {
 
 /// States of the flags that one field of a reading reports.
 struct Flags {
-  const FieldInfo* field;  ///< Field that defines the names of the bits; null: the unit has no such field.
+  const FieldInfo* field;  ///< Field that defines the names of the bits; never null.
   std::uint32_t bits;      ///< Bits of the flags that are raised.
   /// Bits of the flags that were reported; the state of the other flags is unknown.
   std::uint32_t reported = ~std::uint32_t{0};

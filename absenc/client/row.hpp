@@ -19,7 +19,7 @@ enum class ColumnType : std::uint8_t { int64, uint64, real, boolean, flags, text
 
 /// Name, unit, type and meaning of a value that each row has.
 struct Column {
-  /// How people see the value in text and tables.
+  /// Number format in text and CSV, and which tables or lists leave the value out.
   struct Presentation {
     /// Format of a real number, as for std::format; "": the shortest text of the same number.
     std::string_view format{};
@@ -31,10 +31,10 @@ struct Column {
   };
 
   std::string_view name;        ///< Name of the column, in `snake_case`.
-  std::string_view unit;        ///< Unit of the value, as "deg"; "" for a plain number.
+  std::string_view unit;        ///< Unit of the value, as "deg"; "" if it has none.
   ColumnType type;              ///< Type of the values.
   std::string_view meaning;     ///< Meaning of the value, as a phrase.
-  Presentation presentation{};  ///< How people see the value.
+  Presentation presentation{};  ///< Number format, and where the value is left out.
 };
 
 /// Type of a value that is a sequence of bytes.
@@ -62,12 +62,12 @@ using Value = std::variant<std::monostate, std::int64_t, std::uint64_t, double, 
   return value.index() != 0 && !std::holds_alternative<Invalid>(value) && !std::holds_alternative<Unknown>(value);
 }
 
-/// Returns flags as a value, or `Unknown` if too few of them are reported.
+/// Returns the flags as a value; `Unknown` if none is raised and a required one was not reported.
 [[nodiscard]] Value value_of(const Flags& flags);
 /// Returns whether the validity is `valid`; no value if it is absent, `Unknown` if it is unknown.
 [[nodiscard]] Value value_of(Validity validity);
 
-/// Returns the value as text, as "12.5", "yes" or "1A 00"; "" if there is none.
+/// Returns the value as text, as "12.5", "yes" or "1A 00"; "" without a value or a raised flag.
 [[nodiscard]] std::string to_text(const Value& value);
 /// Returns the value of a column as text with its unit: "80 degC".
 [[nodiscard]] std::string to_text(const Column& column, const Value& value);

@@ -40,7 +40,7 @@ struct SettingChange {
   Answer now;           ///< Value of the setting that was read back; if the setting cannot be read, the written value.
   bool was_so = false;  ///< Whether no write was sent, because the encoder already had this value.
   ChangeState state = ChangeState::none;  ///< State of the change; not_sent if the encoder already had this value.
-  /// A sentence about a new address of the encoder; "": the address is unchanged.
+  /// Sentence about the option with which the encoder is reached from now on; "": unchanged.
   std::string note{};
 };
 

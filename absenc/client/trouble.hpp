@@ -32,8 +32,8 @@ struct Trouble {
 struct BadExchangeText {
   Error error = Error::none;  ///< Kind of the error.
   Time at{};                  ///< Time of the exchange, by the same clock as the times of readings.
-  std::string sent{};         ///< Bytes or frames that were sent, as text.
-  std::string received{};     ///< Bytes or frames that were received, as text; "": none were received.
+  std::string sent{};         ///< First bytes or frames that were sent, as text.
+  std::string received{};     ///< First bytes or frames that were received, as text; "": none were received.
 };
 
 /// Exception for a failed command or reading.

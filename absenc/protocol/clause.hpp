@@ -22,9 +22,9 @@ enum class Demand : std::uint8_t {
   checked,   ///< replies have a correct checksum
   as_drawn,  ///< fixed bits, echoes and ranges are as the document draws them, and redundant values are equal
   does,      ///< the command `command`, which makes checks of its own, ends without an error each time
-  // Demands about requests that a host of this encoder does not send
+  // Demands about requests that no host of this encoder sends; the conformance test sends them itself
   foreign_silent,  ///< the encoder does not answer a request to another address
-  reacts,          ///< the encoder reacts to the request `ask` as `reaction` states
+  reacts,          ///< the encoder reacts to the request `ask`, sent without repetition, as `reaction` states
   // Demands about changes of the encoder, which the test undoes
   byte_written,  ///< the byte or word at `page` and `address` can be written and read back
   byte_alone,    ///< writing the byte or word at `page` and `address` leaves the four below it unchanged
@@ -41,8 +41,8 @@ enum class Demand : std::uint8_t {
   /// `command` makes the encoder send as many unsolicited frames per second as its argument says.
   paced,
   // Demands about values that the test cannot restore
-  zero,  ///< the position, which was not 0 before, is 0 after the zero command
-  /// The command of `verb` resets the alarms in the mask `value`, and leaves the position.
+  zero,  ///< the position, which was not about 0 before, is about 0 after the zero command
+  /// The command of `verb` resets the alarms in the mask `value`, or the turns, and leaves the position.
   reset,
   restarts  ///< after `command` the encoder is silent; `value` ms later it reports the former position
 };
@@ -71,7 +71,7 @@ struct Ask {
   std::string_view command{};
   std::span<const std::int64_t> arguments{};  ///< Arguments of `command`; those left out have their defaults.
   bool wrong_end = false;                     ///< Whether the last byte has a wrong bit; not used with `wire`.
-  /// Writes the request into `request` and returns its length; null: another member gives it.
+  /// Writes the request into `request` and returns its length; null: `wire` or `command` gives the request.
   Result<std::size_t> (*make)(const Options& options, MutableBytes request) = nullptr;
   /// Bit rate of the request in 1/1000 of the line's rate; 0: the line's rate.
   std::uint32_t permille = 0;
@@ -116,7 +116,7 @@ enum class HostDemand : std::uint8_t {
   asks,           ///< the host sends only requests, from its first one on, and the encoder answers at least one
   after_silence,  ///< the host sends further requests after the encoder sent no reply
   after_damage,   ///< the host sends further requests after a damaged reply
-  after_refusal,  ///< the host sends further requests after the encoder refused a damaged one
+  after_refusal,  ///< the host sends further requests after one that reached the encoder damaged
   rule,           ///< the host never breaks `rule`
   /// The host keeps `rule`; requests during or soon after an injected fault do not count.
   row
@@ -124,8 +124,11 @@ enum class HostDemand : std::uint8_t {
 
 /// A request of a host that ignores replies, and how often it is sent.
 struct HostStep {
-  Time pause{};  ///< pause before the request, after the last sent character
-  /// Name of a command, or the bytes or CAN frame to send: "1a 1a", "220:8020".
+  /// Pause before the request, after the last sent character. It is longer than a reply takes,
+  /// unless the step is to send during the encoder's transmission.
+  Time pause{};
+  /// Name of a command, or the bytes or CAN frame to send: "1a 1a", "220:8020". They are sent
+  /// without a pause in between: a request of several frames is a step for each frame.
   std::string_view what{};
   std::span<const std::int64_t> arguments{};  ///< arguments; empty: required ones are 1, or their minimum if greater
   unsigned times = 1;                         ///< how often the request is sent, each time after `pause`
@@ -142,8 +145,10 @@ struct HostClause {
   /// Demands rule and row: name of the rule.
   std::string_view rule{};
   // Test hosts for this clause, if the hosts that the tests use for every clause do not break it.
-  std::array<HostScript, 2> breaks{};  ///< scripted hosts that break this clause, or it and "asks"; empty: none
-  HostScript keeps{};                  ///< requests like those of `breaks` that keep this clause; empty: none
+  /// Scripted hosts that break this clause, or it and "asks"; empty: none. Two rules that each
+  /// such host breaks together have one cause, and are one clause.
+  std::array<HostScript, 2> breaks{};
+  HostScript keeps{};  ///< requests like those of `breaks` that keep this clause; empty: none
   /// Options of the virtual encoder in tests of host clauses: "acquisition_us=20000".
   std::string_view options{};
 };

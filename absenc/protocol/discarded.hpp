@@ -24,7 +24,7 @@ class DiscardedFrames {
     begun_ = true;
     gap_ = 0;
   }
-  /// Returns the number of discarded frames so far.
+  /// Returns the estimated number of discarded frames so far.
   [[nodiscard]] constexpr std::uint64_t count() const {
     return before_ + (gap_ + (begun_ ? frame_bytes_ - 1 : 0)) / frame_bytes_;
   }

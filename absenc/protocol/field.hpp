@@ -14,8 +14,8 @@ namespace absenc {
 
 /// One bit of a status or alarm field.
 struct FlagInfo {
-  std::string_view name;     ///< name of the flag; "": the bit has no meaning
-  std::string_view meaning;  ///< what happened in the encoder if the bit is set, as a phrase
+  std::string_view name;     ///< name of the flag; "": the bit is no flag
+  std::string_view meaning;  ///< meaning of the set bit, as a phrase
   /// Action for the operator, with commands as "`absenc clear-alarms`"; "": none.
   std::string_view action;
   bool optional = false;  ///< true: some encoders that report the other flags never report this one
@@ -23,7 +23,7 @@ struct FlagInfo {
   std::uint32_t sums = 0;
 };
 
-/// Action of a status flag that only sums up alarms.
+/// Action or advice for an error whose cause the alarms name.
 inline constexpr std::string_view read_the_alarms = "`absenc alarms` names the cause";
 
 /// Description of a field, which is a named value in requests, replies or results.

@@ -28,7 +28,7 @@ enum Sharing : std::int64_t { sharing_automatic, sharing_yes, sharing_no };
 struct Option {
   std::string_view name;                        ///< Name of the option.
   std::string_view meaning;                     ///< Meaning of the option, with its unit.
-  std::int64_t default_value;                   ///< Value if the user does not set the option.
+  std::int64_t default_value;                   ///< Value if neither the user nor a model sets the option.
   std::int64_t minimum = 0;                     ///< Lowest value of a number, apart from the 0 of `or_zero`.
   std::int64_t maximum = 0;                     ///< Highest value, if the option is a number.
   std::span<const std::string_view> choices{};  ///< Words for the values from 0 on; empty: the option is a number.
@@ -64,7 +64,8 @@ inline constexpr std::string_view word_option_name = "word";
 /// The values of all options of a unit, by the index of the option.
 struct Options {
   std::array<std::int64_t, maximum_options> values{};  ///< Values in the order of the unit's options.
-  const Model* model = nullptr;  ///< model that the user named, or the first that no setting contradicts; null: none
+  /// Model that the user named, or the first that no setting contradicts; null: there is none, or `word` is set.
+  const Model* model = nullptr;
   WordFormat word{};  ///< word format, which replaces the options that describe a word; empty: those options apply
 
   /// Returns whether the user gave a word format.

@@ -19,8 +19,8 @@ enum class Role : std::uint8_t {
   life_counter,  ///< field: counts the frames, 0 to 63 and again from 0, by one for each frame
   // Roles on a line
   encoder,   ///< option, field: address of the encoder on the line; in a scan this field begins a new record
-  identity,  ///< field: identifies the encoder: its type, its serial number
-  clash,     ///< field of a scan: not 0: answers at this address are damaged, and none is valid
+  identity,  ///< field: identifies the encoder or its interface: type, serial number
+  clash,     ///< field of a scan: not 0: answers at this address are damaged, or from two encoders
   trouble,   ///< field of a scan: what is wrong with an answer that was complete
   rate,      ///< option: bit rate; its choices are bits per second
   // Roles of the options of a checksum at the end of a word, which `crc find` finds
@@ -29,17 +29,17 @@ enum class Role : std::uint8_t {
   check_init,        ///< option: start value of the checksum
   check_inverted,    ///< option: whether the checksum is sent inverted
   // Roles in memory, registers and settings
-  address,   ///< argument: address of the byte or register
+  address,   ///< argument: address of the byte, word or register
   page,      ///< argument: page of the byte, if the memory has pages
-  count,     ///< argument: number of bytes to read; commands without it read one byte, word or register
+  count,     ///< argument: how many bytes, words or registers to read; commands without it read one
   force,     ///< argument: 1 also writes a protected byte, or a value that the encoder has already
-  value,     ///< argument, field: the byte, or the content of a register, most significant byte first
+  value,     ///< argument, field: the byte or word, or a register's content, most significant byte first
   data,      ///< field: several bytes of memory, or the bytes of a register
   written,   ///< field: 0 if nothing was written, because the encoder has the value already
   exchange,  ///< field: a part of the request or of its encoding, which says nothing about the encoder's state
 };
 
-/// Returns whether a field of this role is a part of a reading.
+/// Returns whether a field of this role is the position, the turns, or valid only while the position is.
 [[nodiscard]] constexpr bool is_of_reading(Role role) {
   return role == Role::position || role == Role::turns || role == Role::of_position;
 }

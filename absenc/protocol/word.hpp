@@ -83,7 +83,7 @@ struct PlacedField {
   unsigned first;     ///< Index of the field's first bit in the word.
   Meaning meaning;    ///< Meaning of the field.
   unsigned bits;      ///< Number of bits of the field, 1 to 64.
-  bool active_low;    ///< Whether the field is sent inverted, so that 0 means that a flag is set.
+  bool active_low;    ///< whether the field is sent inverted: a flag is set when 0, parity is odd
 };
 
 /// A format for the functions of a position word, known at run time.
@@ -125,7 +125,7 @@ struct Known {
     static constexpr unsigned first = word.first_of(i);           ///< Index of the field's first bit in the word.
     static constexpr Meaning meaning = word.fields()[i].meaning;  ///< Meaning of the field.
     static constexpr unsigned bits = word.fields()[i].bits;       ///< Number of bits of the field, 1 to 64.
-    /// Whether the field is sent inverted, so that 0 means that a flag is set.
+    /// Whether the field is sent inverted: a flag is set when 0, parity is odd.
     static constexpr bool active_low = word.fields()[i].active_low;
   };
 
@@ -245,7 +245,7 @@ constexpr bool encode_word(const WordFormat& format, const Word& word, BitBuffer
   return true;
 }
 
-/// Puts the fields of the word into `sink`, in the order of the wire.
+/// Puts the values of the word into `sink`, in the order of the wire; none for skip and parity.
 constexpr void put_word(FieldSink& sink, const WordFormat& format, const Word& word, const Scale& scale) {
   for (std::size_t i = 0; i < format.fields().size(); ++i) {
     const WordField& field = format.fields()[i];

@@ -63,7 +63,7 @@ struct WordField {
   WordFieldName name{};             ///< name of the field: that of its meaning, unless the text gives another
   Meaning meaning = Meaning::skip;  ///< Meaning of the field.
   std::uint8_t bits = 0;            ///< number of bits, 1 to 64; error, warning and parity have 1
-  bool active_low = false;          ///< Whether the field is sent inverted, so that 0 means that a flag is set.
+  bool active_low = false;          ///< whether the field is sent inverted: a flag is set when 0, parity is odd
 };
 
 /// Error in the text of a word format; `reason` is empty if there is none.

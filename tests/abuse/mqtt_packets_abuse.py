@@ -19,7 +19,7 @@ CONVERSATIONS = often(150, 10_000)
 SERVERS = often(20, 60)  # number of processes `absenc serve`; each pauses for up to 5 s between two conversations
 NOBODYS = 60_000  # a packet number that no message has, because packet numbers count from 1 in each conversation
 KNOWN = [bytes.fromhex(one) for one in ("20050000027f00", "4006000100027f00", "e00487027f00", "30050001615859")]
-# Types of packets that a broker sends: 9 is SUBACK, 15 is AUTH.
+# Types of the bad packets that the broker sends; 9 is SUBACK, 15 is AUTH.
 KINDS = (CONNACK, PUBACK, 9, PUBLISH, DISCONNECT, PINGRESP, 15)
 
 
@@ -31,7 +31,7 @@ def properties(random_):
 
 
 def body(random_, kind, number):
-    """Returns a valid body of a packet that a broker may send."""
+    """Returns a body, valid or nearly so, of a packet that a broker may send."""
     if kind == CONNACK:
         return bytes((0, 0, 0))
     if kind in (PUBACK, 9):
@@ -86,7 +86,7 @@ def acknowledged(stream):
 class Conversation:
     def __init__(self, seed):
         self.random = random.Random(seed)
-        # With 0, the bad packet replaces the CONNACK or follows it.
+        # With 0 good packets, the bad packet replaces the CONNACK or follows it.
         self.good_packets = self.random.choice((0, 0, 0, 1, 2, 3, 5, 8))
         self.seen = 0
         self.ends = None
@@ -97,7 +97,7 @@ class Conversation:
         return [*sorted(self.received), NOBODYS]
 
     def truthful(self, data):
-        """Returns `data`. Raises Closed if it acknowledges a message that was not received."""
+        """Returns `data`. Raises Closed if `data` acknowledges a message, other than NOBODYS, that was not received."""
         found, self.rest = acknowledged(self.rest + data)
         if any(number != NOBODYS and number not in self.received for number in found):
             raise Closed

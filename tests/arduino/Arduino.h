@@ -30,7 +30,7 @@ inline int direction = -1;
 inline void pinMode(int, int) {}
 inline void digitalWrite(int, int value) { direction = value; }
 
-// Each call advances the clock by 10 us, so that a loop which only polls the clock ends.
+// Each call of micros advances the clock by 10 us, so that a loop which only polls the clock ends.
 inline std::uint32_t microseconds_passed = 0xFFFF'0000;
 inline std::uint32_t micros() { return microseconds_passed += 10; }
 

@@ -222,7 +222,7 @@ std::string description(const Subcommand& subcommand) {
                      subcommand.name, fmt::join(arguments, " "), fmt::join(options, " "), repeats);
 }
 
-// -g, because a function may source the script.
+// The arrays are declared with -g, because a function may source the script.
 template <class Names>
 std::string by_protocol(std::string_view name, std::span<const Unit* const> units, const Names& names) {
   std::string text = fmt::format("declare -gA _absenc_{}=(\n", name);

@@ -63,8 +63,8 @@ class Annotator {
     Carries carries = Carries::both;
     Run run;
     bool synchronised = false;    // false: a run that ends is reported as cut (not with arrival times)
-    bool at_frame_start = false;  // a frame is known to begin at the next character to parse
-    std::size_t last_size = 0;    // as `stream_size`, in this run only; 0 too after a reply with arrival times
+    bool at_frame_start = false;  // a frame is taken to begin at the next character to parse
+    std::size_t last_size = 0;    // like `stream_size`, but of this run; with arrival times a reply clears it
     std::size_t stream_size = 0;  // size of the last good unsolicited frame in any run; 0: none
   };
 
@@ -80,7 +80,7 @@ class Annotator {
   void close(Channel& channel, bool cut);
   void parse(Channel& channel, bool whole, bool cut);
 
-  // These functions parse the run from index `at_` on. A returned size is 0 if nothing matches.
+  // Parsing of the run from index `at_` on. A returned size is 0 if nothing matches.
   std::size_t next_frame();
   std::size_t whole_frame();
   std::size_t match_reply();
@@ -96,7 +96,7 @@ class Annotator {
   std::size_t take_bad();
   void report_bad(std::size_t size);
 
-  // Returns the index of a request into `reply_sizes_`: its first two bytes contain the command.
+  // Returns the index of a request in `reply_sizes_`: a hash of its first two bytes.
   [[nodiscard]] static std::size_t size_index(Bytes request) {
     return (request[0] + 31u * (request.size() > 1 ? request[1] : 0u)) % 256;
   }
@@ -115,16 +115,16 @@ class Annotator {
   Exchanges exchanges_;
   Options options_;
   std::array<Channel, 2> channels_{};
-  std::array<std::size_t, 256> reply_sizes_{};  // size of the last good reply, by the index of its request
+  std::array<std::size_t, 256> reply_sizes_{};  // usual size of a reply, by the index of its request; 0: not known
   std::vector<Character> undecided_;            // characters stored until the channels' directions are known
 
-  bool is_first_ = true;  // the next frame is the first, and its beginning may lie before the capture
+  bool is_first_ = true;  // no frame was parsed yet, and the capture may begin within a frame or exchange
 
   // State while a run is parsed.
   Channel* channel_ = nullptr;
   std::size_t at_ = 0;
   bool whole_ = true;  // no characters will be added to the run
-  bool cut_ = false;   // the capture ends with this run, perhaps within its last frame
+  bool cut_ = false;   // the capture ends before a pause behind this run, so perhaps within a frame
   std::size_t last_reply_at_ = 0;
   std::size_t last_reply_size_ = 0;  // size of the reply that begins at `last_reply_at_`; 0: none
 };

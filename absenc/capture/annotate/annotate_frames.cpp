@@ -8,7 +8,7 @@ namespace absenc::capture {
 
 // ---- Bursts
 
-// `with_last` appends the level of the data line behind the last clock.
+// Returns the word in a burst; `with_last` appends the level of the data line behind the last clock.
 Frame BurstAnnotator::word_of(const Burst& burst, bool with_last) {
   const bool rises = burst.low_before && judge_.unit().control_bit != nullptr;
   const std::size_t idle = judge_.unit().line.idle_clocks + (rises ? 1u : 0u);
@@ -41,7 +41,7 @@ void BurstAnnotator::put(const Burst& burst) {
   sink_.put(annotation);
 }
 
-// `answered` receives whether the encoder's control bit was sampled as 1.
+// Decodes a burst as a word; `answered` receives whether the encoder's control bit was sampled as 1.
 Error BurstAnnotator::decode_as(const Burst& burst, bool with_last, Frame& word, bool& answered) {
   word = word_of(burst, with_last);
   const std::optional<std::size_t> place = judge_.control_bit(word);

@@ -115,7 +115,7 @@ std::size_t Annotator::match_reply() {
   if (size == 0 || leaves_rest) {
     // Some replies equal their requests, and a reply may be sent twice: these are no echoes.
     const bool may_be_accident = size == 0 || size > pending.bytes().size();
-    // So late, bytes that equal the request are the request again, no echo.
+    // Bytes that equal the request and come late are the request again, no echo.
     const bool is_late = settings_.ticks.turnaround != 0 && begin > pending.end + 2 * settings_.ticks.turnaround;
     // A tap (arrival times) receives no echo: bytes that equal the request are a repeated request.
     const bool may_be_echo = !is_late && !settings_.by_arrival;
@@ -200,7 +200,7 @@ std::size_t Annotator::match_request() {
   return size;
 }
 
-// Returns whether the good request at `at_` is one: its bytes may also begin a reply.
+// Returns whether the host sent the bytes at `at_`, a good request: they may also begin a reply.
 bool Annotator::is_request(std::size_t size) {
   const Channel& channel = *channel_;
   const bool is_rest = whole_ && size == rest(at_).size();
@@ -232,7 +232,7 @@ bool Annotator::is_request(std::size_t size) {
 
 std::size_t Annotator::match_unsolicited() {
   const bool streams = judge_.streams();
-  // While a request is outstanding, a reply that does not match it is not taken as unsolicited.
+  // Unless the encoder streams, no frame behind an outstanding request is taken as unsolicited.
   if (!streams && request_before(channel_->run.begin(at_))) return 0;
   const std::size_t size = reply_at({}, at_, channel_->last_size);
   if (size == 0) return 0;

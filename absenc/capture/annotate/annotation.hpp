@@ -23,7 +23,7 @@ enum class Remark : std::uint8_t {
   repeated,      // the reply was sent a second time
   echo,          // the request's echo was received between the request and the reply
   late,          // the reply arrived after the time in which a host expects it
-  damaged,       // a character had a wrong parity or stop bit, or a CAN controller reported an error
+  damaged,       // a character had a wrong parity or stop bit, or the CAN bus had an error
   undocumented,  // no document states the reply to this request
   cut,           // the capture begins or ends here: the frame or its exchange may be incomplete
 };
@@ -51,7 +51,7 @@ struct Annotation {
   bool composed = false;      // the frame was composed of several exchanges that carried one byte of it each
   Tick begin = 0;
   Tick end = 0;
-  // The members below refer to data that is valid only during the call of AnnotationSink::put.
+  // `request`, `reply` and `contents` refer to data that is valid only during the call of AnnotationSink::put.
   Frame request{};
   Frame reply{};
   Contents contents{};               // decoded content of request and reply; empty for bad frames

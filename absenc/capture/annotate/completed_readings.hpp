@@ -14,8 +14,8 @@
 
 namespace absenc::capture {
 
-/// Passes annotations on to a sink, with good readings completed by alarms of earlier replies of the same encoder, if
-/// the unit has `remembered`. An unanswered request clears the stored alarms of all encoders.
+/// Completes good readings with the encoder's earlier alarms, by Unit::remembered if it is not null, and passes all
+/// annotations on. An unanswered request clears the stored alarms of all encoders.
 class CompletedReadings final : public AnnotationSink {
  public:
   /// `unit` and `sink` must outlive this object.
@@ -78,7 +78,8 @@ class CompletedReadings final : public AnnotationSink {
   const Unit* unit_;
   AnnotationSink* sink_;
   std::vector<std::vector<std::uint8_t>> clearing_;  // requests that clear alarms or reset the turns
-  std::map<std::int64_t, Reading> last_;             // last completed reading of each encoder, by the encoder's address
+  // Last completed reading of each encoder, or only its alarms, by the encoder's address.
+  std::map<std::int64_t, Reading> last_;
 };
 
 }  // namespace absenc::capture

@@ -29,7 +29,7 @@ constexpr auto battery_before_clearing = hex<"041201000090">;
 
 class CompletedReadingsByAlarms : public ::testing::Test, private AnnotationSink {
  protected:
-  // Returns the reading of a good exchange as it is completed; nothing if it has none.
+  // Returns the completed reading of a good exchange; nothing if the exchange has none.
   std::optional<Reading> after(Bytes request, Bytes reply) {
     Judge judge(unit_, options_);
     EXPECT_EQ(judge.decode({.bytes = request}, {.bytes = reply}), Error::none);

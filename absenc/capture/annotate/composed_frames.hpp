@@ -12,7 +12,7 @@
 
 namespace absenc::capture {
 
-/// Passes annotations on to a sink, and inserts annotations of the frames that they compose.
+/// Passes annotations on to a sink, and inserts annotations of the frames that several exchanges compose.
 class ComposedFrames final : public AnnotationSink {
  public:
   /// `unit` and `sink` must outlive this object.

@@ -29,7 +29,7 @@ inline Options options_of(const Unit& unit, const std::vector<OptionText>& setti
 /// Returns the line settings of `unit`, with a default rate if the unit's document states none.
 inline LineSettings line_of(const Unit& unit) { return unit.line.with_some_rate(); }
 
-/// Bytes that host or encoder sent together; times in ticks.
+/// Bytes that the host or the encoder sent as one message; times in ticks.
 struct Transmission {
   sim::NodeRole by;
   std::vector<std::uint8_t> bytes;
@@ -117,7 +117,7 @@ class Talker {
       for (const Transmission& one : record_.transmissions)
         record_.collided = record_.collided || (one.by != by && one.end > begin);
     }
-    // The frames of one request have pauses between them.
+    // The frames of one request may have pauses between them.
     const Tick pause = by == sim::NodeRole::host ? static_cast<Tick>(unit_.timing.frame_pause.count()) : 0;
     const bool is_newest = last == record_.transmissions.rbegin();
     const bool goes_on =

@@ -17,8 +17,8 @@ namespace absenc::capture {
 struct LineTicks {
   static constexpr Tick never = UINT64_MAX / 4;  // a time that is never reached; sums with it do not overflow
 
-  Tick pause = 1;        // a silence of this length ends a frame
-  Tick frame_pause = 0;  // a shorter silence does not end a run that does not end with a request; 0: it does
+  Tick pause = 1;        // a shorter silence ends no run of characters
+  Tick frame_pause = 0;  // a shorter silence ends a run only behind a complete request; 0: unused
   Tick character = 1;    // duration of a character; a silence within a character is shorter
   Tick turnaround = 0;   // turnaround time that the unit's document states; 0: not known
   Tick limit = never;    // longest time from request to reply, after which no host expects the reply

@@ -145,7 +145,7 @@ TEST_P(WholeWay, EqualsDirectAnnotation) {
   talker.draw(waveform);
   std::vector<Character> all;
   const unsigned least = test_cases(300);
-  // Some units send no bytes in some conversations, so they need more conversations.
+  // Some conversations have few or no characters, so more of them are run.
   for (unsigned i = 0; i < least || (expected.lines.empty() && all.size() < 1200); ++i) {
     const TalkRecord talk = talker.talk();
     ASSERT_FALSE(talk.collided);

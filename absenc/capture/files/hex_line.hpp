@@ -22,7 +22,7 @@ struct HexLine {
   int channel = -1;  // direction of the bytes: 0 tx, 1 rx, -1 not stated
   std::optional<std::uint64_t> offset;
   std::vector<std::uint8_t> bytes;
-  std::string source;   // name of the port in a terminal log; "": none
+  std::string source;   // source that a log line names, such as a port; "": none
   std::string problem;  // reason why the line is invalid, as words; "" if no reason is known
 };
 

@@ -14,8 +14,8 @@ namespace absenc::capture {
 
 /// Properties of a capture that the user states, because the file may not contain them.
 struct OpenChoices {
-  unsigned channels = 0;                 // raw samples: 1 to 64, required; other files: 0, or the number in the file
-  std::uint64_t samples_per_second = 0;  // raw samples: required; other files: used if the file has no rate
+  unsigned channels = 0;                 // raw samples: 1 to 64, required; other levels: 0 or their number; else: 0
+  std::uint64_t samples_per_second = 0;  // raw samples: required; others: used where samples lack a rate
 };
 
 /// Opens a session of sigrok (sigrok.hpp), a value change dump (vcd.hpp), CSV of logic analysers (logic_csv.hpp),

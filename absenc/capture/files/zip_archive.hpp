@@ -32,7 +32,7 @@ class ZipArchive {
   /// Returns the names of all entries, in the order of the archive.
   [[nodiscard]] std::vector<std::string> names() const;
 
-  /// Returns whether it expanded the entry into `into`; works only for intact deflated entries.
+  /// Expands an intact deflated entry into `into`; returns false if that fails, as for other entries.
   [[nodiscard]] bool expand(const Entry& entry, std::span<std::uint8_t> into);
 
   /// Begins to read an entry instead of the previous one; returns false on error, see `problem`.

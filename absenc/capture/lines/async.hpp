@@ -18,7 +18,7 @@ struct AsyncFormat {
   bool idle_high = true;
   Parity parity = Parity::none;
   unsigned stop_bits = 1;  // number of stop bits, 1 or 2; only the first is checked, as in a receiver
-  Tick glitch = 0;         // a level shorter than this is noise; 0: no filter
+  Tick glitch = 0;         // a level shorter than this is noise, in ticks; 0: no filter
   unsigned data_bits = 8;  // 5 to 16
 };
 

@@ -39,7 +39,7 @@ class CanDecoder {
 
   double bit_;
   bool level_ = true;
-  Tick level_since_ = 0;  // time of the last level change, in ticks
+  Tick level_since_ = 0;  // begin of the present level, as far as known, in ticks
   Tick end_ = 0;
   std::size_t bits_taken_ = 0;  // number of bits at the present level that were handled already
 

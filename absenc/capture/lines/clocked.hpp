@@ -102,7 +102,7 @@ class ClockedDecoder {
   Tick last_ = 0;  // time of the last clock change, or the beginning of the capture, in ticks
   bool seen_pause_ = false;
   bool open_ = false;
-  bool lone_ = false;     // the clock has changed at most once in the present burst
+  bool lone_ = false;     // without chip select: the clock has changed at most once in the present burst
   bool fell_ = false;     // since the last word a single clock change was followed by a rest low
   bool changed_ = false;  // the data line has changed during the present rest of the clock
   Burst burst_;

@@ -19,10 +19,10 @@ namespace absenc::capture {
   return (block.samples[index * block.bytes_per_sample + channel / 8] >> channel % 8 & 1) != 0;
 }
 
-/// Sets `changes[i].at` for `channels[i]`; `changes[i].before` must be the level before it.
+/// Sets `changes[i].at` for `channels[i]`; `changes[i].before` must be the level before the block.
 void find_changes(const Block& block, std::span<const unsigned> channels, std::span<Changes> changes);
 
-/// Returns the level after the last change; without changes the level before them.
+/// Returns the level after the last change, or `changes.before` if there is none.
 [[nodiscard]] inline bool level_after(const Changes& changes) { return changes.before != (changes.at.size() % 2 != 0); }
 
 /// Appends the changes of `next`, a part that begins at `first`, where the level may change.

@@ -67,7 +67,7 @@ struct ClockedLine {
 
 struct ClockedOutcome {
   std::string problem;  // reason why nothing could be decoded, as a sentence; "": none
-  Tick pause = 0;       // limit above which a rest of the clock ended a word, in ticks
+  Tick pause = 0;       // without chip select: limit above which a rest of the clock ended a word, in ticks
 };
 
 ClockedOutcome decode_clocked(Reader& reader, const ClockedLine& line, unsigned threads, const PartSink& sink);

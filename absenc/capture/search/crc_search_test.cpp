@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the search for checksums, with frames whose CRC `crc_bitwise` of core computes.
+// Tests the search for checksums, mostly with frames whose CRC `crc_bitwise` of core computes.
 #include "absenc/capture/search/crc_search.hpp"
 
 #include <gtest/gtest.h>

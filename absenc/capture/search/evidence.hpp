@@ -52,8 +52,8 @@ inline constexpr double frames_suffice = -2;
 /// Usual limit for the number of random replies tried for a frame.
 inline constexpr unsigned usual_attempts = 1u << 14;
 
-/// Returns the probability that the unit accepts a random reply like `good.reply`, at least 1 / `attempts`. Bytes at
-/// its beginning that repeat the request are not random.
+/// Estimates the probability that the unit accepts a random reply like `good.reply`, at least 1 / `attempts`. Bytes at
+/// the beginning of the reply that repeat the request are not random.
 [[nodiscard]] double acceptance(const Unit& unit, const Options& options, const ObservedExchange& good,
                                 unsigned attempts = usual_attempts);
 

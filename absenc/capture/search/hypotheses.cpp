@@ -56,7 +56,7 @@ class HypothesisSearch {
   HypothesisSearch(const Unit& unit, std::span<const ObservedExchange> exchanges)
       : unit_(unit), exchanges_(exchanges) {}
 
-  /// Adds a hypothesis unless it explains nothing, less than others, or the same as one of them.
+  /// Adds a hypothesis unless it explains nothing or less than others, or decodes the same as one of them.
   void add(const Options& options, bool at_least = false) {
     if (contains(best_, options)) return;
     ++tried_;

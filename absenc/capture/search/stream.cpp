@@ -23,7 +23,7 @@ std::size_t reply_size(const Unit& unit, const Options& options, Bytes bytes) {
   return explains(unit, options, reply) ? end.size : 0;
 }
 
-// Returns the probability that random bytes contain a good reply at a given position.
+// Estimates the probability that random bytes contain a good reply at a given position.
 double acceptance_of_noise(const Unit& unit, const Options& options) {
   std::mt19937_64 random(1);
   std::vector<std::uint8_t> noise(noise_size);

@@ -33,7 +33,7 @@ struct Estimated {
 /// the most significant bit.
 class CheckCode {
  public:
-  /// Derives the code from the decoder; returns nothing if the checksum is no such code. `replies` must not be empty.
+  /// Derives the code from the decoder; returns nothing if that fails. `replies` must not be empty.
   [[nodiscard]] static std::optional<CheckCode> learn(const Unit& unit, const Options& options,
                                                       std::span<const GoodReply> replies);
 
@@ -45,7 +45,7 @@ class CheckCode {
   [[nodiscard]] std::vector<double> weights(unsigned most) const;
   /// Returns the chance that bit errors damage only covered bits, but leave the checksum right.
   [[nodiscard]] double unseen(double bit_errors) const;
-  /// Estimates the probability that the decoder accepts a damaged reply with another position.
+  /// Estimates the share of all replies that are damaged, yet accepted with another position.
   [[nodiscard]] Estimated taken(const Unit& unit, const Options& options, std::span<const GoodReply> replies,
                                 double bit_errors, unsigned samples) const;
 

@@ -10,7 +10,7 @@ namespace absenc::client {
 
 namespace {
 
-// Wait that is longer than the busy time of a byte write with its reply.
+// Wait before a byte is read back whose write was not answered.
 constexpr Time settling = std::chrono::milliseconds(50);
 
 }  // namespace
@@ -80,7 +80,7 @@ void MemoryChange::settle() {
     if (!there) return;
     written_[at] = value;
     left_.erase(at);
-  } catch (const std::exception&) {  // no reply came, or the wait was cancelled: the state of the byte remains unknown
+  } catch (const std::exception&) {  // the byte could not be read: its state remains unknown
   }
 }
 

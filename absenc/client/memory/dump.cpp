@@ -36,7 +36,7 @@ class Checksum {
 
 std::string_view model_name(const Options& options) { return options.model != nullptr ? options.model->name : "none"; }
 
-// These lines must match the encoder.
+// Returns the lines of a dump that must match the encoder.
 std::vector<std::string> header(const Unit& unit, const Options& options) {
   std::vector<std::string> lines{fmt::format("protocol: {}", unit.id), fmt::format("model: {}", model_name(options))};
   if (options.model != nullptr) return lines;
@@ -166,7 +166,7 @@ class DumpParser {
   MemoryAccess access_;
   Checksum sum_;
   Dump dump_;
-  std::map<MemoryAddress, std::size_t> given_in_;  // for each address, the number of the line that gave its byte
+  std::map<MemoryAddress, std::size_t> given_in_;  // for each address, the number of the line that gave its content
 };
 
 }  // namespace

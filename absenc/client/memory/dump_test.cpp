@@ -113,7 +113,7 @@ TEST(DumpFile, ChecksumCountsOnlyWhatCounts) {
 }
 
 TEST(DumpFile, ChecksumIsTheDocumentedOne) {
-  // The checksum is the CRC-16/IBM-3740 of these four lines, computed with another program.
+  // DDEB is the CRC-16/IBM-3740 of the four lines of `small`, computed with another program.
   const std::string text = to_dump(unit, options_of("TS5700N8500"), {{{0, 5}, 0x5A}, {{0, 6}, 0x5B}});
   EXPECT_TRUE(text.starts_with(small)) << text;
   EXPECT_TRUE(text.ends_with("checksum: DDEB\n")) << text;

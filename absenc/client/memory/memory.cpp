@@ -15,13 +15,13 @@ namespace absenc::client {
 
 namespace {
 
-/// Collects the bytes that a command with Verb::memory_read reports.
+/// Collects the bytes, or the value, that a command with Verb::memory_read reports.
 struct ReadBytes final : FieldSink {
   void put(const FieldValue& field) override {
     if (field.info->role == Role::data) data.assign(field.bytes.begin(), field.bytes.end());
     if (field.info->role == Role::value) value = static_cast<std::uint32_t>(field.number);
   }
-  // Returns words of `size` bytes, with the low byte first.
+  // Returns the words of `size` bytes in the data, low byte first; without data, the value.
   [[nodiscard]] std::vector<std::uint32_t> words(std::size_t size) const {
     if (data.empty() && value) return {*value};
     std::vector<std::uint32_t> all;
@@ -34,7 +34,7 @@ struct ReadBytes final : FieldSink {
   std::optional<std::uint32_t> value{};
 };
 
-// Returns how many bytes from `at` on a single request can read.
+// Returns how many addresses from `at` on a single request can read.
 std::size_t most_at_once(const Unit& unit, const Command& command, MemoryAddress at) {
   const Argument* count = find_role(command.arguments, Role::count);
   const auto most = count != nullptr ? static_cast<std::size_t>(count->maximum) : 1;

@@ -12,7 +12,7 @@ namespace absenc::client {
 namespace {
 
 struct DriverFile {
-  H5FD_t common;  // first member: the HDF5 library casts a pointer to `common` to a pointer to the whole struct
+  H5FD_t common;  // first member, so that a pointer to it can be cast to a pointer to the struct
   Hdf5Store* store;
 };
 
@@ -74,7 +74,7 @@ const H5FD_class_t& driver_class() {
     made.get_eof = allocated;
     made.read = read;
     made.write = write;
-    // The driver allocates each type of block separately.
+    // Metadata and raw data have separate lists of free space.
     const H5FD_mem_t types[] = H5FD_FLMAP_DICHOTOMY;
     std::copy(std::begin(types), std::end(types), std::begin(made.fl_map));
     return made;
@@ -94,7 +94,7 @@ void Hdf5Store::attach(hid_t access) {
 }
 
 void Hdf5Store::write(H5FD_mem_t type, std::uint64_t at, Bytes bytes) {
-  // The HDF5 library writes whole objects, so overlapping blocks lie inside each other.
+  // The HDF5 library writes whole objects, so of two overlapping blocks one should contain the other.
   auto next = blocks_.upper_bound(at);
   if (next != blocks_.begin()) {
     auto& [begin, block] = *std::prev(next);
@@ -122,7 +122,7 @@ void Hdf5Store::read(std::uint64_t at, MutableBytes bytes) {
   }
 }
 
-// The lowest rank is written first.
+// Returns the place of a block in the order of rewriting: the lowest rank is written first.
 int Hdf5Store::rank(const StoredBlock& block) {
   constexpr int last = 1000;
   switch (block.type) {

@@ -25,7 +25,7 @@ class Hdf5Store {
   /// Sets this store, which must outlive the file, as the driver.
   void attach(hid_t access);
 
-  /// Throws the exceptions of `disk`.
+  /// Writes the stored blocks to the disk. Throws the exceptions of `disk`.
   void commit();
 
   // Functions for the HDF5 driver:

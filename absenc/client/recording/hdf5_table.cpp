@@ -17,7 +17,7 @@ constexpr hsize_t rows_of_a_chunk = 1024;
 constexpr hsize_t page = 4096;
 constexpr std::size_t text_bytes = 48;  // length of text columns in bytes, which is longer than the name of any error
 
-// Lock for all calls of the HDF5 library, because Debian's is not thread-safe.
+// Lock for all calls of the HDF5 library, which may be built without thread safety.
 std::mutex& library() {
   static std::mutex mutex;
   return mutex;

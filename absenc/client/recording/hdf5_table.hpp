@@ -39,15 +39,15 @@ constexpr std::uint64_t hdf5_not_ended = UINT64_MAX;
 
 class Hdf5Table {
  public:
-  /// Throws Failure and the exceptions of `disk`.
+  /// Writes an empty table with these attributes. Throws Failure and the exceptions of `disk`.
   Hdf5Table(Hdf5Store::Disk disk, std::span<const Column> columns, const Hdf5Attributes& attributes);
   ~Hdf5Table();
   Hdf5Table(const Hdf5Table&) = delete;
   Hdf5Table& operator=(const Hdf5Table&) = delete;
 
-  /// Throws Failure and the exceptions of `disk`.
+  /// Appends the rows to the file. Throws Failure and the exceptions of `disk`.
   void commit(const Hdf5Rows& rows);
-  /// Throws Failure and the exceptions of `disk`.
+  /// Stores the number of rows in the attribute `rows`. Throws Failure and the exceptions of `disk`.
   void finish();
 
  private:

@@ -60,7 +60,7 @@ Hdf5Rows rows_from(std::int64_t first, std::int64_t count) {
   return rows;
 }
 
-/// Returns -1 if the dataset has wrong values.
+/// Returns the number of rows; -1 if the dataset cannot be read or has wrong values.
 template <class T>
 std::int64_t whole_rows(const fs::path& path, const char* name, hid_t type, T (*expected)(std::int64_t)) {
   const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);

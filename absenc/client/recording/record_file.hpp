@@ -26,12 +26,12 @@ struct RecordHeader {
   std::uint64_t part = 1;
 };
 
-/// Functions that write, and `require_there`, throw os::Failure, Failure.
+/// One file of a recording. Functions that write, and `require_there`, throw os::Failure, Failure.
 class RecordFile {
  public:
   virtual ~RecordFile() = default;
 
-  /// Adds `counts` to the counts of the file.
+  /// Appends a row, and adds `counts` to the counts of the file.
   virtual void append(const Row& row, const RecordCounts& counts) = 0;
   /// Waits until all appended rows are in the file and on the disk.
   virtual void sync() = 0;

@@ -41,6 +41,13 @@ TEST(ClientRecording, HasALineForEachReading) {
   EXPECT_EQ(lines.back(), "# end: 20 rows");
 }
 
+TEST(ClientRecording, RefusesToWriteEveryZerothReading) {
+  Encoder encoder = open("sim:tformat");
+  const RecordingSettings settings{.path = own_path("record") + ".csv", .encoder = "motor", .every = 0};
+  EXPECT_THROW(Recording(settings, encoder), UsageError);
+  EXPECT_FALSE(std::filesystem::exists(settings.path));
+}
+
 TEST(ClientRecording, EndsByCancelWhileItWaits) {
   Encoder encoder = open("sim:tformat");
   Recording recording({.path = own_path("record") + ".jsonl", .encoder = "motor", .rate_hz = 1e-3}, encoder);

@@ -43,13 +43,13 @@ class Json {
   Json& operator=(Json other) noexcept;
   ~Json();
 
-  /// Members keep the order in which they were first set.
+  /// Sets a member of an object; members keep the order in which they were first set.
   Json& set(std::string_view name, Json value);
   Json& append(Json value);
   [[nodiscard]] bool empty() const;
   [[nodiscard]] bool is_text() const;
 
-  /// Bytes that are not UTF-8 become U+FFFD.
+  /// Returns the value as one line of JSON; bytes that are not UTF-8 become U+FFFD.
   [[nodiscard]] std::string line() const;
 
  private:

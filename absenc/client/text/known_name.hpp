@@ -21,7 +21,7 @@ struct KnownName {
   [[nodiscard]] std::string sentence() const;
 };
 
-/// Compares letters and digits alone, in any case.
+/// Finds a name by its letters and digits, in any case; nothing: there is none, or `word` is a protocol.
 [[nodiscard]] std::optional<KnownName> find_known_name(std::string_view word);
 
 }  // namespace absenc::client

@@ -1,21 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absenc/client/text/real_number.hpp"
 
-#include <cctype>
-#include <cerrno>
+#include <charconv>
 #include <cmath>
-#include <cstdlib>
-#include <string>
 
 namespace absenc::client {
 
+// std::strtod would take the decimal point from the program's locale.
 std::optional<double> parse_real(std::string_view text) {
-  const std::string copy(text);
-  if (copy.empty() || std::isspace(static_cast<unsigned char>(copy.front())) != 0) return std::nullopt;
-  char* end = nullptr;
-  errno = 0;
-  const double value = std::strtod(copy.c_str(), &end);
-  const bool is_number = end == copy.c_str() + copy.size() && std::isfinite(value) && errno != ERANGE;
+  if (text.starts_with("+-")) return std::nullopt;
+  if (text.starts_with('+')) text.remove_prefix(1);
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool is_number = error == std::errc{} && end == text.data() + text.size() && std::isfinite(value);
   return is_number ? std::optional(value) : std::nullopt;
 }
 

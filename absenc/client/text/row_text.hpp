@@ -23,7 +23,7 @@ void append_csv(std::string& text, const Row& row);
 /// Returns the names of the flags in `bits` as a JSON array: ["over_heat","battery_alarm"].
 [[nodiscard]] Json flags_to_json(const FieldInfo& field, std::uint64_t bits);
 [[nodiscard]] Json to_json(const Value& value);
-/// Leaves out missing values; invalid and unknown ones are null.
+/// Returns the row as a JSON object without missing values; invalid and unknown ones are null.
 [[nodiscard]] Json to_json(const Row& row);
 
 /// Returns the value of an option as JSON: a number, the name of a choice, or a boolean.

@@ -12,10 +12,10 @@ namespace absenc::client {
 inline constexpr std::string_view memory_file_title = "absenc memory 1";  // memory of a virtual encoder
 inline constexpr std::string_view dump_title = "absenc dump 1";           // dump: copy of the memory of an encoder
 
-/// Returns the content; `what` names the file in errors. Throws Failure.
+/// Returns the content, about 16 MiB at most; `what` says in errors what the file is. Throws Failure.
 [[nodiscard]] std::string read_text_file(std::string_view what, const std::string& path);
 
-/// Follows up to 40 symbolic links.
+/// Returns the absolute path to which `path` leads through up to 40 symbolic links.
 [[nodiscard]] std::string link_target(const std::string& path);
 
 /// Throws Failure if the path is known not to be writable.

@@ -26,13 +26,13 @@ namespace absenc::client {
 /// Returns the options of a model, changed by settings "name=value". Throws UsageError.
 [[nodiscard]] Options require_options(const Unit& unit, std::string_view model, std::span<const std::string> settings);
 
-/// Throws UsageError.
+/// Parses the arguments of a command, and adds defaults for missing ones. Throws UsageError.
 [[nodiscard]] std::vector<std::int64_t> require_arguments(const Command& command, std::span<const std::string> written);
 
-/// Throws UsageError.
+/// Returns the given arguments, and defaults for missing ones. Throws UsageError.
 [[nodiscard]] std::vector<std::int64_t> complete_arguments(const Command& command, std::span<const std::int64_t> given);
 
-/// Returns `options` after a command that changes one of them.
+/// Returns `options` as they are after a command that sets one of them to `value`.
 [[nodiscard]] Options options_behind(const Unit& unit, const Options& options, const Command& setter,
                                      std::int64_t value);
 
@@ -40,7 +40,7 @@ struct RoleArgument {
   Role role;
   std::int64_t value;
 };
-/// Returns values by role, or else by default.
+/// Returns the command's arguments: for each the value of its role, or else its default.
 [[nodiscard]] std::vector<std::int64_t> role_arguments(const Command& command,
                                                        std::initializer_list<RoleArgument> values);
 
@@ -51,7 +51,7 @@ struct RoleArgument {
 [[nodiscard]] std::uint32_t require_alarms(const Unit& unit, std::span<const std::string> names);
 /// Returns the names of the alarms that an encoder with these options can report.
 [[nodiscard]] std::vector<std::string> reportable_alarms(const Unit& unit, const Options& options);
-/// Throws UsageError also for an alarm that cannot be reported.
+/// Returns the bits of the alarms with these names. Throws UsageError also if one cannot be reported.
 [[nodiscard]] std::uint32_t require_alarms(const Unit& unit, const Options& options,
                                            std::span<const std::string> names);
 
@@ -59,7 +59,7 @@ struct RoleArgument {
 [[nodiscard]] const Condition* find_condition(const Unit& unit, std::string_view name);
 /// Returns the unit's condition of this name. Throws UsageError if there is none.
 [[nodiscard]] const Condition& require_condition(const Unit& unit, std::string_view name);
-/// Throws UsageError.
+/// Parses a value of a condition, which must be in its range. Throws UsageError.
 [[nodiscard]] std::int64_t require_value(const Condition& condition, std::string_view written);
 /// Returns the range of a condition as text: "-20 to 127 degC".
 [[nodiscard]] std::string range_of(const Condition& condition);
@@ -80,12 +80,12 @@ struct RoleArgument {
 
 /// Returns the description of a position word as text: "multiturn:12 position:24 gray".
 [[nodiscard]] std::string to_text(const WordFormat& word);
-/// Returns settings "name=value"; a position word replaces some.
+/// Returns the options as settings "name=value"; a position word replaces some.
 [[nodiscard]] std::vector<std::string> option_texts(const Unit& unit, const Options& options);
 
 /// Returns the flags of the field that have a name and are set in `bits`.
 [[nodiscard]] std::vector<const FlagInfo*> raised(const FieldInfo& field, std::uint64_t bits);
-/// Leaves out, with `beside_alarms`, the advice on a sum of alarms.
+/// Returns the advice on a flag; "" with `beside_alarms` if the flag is a sum of others.
 [[nodiscard]] std::string_view action_of(const FlagInfo& flag, bool beside_alarms);
 [[nodiscard]] std::vector<std::string_view> flag_names(const FieldInfo& field, std::uint64_t bits);
 [[nodiscard]] std::string to_text(const FieldValue& value);
@@ -108,7 +108,7 @@ struct RoleArgument {
 /// Returns the name of a role, as "identity"; "" for `other`.
 [[nodiscard]] std::string_view name_of(Role role);
 
-/// Returns `valid` for other fields than position and turns.
+/// Returns the validity of a field in a reading; `valid` for fields other than position and turns.
 [[nodiscard]] Validity validity_of(const FieldInfo& field, const Reading& reading);
 [[nodiscard]] bool holds(const FieldInfo& field, const Reading& reading);
 /// Returns for example "unknown (74565 counts)" or "INVALID (74565 counts)".

@@ -28,7 +28,7 @@ struct Format {
   std::uint8_t multiturn_bits = 0;    ///< Number of bits of the turns: 14, or 0 for a single-turn encoder.
   std::uint8_t address = 0x54;        ///< Address of the encoder, a multiple of 4.
   std::uint8_t rate = 0;              ///< Index of the baud rate in `rates`.
-  bool drops_low_bits = false;        ///< Whether the host drops the two low bits of a 14-bit encoder.
+  bool drops_low_bits = false;        ///< With 12 bits: whether low bits that are not 0 are dropped, not refused.
 
   /// Returns the line settings with the baud rate of the format.
   [[nodiscard]] constexpr LineSettings line() const { return {.rate = rates[rate]}; }

@@ -31,7 +31,7 @@ inline constexpr std::uint16_t most_registers = 125;
 /// Bit of the function code that marks a refusal; functions of the standard are below it.
 inline constexpr std::uint8_t refusal_bit = 0x80;
 
-/// Byte order of a received CRC; `wrong`: the CRC does not match.
+/// Byte order of a CRC in a frame; `wrong`: the CRC matches in neither order.
 enum class CrcOrder : std::uint8_t { low_first, high_first, wrong };
 
 /// Returns the byte order in which the last two bytes of a frame are its CRC, or `wrong`.

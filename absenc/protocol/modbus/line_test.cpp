@@ -19,7 +19,7 @@ using Wire = std::vector<std::uint8_t>;
 constexpr LineSettings line_settings{.rate = 19'200};
 const Time character = line_settings.character();
 
-/// A server at address 7. It refuses function 04, and function 41 changes its rate.
+/// A server at address 7. It refuses function 0x04, and function 0x41 changes its rate.
 class ToyServer final : public Server {
  public:
   ToyServer() : Server(line_settings) {}

@@ -7,7 +7,7 @@ namespace {
 
 // Time between the silence that ends a request and the reply; the standard states none.
 constexpr Time answer_time = 200us;
-// Delay after which a request counts as late: the client may have timed out.
+// Delay of the report of a silence after which the request counts as late: the client may have timed out.
 constexpr Time late = 20ms;
 constexpr std::string_view turn_rule = "something was sent during the encoder's transmission";
 
@@ -70,12 +70,12 @@ void Server::feed(const ByteEvent& event) {
 
 void Server::receive(const ByteEvent& event) {
   if (transmitting_) {
-    // Whatever is received during one transmission breaks the rule once, not once for each byte.
+    // Bytes received during one transmission break the rule at most once, not once for each byte.
     if (!expects_collision_ && !interrupted_ && !ended_late_) expect(false, turn_rule, event.at);
     interrupted_ = true;
     return;
   }
-  // A pseudo-terminal delivers whole frames at once, so their duration is unknown.
+  // A pseudo-terminal may deliver several bytes at once, so when the first one began is unknown.
   const Time begun = event.items.size() == 1 ? event.at - line_.character() : event.at;
   const Time idle = begun - quiet_since_;
   if (frame_.empty()) {

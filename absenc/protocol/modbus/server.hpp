@@ -25,7 +25,7 @@ class Server : public Device<std::uint8_t> {
   /// Switches the encoder off.
   void power_off(Time now) final;
   [[nodiscard]] std::span<const Violation> violations() const final { return rules_.violations(); }
-  /// Returns how often the host broke a rule of the document.
+  /// Returns how often the host broke a rule that the server checks.
   [[nodiscard]] std::uint32_t violation_count() const final { return rules_.violation_count(); }
   void watch_rules(RuleWatch* watch) final { rules_.watch(watch); }
   [[nodiscard]] std::uint64_t answer_count() const final { return answer_count_; }
@@ -41,9 +41,9 @@ class Server : public Device<std::uint8_t> {
   /// sent.
   virtual void request(Bytes body, Time at, FrameBytes& reply) = 0;
 
-  /// Sets that the baud rate changes to `rate` as soon as nothing is transmitted.
+  /// Sets that the baud rate changes to `rate` as soon as this server transmits nothing.
   void set_rate(std::uint32_t rate);
-  /// Records whether the host kept `rule` of the document; returns `satisfied`.
+  /// Records whether the host kept `rule`; returns `satisfied`.
   bool expect(bool satisfied, std::string_view rule, Time at) { return rules_.expect(satisfied, rule, at); }
   /// Checks the timing of the frame that is being handled. Call it for frames to this server.
   void check_line_rules(Time at);

@@ -12,7 +12,7 @@ namespace absenc::modbus {
 
 using namespace std::chrono_literals;
 
-/// Above this baud rate the silences are constant instead of a number of characters.
+/// Above this baud rate `frame_silence` and `character_gap` are constant, not a number of characters.
 inline constexpr std::uint32_t fixed_times_above = 19'200;
 
 /// Returns the silence that ends a frame: 3.5 characters, or 1750 us at high rates. The rate must not be 0.
@@ -35,7 +35,7 @@ inline constexpr std::uint32_t fixed_times_above = 19'200;
   return {.answer_limit = answer_limit + line.character(),
           .gap_limit = frame_silence(line),
           .silence = request_silence(line),
-          // Longer than any reply of the units that use it.
+          // The patience is longer than any reply of the units that use these times.
           .patience = 1s};
 }
 

@@ -8,7 +8,7 @@
 namespace absenc::nikon {
 namespace {
 
-/// Alarms that a reset must clear: the state of the EEPROM is none of them.
+/// Bits that clearing the alarms must clear: all but the state of the EEPROM.
 constexpr std::int64_t cleared_alarms = alarm::all & ~alarm::memory_busy;
 
 /// Clauses for encoders.

@@ -34,7 +34,7 @@ class VirtualEncoder final : public author::Responder {
     memory_[address_at] = format.address;
   }
   [[nodiscard]] MutableBytes memory() override { return memory_; }
-  /// Ends the alarms `bits`. All alarms stay until they are cleared, also without their cause.
+  /// Ends the alarms `bits`, which otherwise stay until a reset clears them or the power goes off.
   void lower_alarms(std::uint32_t bits) override { latches_ &= static_cast<std::uint16_t>(~bits); }
   /// Raises the alarms `bits`.
   void raise_alarms(std::uint32_t bits) override { latches_ |= static_cast<std::uint16_t>(bits & alarm::all); }
@@ -67,7 +67,7 @@ class VirtualEncoder final : public author::Responder {
       take_turn(one * address(), one * encoder_count);
     }
     if (!is_reset(request->code)) resets_.end();
-    // The replies to a reset, and to a request for an address, have the state from before.
+    // The replies to requests of a reset, and to CC 20, have the state from before.
     const OneReply before{.address = address(), .status = status(at), .data = data_for(*request, at)};
     reply.append(encode_reply(request->code, before).view());
     if (is_reset(request->code)) count_reset(*request, at);
@@ -146,7 +146,7 @@ class VirtualEncoder final : public author::Responder {
   // ---- Resets and EEPROM
 
   void count_reset(const Request& request, Time at) {
-    // Requests for two addresses are two rows.
+    // Requests that set two different addresses are two rows.
     const unsigned row =
         static_cast<unsigned>(request.code) << 3 | (request.code == Code::set_address ? request.address : 0u);
     if (resets_.count(row, at, at)) reset(request, at);
@@ -179,7 +179,7 @@ class VirtualEncoder final : public author::Responder {
     if (address == temperature_address) return static_cast<std::uint16_t>(quarters());
     return static_cast<std::uint16_t>(address < user_words ? load(2 * std::size_t{address}, 2) : 0);
   }
-  // Returns the word that was fetched last, with its address.
+  // Executes a request for the EEPROM unless it is busy. Returns the word fetched before, with its address.
   [[nodiscard]] std::uint64_t access_memory(const Request& request, Time at) {
     const bool ready = is_ready(at);
     if (ready && fetching_) fetched_ = {*fetching_, word(*fetching_)};
@@ -212,7 +212,7 @@ class VirtualEncoder final : public author::Responder {
   std::int64_t temperature_ = conditions[0].normal;
   std::uint16_t latches_ = 0;
   Word fetched_{};                          // the word that was fetched last
-  std::optional<std::uint8_t> fetching_{};  // address of the word that was requested last
+  std::optional<std::uint8_t> fetching_{};  // address of the word whose access began last
   Time memory_ready_at_{};
   author::InARow row_ = reset_row(format_);
   author::RowCounter resets_{row_, rules()};

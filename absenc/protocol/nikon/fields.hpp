@@ -47,7 +47,7 @@ struct Values {
   std::optional<Bytes> data{};                    ///< Words of the EEPROM from `address` on, the low byte first.
   std::optional<std::uint32_t> identification{};  ///< Identification code of the encoder, 24 bits.
   std::optional<bool> written{};                  ///< Whether something was written; false: the value was there.
-  std::optional<bool> clash{};                    ///< Whether the reply to a scan was damaged.
+  std::optional<bool> clash{};                    ///< Scan: whether no answer was valid, and at least one damaged.
 };
 
 /// Table of the fields of requests, replies and results.
@@ -82,7 +82,7 @@ inline constexpr auto fields = [] {
   return all;
 }
 
-/// Returns the temperature in degC of its 10 bits, in quarters of a degree.
+/// Converts a temperature, 10 bits in quarters of a degree, to degC.
 [[nodiscard]] constexpr double degrees_of(std::uint64_t quarters) { return static_cast<double>(quarters & 0x3FF) / 4; }
 
 /// Returns the values of the fields of one encoder's reply to a request with this code.

@@ -41,13 +41,13 @@ inline constexpr std::array<MemoryArea, 2> memory_areas{{
      .word = 2},
 }};
 
-/// Command codes (CC) of requests. The data of the reply follows the dash.
+/// Command codes (CC) of requests, some with the data of the reply.
 enum class Code : std::uint8_t {
   position = 0,  ///< position within the turn, then turns: 40 bits
-  lower = 1,     ///< the lower 24 of these bits
-  upper = 2,     ///< the upper 24 of these bits
+  lower = 1,     ///< the lower 24 of the 40 bits of CC 0
+  upper = 2,     ///< the upper 24 of the 40 bits of CC 0
   alarms = 3,
-  all_positions = 4,  ///< as 0, of all encoders of the line in turn
+  all_positions = 4,  ///< as CC 0, of all encoders of the line in turn
   all_lower = 5,
   all_upper = 6,
   all_alarms = 7,
@@ -63,12 +63,12 @@ enum class Code : std::uint8_t {
   read_only_identity = 17,  ///< as 16, of the only encoder of the line
   write_identity = 18,
   write_only_identity = 19,  ///< as 18, to the only encoder of the line
-  assign_address = 20,       ///< gives the address of the request to the encoder with this identification
+  assign_address = 20,       ///< gives the address of the request to the encoder with the identification in it
   short_position = 21,       ///< the lower 17 bits of the position
   all_short_positions = 22,
-  with_alarms = 27,  ///< the lower 24 bits, and 16 bits of alarms
+  with_alarms = 27,  ///< the lower 24 bits of CC 0, and 16 bits of alarms
   all_with_alarms = 28,
-  with_temperature = 29,  ///< the lower 24 bits, and the temperature
+  with_temperature = 29,  ///< the lower 24 bits of CC 0, and the temperature
   all_with_temperature = 30,
 };
 
@@ -127,7 +127,7 @@ struct Format {
 }
 /// Returns whether eight requests with this code execute its command.
 [[nodiscard]] constexpr bool is_reset(Code code) { return code >= Code::clear_alarms && code <= Code::zero; }
-/// Returns whether the data of request and reply with this code is an identification.
+/// Returns whether the data of replies to this code is an identification.
 [[nodiscard]] constexpr bool has_identity(Code code) {
   return code >= Code::read_identity && code <= Code::assign_address;
 }
@@ -142,7 +142,7 @@ struct Format {
 /// Returns whether requests with this code carry a value: a word or an identification.
 [[nodiscard]] constexpr bool is_write(Code code) { return code == Code::write_memory || sends_identity(code); }
 
-/// Returns the code with this number; nothing for 23 to 26 and 31, which no source lists.
+/// Returns the code with this number; nothing for a number that no source lists.
 [[nodiscard]] constexpr std::optional<Code> code_of(unsigned number) {
   if (number > 30 || (number > 22 && number < 27)) return std::nullopt;
   return static_cast<Code>(number);

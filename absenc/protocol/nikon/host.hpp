@@ -21,9 +21,9 @@ class ReadPosition : public author::HostOf<Protocol> {
   explicit ReadPosition(const Format& format) : ReadPosition(format, {.address = format.address}) {}
 
   [[nodiscard]] const Reading* reading() const final { return has_reading_ ? &reading_ : nullptr; }
-  /// Returns the request for the position, also after the one for the alarms.
+  /// Returns the first request, also after the one for the alarms.
   [[nodiscard]] const Request& request() const { return position_request_; }
-  /// Returns the valid reply to `request`.
+  /// Returns the valid reply to `request`; an empty one if there was none.
   [[nodiscard]] const Reply& last() const { return reply_; }
 
  private:

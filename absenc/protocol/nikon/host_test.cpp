@@ -130,7 +130,7 @@ struct Evidence final : EvidenceSink {
   std::vector<OptionEvidence> all;
 };
 
-// Returns the order that a probe of these exchanges finds, 0 or 1; -1: none explains them.
+// Returns the order after a probe of these exchanges, 0 or 1; -1: they contradict both orders.
 std::int64_t probed(std::span<const Capture> captures, Evidence& evidence, std::string_view settings = "") {
   Options options = author::testing::options_of(unit, settings);
   const auto is_order = [](const Option& option) { return option.name == "bit_order"; };

@@ -139,7 +139,7 @@ Procedure write_identity(Dialog& dialog, ProcedureResult& found, Arguments argum
   found.written = before != value;
   if (before == value) co_return done;
   const Request request{.code = Code::write_identity, .address = format.address, .value = value};
-  // A lost reply does not show whether it was written, but reading it back does.
+  // A lost reply does not show whether the identification was written, but reading it back does.
   static_cast<void>(co_await dialog.attempt(request).changes());
   co_await dialog.rest(memory_write_time);
   const Reply again = co_await dialog.ask(identity_request(format.address))
@@ -203,7 +203,7 @@ Procedure assign_address(Dialog& dialog, ProcedureResult& found, Arguments argum
     co_return done;
   }
   if (!*found.written) co_return {Error::invalid_argument, other_there, "choose a free one: `absenc scan` lists them"};
-  // A lost reply does not show whether the encoder took the address, but its answer there does.
+  // A lost reply does not show whether the encoder took the address, but an answer at it does.
   static_cast<void>(
       co_await dialog.attempt({.code = Code::assign_address, .address = wanted, .value = identity}).changes());
   co_await find_at(dialog, found, wanted, identity);

@@ -72,7 +72,7 @@ TEST(NikonProcedures, ResetsThatFailSayWhy) {
     std::uint16_t alarms;
     std::string_view detail;
   };
-  // A position of 0x3FF counts is 0.35 degrees from 0, 0x400 is more.
+  // A position of 0x3FB counts is just below 0.35 degrees from 0, 0x400 is above.
   for (const Row& row :
        {Row{"zero", {.data = 0x400}, 0, "the position is still not zero"},
         Row{"zero", {.data = 0x3FB}, alarm::battery, ""},
@@ -91,7 +91,7 @@ TEST(NikonProcedures, ResetsThatFailSayWhy) {
   }
 }
 
-// A reset waits until the encoder has stored it; after a lost reply nothing is sent.
+// A reset waits until the encoder has stored it; after a lost reply no further request is sent.
 TEST(NikonProcedures, ResetEndsWithItsRow) {
   Bench bench;
   const auto good = bench.run("clear-alarms");

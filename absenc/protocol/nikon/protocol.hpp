@@ -104,7 +104,7 @@ struct Protocol {
   static constexpr RequestBytes encode(const Format& format, const Request& request) {
     return encode_request(format, request);
   }
-  /// Returns the length of the request that begins with `begin`, or how many bytes tell it; 0: none.
+  /// Returns the length of the request that begins with `begin`, or how many bytes tell it; 0: none does.
   static constexpr std::size_t request_size(const Format&, Bytes begin) {
     if (begin.size() < frame_bytes) return frame_bytes;
     const unsigned first = detail::frame_at(begin, 0);

@@ -175,7 +175,7 @@ BitRanges bits_in(const Options& values, Frame request, Frame reply, const Field
   return place_of(format, asked->code, field);
 }
 
-// Returns the bits that an exchange reports as the word 0xF9, the first bit of the wire lowest.
+// Returns the bits that an exchange reports as the word 0xF9, the first bit of the wire lowest; nothing: it has none.
 std::optional<std::uint64_t> temperature_word(const Capture& capture) {
   const Result<Request> request =
       capture.request.empty() ? request_of_reply(capture.reply) : decode_request({}, capture.request);
@@ -188,7 +188,8 @@ std::optional<std::uint64_t> temperature_word(const Capture& capture) {
 // The word 0xF9, a temperature of 10 bits, can show the order of the bits.
 bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sink) {
   const std::size_t option = options.find("bit_order");
-  std::array<std::optional<std::size_t>, order_names.size()> against{};  // the capture that contradicts each order
+  // For each order the first capture that contradicts it.
+  std::array<std::optional<std::size_t>, order_names.size()> against{};
   for (std::size_t i = 0; i < captures.size(); ++i) {
     const std::optional<std::uint64_t> word = temperature_word(captures[i]);
     if (!word) continue;

@@ -4,7 +4,7 @@
 
 #include "absenc/protocol/clause.hpp"
 
-/// Nikon's A-format: one encoder or eight on an RS-485 line.
+/// Nikon's A-format: one to eight encoders on an RS-485 line.
 namespace absenc::nikon {
 
 extern constinit const Unit unit;   ///< Descriptor of the A-format.

@@ -107,7 +107,7 @@ constexpr auto can_clauses = std::array{
            .demand = Demand::as_drawn,
            .errors = any_of(Error::out_of_range)},
     Clause{"node", "3.4.1 (3)", "a request to another node is not answered", Demand::foreign_silent},
-    // No requirements cover setting the node number and the bit rate; README.md gives the reason.
+    // No requirement on encoders covers setting node number and bit rate; README.md gives the reason.
     Clause{.id = "cyclic",
            .paragraph = "3.4.1 (3) 7, 8",
            .words = "after command 31 the node sends as many readings a second as it was told",

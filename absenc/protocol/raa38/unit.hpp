@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The three units of the RAA38S6, one for each protocol, and their clauses.
+// The units of the RAA38S6 on serial lines, with Modbus RTU and on CAN, and their clauses.
 #pragma once
 
 #include "absenc/protocol/clause.hpp"

@@ -40,7 +40,7 @@ struct Format {
   /// Whether the last bit is a parity bit that the encoder inverts if its position is wrong.
   bool error_parity = false;
   bool padded = false;  ///< Whether skipped bits of the word must be zero.
-  /// Highest speed of the shaft between two words that confirm the position; 0: reads one word.
+  /// Highest speed of the shaft, in rpm, between two words that confirm the position; 0: reads one word.
   std::uint32_t confirm_rpm = 0;
   // ---- Values that vary by product (RAA38S6 3.5, note)
   /// Longest pause of the clock after which the old word may still continue (monoflop time Tm).

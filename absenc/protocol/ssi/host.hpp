@@ -13,7 +13,7 @@ namespace absenc::ssi {
 struct Protocol {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = ssi::Format;
-  /// Empty type: on a clocked link the host sends no requests.
+  /// Empty type: a host of SSI encoders sends no requests.
   using Request = author::NoRequest;
   /// Type of the decoded word.
   using Reply = Word;

@@ -121,7 +121,7 @@ TEST(TformatDevice, IsBusyFor18MillisecondsAfterAWrite) {
   // The write during the busy time was not executed.
   EXPECT_EQ(memory_read(bench, 6), wire(Reply{.id = DataId::read_memory, .address = 6}));
   EXPECT_EQ(bench.encoder.writes(), 1u);
-  EXPECT_EQ(bench.violations(), 0u);  // no access while the encoder writes is a violation
+  EXPECT_EQ(bench.violations(), 0u);  // an access while the encoder writes is no violation
 }
 
 TEST(TformatDevice, PagesAreSeparateAndChangingThemTakesTime) {

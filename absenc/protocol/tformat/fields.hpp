@@ -62,7 +62,7 @@ struct Values {
   std::optional<bool> overheat_enabled{};            ///< Whether the encoder raises over_heat.
   std::optional<std::uint8_t> overheat_threshold{};  ///< Temperature above which over_heat is raised, in degC.
   std::optional<bool> written{};                     ///< Whether the byte was written; false: it had the value already.
-  /// Page that a procedure leaves selected because it could not select the page from before again.
+  /// Page that a procedure leaves, or may leave, selected; another may have been selected before.
   std::optional<std::uint8_t> page_left{};
 };
 

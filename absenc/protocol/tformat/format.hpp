@@ -82,7 +82,7 @@ enum class DataId : std::uint8_t {
 
 /// Bits of SF, the status field of replies (6.3.2).
 namespace status {
-inline constexpr std::uint8_t information = 0x0F;  ///< mask of the four information bits, always 0
+inline constexpr std::uint8_t information = 0x0F;  ///< mask of the four information bits, 0 by the specification
 /// Status bit ea0: the encoder found the position within the turn wrong.
 inline constexpr std::uint8_t counting_error = 0x10;
 /// Status bit ea1: over-heat, multi-turn error, battery error or battery alarm.

@@ -380,7 +380,7 @@ constexpr std::size_t size_of_reply(const Format&, Bytes begin) {
   const std::optional<DataId> of = data_id(begin[0]);
   return of && begin[0] == control_field(*of) ? reply_length(*of) : 0;
 }
-/// Returns the request that a reply shows. Error: unexpected_reply.
+/// Returns the request that a reply captured without one is taken to answer. Error: unexpected_reply.
 constexpr Result<Request> guess_request(const Format&, Bytes reply) {
   const std::optional<DataId> asked = data_id(reply[0]);
   if (!asked) return Error::unexpected_reply;

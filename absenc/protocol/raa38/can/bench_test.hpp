@@ -58,7 +58,7 @@ struct Bench : raa38::testing::Bench<CanFrame, VirtualNode, Format, can_unit> {
       : raa38::testing::Bench<CanFrame, VirtualNode, Format, can_unit>(own, LinkKind::can, {.rate = own.bit_rate()}) {
     add(own);
   }
-  /// Adds a node that shares the number of the first node and counts down.
+  /// Adds a node that has the default number and counts down.
   void add_twin() {
     add({.positive = 1, .negative = 0, .cyclic = 0});
     static_cast<void>(raw(encode(Order::direction, 0x20, 0)));

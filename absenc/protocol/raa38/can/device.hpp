@@ -16,7 +16,7 @@ class VirtualNode final : public Device<CanFrame> {
   VirtualNode(const Format& format, const Shaft& shaft)
       : format_(format), settings_(format.node, rates[format.rate].index, format.bits, shaft) {}
 
-  /// Processes an event of the port, such as received data or silence.
+  /// Handles received frames and the end of a sent one; ignores other events.
   void feed(const Event<CanFrame>& event) override;
   /// Returns what the port must do next, such as send or wait.
   Step<CanFrame> next(Time now) override;

@@ -121,7 +121,7 @@ struct Values {
   Number value{};                             ///< Counting direction, as order 22 carries it.
   Number new_node{};                          ///< Node number that a setting gives to the node.
   Number bit_rate{};                          ///< Bit rate that a setting gives to the node, in bits per second.
-  std::optional<bool> clash{};                ///< Whether two nodes share this number, or the line is bad.
+  std::optional<bool> clash{};                ///< Whether two nodes seem to share this number, or the line is bad.
   Number readings_per_s{};                    ///< Positions per second that the node sends without a request.
   std::optional<std::uint64_t> singleturn{};  ///< Position within one revolution, in counts.
   std::optional<double> angle{};              ///< Position within one revolution, in degrees.

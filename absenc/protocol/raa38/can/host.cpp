@@ -14,7 +14,7 @@ Read::Read(const Format& format, Mode mode) : format_(format) {
 }
 
 void Read::heard(const CanFrame& frame, Time at) {
-  // A frame with this 29-bit identifier may be from another device, but it is evidence for the user.
+  // A 29-bit identifier with the number of a reply may be another device's, but is evidence for the user.
   if (frame.extended && frame.id == encode_position(format_.node, 0).id) keep(frame, at);
   if (!is_from(frame, format_.node)) return;
   keep(frame, at);

@@ -16,7 +16,7 @@ using namespace std::chrono_literals;
 // Assumed: the document gives no reply times.
 inline constexpr Time answer_limit = 50ms;  ///< Timeout of a reply on a bus without other frames.
 inline constexpr Time busy_limit = 250ms;   ///< Timeout of a reply on a bus that other nodes keep busy.
-/// Time for which the host listens for unsolicited frames.
+/// Time for which the host listens for unsolicited frames whose rate it does not know.
 inline constexpr Time listening_time = 1200ms;
 
 /// Types and functions of the protocol that the classes in absenc/protocol/author use.
@@ -80,7 +80,7 @@ class Read : public author::CanEngine {
 
 /// Returns the frame that requests a position: order 01 in the mode `start`, otherwise order 80.
 [[nodiscard]] constexpr CanFrame position_request(const Format& format, Read::Mode mode) {
-  // Constant orders, so that firmware does not link the table of orders.
+  // Each call has a constant order, so that firmware does not link the table of orders.
   return mode == Read::Mode::start ? encode(Order::start, format.node) : encode(Order::read, format.node);
 }
 

@@ -46,7 +46,7 @@ struct SendRate {
 
 // ---- Receiving until a time is over
 
-// Measures the send rate until the time is over; with `until_enough` possibly for less time.
+// Measures the send rate until the time of listening is over; with `until_enough` possibly for less.
 Part<SendRate> count_frames(Dialog& dialog, bool until_enough = false) {
   SendRate cadence;
   for (;;) {
@@ -242,7 +242,7 @@ Procedure change(Dialog& dialog, Values& found, Order order, Arguments arguments
 namespace {
 
 constexpr Time between_requests = 2ms;  // time between two requests; one request and one answer take 1 ms at 250 kbit/s
-// While requests are sent, a frame this many requests after its own is no answer.
+// While requests are sent, a frame of a node this many requests after that to the node is no answer.
 constexpr unsigned answering = 10;
 constexpr Time last_answers = 100ms;
 constexpr Time entering_time = 20ms;  // time after "enter configuration", which is not answered
@@ -260,7 +260,7 @@ constexpr std::string_view scan_hint = "`absenc scan` shows which: set node=";
 constexpr unsigned before_requests = 0;
 constexpr unsigned after_requests = 256;
 
-// Counts frames until the time is over. `asked`: last requested number, or one of the above.
+// Counts frames until the time is over. `asked`: last requested number, `before_requests` or `after_requests`.
 Part<bool> count_node_frames(Dialog& dialog, Nodes& nodes, unsigned asked) {
   Time from = never;
   while (const MaybeFrame frame = co_await dialog.heard()) {

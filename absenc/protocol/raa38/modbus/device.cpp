@@ -11,7 +11,7 @@ using modbus::Exception;
 using modbus::FrameBytes;
 using namespace std::chrono_literals;
 
-// More settings in one window of time break the document's rule "Do not regularly send".
+// More settings than this in one window of time break the document's rule "Do not regularly send".
 constexpr std::uint32_t most_settings = 10;
 constexpr Time settings_window = 1min;
 

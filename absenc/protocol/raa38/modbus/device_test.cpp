@@ -29,7 +29,7 @@ TEST(Raa38ModbusDevice, RefusesWithExceptionsOfTheStandard) {
       {{1, 1, 0, 0, 0, 1}, {1, 0x81, 1}},  // function 01, read coils, does not exist
       {{1, 6, 0, 0, 0, 1}, {1, 0x86, 1}},  // function 06, write a register, does not exist
       {{1, 0x11}, {1, 0x91, 1}},           // function 11, report server id, does not exist
-      {{1, 3, 0, 1, 0, 1}, {1, 0x83, 2}},  // request of register 1, which does not exist
+      {{1, 3, 0, 1, 0, 1}, {1, 0x83, 2}},  // request that does not begin at register 0
       {{1, 3, 0, 0, 0, 3}, {1, 0x83, 2}},  // request of three registers, but only two exist
       {{1, 3, 0xFF, 0xFF, 0, 1}, {1, 0x83, 2}},
       {{1, 3, 0, 0, 0, 0}, {1, 0x83, 3}},    // request of 0 registers

@@ -235,7 +235,7 @@ constexpr bool is_answer(const Request& request, Bytes reply) {
   return reply;
 }
 
-/// Returns the request that a captured reply seems to answer.
+/// Returns the request that a reply captured without one is taken to answer.
 [[nodiscard]] constexpr Request assumed_request(const Format& format, Bytes reply) {
   Request request = read_request(format);
   if (reply.size() < modbus::shortest_frame) return request;
@@ -307,7 +307,7 @@ struct Protocol {
   }
 };
 
-/// Reads a position with function 03, and confirms it if the CRC does not prove its length.
+/// Reads a position with function 03, twice if the CRC does not prove the length of the reply.
 using ReadPosition = author::ReadConfirmed<Protocol>;
 
 }  // namespace absenc::raa38::rtu

@@ -54,7 +54,7 @@ author::Procedure read_position_once(Dialog& dialog, CommandValues& found);
 /// Reads the position for the direction command: no request reads the direction.
 author::Procedure read_direction(Dialog& dialog, CommandValues& found);
 
-/// Reads the address with A0, or confirms that of the format.
+/// Reads the address with A0; if that fails, checks that an encoder answers at the format's one.
 author::Procedure read_address(Dialog& dialog, CommandValues& found);
 
 /// Finds the baud rate at which the encoder answers. Errors: invalid_argument, timeout, or that of an exchange.

@@ -231,7 +231,7 @@ TEST(Raa38ModbusSettings, RefusesAddressInUse) {
     return request[0] == 1 ? position_of_1 : Wire{2, 3, 2, 0, 9, 0, 0};
   };
   EXPECT_TRUE(ended(with(damaged, "set-address", {2}), Error::invalid_argument, "though not well"));
-  // One damaged reply is enough, also if the next requests are not answered.
+  // One damaged reply is enough to refuse the address, even if the next requests are not answered.
   unsigned asked = 0;
   const auto damaged_once = [&asked](Bytes request, unsigned) {
     if (request[0] == 1) return position_of_1;

@@ -37,7 +37,7 @@ struct Talk final : raa38::testing::Talk<std::uint8_t> {
       : raa38::testing::Talk<std::uint8_t>(serial_unit, options_of(format), name) {}
 };
 
-/// A virtual encoder whose frames a test can change; a frame that it empties is not sent.
+/// A virtual encoder whose frames a test can change; a frame that the test empties is not sent.
 struct Tampered final : Device<std::uint8_t> {
   using Tamper = author::testing::Tamper;
   Tampered(const Format& format, const Shaft& shaft) : encoder(format, shaft) {}

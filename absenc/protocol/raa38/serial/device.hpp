@@ -20,7 +20,7 @@ class VirtualEncoder final : public author::BusDevice<Protocol, VirtualEncoder, 
   /// Switches the encoder off.
   void power_off(Time now) override;
 
-  /// Returns whether a request is for this encoder.
+  /// Returns whether a request is for this encoder, and one that it can execute.
   [[nodiscard]] bool is_mine(const Request& request) const;
   /// Executes a request and returns the reply; no value if it is not answered.
   std::optional<Position> answer(const Request& request, Time at);

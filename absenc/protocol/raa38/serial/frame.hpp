@@ -40,7 +40,7 @@ inline constexpr std::uint8_t header = 0xFF;  ///< First byte of each frame.
 inline constexpr std::uint8_t fixed_second_byte = 0x81;
 inline constexpr std::uint8_t number_mark = 0xB0;  ///< High digit of the third byte Bx of a request: read unit x.
 inline constexpr std::uint8_t clear_mark = 0xC0;   ///< High digit of the third byte Cx: set the zero of unit x.
-inline constexpr unsigned unit_count = 16;         ///< Most units on a bus: x is one hexadecimal digit.
+inline constexpr unsigned unit_count = 16;         ///< Most units on a bus: a number is one hexadecimal digit.
 inline constexpr unsigned least_bits = 10;         ///< Lowest number of bits of the position that can be ordered.
 /// Highest number of bits of the position that can be ordered.
 inline constexpr unsigned most_bits = 21;
@@ -98,7 +98,7 @@ struct Format {
   [[nodiscard]] constexpr std::uint8_t zeroed_unit() const {
     return zero_unit < 0 ? unit : static_cast<std::uint8_t>(zero_unit);
   }
-  /// Returns the second byte of the frames that the encoder with number `unit` sends: 81, or Bx.
+  /// Returns the second byte of a stream, and of the virtual encoder's frames: Bx for `echo`, else 81.
   [[nodiscard]] constexpr std::uint8_t own_second_byte() const {
     return second_byte == SecondByte::echo ? static_cast<std::uint8_t>(number_mark | unit) : fixed_second_byte;
   }
@@ -158,7 +158,7 @@ inline constexpr int any_unit = -1;
   return Position{value, bytes[1]};
 }
 
-/// A request to the encoder.
+/// A request to the encoder: three bytes, or a pulse on CLK or CLR.
 struct Request {
   /// Kinds of requests.
   enum class Kind : std::uint8_t {
@@ -195,7 +195,7 @@ struct Request {
 /// Values of frames and commands. Only members with a value are reported.
 struct Values {
   std::optional<std::uint8_t> encoder_address{};  ///< Number of a unit that answered during a scan, 0 to 15.
-  /// Whether every answer of the unit was damaged: two encoders with one number, or a bad line.
+  /// Scan: whether no answer of the unit was valid, as with two encoders of one number, or on a bad line.
   std::optional<bool> clash{};
   std::optional<std::uint32_t> before{};      ///< Position before the zero was set, in counts.
   std::optional<std::uint32_t> singleturn{};  ///< Position within the turn, in counts.

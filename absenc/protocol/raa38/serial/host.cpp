@@ -26,7 +26,7 @@ Explanation explain_other(const Format& format, Bytes request, Bytes reply) {
           "check unit and second_byte; `absenc scan` shows who answers"};
 }
 
-// Returns cause and advice for the error of a stream without a valid frame.
+// Returns cause and advice for the error with which a stream ends.
 Explanation explain_stream(Error error) {
   switch (error) {
     case Error::timeout:
@@ -79,10 +79,10 @@ ByteStep Listen::next(Time now) {
     restart_timeout_ = true;
     return {.kind = ByteStep::Kind::emit};
   }
-  // The time that the caller takes to process a result does not count.
+  // The time that the caller takes to process a result does not count towards the timeout.
   if (restart_timeout_) deadline_ = now + std::max(listen_limit, 4 * format_.period());
   restart_timeout_ = false;
-  // Bytes that form no frames do not extend the deadline.
+  // Only emitted results extend the deadline; other bytes do not.
   if (!done_ && now >= deadline_) end_stream();
   if (done_) return {.kind = ByteStep::Kind::done};
   return {.at = deadline_};

@@ -30,7 +30,7 @@ inline constexpr auto fields = author::fields_of<Values>(
 /// the end: timeout, bad_framing, out_of_range.
 class Listen final : public Conversation<std::uint8_t> {
  public:
-  /// Creates a conversation that receives an encoder of this format.
+  /// Creates a conversation that receives the stream of an encoder of this format.
   explicit Listen(const Format& format);
 
   /// Processes an event of the port, such as received data or silence.
@@ -67,7 +67,7 @@ class Listen final : public Conversation<std::uint8_t> {
   bool restart_timeout_ = true;     // whether the timeout must be restarted
   Time deadline_{};
   Time received_at_{};             // time at which the bytes that are being processed were received
-  Time received_before_{};         // time at which the bytes before those of `received_at_` were received
+  Time received_before_{};         // time at which the bytes before were received; for the first bytes their own
   std::uint64_t valid_count_ = 0;  // number of valid frames emitted so far
   StreamCounts counts_{};
   Reading reading_{};
@@ -79,8 +79,8 @@ class Listen final : public Conversation<std::uint8_t> {
 /// Interface by which procedures send requests and await replies.
 using Dialog = author::DialogOf<Protocol>;
 
-/// Reads the position, sets the zero, and polls until the position is zero. Errors: unsupported, invalid_argument,
-/// not_still, cross_check_failed, or those of reading the position.
+/// Reads the position, sets the zero, and polls the position until it is zero or a time is over. Errors: unsupported,
+/// invalid_argument, not_still, cross_check_failed, or those of reading the position.
 author::Procedure set_zero(Dialog& dialog, Values& found);
 
 /// Result of a scan of the units on a bus; the index is the unit number.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests every row of README's table of order codes with a virtual encoder.
+// Tests the rows of README's table of order codes that have the option mode, with a virtual encoder.
 #include <gtest/gtest.h>
 
 #include <fstream>
