@@ -92,6 +92,13 @@ TEST(DriveGuide, ElectricalAngleFollowsShaftAndMissingRepliesStopTheDrive) {
   }
   EXPECT_FALSE(is_stopped);
   EXPECT_EQ(axis.cycles.cycle().stale, 0u);
+  // A PWM event begins the next cycle earlier than the plan.
+  const Time early = time_now + 30us;
+  axis.cycles.begin_next_at(early);
+  axis.carrier.wake(time_now);
+  run_until(early + 90us);
+  EXPECT_EQ(axis.cycles.cycle().begun, early);
+  EXPECT_EQ(axis.cycles.cycle().kind, host::Cycle::Kind::fresh);
   is_silent = true;
   run_until(time_now + 2 * Axis::period);
   EXPECT_FALSE(is_stopped);

@@ -60,7 +60,7 @@ struct CyclePlan {
   bool carried = false;
 };
 
-/// What one cycle gave.
+/// Result of one cycle.
 struct Cycle {
   /// Kinds of cycles.
   enum class Kind : std::uint8_t {

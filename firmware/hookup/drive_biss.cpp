@@ -34,7 +34,7 @@ struct Axis {
   std::size_t bytes = 0;
   host::Cycle last{};
 
-  // The carrier calls these. The level of the clock in the pause before a frame is a bit for the encoder.
+  // The carrier calls `hold_clock`, `begin` and `result`. The clock's level in the pause is a bit for the encoder.
   void hold_clock(bool low) { set_clock(!low); }
   void begin(const ByteStep& step) {
     if (step.kind != ByteStep::Kind::transfer) return;  // the rate of the clock stays as it is

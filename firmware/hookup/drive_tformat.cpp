@@ -21,7 +21,7 @@ struct Axis {
   static constexpr Time period = 100us;                 // of the current loop
   static constexpr std::uint32_t pole_pairs = 4;        // of the motor
   static constexpr std::uint32_t offset = 0x4000'0000;  // electrical angle at position 0, in 2^-32 turn: measured once
-  static constexpr std::uint32_t most_stale = 3;        // cycles without a position after which the drive stops
+  static constexpr std::uint32_t most_stale = 3;        // the drive stops after more cycles without a position
 
   struct Read {
     Conversation<std::uint8_t>& operator()() { return *new (memory) tformat::ReadPosition(format); }
@@ -33,7 +33,7 @@ struct Axis {
   host::Carrier<std::uint8_t, Axis> carrier{*this, 4us};  // latency of one character
   host::Extrapolation extrapolation;
 
-  // The carrier calls these two.
+  // The carrier calls `begin` and `result`.
   void begin(const ByteStep& step) { uart_send(step.out); }
   void result(bool) {
     const host::Cycle& cycle = cycles.cycle();

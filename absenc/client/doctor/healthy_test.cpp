@@ -71,7 +71,7 @@ TEST_P(HealthyEncoder, IsNeverCalledIll) {
     const unsigned bits = std::min(unit.resolution(usual->options).singleturn_bits, 62u);
     unsigned ill = 0;
     for (unsigned i = 0; i < examinations && ill < 3; ++i) {
-      // So many turns leave room for a shaft that turns backwards.
+      // The shaft has room to turn backwards from this many turns.
       const bool has_turns = unit.resolution(usual->options).multiturn_bits >= 8;
       const std::string turns = has_turns ? "&multiturn=100" : "";
       const std::string state = fmt::format("singleturn={}{}&motion={}", random.below(std::uint64_t{1} << bits), turns,

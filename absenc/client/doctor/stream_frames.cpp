@@ -51,7 +51,7 @@ double evenness(const std::vector<PausedBytes>& pieces) {
   return static_cast<double>(usual->second) / static_cast<double>(pieces.size());
 }
 
-// Of several pauses that divide a stream equally well, the middle one is safest.
+// Chooses the middle one of several pauses that divide a stream equally well: it is the safest.
 std::vector<PausedBytes> most_even_pieces(const StreamBytes& stream) {
   constexpr Time shortest = 100us;
   constexpr Time longest = 200ms;
