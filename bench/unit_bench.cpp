@@ -37,7 +37,7 @@ Options options_of(const Unit& unit, const Vector& vector) {
 /// A frame of a vector in the form of its link, with the data that `frame()` refers to.
 struct OwnedFrame {
   OwnedFrame(const Unit& unit, Bytes text) : bytes(text.begin(), text.end()) {
-    if (unit.link == LinkKind::clocked) {
+    if (carries_bits(unit.link)) {
       const auto packed = bits_of_text(text);
       bits = packed.size();
       bytes.assign(packed.bytes().begin(), packed.bytes().end());

@@ -106,7 +106,7 @@ class ReferenceCheck final : public FieldSink {
 // A frame of a vector, which has bytes, or the text of bits or of a CAN frame.
 class VectorFrame {
  public:
-  VectorFrame(LinkKind link, Bytes text) : bytes_(text), is_bits_(link == LinkKind::clocked) {
+  VectorFrame(LinkKind link, Bytes text) : bytes_(text), is_bits_(carries_bits(link)) {
     if (is_bits_) bits_ = bits_of_text(text);
     is_can_ = link == LinkKind::can && !text.empty();
     if (is_can_) can_ = can_frame_of_text(text);

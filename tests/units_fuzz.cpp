@@ -40,7 +40,7 @@ OwnedFrame as_frame(const Unit& unit, Bytes bytes) {
   OwnedFrame frame{.link = unit.link};
   if (bytes.empty()) return frame;
   frame.bytes.assign(bytes.begin(), bytes.end());
-  if (unit.link == LinkKind::clocked) frame.bits = 8 * bytes.size() - (bytes.back() & 7);
+  if (carries_bits(unit.link)) frame.bits = 8 * bytes.size() - (bytes.back() & 7);
   if (unit.link != LinkKind::can) return frame;
   CanFrame can{.id = bytes[0] * 8u, .size = static_cast<std::uint8_t>(std::min<std::size_t>(8, bytes.size() - 1))};
   std::copy_n(bytes.begin() + 1, can.size, can.data.begin());
@@ -101,7 +101,7 @@ void converse(const Unit& unit, const Options& options, const Command& command, 
   Conversation<Item>* conversation = unit.host(options, command, least_arguments(command), storage).template of<Item>();
   if (conversation == nullptr) return;
   std::vector<Item> items = items_of<Item>(unit, input);
-  const bool clocks = unit.link == LinkKind::spi || unit.link == LinkKind::clocked;
+  const bool clocks = host_clocks(unit.link);
   Time now{};
   std::span<const Item> left{};
   bool unsolicited = true;
@@ -174,7 +174,7 @@ void run(const Unit& unit, const Options& options, const Command& command, Bytes
   const Bytes reply = input.first(std::min<std::size_t>(input.size(), command.verb == Verb::scan ? 8 : input.size()));
   converse<Item>(unit, options, command, reply, 1);
   converse<Item>(unit, options, command, reply, reply.size() + 1);
-  if (unit.link != LinkKind::spi && unit.link != LinkKind::clocked) ask_device<Item>(unit, options, input);
+  if (!host_clocks(unit.link)) ask_device<Item>(unit, options, input);
 }
 
 }  // namespace

@@ -252,7 +252,7 @@ class Session {
   // No reply is late where the host drives the clock; on CAN a listener needs all frames.
   [[nodiscard]] bool guarded(const Command& command) const {
     if (unit_->link == LinkKind::can) return command.verb == Verb::read || command.verb == Verb::read_part;
-    return unit_->link != LinkKind::spi && unit_->link != LinkKind::clocked;
+    return !host_clocks(unit_->link);
   }
 
   // Returns the outermost machine in use: echo filter, filter, reply guard or conversation.

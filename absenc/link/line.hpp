@@ -18,6 +18,11 @@ enum class LinkKind : std::uint8_t {
   can,
 };
 
+/// Returns whether the host clocks every item, so that the encoder sends only while the host clocks.
+[[nodiscard]] constexpr bool host_clocks(LinkKind kind) { return kind == LinkKind::spi || kind == LinkKind::clocked; }
+/// Returns whether frames are sequences of bits, which need not fill whole bytes.
+[[nodiscard]] constexpr bool carries_bits(LinkKind kind) { return kind == LinkKind::clocked; }
+
 /// Parity of a character.
 enum class Parity : std::uint8_t { none, odd, even };
 

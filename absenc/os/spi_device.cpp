@@ -27,7 +27,7 @@ std::uint8_t mask_of(std::size_t bit, bool lsb_first) {
 
 SpiDevice::SpiDevice(LinkKind kind, const LineSettings& settings, Machine<std::uint8_t>& device)
     : kind_(kind), settings_(settings), device_(&device) {
-  if (kind != LinkKind::spi && kind != LinkKind::clocked) {
+  if (!host_clocks(kind)) {
     throw std::invalid_argument("behind an SPI controller bytes are exchanged or bits clocked");
   }
 }
@@ -82,7 +82,7 @@ void SpiDevice::select(Time at, Time period) {
 void SpiDevice::deselect(Time at) {
   if (!selected_) return;
   selected_ = false;
-  if (kind_ == LinkKind::clocked) return feed({.kind = ByteEvent::Kind::sent, .at = at, .bits = clocks_});
+  if (carries_bits(kind_)) return feed({.kind = ByteEvent::Kind::sent, .at = at, .bits = clocks_});
   feed({.kind = ByteEvent::Kind::received, .at = at, .items = received_});
   feed({.kind = ByteEvent::Kind::sent, .at = at, .bits = clocks_, .width = period_, .lead = lead_});
 }
@@ -137,12 +137,12 @@ void SpiDevice::run_device(Time now) {
 
 // Modes 2 and 3 give a clocked device the same edges.
 bool SpiDevice::suits(std::uint8_t mode) const {
-  return kind_ == LinkKind::clocked ? idles_high(mode) : mode == settings_.spi_mode;
+  return carries_bits(kind_) ? idles_high(mode) : mode == settings_.spi_mode;
 }
 
 bool SpiDevice::shifts_at_leading_edge(std::uint8_t mode) const {
   const bool shifts_at_rising_edge =
-      kind_ == LinkKind::clocked || idles_high(settings_.spi_mode) != samples_at_trailing_edge(settings_.spi_mode);
+      carries_bits(kind_) || idles_high(settings_.spi_mode) != samples_at_trailing_edge(settings_.spi_mode);
   return shifts_at_rising_edge != idles_high(mode);
 }
 

@@ -84,7 +84,7 @@ std::vector<std::string> spi_devices(const std::filesystem::path& sys) {
 SpiPort::SpiPort(const std::string& path, LinkKind kind, const LineSettings& settings, const SpiChoice& choice,
                  SpiKernel& kernel)
     : path_(path), kind_(kind), choice_(choice), kernel_(&kernel), descriptor_(kernel.open(path)) {
-  if (kind != LinkKind::spi && kind != LinkKind::clocked) {
+  if (!host_clocks(kind)) {
     throw std::invalid_argument("an SPI controller exchanges bytes or clocks bits");
   }
   if (!descriptor_) throw spi_failure(path, errno);
@@ -135,7 +135,7 @@ ByteEvent SpiPort::wait(const ByteStep& step) {
 }
 
 void SpiPort::transfer(const ByteStep& step) {
-  const bool clocked = kind_ == LinkKind::clocked;
+  const bool clocked = carries_bits(kind_);
   const std::size_t clocks = settings_.idle_clocks + step.bits;
   in_.assign(clocked ? (clocks + 7) / 8 : std::max(step.out.size(), step.expect), 0);
   out_.assign(step.out.begin(), step.out.end());
@@ -213,7 +213,7 @@ void SpiPort::set_mode(std::uint8_t mode) {
   const int error = set ? EINVAL : errno;
   if (set && control(SPI_IOC_RD_MODE32, &given) >= 0 && (given & ours) == mode) return;
   std::string advice = "use another controller";
-  if (kind_ == LinkKind::clocked) {
+  if (carries_bits(kind_)) {
     advice =
         "swap the two wires of the clock pair and set spi_mode=" + std::to_string(mode ^ SPI_CPOL) + ", or " + advice;
   }

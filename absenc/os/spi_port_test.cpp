@@ -29,7 +29,7 @@ ByteStep clocks(std::size_t bits) { return {.kind = ByteStep::Kind::transfer, .b
 struct SpiPortTest : ::testing::Test {
   SpiPort open(LinkKind link = LinkKind::spi, const LineSettings& settings = encoder_settings,
                const SpiChoice& choice = {}) {
-    if (link == LinkKind::spi || link == LinkKind::clocked) kernel.connect(link, settings, device);
+    if (host_clocks(link)) kernel.connect(link, settings, device);
     return SpiPort(FakeSpi::path, link, settings, choice, kernel);
   }
   std::string refusal(Kind kind, LinkKind link = LinkKind::spi, const LineSettings& settings = encoder_settings) {

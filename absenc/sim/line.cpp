@@ -211,8 +211,7 @@ template <class Item>
 void Line<Item>::accept_step(Node node, const Step<Item>& step) {
   State& state = *nodes_[node];
   // A device selected by chip select or clock answers into the transfer in progress.
-  const bool driven = state.role == NodeRole::device && step.kind == Step<Item>::Kind::transfer &&
-                      (kind_ == LinkKind::spi || kind_ == LinkKind::clocked);
+  const bool driven = state.role == NodeRole::device && step.kind == Step<Item>::Kind::transfer && host_clocks(kind_);
   if (!driven && state.active_step != Step<Item>::Kind::wait) {
     throw std::logic_error("a machine began a transfer or pulse before its last one was sent");
   }

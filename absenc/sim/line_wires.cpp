@@ -43,7 +43,7 @@ void Line<Item>::begin(Node node) {
       if (other == node) continue;
       feed(other, {.kind = Event<Item>::Kind::triggered, .at = now_, .wire = state.pulse_wire, .width = state.width});
     }
-  } else if (kind_ == LinkKind::spi || kind_ == LinkKind::clocked) {
+  } else if (host_clocks(kind_)) {
     begin_transfer(node);
   } else if (state.out.empty()) {
     schedule(ScheduledEvent::Kind::finished, now_, node);
@@ -137,7 +137,7 @@ void Line<Item>::deliver(Node node, Node sender, const Item& item, bool garbled)
 template <class Item>
 void Line<Item>::begin_transfer(Node node) {
   State& host = *nodes_[node];
-  host.expect = kind_ == LinkKind::clocked ? (host.bits + 7) / 8 : std::max(host.out.size(), host.expect);
+  host.expect = carries_bits(kind_) ? (host.bits + 7) / 8 : std::max(host.out.size(), host.expect);
   if (kind_ == LinkKind::spi) host.bits = host.expect * 8;
   for (Node other = 0; other < nodes_.size(); ++other) {
     if (nodes_[other]->role == NodeRole::host) continue;
@@ -145,7 +145,7 @@ void Line<Item>::begin_transfer(Node node) {
     nodes_[other]->out.clear();
     nodes_[other]->width = {};
     nodes_[other]->behind_out = 0xFF;
-    const Time period = kind_ == LinkKind::clocked ? host.settings.bits(1) : Time{};
+    const Time period = carries_bits(kind_) ? host.settings.bits(1) : Time{};
     feed(other, {.kind = Event<Item>::Kind::selected, .at = now_, .held_low = host.hold_low, .width = period});
   }
   if (kind_ == LinkKind::spi) host.lead = host.settings.select_lead;

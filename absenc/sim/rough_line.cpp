@@ -56,7 +56,7 @@ void RoughLine<Item>::begin(const Step<Item>& step) {
   if (step.kind == Kind::pulse) {
     feed({.kind = Event<Item>::Kind::triggered, .at = time_, .wire = step.wire, .width = step.width});
     run_until(time_ + step.width);
-  } else if (host_is_clock()) {
+  } else if (host_clocks(kind_)) {
     transfer(step);
   } else {
     copy(step.out, request_);
@@ -78,7 +78,7 @@ void RoughLine<Item>::begin(const Step<Item>& step) {
 
 template <class Item>
 void RoughLine<Item>::set_rate(std::uint32_t& end, std::uint32_t rate) {
-  if (host_is_clock()) return;
+  if (host_clocks(kind_)) return;
   end = settings_.rate = rate;
   byte_time_ = settings_.byte_time();
 }
@@ -95,7 +95,7 @@ template <class Item>
 void RoughLine<Item>::transfer(const Step<Item>& step) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
     using Kind = typename Event<Item>::Kind;
-    const bool clocked = kind_ == LinkKind::clocked;
+    const bool clocked = carries_bits(kind_);
     const std::size_t size = clocked ? (step.bits + 7) / 8 : std::max(step.out.size(), step.expect);
     bits_ = clocked ? step.bits : size * 8;
     request_.assign(step.out.begin(), step.out.end());
@@ -247,7 +247,7 @@ template <class Item>
 void RoughLine<Item>::send(const Step<Item>& step) {
   copy(step.out, out_);
   behind_out_ = step.behind_out();
-  if (host_is_clock()) return;
+  if (host_clocks(kind_)) return;
   const Time start = std::max(step.at, time_);
   side_.sending = true;
   side_.end = start;
@@ -271,7 +271,7 @@ void RoughLine<Item>::enqueue(Time start, Time first, Time end, std::span<const 
   copy(items, arrived.items);
   damage(arrived.items);
   if (host_rate_ != device_rate_) arrived.items.clear();
-  const Time late = host_is_clock() ? Time{} : lateness();
+  const Time late = host_clocks(kind_) ? Time{} : lateness();
   // A frame does not arrive before the frames sent before it, because a line keeps their order.
   const Time before = back_ != front_ ? in_transit_[back_ - 1].at : Time{};
   arrived.sent = start;
@@ -333,7 +333,7 @@ bool RoughLine<Item>::flip_bits(std::vector<Item>& items, std::size_t count) {
 template <class Item>
 void RoughLine<Item>::double_item(std::vector<Item>& items, std::size_t count) {
   if constexpr (std::is_same_v<Item, std::uint8_t>) {
-    if (!host_is_clock()) {
+    if (!host_clocks(kind_)) {
       const auto which = items.begin() + static_cast<std::ptrdiff_t>(random_.below(items.size()));
       items.insert(which, *which);
       return;
@@ -357,7 +357,7 @@ void RoughLine<Item>::add_other_sender(std::vector<Item>& items) {
       const auto other = static_cast<Item>(random_.below(256));
       if (i < items.size()) {
         items[i] = static_cast<Item>(items[i] & other);
-      } else if (!host_is_clock()) {
+      } else if (!host_clocks(kind_)) {
         items.push_back(other);
       }
     }
@@ -369,7 +369,7 @@ void RoughLine<Item>::damage(std::vector<Item>& items) {
   if (items.empty()) return;
   std::size_t count = items.size() * 8;
   if constexpr (std::is_same_v<Item, CanFrame>) count = can_bit_count(items.front());
-  if (kind_ == LinkKind::clocked) count = bits_;
+  if (carries_bits(kind_)) count = bits_;
   if (count == 0) return;
   bool struck = flip_bits(items, count);
   const bool talked = rates_.talker > 0 && random_.chance(rates_.talker);

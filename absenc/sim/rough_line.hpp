@@ -84,7 +84,6 @@ class RoughLine final : public Port<Item> {
     Time end{};
   };
 
-  [[nodiscard]] bool host_is_clock() const { return kind_ == LinkKind::spi || kind_ == LinkKind::clocked; }
   [[nodiscard]] Time due() const;
   void set_rate(std::uint32_t& end, std::uint32_t rate);
   void deliver_request(std::span<const Item> request);

@@ -146,7 +146,7 @@ void Waveform::character(NodeRole sender, Time start, Time end, std::uint16_t va
 }
 
 void Waveform::transfer(const Line<std::uint8_t>::Transfer& seen) {
-  if (kind_ == LinkKind::clocked) {
+  if (carries_bits(kind_)) {
     draw_clocked(seen);
     comment(seen.start, std::to_string(seen.bits) + " bits " + to_hex(seen.in));
   } else {

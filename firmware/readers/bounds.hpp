@@ -96,7 +96,7 @@ inline void set_frame(LineContent<CanFrame>& line, const Unit&, Bytes text) {
   line.set({&frame, 1});
 }
 inline void set_frame(LineContent<std::uint8_t>& line, const Unit& unit, Bytes bytes) {
-  line.set(unit.link == LinkKind::clocked ? bits_of_text(bytes).bytes() : bytes);
+  line.set(carries_bits(unit.link) ? bits_of_text(bytes).bytes() : bytes);
 }
 
 /// Calls `visit` with every reply in the vectors of the unit ABSENC_UNIT, and each of its variations.

@@ -21,7 +21,7 @@ namespace {
 client::WireFrame frame_of(LinkKind link, const char* what, const py::object& object) {
   if (py::len(object) == 0) return {};
   if (py::isinstance<py::str>(object)) return client::parse_wire_text(link, what, py::cast<std::string>(object));
-  if (link == LinkKind::can || link == LinkKind::clocked) {
+  if (link == LinkKind::can || carries_bits(link)) {
     throw client::UsageError(std::string(what) + " must be text: \"1FF:022B\" on CAN, \"0001\" on clocked links");
   }
   const std::string text(py::bytes{object});
@@ -66,7 +66,7 @@ py::object encode(const std::string& name, const std::string& command_name, cons
                              ". Try: " + std::string(text_of(size.error()).advice));
   }
   const Bytes encoded = Bytes(bytes).first(*size);
-  if (unit.link == LinkKind::can || unit.link == LinkKind::clocked)
+  if (unit.link == LinkKind::can || carries_bits(unit.link))
     return py::str(std::string(encoded.begin(), encoded.end()));
   return to_bytes(encoded);
 }

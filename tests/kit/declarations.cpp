@@ -198,7 +198,7 @@ void refused_arguments(const Unit& unit, const Configuration& configuration, con
 Findings check_declarations(const Unit& unit) {
   Findings findings;
   findings.require(find_command(unit, Verb::read) != nullptr, [] { return "reads no position"; });
-  const auto goes_over_spi = [](const Unit& one) { return one.link == LinkKind::spi || one.link == LinkKind::clocked; };
+  const auto goes_over_spi = [](const Unit& one) { return host_clocks(one.link); };
   findings.require(unit.over_spi == nullptr || (!goes_over_spi(unit) && goes_over_spi(*unit.over_spi)),
                    [] { return "its unit over SPI has another link"; });
   for (const FieldInfo* field : {unit.alarms, unit.second_alarms}) {

@@ -115,14 +115,12 @@ class Decoding {
     Wire reply;
   };
 
-  [[nodiscard]] std::size_t open_bits(OpenBytes open) const {
-    return open.count * (unit_.link == LinkKind::clocked ? 1 : 8);
-  }
+  [[nodiscard]] std::size_t open_bits(OpenBytes open) const { return open.count * (carries_bits(unit_.link) ? 1 : 8); }
 
   // Returns the frame with each value of its open bytes that makes it good; none if there are too many to try.
   template <class IsGood>
   [[nodiscard]] std::vector<Wire> filled(Bytes frame, OpenBytes open, const IsGood& is_good) const {
-    const bool is_bits = unit_.link == LinkKind::clocked;
+    const bool is_bits = carries_bits(unit_.link);
     std::vector<Wire> good;
     Wire one(frame.begin(), frame.end());
     for (std::uint32_t value = 0; open_bits(open) <= most_open_bits && value >> open_bits(open) == 0; ++value) {
@@ -149,7 +147,7 @@ class Decoding {
     });
   }
   [[nodiscard]] std::string pasted(const Wire& frame) const {
-    if (unit_.link == LinkKind::clocked) return {frame.begin(), frame.end()};
+    if (carries_bits(unit_.link)) return {frame.begin(), frame.end()};
     std::string text;
     for (const std::uint8_t byte : frame) {
       for (const int digit : {byte >> 4, byte & 15}) text += "0123456789ABCDEF"[digit];

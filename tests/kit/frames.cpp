@@ -10,12 +10,12 @@ namespace absenc::kit {
 
 std::size_t OwnedFrame::elements() const {
   if (can) return can->size;
-  return link == LinkKind::clocked ? bits : bytes.size();
+  return carries_bits(link) ? bits : bytes.size();
 }
 
 std::size_t OwnedFrame::bit_count() const {
   if (can) return std::size_t{8} * can->size;
-  return link == LinkKind::clocked ? bits : 8 * bytes.size();
+  return carries_bits(link) ? bits : 8 * bytes.size();
 }
 
 OwnedFrame OwnedFrame::cut(std::size_t count) const {
@@ -23,7 +23,7 @@ OwnedFrame OwnedFrame::cut(std::size_t count) const {
   if (can) {
     shorter.can->size = static_cast<std::uint8_t>(count);
     std::fill(shorter.can->data.begin() + static_cast<std::ptrdiff_t>(count), shorter.can->data.end(), std::uint8_t{0});
-  } else if (link == LinkKind::clocked) {
+  } else if (carries_bits(link)) {
     shorter.bits = count;
     shorter.bytes.resize((count + 7) / 8);
     if (count % 8 != 0) shorter.bytes.back() = static_cast<std::uint8_t>(shorter.bytes.back() & 0xFF00u >> count % 8);
@@ -36,7 +36,7 @@ OwnedFrame OwnedFrame::cut(std::size_t count) const {
 OwnedFrame OwnedFrame::flipped(std::size_t bit) const {
   OwnedFrame other = *this;
   std::uint8_t& byte = can ? other.can->data[bit / 8] : other.bytes[bit / 8];
-  byte = static_cast<std::uint8_t>(byte ^ (link == LinkKind::clocked ? 0x80u >> bit % 8 : 1u << bit % 8));
+  byte = static_cast<std::uint8_t>(byte ^ (carries_bits(link) ? 0x80u >> bit % 8 : 1u << bit % 8));
   return other;
 }
 
@@ -52,7 +52,7 @@ OwnedFrame frame_of(const Unit& unit, Bytes text) {
   if (text.empty()) return frame;
   if (unit.link == LinkKind::can) {
     frame.can = can_frame_of_text(text);
-  } else if (unit.link == LinkKind::clocked) {
+  } else if (carries_bits(unit.link)) {
     frame.bits = text.size();
     frame.bytes.resize((text.size() + 7) / 8);
     for (std::size_t i = 0; i < text.size(); ++i) {

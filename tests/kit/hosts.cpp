@@ -389,7 +389,7 @@ void compare_limits(const Unit& unit, Findings& findings) {
     longest = std::max(longest, unit.link == LinkKind::can ? wait_for_reply<CanFrame>(unit, configuration.options)
                                                            : wait_for_reply<std::uint8_t>(unit, configuration.options));
   }
-  if (!longest || unit.link == LinkKind::spi || unit.link == LinkKind::clocked) return;
+  if (!longest || host_clocks(unit.link)) return;
   const Time limit = unit.timing.turnaround_limit;
   findings.require(4 * limit >= 3 * *longest && 3 * limit <= 4 * *longest, [&] {
     return "captures wait " + std::to_string(limit.count()) + " ns for a reply, hosts " +

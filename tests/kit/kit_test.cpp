@@ -51,7 +51,7 @@ TEST_P(Kit, HostsReadVectorReplies) {
 
 TEST_P(Kit, SilenceEndsWithTimeout) {
   const Findings findings = check_silence(unit);
-  EXPECT_EQ(findings.check_count() > 1, unit.link != LinkKind::clocked && unit.link != LinkKind::spi);
+  EXPECT_EQ(findings.check_count() > 1, !host_clocks(unit.link));
   expect_none(findings);
 }
 

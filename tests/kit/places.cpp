@@ -12,7 +12,7 @@ namespace {
 
 bool bit_of(const OwnedFrame& frame, std::size_t bit) {
   const std::span<const std::uint8_t> bytes = frame.can ? frame.can->bytes() : Bytes(frame.bytes);
-  return (bytes[bit / 8] & (frame.link == LinkKind::clocked ? 0x80u >> bit % 8 : 1u << bit % 8)) != 0;
+  return (bytes[bit / 8] & (carries_bits(frame.link) ? 0x80u >> bit % 8 : 1u << bit % 8)) != 0;
 }
 
 /// Returns the value of at most 64 bits at these positions, and sets `width` to their number.
@@ -21,7 +21,7 @@ std::uint64_t bits_at(const OwnedFrame& frame, const BitRanges& ranges, unsigned
   width = 0;
   for (const BitRange& range : ranges.view()) {
     for (std::size_t i = 0; i < range.count && width < 64; ++i, ++width) {
-      const std::size_t bit = range.first + (frame.link == LinkKind::clocked ? range.count - 1 - i : i);
+      const std::size_t bit = range.first + (carries_bits(frame.link) ? range.count - 1 - i : i);
       if (bit_of(frame, bit) != range.inverted) value |= std::uint64_t{1} << width;
     }
   }

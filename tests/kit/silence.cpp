@@ -35,7 +35,7 @@ void meet_silence(const Unit& unit, const Configuration& configuration, const Co
 Findings check_silence(const Unit& unit) {
   Findings findings;
   // On clocked and SPI links the host always reads some level, even without an encoder.
-  const bool can_be_silent = unit.link != LinkKind::clocked && unit.link != LinkKind::spi;
+  const bool can_be_silent = !host_clocks(unit.link);
   if (!can_be_silent) return findings;
   for (const Configuration& configuration : configurations(unit)) {
     for (const Command& command : unit.commands) {

@@ -62,7 +62,7 @@ class EncoderWithAlarm {
     if (!result.good()) return outcome;
     outcome.live = result.seen.reading;
     if (result.received.empty()) return outcome;
-    const std::size_t bits = unit_.link == LinkKind::clocked ? 8 * result.received.size() : 0;
+    const std::size_t bits = carries_bits(unit_.link) ? 8 * result.received.size() : 0;
     if (unit_.decode(world_.options(), {.bytes = result.sent}, {.bytes = result.received, .bits = bits},
                      outcome.captured) != Error::none) {
       outcome.captured = {};

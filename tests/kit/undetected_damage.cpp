@@ -57,7 +57,7 @@ struct Judge {
   [[nodiscard]] WrongValues judge(Bytes bytes) const {
     WrongValues wrong;
     OwnedFrame part{.link = unit.link, .bytes = Wire(bytes.begin(), bytes.end())};
-    if (unit.link == LinkKind::clocked) {
+    if (carries_bits(unit.link)) {
       part.bytes.resize(reply.bytes.size(), 0xFF);
       part.bits = reply.bits;
       judge(part, wrong);

@@ -148,7 +148,7 @@ class World {
       const auto fault = static_cast<FaultKind>(kind);
       const bool keeps = fault == FaultKind::delay || fault == FaultKind::echo || fault == FaultKind::silence ||
                          fault == FaultKind::repeat;
-      if (!keeps || unit_.link == LinkKind::clocked || unit_.link == LinkKind::spi) {
+      if (!keeps || host_clocks(unit_.link)) {
         sum += faulty_->counts()[kind];
       }
     }
@@ -189,7 +189,7 @@ class World {
   // Returns whether the reply guard covers the command, by the rule of `host::Session`.
   [[nodiscard]] bool guarded(const Command& command) const {
     if (is_can) return command.verb == Verb::read || command.verb == Verb::read_part;
-    return unit_.link != LinkKind::spi && unit_.link != LinkKind::clocked;
+    return !host_clocks(unit_.link);
   }
   void attach(Machine<Item>& machine) {
     if (node_ == none) {

@@ -56,7 +56,7 @@ class WholeWay : public ::testing::TestWithParam<const Unit*> {
   const Unit& unit = *GetParam();
   const Options options = testing::options_of(unit);
   const LineSettings line = testing::line_of(unit);
-  const bool clocked = unit.link == LinkKind::clocked || unit.link == LinkKind::spi;
+  const bool clocked = host_clocks(unit.link);
   Annotator::Settings settings;
 
   void SetUp() override {

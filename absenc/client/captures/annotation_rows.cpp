@@ -16,8 +16,7 @@ enum At : std::size_t { at_begin, at_end, at_kind, at_request, at_reply, at_turn
 
 std::vector<Column> columns_of(const Unit& unit, const Options& options, bool has_time) {
   const bool is_linear = unit.resolution(options).unit_um > 0;
-  const ColumnType wire =
-      unit.link == LinkKind::can || unit.link == LinkKind::clocked ? ColumnType::text : ColumnType::bytes;
+  const ColumnType wire = unit.link == LinkKind::can || carries_bits(unit.link) ? ColumnType::text : ColumnType::bytes;
   const ColumnType time = has_time ? ColumnType::real : ColumnType::uint64;
   std::vector<Column> columns{
       {has_time ? "time_s" : "tick", has_time ? "s" : "", time, "when its first bit began"},

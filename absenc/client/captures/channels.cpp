@@ -54,8 +54,6 @@ std::vector<std::string_view> split(std::span<const std::string> wanted) {
   return parts;
 }
 
-bool is_clocked(LinkKind link) { return link == LinkKind::clocked || link == LinkKind::spi; }
-
 bool is_needed(LinkKind link, std::string_view wire) {
   // A capture of a full-duplex line may contain the host's or the encoder's wire alone.
   if (link == LinkKind::full_duplex) return false;
@@ -132,7 +130,7 @@ WireChannels find_wires(LinkKind link, std::span<const std::string> channels, st
     // Channels without names of wires may be in the order of the wires.
     const bool any =
         std::any_of(found.wires.begin(), found.wires.end(), [](const auto& one) { return one.has_value(); });
-    if (!any && !is_clocked(link) && channels.size() <= wires.size()) {
+    if (!any && !host_clocks(link) && channels.size() <= wires.size()) {
       for (unsigned i = 0; i < channels.size(); ++i) found.wires[i] = i;
       found.assumed = link == LinkKind::full_duplex;
     }

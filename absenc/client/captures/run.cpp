@@ -152,7 +152,7 @@ CaptureOutcome CaptureRun::run(capture::AnnotationSink& all, const std::function
   capture::CompletedReadings remembering(unit_, options_, all);
   capture::ComposedFrames sink(unit_, options_, remembering);
   const Content content = reader_->layout().content;
-  const bool clocked = unit_.link == LinkKind::clocked || unit_.link == LinkKind::spi;
+  const bool clocked = host_clocks(unit_.link);
   CaptureOutcome outcome = content == Content::bytes     ? run_bytes(sink, progress)
                            : content == Content::frames  ? run_frames(sink, progress)
                            : clocked                     ? run_bursts(sink, progress)

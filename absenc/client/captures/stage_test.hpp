@@ -156,7 +156,7 @@ class Stage {
     } else {
       // If the last reply is good, the failure is a verdict of the procedure.
       const Exchange<Item> last = conversation->exchange();
-      const bool has_bytes = address.unit->link != LinkKind::clocked && !last.received.empty();
+      const bool has_bytes = !carries_bits(address.unit->link) && !last.received.empty();
       said.is_verdict = has_bytes && address.unit->check(address.options, {.bytes = last.sent},
                                                          {.bytes = last.received}) == Error::none;
     }

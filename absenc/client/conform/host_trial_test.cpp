@@ -48,7 +48,7 @@ std::vector<Flaws> flaws_for(const EncoderAddress& address) {
   for (const Time skipped_wait : {Time(100'000), Time(1'000'000), Time(19'000'000), Time(100'000'000)}) {
     all.push_back({.skipped_wait = skipped_wait});
   }
-  if (unit.link == LinkKind::spi || unit.link == LinkKind::clocked) {
+  if (host_clocks(unit.link)) {
     const std::vector<Flaws> controllers = flaws_of_controllers();
     all.insert(all.end(), controllers.begin(), controllers.end());
   }

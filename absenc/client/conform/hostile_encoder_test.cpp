@@ -66,7 +66,7 @@ class Stranger final : public Machine<Item> {
 
   Stranger(const EncoderAddress& address, Next next) : next_(std::move(next)) {
     const Unit& unit = *address.unit;
-    driven_ = unit.link == LinkKind::clocked || unit.link == LinkKind::spi;
+    driven_ = host_clocks(unit.link);
     streams_ = unit.streams != nullptr && unit.streams(address.options);
     character_ = address.line.with_some_rate().character();
     answer_ = std::max<Time>(unit.timing.turnaround, 4 * character_);
@@ -141,7 +141,7 @@ std::vector<Item> reply_of_neighbour(const EncoderAddress& address) {
 bool is_same_kind(const Unit& one, const Unit& other) {
   const auto kind = [](const Unit& unit) {
     if (unit.link == LinkKind::can) return 0;
-    return unit.link == LinkKind::clocked ? 1 : 2;
+    return carries_bits(unit.link) ? 1 : 2;
   };
   return kind(one) == kind(other);
 }

@@ -25,8 +25,7 @@ class Mutant final : public Machine<Item> {
  public:
   using Kind = typename Event<Item>::Kind;
 
-  explicit Mutant(Machine<Item>& device, LinkKind link)
-      : driven(link == LinkKind::clocked || link == LinkKind::spi), device_(device) {}
+  explicit Mutant(Machine<Item>& device, LinkKind link) : driven(host_clocks(link)), device_(device) {}
 
   void feed(const Event<Item>& event) override {
     Event<Item> changed = event;

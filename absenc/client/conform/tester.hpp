@@ -178,7 +178,7 @@ class Tester {
     return unit_.streams != nullptr && unit_.streams(options);
   }
   // On SPI and clocked links the host clocks the bits, so no reply can be late.
-  [[nodiscard]] bool is_polled() const { return unit_.link != LinkKind::clocked && unit_.link != LinkKind::spi; }
+  [[nodiscard]] bool is_polled() const { return !host_clocks(unit_.link); }
   // Returns whether a reading succeeds, without which a missing reply proves nothing.
   [[nodiscard]] bool answers() {
     for (unsigned i = 0; i < times; ++i) {

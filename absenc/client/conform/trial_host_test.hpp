@@ -183,7 +183,7 @@ class Host {
   std::shared_ptr<Port<Item>> make_line() {
     const LineSettings line = address_.line.with_some_rate();
     if constexpr (std::is_same_v<Item, std::uint8_t>) {
-      if (unit_.link == LinkKind::spi || unit_.link == LinkKind::clocked) {
+      if (host_clocks(unit_.link)) {
         controller_ = std::make_shared<ControllerPort>(unit_.link, line, watch_, flaws_);
         return controller_;
       }

@@ -52,7 +52,7 @@ bool most(const All& all, const Is& is) {
 }
 
 std::optional<Finding> stuck_data(const Case& one, const All& all) {
-  if (one.unit.link != LinkKind::spi && one.unit.link != LinkKind::clocked) return {};
+  if (!host_clocks(one.unit.link)) return {};
   for (const std::uint8_t level : {std::uint8_t{0x00}, std::uint8_t{0xFF}}) {
     const auto is_level = [level](std::uint8_t byte) { return byte == level; };
     const bool stuck = most(all, [&](const Attempted& attempt) {

@@ -169,7 +169,7 @@ const Ids& causes_of(const Unit& unit, sim::FaultKind kind) {
     all.insert({"miso_stuck", "sometimes_silent", "contradictory", "requests_damaged", "other_checksum"});
     return all;
   }();
-  if (unit.link == LinkKind::clocked || unit.link == LinkKind::spi) return clocked;
+  if (host_clocks(unit.link)) return clocked;
   const auto found = others.find(kind);
   return found == others.end() ? damage : found->second;
 }

@@ -34,7 +34,7 @@ constexpr Time between_tries_to_look = std::chrono::milliseconds(20);
 EncoderAddress virtual_address(std::string_view text) {
   EncoderAddress address = parse_address("sim:" + std::string(text));
   const LinkKind link = address.unit->link;
-  if (link != LinkKind::spi && link != LinkKind::clocked) return address;
+  if (!host_clocks(link)) return address;
   throw UsageError(fmt::format("{} ({}) does not go over a pseudo-terminal: open it as sim:{}", address.unit->id,
                                line_of(*address.unit), address.unit->id));
 }

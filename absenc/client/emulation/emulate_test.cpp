@@ -26,7 +26,7 @@ std::string flag_text(const Unit& unit, const Reading& reading) {
 
 TEST(ClientEmulation, EveryUnitOfALineIsServedAndRead) {
   for (const Unit* unit : all_units()) {
-    const bool goes = unit->link != LinkKind::spi && unit->link != LinkKind::clocked;
+    const bool goes = !host_clocks(unit->link);
     const std::string text = std::string(unit->id);
     if (!goes) {
       EXPECT_THAT(thrown_by<UsageError>([&] { static_cast<void>(emulate(text)); }), HasSubstr("sim:" + text));

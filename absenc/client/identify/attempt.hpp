@@ -221,7 +221,7 @@ class Attempt {
       const std::uint64_t late = runner_.late();
       const auto known = static_cast<std::ptrdiff_t>(exchanges.size());
       Conversed one = converse_once(command, options, exchanges, sink);
-      if (is_can || unit_.link == LinkKind::clocked || unit_.link == LinkKind::spi) return one;
+      if (is_can || host_clocks(unit_.link)) return one;
       // A scan that was given up is followed by a reading, whose reply is late, too, if any is.
       const bool is_cut = command.verb == Verb::scan && !one.ended && !effort_.asks_again;
       if (is_unanswered_ && !is_cut) runner_.settle(late_window, longest_settling);
@@ -284,7 +284,7 @@ class Attempt {
   // Returns false if all bits of a reply on a clocked or SPI line are equal: a host receives such bits from an undriven
   // line too.
   [[nodiscard]] bool is_alive(const ObservedExchange& exchange) const {
-    if (unit_.link != LinkKind::clocked && unit_.link != LinkKind::spi) return true;
+    if (!host_clocks(unit_.link)) return true;
     const auto& bytes = exchange.reply.bytes;
     const auto same_as = [&](std::uint8_t value) {
       return std::all_of(bytes.begin(), bytes.end(), [value](std::uint8_t byte) { return byte == value; });

@@ -153,7 +153,7 @@ class Found : public ::testing::TestWithParam<const Unit*> {};
 
 TEST_P(Found, TheFirstCandidateIsTheEncoderOfEachModelAndNumber) {
   const Unit& unit = *GetParam();
-  if (unit.link == LinkKind::clocked || unit.link == LinkKind::spi) GTEST_SKIP() << "an SPI controller is needed";
+  if (host_clocks(unit.link)) GTEST_SKIP() << "an SPI controller is needed";
   std::vector<std::string> settings{""};
   // Tests addresses and models only of encoders that send nothing unsolicited, because others take seconds to find.
   if (!host::sends_unsolicited(unit, parse_address(fmt::format("sim:{}", unit.id)).options)) {

@@ -24,7 +24,7 @@ bool fits(const Unit& unit, const LineSearch& search) {
   if (unit.line.data_bits > search.most_data_bits) return false;
   const Medium way = medium_of(search);
   if (way == Medium::can) return unit.link == LinkKind::can;
-  if (way == Medium::spi) return unit.link == LinkKind::spi || unit.link == LinkKind::clocked;
+  if (way == Medium::spi) return host_clocks(unit.link);
   // A pseudo-terminal carries any bytes, but no UART has characters of more than 8 bits.
   if (way == Medium::serial && unit.line.data_bits > 8 && !os::is_pseudo_terminal(search.place)) return false;
   return unit.link == LinkKind::half_duplex || unit.link == LinkKind::full_duplex;

@@ -166,7 +166,6 @@ void take_settings(EncoderAddress& uri, std::span<const OptionText> settings) {
 bool goes_over_serial(const Unit& unit) {
   return unit.link == LinkKind::half_duplex || unit.link == LinkKind::full_duplex;
 }
-bool goes_over_spi(const Unit& unit) { return unit.link == LinkKind::spi || unit.link == LinkKind::clocked; }
 
 std::string examples(const Unit& unit) {
   const auto first = [](const std::vector<std::string>& ports, const char* otherwise) {
@@ -185,7 +184,7 @@ std::string examples(const Unit& unit) {
 void check_place(const EncoderAddress& uri, std::string_view address) {
   const bool is_can = uri.port_kind == PortKind::can || uri.port_kind == PortKind::slcan;
   const bool fits = is_can                           ? uri.unit->link == LinkKind::can
-                    : uri.port_kind == PortKind::spi ? goes_over_spi(*uri.unit)
+                    : uri.port_kind == PortKind::spi ? host_clocks(uri.unit->link)
                                                      : goes_over_serial(*uri.unit);
   if (fits) return;
   const std::string_view place = is_can                           ? "a CAN adapter"

@@ -66,21 +66,21 @@ Diagnosis other_settings(const Unit& unit, const Options& options, const Frame& 
 }
 
 std::string meaning(LinkKind link, Subject subject, Error error) {
-  const std::string_view frame = link == LinkKind::clocked || link == LinkKind::can ? "frame"
-                                 : subject == Subject::request                      ? "request"
-                                                                                    : "reply";
+  const std::string_view frame = carries_bits(link) || link == LinkKind::can ? "frame"
+                                 : subject == Subject::request               ? "request"
+                                                                             : "reply";
   switch (error) {
     case Error::wrong_length:
       return fmt::format("the {} has the wrong number of {}", frame,
-                         link == LinkKind::clocked ? "bits"
-                         : link == LinkKind::can   ? "data bytes"
-                                                   : "bytes");
+                         carries_bits(link)      ? "bits"
+                         : link == LinkKind::can ? "data bytes"
+                                                 : "bytes");
     case Error::bad_checksum:
       return fmt::format("the checksum of the {} is wrong", frame);
     case Error::cross_check_failed:
       return fmt::format("parts of the {} contradict each other", frame);
     case Error::out_of_range:
-      if (link == LinkKind::clocked) return "the word is outside its range";
+      if (carries_bits(link)) return "the word is outside its range";
       break;
     case Error::unexpected_reply:
       if (subject == Subject::request) return "this encoder knows no such request";

@@ -55,9 +55,7 @@ std::size_t count_of(const std::string& text, const std::string& part) {
 
 std::vector<const Unit*> units_of_bytes() {
   std::vector<const Unit*> units(all_units().begin(), all_units().end());
-  std::erase_if(units, [](const Unit* unit) {
-    return unit->link == LinkKind::can || unit->link == LinkKind::spi || unit->link == LinkKind::clocked;
-  });
+  std::erase_if(units, [](const Unit* unit) { return unit->link == LinkKind::can || host_clocks(unit->link); });
   return units;
 }
 
@@ -121,7 +119,7 @@ WireFrame without_end(WireFrame frame) {
 
 WireFrame frame_of(const Unit& unit, Bytes bytes) {
   if (bytes.empty()) return {};
-  const bool is_text = unit.link == LinkKind::can || unit.link == LinkKind::clocked;
+  const bool is_text = unit.link == LinkKind::can || carries_bits(unit.link);
   if (is_text) return parse_wire_text(unit.link, "vector", std::string(bytes.begin(), bytes.end()));
   return {.bytes = {bytes.begin(), bytes.end()}, .bits = 0, .can = {}};
 }
@@ -141,9 +139,9 @@ std::string said_of(const Unit& unit, const Options& options, const WireFrame& r
 TEST(FrameWords, WrongLengthIsSaidOfTheFrameThatHasIt) {
   std::set<LinkKind> links;
   for (const Unit* const unit : all_units()) {
-    const std::string_view counted = unit->link == LinkKind::can       ? "the frame has the wrong number of data bytes"
-                                     : unit->link == LinkKind::clocked ? "the frame has the wrong number of bits"
-                                                                       : "";
+    const std::string_view counted = unit->link == LinkKind::can ? "the frame has the wrong number of data bytes"
+                                     : carries_bits(unit->link)  ? "the frame has the wrong number of bits"
+                                                                 : "";
     for (const Vector& vector : unit->vectors) {
       if (vector.error != Error::none) continue;
       const Options options = require_options(*unit, {}, words_of(vector.options));

@@ -140,7 +140,7 @@ std::string to_hex(Bytes bytes) { return fmt::format("{:02X}", fmt::join(bytes, 
 
 std::string to_wire_text(LinkKind link, const Frame& frame) {
   if (frame.can != nullptr) return can_text(*frame.can);
-  return link == LinkKind::clocked ? bits_text(frame, 4) : to_hex(frame.bytes);
+  return carries_bits(link) ? bits_text(frame, 4) : to_hex(frame.bytes);
 }
 
 std::string to_compact_wire_text(LinkKind link, const Frame& frame) {
@@ -150,7 +150,7 @@ std::string to_compact_wire_text(LinkKind link, const Frame& frame) {
                    [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c | 0x20) : c; });
     return text;
   }
-  return link == LinkKind::clocked ? bits_text(frame, 0) : fmt::format("{:02x}", fmt::join(frame.bytes, ""));
+  return carries_bits(link) ? bits_text(frame, 0) : fmt::format("{:02x}", fmt::join(frame.bytes, ""));
 }
 
 }  // namespace absenc::client

@@ -123,7 +123,7 @@ Conformance judge_on_spidev(const std::string& text, const Invocation& invocatio
 }
 
 void check_place(const Unit& unit, const Invocation& invocation) {
-  const bool is_spi = unit.link == LinkKind::spi || unit.link == LinkKind::clocked;
+  const bool is_spi = host_clocks(unit.link);
   const bool elsewhere = invocation.has("--pty") || invocation.has("--tcp") || invocation.has("--can");
   if (is_spi && (elsewhere || !invocation.has("--spidev"))) {
     throw UsageError(fmt::format("{} ({}) does not go over a pseudo-terminal, TCP or CAN: use --spidev NAME alone",

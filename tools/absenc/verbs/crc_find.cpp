@@ -128,7 +128,7 @@ int run_crc_find(const Invocation& invocation) {
   const CheckFindings findings = find_crc(frames);
   const bool found = !findings.checks.empty();
   const LinkKind link = frames.front().bits != 0 ? LinkKind::clocked : LinkKind::half_duplex;
-  const std::string_view unit = link == LinkKind::clocked ? "bits" : "bytes";
+  const std::string_view unit = carries_bits(link) ? "bits" : "bytes";
   if (invocation.has("--json")) {
     const Json list = Json::list(findings.checks,
                                  [&](const auto& check) { return check_json(check, findings.shortest, link, unit); });

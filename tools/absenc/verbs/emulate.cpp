@@ -94,7 +94,7 @@ void check_gap(const Unit& unit, const Invocation& invocation) {
 }
 
 void check_line(const Unit& unit, const Options& options, const Invocation& invocation) {
-  const bool is_spi = unit.link == LinkKind::spi || unit.link == LinkKind::clocked;
+  const bool is_spi = host_clocks(unit.link);
   const bool is_can = unit.link == LinkKind::can;
   const std::array<Where, 5> places{{{"--pty", "a serial line", !is_spi},
                                      {"--tcp", "a serial line", !is_spi},

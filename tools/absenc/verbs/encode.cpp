@@ -53,7 +53,7 @@ int run_encode(const Invocation& invocation) {
                                  text_of(size.error()).advice));
   }
   const Bytes encoded = Bytes(bytes).first(*size);
-  const bool is_text = unit.link == LinkKind::can || (unit.link == LinkKind::clocked && !encoded.empty());
+  const bool is_text = unit.link == LinkKind::can || (carries_bits(unit.link) && !encoded.empty());
   const WireFrame frame = is_text
                               ? parse_wire_text(unit.link, command.name, std::string(encoded.begin(), encoded.end()))
                               : WireFrame{.bytes = {encoded.begin(), encoded.end()}, .bits = 0, .can = {}};

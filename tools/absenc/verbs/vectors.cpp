@@ -32,7 +32,7 @@ std::vector<OptionText> vector_settings(const Vector& vector) {
 // A vector stores a frame as bytes, or as the text of a CAN frame or clocked word.
 WireFrame vector_frame(const Unit& unit, Bytes bytes) {
   if (bytes.empty()) return {};
-  if (unit.link != LinkKind::can && unit.link != LinkKind::clocked) return {{bytes.begin(), bytes.end()}, 0, {}};
+  if (unit.link != LinkKind::can && !carries_bits(unit.link)) return {{bytes.begin(), bytes.end()}, 0, {}};
   return parse_wire_text(unit.link, "vector", std::string(bytes.begin(), bytes.end()));
 }
 
