@@ -240,8 +240,7 @@ struct Descriptor {
   /// Returns the settings of the line with these options.
   static constexpr LineSettings settings(const Options& values) { return line_of(declared.format(values)); }
 
-  /// Returns whether the host awaits a certain reply to the request: Protocol::manner expects one and does not accept
-  /// any.
+  /// Returns false if Protocol::manner states that the request has no reply, or that any reply is accepted; else true.
   static bool is_answered(const Options& values, Frame asked) {
     const Format f = declared.format(values);
     const Result<Request> request = P::decode_request(f, asked.bytes);
