@@ -171,7 +171,8 @@ template <class F>
   }
 }
 
-/// Returns false for the last idle sample, the ACK and the start bit, where errors may pass.
+/// Returns whether the checks must detect a wrong sample `bit`: false for the last idle sample, the ACK and the start
+/// bit, whose errors may remain undetected.
 [[nodiscard]] inline bool is_behind_ack(Frame reply, std::size_t bit) {
   const BitView samples = author::to_bits(reply);
   const std::size_t idle = samples[0] ? samples.end_of_run(0) : 0;

@@ -48,7 +48,7 @@ std::string cdm_of(const ControlMaster& master) {
   return text;
 }
 
-// At least 14 zeros, and no 1, must follow the last drawn 1.
+// Compares CDM with the bits of the document up to their last 1; then at least 14 zeros, and no 1, must follow.
 TEST(BissControl, EncodesRequestsOfTheDocument) {
   const auto expect = [](const ControlMaster& master, std::string_view drawn) {
     const std::string cdm = cdm_of(master);
@@ -88,7 +88,7 @@ TEST(BissControl, DecodesWrittenDataFromCdmAlone) {
 }
 
 TEST(BissControl, DetectsEachFlippedBitOfAnAnswer) {
-  // Flips one bit of CDS at a time, from the answer to R to the CRC of the byte.
+  // Flips one bit of CDS at a time, from the answer to the bit R (read) to the CRC of the byte.
   for (std::size_t i = 14 + 17; i < 14 + 32; ++i) {
     std::string cds(read_44_answer);
     cds[i] = cds[i] == '1' ? '0' : '1';
@@ -170,7 +170,8 @@ TEST(BissControl, HostAndSlavesSendBitsOfTheTable) {
   EXPECT_EQ(transcript.cdm.size(), 14u + 33u);
 }
 
-/// Encoders that send P = 1 after each register, and send the next register all the same.
+/// Encoders that send P = 1 (the next register is refused) after each register, but send the next register
+/// nevertheless.
 struct Stopping final : Target {
   [[nodiscard]] bool stop_bit(bool) const override { return true; }
 };
@@ -195,7 +196,7 @@ TEST(BissControl, DecodesHostThatContinuesAfterStopBit) {
     slaves.take(c == '1', target);
   }
   for (unsigned i = 0; i < 44; ++i) {
-    const bool goes_on = i == 13;  // the host continues in the frame of P
+    const bool goes_on = i == 13;  // the host sends its start bit for the next register in the frame of the bit P
     cdm.append(goes_on ? 1 : 0, 1);
     cds.append(slaves.cds() ? 1 : 0, 1);
     slaves.take(goes_on, target);
@@ -370,7 +371,7 @@ TEST(BissControl, DecoderChecksEachRuleOfAControlFrame) {
 TEST(BissControl, SlaveDoesNotStoreByteWithWrongCrc) {
   Target target;
   ControlSlaves slaves(1);
-  // A write of 0x55 to 0x48 with one wrong data bit.
+  // CDM of a write of 0x55 to the register 0x48, with one wrong data bit.
   for (const char c : std::string_view("0000000000000011000100100010100110101000100100000"))
     slaves.take(c == '1', target);
   EXPECT_EQ(target.writes, 0);

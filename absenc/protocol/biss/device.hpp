@@ -16,7 +16,8 @@ struct Behaviour {
   Time latency = 10us;  ///< Time that the encoder needs for a position, from the second rising edge of MA.
   /// Delay of the line, there and back.
   Time line_delay{};
-  Time edge_noise = 20ns;       ///< A sample closer than this to a delayed edge may read the old or the new bit.
+  /// A sample that is taken less than this time from a delayed edge may read the old or the new bit.
+  Time edge_noise = 20ns;
   Time register_delay{};        ///< Time from the request for a register until it is ready.
   bool start_sequence = false;  ///< Whether SLO stays idle after power on until the start sequence.
 };
@@ -212,7 +213,8 @@ class VirtualEncoderOf final : public author::ClockedDevice {
     clocked_before_ = false;
     start_sequence_received_ = false;
   }
-  // Eight clocks count too, because many SPI controllers only clock whole bytes.
+  // Returns whether the host has sent the start sequence. Eight clocks count, too, because many SPI controllers only
+  // clock whole bytes.
   static bool is_start_sequence(std::size_t clocks) { return clocks == start_pulses || clocks == 8; }
 
   EncoderOf<F> encoder_;

@@ -62,7 +62,7 @@ TEST(BissDevice, ReportsBrokenTimingRules) {
 }
 
 TEST(BissDevice, UsesTimeoutOfFormat) {
-  // `pause` begins after the last period, half of which lies after the last edge.
+  // `pause` begins at the end of the last clock period, half a period after the last rising edge.
   const auto allows = [](Timeout timeout, std::uint32_t rate, Time pause) {
     Format format = bits_19;
     format.timeout = timeout;
