@@ -53,7 +53,8 @@ struct Reply {
   std::int32_t value = 0;  ///< Position in counts, or turns, depending on the request.
 };
 
-/// Returns whether K1 makes the odd bits, and K0 the even bits, odd in number of ones.
+/// Returns whether both check bits are right: K1 (bit 15) makes the number of ones in the odd bits odd, K0 (bit 14)
+/// that in the even bits.
 [[nodiscard]] constexpr bool parity_is_right(std::uint16_t word) {
   return odd_parity(word & 0xAAAA) && odd_parity(word & 0x5555);
 }
@@ -146,7 +147,8 @@ struct Protocol {
   }
 };
 
-extern const Unit unit;             ///< The protocol as a unit, for the list of units.
-extern const Clauses unit_clauses;  ///< The demands of the protocol's document.
+extern const Unit unit;  ///< The AMT21 as a unit, for the list of units.
+/// The document's demands on encoders and hosts of the AMT21, for conformance tests.
+extern const Clauses unit_clauses;
 
 }  // namespace absenc::amt21
