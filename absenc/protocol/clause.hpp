@@ -97,11 +97,12 @@ struct Clause {
   Demand demand;               ///< Kind of the clause, which selects its test.
   /// Conditions on options, separated by blanks: "carries=biss crc_width!=0"; empty: none.
   std::string_view needs{};
-  Errors errors = 0;                     ///< demand as_drawn: errors of replies that break the clause; 0: form_errors
-  Ask ask{};                             ///< Request that the test sends, for demands that name `ask`.
-  Reaction reaction = Reaction::silent;  ///< demand reacts: required reaction of the encoder to `ask`
-  std::string_view as{};       ///< command whose reply is demanded as reaction to `ask`; "": a reply to `ask` itself
-  std::string_view option{};   ///< demands whole, checked, as_drawn: option set to `value` for the readings; "": none
+  Errors errors = 0;  ///< for Demand::as_drawn: errors of replies that break the clause; 0: form_errors
+  Ask ask{};          ///< Request that the test sends, for demands that name `ask`.
+  Reaction reaction = Reaction::silent;  ///< for Demand::reacts: required reaction of the encoder to `ask`
+  std::string_view as{};  ///< command whose reply must be the reaction to `ask`; "": a reply to `ask` itself
+  /// For Demand::whole, checked, as_drawn: option that is set to `value` for the readings; "": none.
+  std::string_view option{};
   std::int64_t value = 0;      ///< value of `option`, or the number that the demand names `value`
   std::uint32_t page = 0;      ///< Page of the memory byte that the clause is about.
   std::uint32_t address = 0;   ///< Address of the memory byte that the clause is about.
@@ -109,7 +110,7 @@ struct Clause {
   /// Name of the field that carries the value of `setting` in the result of the command that reads it.
   std::string_view field{};
   std::int64_t other = 0;      ///< Second page, or second value of `setting`, for demands that name `other`.
-  Verb verb = Verb::run;       ///< Demand reset: verb of the command that resets.
+  Verb verb = Verb::run;       ///< For Demand::reset: verb of the command that resets.
   std::string_view command{};  ///< Name of the command, for demands that name `command`.
   std::string_view stop{};     ///< Command that ends the unsolicited frames of `command`; empty: none.
   /// Options of a virtual encoder that shows the case: "resolution=20&multiturn_bits=0".
@@ -149,7 +150,7 @@ struct HostClause {
   std::string_view paragraph;  ///< Paragraph of the document.
   std::string_view words;      ///< Demand of the document, in words.
   HostDemand demand;           ///< Kind of the clause, which selects its test.
-  /// Demands rule and row: name of the rule.
+  /// For HostDemand::rule and HostDemand::row: name of the rule that hosts must keep.
   std::string_view rule{};
   /// Scripted hosts that break this clause, or this clause and "asks"; empty: none. They are needed if the hosts that
   /// the tests use for every clause keep this clause. Two rules that every such host breaks together are one clause.

@@ -98,7 +98,7 @@ template <class Item>
 struct Device : Machine<Item> {
   /// How long the encoder takes to be ready after it is switched on.
   enum class PowerOn : std::uint8_t {
-    real,  ///< the encoder takes its start-up time, of its document or assumed
+    real,  ///< the encoder needs its start-up time, which its document states or which is assumed
     skip,  ///< the encoder is ready at once
   };
   /// Switches the encoder on at `now`.

@@ -94,8 +94,8 @@ struct OptionError {
   /// The name or value that is wrong, as the user wrote it. Kind::beside_word: the name of the option that cannot be
   /// given together with a word format, or `model`.
   std::string_view text{};
-  const Option* option = nullptr;  ///< bad_value: the option for which `text` was given; else null.
-  WordFormatError word{};          ///< bad_word: reason and place of the error in the word format.
+  const Option* option = nullptr;  ///< Kind::bad_value: the option for which `text` was given; else null.
+  WordFormatError word{};          ///< Kind::bad_word: reason and place of the error in the word format.
 };
 
 struct Unit;

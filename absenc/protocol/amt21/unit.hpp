@@ -28,7 +28,9 @@ struct Format {
   std::uint8_t multiturn_bits = 0;    ///< Number of bits of the turns: 14, or 0 for a single-turn encoder.
   std::uint8_t address = 0x54;        ///< Address of the encoder, a multiple of 4.
   std::uint8_t rate = 0;              ///< Index of the baud rate in `rates`.
-  bool drops_low_bits = false;        ///< With 12 bits: whether low bits that are not 0 are dropped, not refused.
+  /// For 12 bits: whether the two low bits of a position are dropped; false: a reply in which they are not 0 is
+  /// refused.
+  bool drops_low_bits = false;
 
   /// Returns the line settings with the baud rate of the format.
   [[nodiscard]] constexpr LineSettings line() const { return {.rate = rates[rate]}; }
@@ -59,7 +61,7 @@ struct Reply {
   return odd_parity(word & 0xAAAA) && odd_parity(word & 0x5555);
 }
 
-/// The protocol, as author layers use it: frames, lengths and times.
+/// The AMT21 protocol as the classes of protocol/author use it: frames, lengths and times.
 struct Protocol {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = amt21::Format;

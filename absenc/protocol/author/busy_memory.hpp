@@ -12,7 +12,7 @@ namespace absenc::author {
 struct BusyWait {
   /// How long after the first valid reply the host still repeats the request; then it reports Error::busy.
   Time limit;
-  Time pause;             ///< Pause before a repetition after a valid reply.
+  Time pause;             ///< Pause from a valid reply to the repetition of the request.
   unsigned attempts = 1;  ///< How often each request is sent, at most, until its reply is valid.
   /// Whether a reply is the result only after at least one reply has reported the memory busy.
   bool after_busy = false;

@@ -116,7 +116,7 @@ class Responder : public EncoderOn<std::uint8_t> {
   Time longer_{};
   Time turns_{};              // duration of the replies of all encoders to the present request; 0: only one answers
   Time turns_end_{};          // bytes received before this time are replies of other encoders
-  ByteBuffer<64> stored_;     // bytes received during the present transmission, if they are kept
+  ByteBuffer<64> stored_;     // bytes received during the present transmission, if DeviceTimes::keeps_requests is true
   unsigned interrupted_ = 0;  // number of requests received during the present transmission
   // Number of consecutive transmissions, before the present one, during which a request was received.
   unsigned interruptions_in_a_row_ = 0;

@@ -169,7 +169,7 @@ class DialogOf : public HostOf<P>, public Routine {
     [[nodiscard]] bool await_ready() const { return false; }
     /// Sets that the request is sent next.
     void await_suspend(std::coroutine_handle<>) { dialog_.ask_it(must); }
-    /// Returns the reply; without `must` the reply or the error.
+    /// Returns the reply or, without `must`, the reply or the error of the exchange.
     auto await_resume() const {
       if constexpr (must) {
         return dialog_.last();

@@ -12,7 +12,7 @@
 
 namespace absenc::biss {
 
-/// A word and its check, compiled. `Entry` and `rows` are those of BitCrc.
+/// A word and its check, compiled. `Entry` and `rows` are the template arguments of its CRC table, BitCrc.
 template <class Entry = std::uint16_t, std::size_t rows = 16>
 class CompiledChannel {
  public:

@@ -157,7 +157,7 @@ bool ControlMaster::end_byte(bool is_last) {
 
 bool ControlMaster::acknowledge(bool cds) {
   const unsigned at = at_++;
-  if (at == direction_at) return true;  // the host's start bit S
+  if (at == direction_at) return true;  // this 1 is the host's start bit S
   if (frame_.request.slaves == 0) {
     frame_.executed = true;
     end(Error::none);

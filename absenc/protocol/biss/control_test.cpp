@@ -186,7 +186,7 @@ TEST(BissControl, DecodesHostThatContinuesAfterStopBit) {
   EXPECT_EQ((run(master, slaves, target), master.error()), Error::request_rejected);
   EXPECT_EQ(master.frame().data.size(), 1u);
   EXPECT_EQ(master.frame().data[0], 10);
-  // A host that ignores P, as LENZ's does, reads the next register.
+  // A host that ignores the bit P, as hosts of LENZ do, reads the next register.
   BitBuffer<256> cdm;
   BitBuffer<256> cds;
   slaves.reset();
@@ -307,7 +307,7 @@ TEST(BissControl, ExecutesCommandWhenAllSlavesAcknowledge) {
   EXPECT_EQ(master.frame().slaves, 3);
 }
 
-// Bits are counted from the start bit, as in TI's table.
+// Bits are counted from the start bit, as in the table of Texas Instruments.
 TEST(BissControl, DecoderChecksEachRuleOfAControlFrame) {
   const auto transcript_of = [](auto begin) {
     Target target;
@@ -343,7 +343,7 @@ TEST(BissControl, DecoderChecksEachRuleOfAControlFrame) {
   EXPECT_EQ(error(flipped(read.cdm, {18}), read.cds), Error::timeout);       // the host sends no start bit S
   EXPECT_EQ(error(late(read.cdm, 13), late(read.cds, 13)), Error::none);     // start bit S of the encoder is late
   EXPECT_EQ(error(late(read.cdm, 14), late(read.cds, 14)), Error::timeout);  // 14 zeros end the frame
-  // P refuses the next register, but the host requests it.
+  // The encoder refuses the next register by P = 1, but the host requests it.
   EXPECT_EQ(error(flipped(read.cdm, {32}), flipped(read.cds, {32})), Error::request_rejected);
   // a delay is not allowed for the first written byte
   EXPECT_EQ(error(write.cdm, late(write.cds, 1)), Error::bad_framing);

@@ -25,7 +25,7 @@ struct Behaviour {
 /// Samples of SLO, one per clock of MA.
 using Samples = author::DrivenBits;
 
-/// Delays samples as a line does.
+/// Delays the samples of SLO as the line between encoder and host does.
 class LineDelay {
  public:
   /// Delays `samples`, which were taken at this period of MA, by `behaviour.line_delay`.
@@ -55,7 +55,7 @@ class EncoderOf {
     reply.ack_bits = head_bits(format_, behaviour_.latency, period);
     reply.cds = cds;
     show(format_, shaft_->at(at), alarms_, life_counter_, reply);
-    if (!encode(format_, reply, samples, data_off_)) {  // the frame does not fit
+    if (!encode(format_, reply, samples, data_off_)) {  // a frame that does not fit is sent without a start bit
       samples.clear();
       samples.append(low_mask(idle_bits), idle_bits);
       while (samples.size() < Samples::capacity()) samples.append(0, 1);

@@ -184,7 +184,7 @@ inline constexpr unsigned widest = 64;  ///< Greatest width of a position in bit
   return reply;
 }
 
-/// The protocol as author/dialog.hpp and author/device.hpp demand it.
+/// The E201-9S protocol, with the members that author/dialog.hpp and author/device.hpp demand.
 struct Protocol {
   /// Layout of the encoder's frames and properties of the interface.
   using Format = e201::Format;

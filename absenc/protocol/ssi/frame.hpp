@@ -24,7 +24,7 @@ enum class AfterWord : std::uint8_t {
   repeat,
   zero,
   one,
-  separated,  ///< A zero, then the word again.
+  separated,  ///< The encoder sends a zero, then the word again.
 };
 
 class CompiledFormat;

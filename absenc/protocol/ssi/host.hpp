@@ -9,7 +9,7 @@
 
 namespace absenc::ssi {
 
-/// The protocol, as author layers use it: word, clocks and times.
+/// SSI as the classes of protocol/author use it: word, clocks and times.
 struct Protocol {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = ssi::Format;
