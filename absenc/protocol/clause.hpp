@@ -17,7 +17,7 @@ enum class Demand : std::uint8_t {
   // Demands about readings of the position; the last one, `does`, is about a command
   answered,  ///< the encoder answers each request, pulse or transfer
   streamed,  ///< the encoder sends frames unsolicited
-  in_time,   ///< each reply begins before the timeout of a host, which is used because documents often state no limit
+  in_time,   ///< each reply begins before the timeout of a host; documents often state no limit for this time
   whole,     ///< replies have the length that the document states
   checked,   ///< replies have a correct checksum
   as_drawn,  ///< fixed bits, echoes and ranges are as the document draws them, and redundant values are equal

@@ -72,7 +72,8 @@ struct Declaration {
 
   // ---- As in Unit (protocol/unit.hpp)
 
-  /// Returns where a frame ends. Null: the lengths decide; on clocked links all bytes are one frame.
+  /// Returns where a frame ends. Null: the lengths of requests and replies decide; on clocked links all bytes are one
+  /// frame.
   FrameEnd (*frame_end)(const Options&, Direction, Bytes) = nullptr;
   /// Returns whether the encoder answers a request. Null: as Protocol::manner states, if the host sends requests.
   bool (*is_answered)(const Options&, Frame request) = nullptr;

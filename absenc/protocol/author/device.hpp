@@ -18,7 +18,8 @@ namespace absenc::author {
 
 /// Times of a virtual encoder: those of its document, or assumed where it states none.
 struct DeviceTimes {
-  /// Duration of a byte, `format.line().byte_time()`: half a character of more than 8 bits.
+  /// Duration of one byte on the line: `format.line().byte_time()`. A character of more than 8 bits counts as two
+  /// bytes.
   Time character{};
   Time answer_time{};  ///< time from the end of a request to the begin of its reply
   Time start_time{};   ///< time from power on until requests are answered
