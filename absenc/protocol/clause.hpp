@@ -14,10 +14,10 @@ namespace absenc {
 
 /// Kind of a clause for encoders. Names in backquotes are members of Clause.
 enum class Demand : std::uint8_t {
-  // Demands about readings of the position, and `does`, a demand about a command
+  // Demands about readings of the position; the last one, `does`, is about a command
   answered,  ///< the encoder answers each request, pulse or transfer
   streamed,  ///< the encoder sends frames unsolicited
-  in_time,   ///< each reply begins before a host's timeout, because documents often state no limit
+  in_time,   ///< each reply begins before the timeout of a host; documents often state no limit for this time
   whole,     ///< replies have the length that the document states
   checked,   ///< replies have a correct checksum
   as_drawn,  ///< fixed bits, echoes and ranges are as the document draws them, and redundant values are equal
@@ -27,22 +27,26 @@ enum class Demand : std::uint8_t {
   reacts,          ///< the encoder reacts to the request `ask`, sent without repetition, as `reaction` states
   // Demands about changes of the encoder, which the test undoes
   byte_written,  ///< the byte or word at `page` and `address` can be written and read back
-  byte_alone,    ///< writing the byte or word at `page` and `address` leaves the four below it unchanged
-  page_alone,    ///< a write to `page` leaves the byte at `address` of page `other` unchanged
+  /// Writing the byte or word at `page` and `address` leaves those at the four addresses below it unchanged.
+  byte_alone,
+  page_alone,  ///< a write to `page` leaves the byte at `address` of page `other` unchanged
   /// While the byte at `page` and `address` is written, reading it gets a busy reply.
   byte_busy,
-  /// With `page` selected, the request `ask` for a closed byte gets a reply to the command `as`.
+  /// With `page` selected, the request `ask` for a byte that hosts may not access gets a valid reply to the command
+  /// `as`.
   page_closed,
   set,  ///< the setting `setting` reads back as the value written: `value` or `other`
   /// The zero command with the argument `value` makes the position about 0.
   zeroed,
-  /// The positions with `value` and with `other` in the setting `setting` are mirrored.
+  /// The positions with the values `value` and `other` of the setting `setting` are mirror images: they count in
+  /// opposite directions.
   mirrored,
   /// `command` makes the encoder send as many unsolicited frames per second as its argument says.
   paced,
   // Demands about values that the test cannot restore
   zero,  ///< the position, which was not about 0 before, is about 0 after the zero command
-  /// The command of `verb` resets the alarms in the mask `value`, or the turns, and leaves the position.
+  /// The command with the verb `verb` resets the alarms in the mask `value`, or the turns, and does not change the
+  /// position.
   reset,
   restarts  ///< after `command` the encoder is silent; `value` ms later it reports the former position
 };
@@ -70,7 +74,7 @@ struct Ask {
   /// Without `wire` and `make`: name of the command that is sent; "": the one that reads the position.
   std::string_view command{};
   std::span<const std::int64_t> arguments{};  ///< Arguments of `command`; those left out have their defaults.
-  bool wrong_end = false;                     ///< Whether the last byte has a wrong bit; not used with `wire`.
+  bool wrong_end = false;  ///< Whether one bit of the request's last byte is wrong; not used with `wire`.
   /// Writes the request into `request` and returns its length; null: `wire` or `command` gives the request.
   Result<std::size_t> (*make)(const Options& options, MutableBytes request) = nullptr;
   /// Bit rate of the request in 1/1000 of the line's rate; 0: the line's rate.
@@ -80,8 +84,8 @@ struct Ask {
 /// Reaction of an encoder to the request `ask` of a clause.
 enum class Reaction : std::uint8_t {
   silent,
-  reply,              ///< the encoder sends a valid reply to the request of the command `as`; to `ask` if that is empty
-  refusal,            ///< the encoder sends a valid reply that reports the request as wrong
+  reply,    ///< the encoder sends a valid reply to the command `as` or, if `as` is empty, to the request `ask`
+  refusal,  ///< the encoder sends a valid reply that reports the request as wrong
   refusal_or_silent,  ///< the document permits either a refusal or silence
 };
 
@@ -93,18 +97,20 @@ struct Clause {
   Demand demand;               ///< Kind of the clause, which selects its test.
   /// Conditions on options, separated by blanks: "carries=biss crc_width!=0"; empty: none.
   std::string_view needs{};
-  Errors errors = 0;                     ///< demand as_drawn: errors of replies that break the clause; 0: form_errors
-  Ask ask{};                             ///< Request that the test sends, for demands that name `ask`.
-  Reaction reaction = Reaction::silent;  ///< demand reacts: required reaction of the encoder to `ask`
-  std::string_view as{};       ///< command whose reply is demanded as reaction to `ask`; "": a reply to `ask` itself
-  std::string_view option{};   ///< demands whole, checked, as_drawn: option set to `value` for the readings; "": none
+  Errors errors = 0;  ///< for Demand::as_drawn: errors of replies that break the clause; 0: form_errors
+  Ask ask{};          ///< Request that the test sends, for demands that name `ask`.
+  Reaction reaction = Reaction::silent;  ///< for Demand::reacts: required reaction of the encoder to `ask`
+  std::string_view as{};  ///< command whose reply must be the reaction to `ask`; "": a reply to `ask` itself
+  /// For Demand::whole, checked, as_drawn: option that is set to `value` for the readings; "": none.
+  std::string_view option{};
   std::int64_t value = 0;      ///< value of `option`, or the number that the demand names `value`
   std::uint32_t page = 0;      ///< Page of the memory byte that the clause is about.
   std::uint32_t address = 0;   ///< Address of the memory byte that the clause is about.
   std::string_view setting{};  ///< setting that the clause is about, or that access to its memory byte changes
-  std::string_view field{};    ///< field of the command that reads `setting`, with its value
+  /// Name of the field that carries the value of `setting` in the result of the command that reads it.
+  std::string_view field{};
   std::int64_t other = 0;      ///< Second page, or second value of `setting`, for demands that name `other`.
-  Verb verb = Verb::run;       ///< Demand reset: verb of the command that resets.
+  Verb verb = Verb::run;       ///< For Demand::reset: verb of the command that resets.
   std::string_view command{};  ///< Name of the command, for demands that name `command`.
   std::string_view stop{};     ///< Command that ends the unsolicited frames of `command`; empty: none.
   /// Options of a virtual encoder that shows the case: "resolution=20&multiturn_bits=0".
@@ -113,10 +119,11 @@ struct Clause {
 
 /// Kind of a clause for hosts: the behaviour that the document demands.
 enum class HostDemand : std::uint8_t {
-  asks,           ///< the host sends only requests, from its first one on, and the encoder answers at least one
+  /// From its first request on the host sends nothing but requests, and the encoder answers at least one of them.
+  asks,
   after_silence,  ///< the host sends further requests after the encoder sent no reply
   after_damage,   ///< the host sends further requests after a damaged reply
-  after_refusal,  ///< the host sends further requests after one that reached the encoder damaged
+  after_refusal,  ///< the host sends further requests after a request that reached the encoder damaged
   rule,           ///< the host never breaks `rule`
   /// The host keeps `rule`; requests during or soon after an injected fault do not count.
   row
@@ -130,8 +137,9 @@ struct HostStep {
   /// Name of a command, or the bytes or CAN frame to send: "1a 1a", "220:8020". They are sent
   /// without a pause in between: a request of several frames is a step for each frame.
   std::string_view what{};
-  std::span<const std::int64_t> arguments{};  ///< arguments; empty: required ones are 1, or their minimum if greater
-  unsigned times = 1;                         ///< how often the request is sent, each time after `pause`
+  /// Arguments of the command; empty: each required argument is 1, or its minimum if that is greater.
+  std::span<const std::int64_t> arguments{};
+  unsigned times = 1;  ///< how often the request is sent, each time after `pause`
 };
 /// The steps of a scripted host that ignores replies, in order.
 using HostScript = std::span<const HostStep>;
@@ -142,13 +150,12 @@ struct HostClause {
   std::string_view paragraph;  ///< Paragraph of the document.
   std::string_view words;      ///< Demand of the document, in words.
   HostDemand demand;           ///< Kind of the clause, which selects its test.
-  /// Demands rule and row: name of the rule.
+  /// For HostDemand::rule and HostDemand::row: name of the rule that hosts must keep.
   std::string_view rule{};
-  // Test hosts for this clause, if the hosts that the tests use for every clause do not break it.
-  /// Scripted hosts that break this clause, or it and "asks"; empty: none. Two rules that each
-  /// such host breaks together have one cause, and are one clause.
+  /// Scripted hosts that break this clause, or this clause and "asks"; empty: none. They are needed if the hosts that
+  /// the tests use for every clause keep this clause. Two rules that every such host breaks together are one clause.
   std::array<HostScript, 2> breaks{};
-  HostScript keeps{};  ///< requests like those of `breaks` that keep this clause; empty: none
+  HostScript keeps{};  ///< a scripted host that keeps this clause, with requests like those of `breaks`; empty: none
   /// Options of the virtual encoder in tests of host clauses: "acquisition_us=20000".
   std::string_view options{};
 };
@@ -156,7 +163,7 @@ struct HostClause {
 /// Rule that os::SpiDevice checks, because a virtual encoder cannot see the clock's edges.
 inline constexpr std::string_view spi_mode_rule = "clock or sampling in another SPI mode than the encoder's";
 
-/// The clauses of a unit; not in its descriptor, which firmware links.
+/// The clauses of a unit. The unit's descriptor does not refer to them, because firmware links the descriptor.
 struct Clauses {
   std::span<const Clause> encoder{};   ///< Clauses for encoders, in the order in which they are tested.
   std::span<const HostClause> host{};  ///< Clauses for hosts.

@@ -16,7 +16,8 @@ namespace absenc {
 /// A compiled word format; it gives the same values as `decode_word`.
 class CompiledWord {
  public:
-  static constexpr unsigned maximum_bits = 64;  ///< Greatest number of bits of a word and the bits behind it.
+  /// Greatest number of bits of a word together with the bits that follow it.
+  static constexpr unsigned maximum_bits = 64;
 
   constexpr CompiledWord() = default;
   /// Compiles `format` for numbers of at most 64 bits whose lowest `behind` bits follow the word.
@@ -48,7 +49,7 @@ class CompiledWord {
   /// Returns whether all skipped bits of the word in `number` are 0.
   [[nodiscard]] constexpr bool is_padding_zero(std::uint64_t number) const { return (number & skipped_) == 0; }
 
-  /// Returns the values of the word in `number`. `Values`: WordWith.
+  /// Returns the values of the word in `number`. `Values`: an instance of the template WordWith.
   template <class Values>
   [[nodiscard]] constexpr Values values_of(std::uint64_t number) const {
     const std::uint64_t high = number ^ inverted_;
@@ -63,11 +64,11 @@ class CompiledWord {
   }
 
  private:
-  // A field as a part of the number.
+  // The place of a field in the number that has the word.
   struct Part {
     std::uint64_t mask = 0;
     std::uint8_t shift = 0;
-    std::uint8_t index = 0;  // of the field in the format
+    std::uint8_t index = 0;  // index of the field in the format
 
     [[nodiscard]] constexpr std::uint64_t of(std::uint64_t number) const { return number >> shift & mask; }
   };
@@ -75,7 +76,8 @@ class CompiledWord {
   // Returns the values of the fields with Meaning::value.
   template <std::size_t size>
   [[nodiscard]] constexpr std::array<std::uint64_t, size> numbers_of(std::uint64_t high) const {
-    std::array<std::uint64_t, size> numbers;  // cleared in halves: g++ clears all of it by a slow `rep stos`
+    // Cleared in two halves, because g++ clears a whole array by a slow `rep stos`.
+    std::array<std::uint64_t, size> numbers;
     for (std::size_t i = 0; i < size / 2; ++i) numbers[i] = 0;
     for (std::size_t i = size / 2; i < size; ++i) numbers[i] = 0;
     if constexpr (size != 0) {
@@ -98,15 +100,15 @@ class CompiledWord {
 
   Part position_{};
   Part multiturn_{};
-  std::uint64_t inverted_ = 0;  // fields that are active low
+  std::uint64_t inverted_ = 0;  // mask of the bits of active-low fields
   std::uint64_t error_ = 0;
   std::uint64_t warning_ = 0;
   std::uint64_t skipped_ = 0;
-  std::uint64_t parity_ = 0;  // the parity bit and all bits that it covers; 0: none
+  std::uint64_t parity_ = 0;  // mask of the parity bit and all bits that it covers; 0: the word has no parity bit
   bool odd_ = false;
   bool gray_ = false;
   std::uint8_t value_count_ = 0;
-  std::array<Part, WordFormat::maximum_fields> values_{};  // fields with Meaning::value
+  std::array<Part, WordFormat::maximum_fields> values_{};  // the fields whose meaning is Meaning::value
 };
 
 }  // namespace absenc

@@ -60,17 +60,18 @@ struct Conversation : Machine<Item> {
   [[nodiscard]] bool streams() const { return stream() != nullptr; }
   /// Returns whether a conversation that streams sends a request for each result.
   [[nodiscard]] virtual bool asks() const { return false; }
-  /// Returns the position that the last reply carried; without bits: none, or this conversation does not tell it.
+  /// Returns the position that the last reply carried. The Reading has no bits if the reply carried no position, or if
+  /// this conversation does not report it.
   [[nodiscard]] virtual Reading carried() const { return {}; }
   /// Puts every named value of the result into `sink`; nothing after an error.
   virtual void report(FieldSink& sink) const = 0;
   /// Returns the last request and the items received after it.
   [[nodiscard]] virtual Exchange<Item> exchange() const = 0;
-  /// Asks the conversation to end early; true: it restores the encoder first, then ends by itself.
+  /// Asks the conversation to end early. Returns true if it first restores the encoder and then ends by itself.
   virtual bool abort() { return false; }
   /// Returns whether a request that changes the encoder was sent; valid at every step.
   [[nodiscard]] virtual ChangeSent change_sent() const { return ChangeSent::no; }
-  /// Puts changes into `sink` that remain if the conversation ends now; by default none.
+  /// Puts fields into `sink` for the changes of the encoder that remain if the conversation ends now; by default none.
   virtual void report_left(FieldSink&) const {}
 
  protected:
@@ -97,7 +98,7 @@ template <class Item>
 struct Device : Machine<Item> {
   /// How long the encoder takes to be ready after it is switched on.
   enum class PowerOn : std::uint8_t {
-    real,  ///< the encoder takes its start-up time, of its document or assumed
+    real,  ///< the encoder needs its start-up time, which its document states or which is assumed
     skip,  ///< the encoder is ready at once
   };
   /// Switches the encoder on at `now`.

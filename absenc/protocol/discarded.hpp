@@ -7,7 +7,7 @@
 
 namespace absenc {
 
-/// Number of discarded frames, estimated from the bytes that belong to no valid frame.
+/// Estimates the number of discarded frames from the number of bytes that belong to no valid frame.
 class DiscardedFrames {
  public:
   /// Counts frames with a length of `frame_bytes` bytes.

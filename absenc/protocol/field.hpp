@@ -60,7 +60,7 @@ struct FieldValue {
 struct FieldSink {
   /// Takes the value of one field.
   constexpr virtual void put(const FieldValue& value) = 0;
-  /// Takes a reading; the same one may be delivered twice. Ignored by default.
+  /// Takes a reading; a decoder may deliver the same reading twice. By default does nothing.
   constexpr virtual void put_reading(const Reading&) {}
 
  protected:

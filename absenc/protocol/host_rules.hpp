@@ -17,7 +17,7 @@ class HostRules {
   /// Records whether the host kept `rule` at the time `at`. Returns `kept`.
   bool expect(bool kept, std::string_view rule, Time at);
 
-  /// Notifies only the observer: breaking this rule is no violation.
+  /// Notifies only the observer whether the host kept `rule`; a breach is not counted as a violation.
   void note(bool kept, std::string_view rule) const;
 
   /// Returns the first 16 rule breaches of the host, in order of time.

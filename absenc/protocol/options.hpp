@@ -88,22 +88,24 @@ struct OptionError {
     unknown_model,
     unknown_option,
     bad_value,
-    bad_word,               ///< the word format is invalid: the member `word` has the reason and the place
-    beside_word,            ///< the option `text`, or a model ("model"), was given together with a word format
-  } kind = Kind::none;      ///< Kind of the error.
-  std::string_view text{};  ///< The name or the value that is wrong, as the user wrote it; beside_word: see there.
-  const Option* option = nullptr;  ///< bad_value: the option for which `text` was given; else null.
-  WordFormatError word{};          ///< bad_word: reason and place of the error in the word format.
+    bad_word,           ///< the word format is invalid: the member `word` has the reason and the place
+    beside_word,        ///< the option `text`, or a model ("model"), was given together with a word format
+  } kind = Kind::none;  ///< Kind of the error.
+  /// The name or value that is wrong, as the user wrote it. Kind::beside_word: the name of the option that cannot be
+  /// given together with a word format, or `model`.
+  std::string_view text{};
+  const Option* option = nullptr;  ///< Kind::bad_value: the option for which `text` was given; else null.
+  WordFormatError word{};          ///< Kind::bad_word: reason and place of the error in the word format.
 };
 
 struct Unit;
 
-/// Computes all options from a model and from settings, which override it, into `resolved`. Returns why that is
-/// impossible, or an error of kind `none`.
+/// Computes the values of all options into `resolved`: settings override the model, and the model overrides the
+/// defaults. Returns why that is impossible, or an error of kind `none`.
 [[nodiscard]] OptionError resolve_options(const Unit& unit, std::string_view model,
                                           std::span<const OptionText> settings, Options& resolved);
 
-/// Sets the options with `sharing_choices` that are `auto` to `true`.
+/// Sets each option that has `sharing_choices` and is `auto` to `true`.
 void tell_shared(const Unit& unit, Options& options);
 
 /// Parses an integer, decimal or 0x hexadecimal, with an optional minus sign. Error: invalid_argument.

@@ -46,7 +46,8 @@ struct Argument {
   Role role = Role::other;         ///< Role by which programs that do not know the unit find the argument.
 };
 
-/// Values of the arguments of a command, with defaults, in the order of its Arguments.
+/// Values of all arguments of a command, in the order of Command::arguments; those that the user left out have their
+/// defaults.
 using Arguments = std::span<const std::int64_t>;
 
 /// Description of a command of a unit.
@@ -80,9 +81,9 @@ struct MemoryArea {
   std::uint32_t write_life = 0;  ///< number of writes that the document permits; 0: the document states none
   /// Why memory_write needs its argument with the role force for this area; "": it needs none.
   std::string_view protection{};
-  /// Whether `write_life` counts the writes of all bytes together; false: not stated.
+  /// Whether `write_life` counts the writes of all bytes together; false: the document does not state that.
   bool life_in_total = false;
-  std::uint32_t pages = 1;  ///< number of pages, from `page` on, with such an area; an encoder may have fewer
+  std::uint32_t pages = 1;  ///< number of pages, from `page` on, that have this area; an encoder may have fewer
   std::uint8_t word = 1;    ///< bytes of the word at each address: 1, 2 or 4, the same in all areas of a unit
 
   /// Returns whether the area includes the byte or word at `address` of the page `on_page`.
@@ -146,8 +147,8 @@ struct Vector {
   Bytes reply;                         ///< Bytes of the reply; empty: none.
   std::span<const Expected> fields{};  ///< Expected values of all fields; empty if `error` is set.
   Error error = Error::none;           ///< Expected error; `Error::none`: the frame is valid.
-  OpenBytes open_request{};            ///< Bytes of the request that the tests are to compute.
-  OpenBytes open_reply{};              ///< Bytes of the reply that the tests are to compute.
+  OpenBytes open_request{};            ///< Bytes of the request that the vector leaves open; the tests compute them.
+  OpenBytes open_reply{};              ///< Bytes of the reply that the vector leaves open; the tests compute them.
 
   /// Returns whether no byte is left open.
   [[nodiscard]] constexpr bool is_complete() const { return open_request.count == 0 && open_reply.count == 0; }
@@ -201,7 +202,7 @@ struct Composed {
 struct Follower {
   /// Takes a valid exchange with its number in the capture. `request` may be empty.
   virtual void follow(std::uint64_t number, Bytes request, Bytes reply) = 0;
-  /// Notes that frames were lost or damaged between the exchange before and the next one.
+  /// Notes that frames were lost or damaged between the last exchange and the next one.
   virtual void lose() = 0;
   /// Stores the next composed frame in `one`, or returns false if there is none. The frame is valid until the next
   /// exchange.
@@ -211,7 +212,7 @@ struct Follower {
   ~Follower() = default;
 };
 
-/// Decodes many frames of one encoder, whose format was made of its options and compiled before.
+/// Decoder for many frames of one encoder. It is made of the encoder's options once, with the format compiled.
 struct FrameDecoder {
   /// Checks a frame and puts its fields into `sink`, as Unit::decode.
   virtual Error decode(Frame request, Frame reply, FieldSink& sink) const = 0;
@@ -274,7 +275,8 @@ struct LineTiming {
   Time frame_pause{};        ///< longest pause between the frames of one request; 0: a request is one frame
   /// Time from a request to its reply at the default rate of the line; 0: unknown.
   Time turnaround{};
-  Time turnaround_limit = std::chrono::milliseconds(100);  ///< captures: longest time until a reply begins
+  /// When decoding captures: longest time from a request to the begin of its reply.
+  Time turnaround_limit = std::chrono::milliseconds(100);
 };
 
 /// Descriptor of a protocol, for the layers that know no protocol.
@@ -285,7 +287,7 @@ struct Unit {
   /// Other names by which users find the unit, such as "Tamagawa" or "Smart-Abs".
   std::span<const std::string_view> known_as{};
   LinkKind link;      ///< Kind of link between host and encoder.
-  LineSettings line;  ///< Default settings of the line. Rate 0: the document states none, so the user must.
+  LineSettings line;  ///< Default settings of the line. Rate 0: the document states none, so the user must state it.
   std::span<const Option> options;    ///< Options that the user may set in an address.
   std::span<const Model> models;      ///< Models of encoders, each of which sets several options by one name.
   std::span<const FieldInfo> fields;  ///< Fields that requests, replies and results can have.
@@ -332,16 +334,16 @@ struct Unit {
   Any<Device> (*device)(const Options& options, const Shaft& shaft, std::span<std::byte> storage);
   /// Returns the resolution of an encoder with these options.
   Resolution (*resolution)(const Options& options);
-  /// Returns whether the checks must detect a flipped bit `bit` of this valid reply. Null: all bits. Bits count from
-  /// the least significant of the first byte on; on clocked links in the order of the wire.
+  /// Returns whether the checks must detect that the bit number `bit` of this valid reply is flipped. Null: all bits.
+  /// Bits count from the least significant bit of the first byte on; on clocked links in the order of the wire.
   bool (*is_checked)(const Options& options, Frame request, Frame reply, std::size_t bit) = nullptr;
-  /// Returns the bits of this valid reply that carry `field`; may be none. Null: unknown.
+  /// Returns the bits of this valid reply that carry `field`; may be none. Null: the unit does not state them.
   BitRanges (*bits)(const Options& options, Frame request, Frame reply, const FieldInfo& field) = nullptr;
   /// Returns the unit's explanation of the error of an exchange. Null: the unit explains none.
   Explanation (*explain)(const Options& options, Error error, Frame request, Frame reply) = nullptr;
   /// Returns the settings of the line with these options. Null: they are always `line`.
   LineSettings (*settings)(const Options& options) = nullptr;
-  /// The unit of the same encoder behind an SPI controller, if that is another; null: none.
+  /// Another unit, which describes the same encoder behind an SPI controller; null: there is none.
   const Unit* over_spi = nullptr;
   /// Compares captures, in the order of time, with values of some options, and puts the evidence into `sink`. Returns
   /// whether no capture contradicts the values left in `options`. Null: frames do not show option values.
@@ -362,7 +364,8 @@ struct Unit {
   /// Conditions of the virtual encoder's environment, which can be set while it runs.
   std::span<const Condition> conditions{};
   /// For links on which the clock line carries a bit of the host in each pause (1: low): returns the index of the bit
-  /// in this reply that answers it; nothing: it has none. Null: no reply of the unit has one.
+  /// in this reply that answers the host's bit; nothing: this reply has no such bit. Null: no reply of the unit has
+  /// one.
   std::optional<std::size_t> (*control_bit)(const Options& options, Frame reply) = nullptr;
   /// Returns the reading `now`, completed by alarms of `before`, the completed reading before it. Null: readings are
   /// not completed.

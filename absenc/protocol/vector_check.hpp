@@ -10,7 +10,7 @@
 
 namespace absenc {
 
-/// A sink that compares delivered fields with expected values; real numbers to 1e-9.
+/// A sink that compares delivered fields with expected values. Real numbers are equal if they differ by less than 1e-9.
 struct VectorCheck final : FieldSink {
   /// Expects exactly the fields `wanted`.
   constexpr explicit VectorCheck(std::span<const Expected> wanted) : expected(wanted) {}

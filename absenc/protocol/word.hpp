@@ -45,7 +45,7 @@ inline constexpr std::array<FlagInfo, 2> word_flags{{
     {"warning", "the encoder works near its limits", "check distance, dirt, temperature and supply", true},
 }};
 
-/// Types of the values of a word that are shown as fields, and of its alarms.
+/// Names and types of the values of a word that are shown as fields, and of its alarms.
 struct WordValues {
   std::uint64_t multiturn;   ///< Number of turns.
   std::uint64_t singleturn;  ///< Position within the turn, in counts.
@@ -86,7 +86,7 @@ struct PlacedField {
   bool active_low;    ///< whether the field is sent inverted: a flag is set when 0, parity is odd
 };
 
-/// A format for the functions of a position word, known at run time.
+/// A format that is known at run time, in the form that the functions for position words take.
 template <class Format>
 struct Given {
   static constexpr bool is_known = false;  ///< Whether the format is known at compile time.
@@ -95,7 +95,7 @@ struct Given {
   const Format& format;    ///< Format of the encoder, of which the word format is a part.
   const WordFormat& word;  ///< Format of the position word.
 
-  /// Calls `use` with each field of the word, until it returns false. Returns whether none did.
+  /// Calls `use` with each field of the word, until a call returns false. Returns true if no call did.
   template <class Use>
   constexpr bool each(Use use) const {
     unsigned first = 0;
@@ -108,7 +108,7 @@ struct Given {
   }
 };
 
-/// A format for the functions of a position word, known at compile time.
+/// A format that is known at compile time, in the form that the functions for position words take.
 template <const auto& known>
 struct Known {
   static constexpr bool is_known = true;                 ///< Whether the format is known at compile time.
@@ -129,7 +129,7 @@ struct Known {
     static constexpr bool active_low = word.fields()[i].active_low;
   };
 
-  /// Calls `use` with each field of the word, until it returns false. Returns whether none did.
+  /// Calls `use` with each field of the word, until a call returns false. Returns true if no call did.
   template <class Use>
   static constexpr bool each(Use use) {
     return each(use, std::make_index_sequence<size>{});

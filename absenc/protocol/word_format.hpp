@@ -197,7 +197,7 @@ constexpr bool is_taken(std::string_view name, std::span<const FieldInfo> taken)
 }  // namespace detail
 
 /// Parses the text of a word format into `format`, which stays unchanged on an error. Returns the error, with an empty
-/// `reason` if there is none. No value may have a name of the fields `taken`.
+/// `reason` if there is none. A value must not have the name of one of the fields `taken`.
 [[nodiscard]] constexpr WordFormatError parse_word_format(std::string_view text, WordFormat& format,
                                                           std::span<const FieldInfo> taken = {}) {
   WordFormat parsed;

@@ -68,8 +68,8 @@ struct WordSettings : Format {
     if (position_bits != 0) return {.position = position_bits};
     return {singleturn_bits, multiturn_bits, multiturn_first};
   }
-  /// Returns the protocol format with its position word: that in `values`, or else `described`. `linear`: whether
-  /// `described` is of a linear encoder.
+  /// Returns the protocol format with its position word: the word that the user gave in `values`, or else `described`.
+  /// `linear`: whether `described` is the word of a linear encoder.
   [[nodiscard]] constexpr Format with_word(const Options& values, const WordFormat& described, bool linear) const {
     Format format = *this;
     format.word = values.has_word() ? values.word : described;
@@ -120,7 +120,7 @@ struct WordSettings : Format {
   return ranges;
 }
 
-/// Models: the four examples in RLS "E201-9S Decoding the BiSS information", which gives no speeds.
+/// Models: the four examples in RLS "E201-9S Decoding the BiSS information", which states no greatest speeds.
 inline constexpr std::array position_models{
     author::ModelText{"rotary-19", "single-turn, 19 bits (example 4)", 0,
                       "singleturn_bits=19 multiturn_bits=0 position_bits=0"},

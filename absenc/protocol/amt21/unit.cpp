@@ -28,7 +28,8 @@ constexpr Request request(const Format& format, Arguments = {}) {
 constexpr Request request_to(std::size_t node) { return {Ask::position, static_cast<std::uint8_t>(4 * node)}; }
 constexpr std::size_t addresses = 64;
 
-// The turns are valid only if the shaft did not pass zero between the positions around them.
+// Reads position, turns and position again. The turns are valid only if the shaft did not pass zero between the two
+// positions.
 Procedure read_both(Dialog& dialog, PositionAndTurns& found) {
   const Format format = dialog.format();
   std::uint64_t before = co_await look(dialog, found, request<Ask::position>(format));
@@ -69,7 +70,7 @@ Procedure restart(Dialog& dialog, PositionAndTurns& found, Ask command_kind) {
 
 // ---- The virtual encoder
 
-class Encoder final : public BusDevice<Protocol, Encoder, 4> {  // 4 bytes of memory, which hold its zero
+class Encoder final : public BusDevice<Protocol, Encoder, 4> {  // 4 bytes of memory, which hold the encoder's zero
  public:
   using BusDevice::BusDevice;
   [[nodiscard]] bool is_mine(const Request& asked) const { return asked.address == format().address; }
@@ -96,7 +97,8 @@ class Encoder final : public BusDevice<Protocol, Encoder, 4> {  // 4 bytes of me
   [[nodiscard]] std::uint64_t turns(Time at) const { return static_cast<std::uint64_t>(counts(at, 0, 0)); }
 
   bool battery_ = true;
-  std::uint64_t lost_turns_ = 0;  // turns of the shaft when a start without a battery set the turns to 0
+  // Number of turns of the shaft at the last start without a battery, which set the reported turns to 0.
+  std::uint64_t lost_turns_ = 0;
 };
 
 // ---- Options and fields

@@ -28,7 +28,9 @@ struct Format {
   std::uint8_t multiturn_bits = 0;    ///< Number of bits of the turns: 14, or 0 for a single-turn encoder.
   std::uint8_t address = 0x54;        ///< Address of the encoder, a multiple of 4.
   std::uint8_t rate = 0;              ///< Index of the baud rate in `rates`.
-  bool drops_low_bits = false;        ///< With 12 bits: whether low bits that are not 0 are dropped, not refused.
+  /// For 12 bits: whether the two low bits of a position are dropped; false: a reply in which they are not 0 is
+  /// refused.
+  bool drops_low_bits = false;
 
   /// Returns the line settings with the baud rate of the format.
   [[nodiscard]] constexpr LineSettings line() const { return {.rate = rates[rate]}; }
@@ -53,12 +55,13 @@ struct Reply {
   std::int32_t value = 0;  ///< Position in counts, or turns, depending on the request.
 };
 
-/// Returns whether K1 makes the odd bits, and K0 the even bits, odd in number of ones.
+/// Returns whether both check bits are right: K1 (bit 15) makes the number of ones in the odd bits odd, K0 (bit 14)
+/// that in the even bits.
 [[nodiscard]] constexpr bool parity_is_right(std::uint16_t word) {
   return odd_parity(word & 0xAAAA) && odd_parity(word & 0x5555);
 }
 
-/// The protocol, as author layers use it: frames, lengths and times.
+/// The AMT21 protocol as the classes of protocol/author use it: frames, lengths and times.
 struct Protocol {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = amt21::Format;
@@ -146,7 +149,8 @@ struct Protocol {
   }
 };
 
-extern const Unit unit;             ///< The protocol as a unit, for the list of units.
-extern const Clauses unit_clauses;  ///< The demands of the protocol's document.
+extern const Unit unit;  ///< The AMT21 as a unit, for the list of units.
+/// The document's demands on encoders and hosts of the AMT21, for conformance tests.
+extern const Clauses unit_clauses;
 
 }  // namespace absenc::amt21

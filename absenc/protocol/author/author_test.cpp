@@ -57,7 +57,7 @@ struct Found {
 };
 using Wire = std::vector<std::uint8_t>;
 
-constexpr std::uint8_t damaged = 0x55;  // a byte that is received as a damaged character
+constexpr std::uint8_t damaged = 0x55;  // stands for a character that the host receives damaged
 
 /// Runs a conversation in virtual time; `encoder` returns the reply to the n-th request.
 struct Bench {
@@ -147,7 +147,7 @@ TEST(Procedures, EndWithoutAValidReply) {
   EXPECT_EQ(bad.host.error(), Error::timeout);
   EXPECT_EQ(bad.host.detail(), "the second");
   ASSERT_EQ(bad.bench.sent.size(), 4u);  // the first request is sent once, and the second three times
-  // The silence that shows the missing reply is part of the pause.
+  // The time in which the host waits for the missing reply is part of the pause before the repetition.
   EXPECT_EQ(bad.bench.sent[3] - bad.bench.sent[2], 1ms + 2ms - 1ms);
   EXPECT_EQ(bad.bench.now, bad.bench.sent[3] + 5ms);  // the conversation ends after the hold time of 5 ms
 }
@@ -183,7 +183,8 @@ TEST(Engine, WeakChecksumNeedsSilence) {
 TEST(Engine, TheLineIsSilentBeforeEachRequest) {
   Case<two_questions> good(echo, {.silence = 20ms});
   EXPECT_EQ(good.bench.sent[0], 20ms);
-  EXPECT_EQ(good.bench.sent[1] - good.bench.sent[0], 20ms + 10us);  // the longer of pause and silence decides
+  // The longer of the pause (10 ms) and the silence (20 ms) decides.
+  EXPECT_EQ(good.bench.sent[1] - good.bench.sent[0], 20ms + 10us);
 }
 
 Procedure attempts(ToyDialog& dialog, Found& found) {
@@ -218,7 +219,8 @@ Part<unsigned> deeper(ToyDialog& dialog, unsigned depth) {
 }
 
 Procedure many_parts(ToyDialog& dialog, Found& found, Arguments arguments) {
-  for (int i = 0; i < 500; ++i) {  // 500 parts one after the other: more than the storage could hold at once
+  // 500 parts run one after the other; the storage could not hold the frames of all of them at once.
+  for (int i = 0; i < 500; ++i) {
     const unsigned sum = co_await deeper(dialog, static_cast<unsigned>(arguments[0]));
     found.sum = sum;
   }
@@ -266,11 +268,11 @@ TEST(Procedures, StopFromAnyDepth) {
 TEST(Procedures, ReportStorageThatIsTooSmall) {
   const std::array<std::int64_t, 1> depth{12};
   const std::size_t needed = Case<many_parts>(echo, {}, depth).host.frames_size();
-  // Just large enough for all nested parts: the procedure ends itself with out_of_range.
+  // The storage is just large enough for all nested parts, so the procedure itself stops with out_of_range.
   EXPECT_EQ(Case<many_parts>(echo, {}, depth, needed).host.error(), Error::out_of_range);
-  // One byte less is too small for the frame of the last part.
+  // With one byte less, there is no room for the coroutine frame of the last part.
   EXPECT_EQ(Case<many_parts>(echo, {}, depth, needed - 1).host.error(), Error::buffer_too_small);
-  // 16 bytes are too small for the frame of the procedure.
+  // 16 bytes are too small for the coroutine frame of the procedure.
   EXPECT_EQ(Case<many_parts>(echo, {}, depth, 16).host.error(), Error::buffer_too_small);
 }
 

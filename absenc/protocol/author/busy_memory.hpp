@@ -10,13 +10,15 @@ namespace absenc::author {
 
 /// How often and how long a host repeats a request to a busy memory.
 struct BusyWait {
-  Time limit;               ///< Longest time from the first valid reply to one after which the request is repeated.
-  Time pause;               ///< Pause before a repetition after a valid reply.
-  unsigned attempts = 1;    ///< How often each request is sent, at most, until its reply is valid.
-  bool after_busy = false;  ///< Whether the result must be a reply that follows a busy reply.
+  /// How long after the first valid reply the host still repeats the request; then it reports Error::busy.
+  Time limit;
+  Time pause;             ///< Pause from a valid reply to the repetition of the request.
+  unsigned attempts = 1;  ///< How often each request is sent, at most, until its reply is valid.
+  /// Whether a reply is the result only after at least one reply has reported the memory busy.
+  bool after_busy = false;
 };
 
-/// Repeats a request to a busy memory, and returns the last reply or an error.
+/// Sends a request, repeats it while the memory is busy, and returns the last reply or an error.
 template <class P>
 Part<Result<typename P::Reply>> until_ready(DialogOf<P>& dialog, typename P::Request request, BusyWait wait) {
   Time last_attempt = never;

@@ -31,14 +31,15 @@ class DialogOf<P> : public CanEngine, public Routine {
   /// Returns the format of the encoder.
   [[nodiscard]] const Format& format() const { return format_; }
 
-  /// Sets the frame to send next, at least `pause` after the last request or its kept answer.
+  /// Sets the frame to send next, at least `pause` after the answer that `keep` stored for the last request or, if it
+  /// stored none, after that request.
   void ask(const CanFrame& frame, Time pause = {}) { CanEngine::ask(frame, P::host_times(format_), pause); }
   using CanEngine::ask_for;
   using CanEngine::configure;
   using CanEngine::listen;
   using CanEngine::overhear;
 
-  /// Returns an awaitable for the next received frame; nothing when a time limit has passed.
+  /// Returns an awaitable that gives the next received frame, or nothing when a time limit has passed.
   [[nodiscard]] auto heard() {
     struct Hear {
       DialogOf& dialog;
@@ -50,7 +51,8 @@ class DialogOf<P> : public CanEngine, public Routine {
   }
   /// Returns the time at which the last awaited frame was complete.
   [[nodiscard]] Time heard_at() const { return heard_at_; }
-  /// Returns whether the last awaited frame came early; see `overhear`.
+  /// Returns whether the last awaited frame was complete before the request was sent or listening began; see
+  /// `overhear`.
   using CanEngine::came_early;
   [[nodiscard]] ChangeSent change_sent() const final { return change(); }
   /// Stores the last awaited frame as the answer to the request, for `exchange`.

@@ -68,7 +68,7 @@ void CanEngine::feed(const FrameEvent& event) {
       break;
     case Kind::received:
       for (const CanFrame& frame : event.items) {
-        // A queue may deliver a frame late that was complete before the request was sent.
+        // The receive queue may deliver a frame late that was complete before the request was sent.
         early_ = state_ < State::receiving || event.at < since_;
         if (state_ <= State::receiving && (receives_early_ || !early_)) heard(frame, event.at);
       }

@@ -16,7 +16,7 @@ struct CanHostTimes {
   Time busy_limit{};    ///< time after which the host stops waiting although other nodes keep the bus busy
 };
 
-/// Conversation that sends one frame at a time and receives frames; a subclass decides which.
+/// Conversation that sends one frame at a time and receives frames; a subclass decides which frames to send.
 class CanEngine : public Conversation<CanFrame> {
  public:
   /// Not copyable: requests and replies are views into the conversation itself.
@@ -27,7 +27,7 @@ class CanEngine : public Conversation<CanFrame> {
   void feed(const Event<CanFrame>& event) final;
   /// Returns the next step that the port must take.
   Step<CanFrame> next(Time now) final;
-  /// Puts nothing: Reported (command.hpp) puts the fields.
+  /// Puts no fields; the subclass Reported (command.hpp) puts them.
   void report(FieldSink&) const override {}
   [[nodiscard]] Error error() const final { return outcome_.error; }
   [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
@@ -53,14 +53,14 @@ class CanEngine : public Conversation<CanFrame> {
   CanEngine() = default;
   ~CanEngine() = default;
 
-  /// Sets that `frame` is sent next, at least `pause` after the last request or its kept answer, and by `times` how
-  /// long frames are then received.
+  /// Sets that `frame` is sent next, at least `pause` after the answer that `keep` stored for the last request or, if
+  /// it stored none, after that request. `times` limit how long frames are then received.
   void ask(const CanFrame& frame, const CanHostTimes& times, Time pause = {});
   /// Sets that `frame` is sent next, and that frames are then received for `duration`.
   void ask_for(const CanFrame& frame, Time duration);
-  /// Sets whether early frames, from before the request or `listen`, are delivered, too.
+  /// Sets whether frames that were complete before the request was sent or `listen` began are delivered, too.
   void overhear(bool yes = true) { receives_early_ = yes; }
-  /// Returns whether the delivered frame is early: from before the request or `listen`.
+  /// Returns whether the delivered frame was complete before the request was sent or `listen` began.
   [[nodiscard]] bool came_early() const { return early_; }
   /// Sets that frames are received next for `duration` without sending.
   void listen(Time duration);
@@ -70,12 +70,13 @@ class CanEngine : public Conversation<CanFrame> {
   void finish(const Outcome& outcome);
   /// Stores `frame`, which was complete at `at`, as the answer to the request, for `exchange`.
   void keep(const CanFrame& frame, Time at);
-  /// Returns whether the explanation of the last reply is left out (`only`).
+  /// Returns whether the texts of the outcome stand alone, without the unit's explanation of the last reply; see
+  /// `only`.
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
 
   /// Handles a received frame, which was complete at `at`.
   virtual void heard(const CanFrame& frame, Time at) = 0;
-  /// Handles the end of a time limit. The conversation ends unless this function continues it.
+  /// Handles the end of receiving: a time limit has passed. The conversation ends unless this function continues it.
   virtual void over() = 0;
 
  private:

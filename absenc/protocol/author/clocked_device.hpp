@@ -29,8 +29,8 @@ class ClockedDevice : public EncoderOn<std::uint8_t> {
   explicit ClockedDevice(Time start_time = {}) : EncoderOn(start_time) {}
   ~ClockedDevice() = default;
 
-  /// Puts the bits to drive into `bits`, which is empty, when the clock starts. `period`: of the clock; 0: unknown.
-  /// `held_low`: whether the clock line was held low before.
+  /// Puts the bits to drive into `bits`, which is empty, when the clock starts. `period` is that of the clock; 0:
+  /// unknown. `held_low`: whether the clock line was held low before.
   virtual void selected(Time at, Time period, bool held_low, DrivenBits& bits) = 0;
   /// Is called when the host has stopped the clock after `clocks` clocks, at least one.
   virtual void clocked(Time at, std::size_t clocks) = 0;

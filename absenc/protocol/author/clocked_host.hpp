@@ -30,7 +30,8 @@ concept Clocked = requires {
 };
 
 struct Later {};
-inline constexpr Later later{};  ///< Argument of a constructor: the host begins no transfer until its subclass does.
+/// Argument of the constructor of ClockedHostOf: the host begins no transfer until its subclass begins one.
+inline constexpr Later later{};
 
 /// A conversation on a clocked line with decoded replies; a subclass handles the bits.
 template <Clocked P>
@@ -53,13 +54,13 @@ class ClockedHostOf : public ClockedEngine {
   }
   /// Returns the position that `keep` or `conclude` stored last, even if invalid replies followed.
   [[nodiscard]] const Reading& position() const { return reading_; }
-  /// Returns false: the explanation of a reply is added to the error's texts.
+  /// Returns false: the unit's explanation of the last reply is always added to the texts of an error.
   [[nodiscard]] static constexpr bool is_alone() { return false; }
 
  protected:
   /// Constructs a host whose first transfer is one reading.
   explicit ClockedHostOf(const Format& format) : ClockedHostOf(format, later) { ask(); }
-  /// Constructs a host that begins no transfer until its subclass does.
+  /// Constructs a host that begins no transfer until its subclass begins one.
   ClockedHostOf(const Format& format, Later) : ClockedEngine(P::host_times(format), storage_), format_(format) {}
   ~ClockedHostOf() = default;
 

@@ -31,7 +31,8 @@ struct Toy {
   static Reading reading(const Format&, const Reply& reply) { return {.singleturn = reply, .singleturn_bits = 8}; }
 };
 
-/// A host that adds transfers as the first byte of the last one states.
+/// A host that repeats a transfer, with 16 clocks plus the first received byte, until it has made more transfers than
+/// that byte says.
 class Host final : public ClockedHostOf<Toy> {
  public:
   explicit Host(const Toy::Format& format) : ClockedHostOf(format) {}

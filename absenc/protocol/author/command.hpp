@@ -19,7 +19,7 @@ namespace absenc::author {
 template <class Item>
 class Refusal final : public Conversation<Item> {
  public:
-  /// Constructs a conversation that ends at once with `error`; `why` is the reason for people.
+  /// Constructs a conversation that ends at once with `error`; `why` is the detail of the error, a text for people.
   explicit Refusal(Error error, std::string_view why) : error_(error), why_(why) {}
   /// Ignores every event.
   void feed(const Event<Item>&) override {}
@@ -71,12 +71,13 @@ struct Report {
   void (*put_request)(FieldSink&, const Format&, const Request&) = nullptr;
   /// Puts the fields of a valid reply to the request into the sink.
   void (*put_reply)(FieldSink&, const Format&, const Request&, const Reply&) = nullptr;
-  /// Returns the unit's explanation of an error, by the last request and reply. Null: none.
+  /// Returns the unit's explanation of an error, made from the last request and reply. Null: the unit explains no
+  /// error.
   Explanation (*explain)(const Format&, Error, Items request, Items reply) = nullptr;
   /// Returns the explanation of the error of a conversation, used instead of `explain`. Null: `explain` is used.
   Explanation (*explain_host)(const Host&) = nullptr;
-  /// Writes the explanation of the error of `host`, used instead of the details of `explain` and `explain_host`. Null:
-  /// those are used.
+  /// Writes the detail of the error of `host`, used instead of the details that `explain` and `explain_host` return.
+  /// Null: their details are used.
   void (*tell)(Sentence&, const Host& host) = nullptr;
   /// Advice for the error that the line is never silent.
   std::string_view noise_advice = endless_noise.advice;
@@ -86,16 +87,19 @@ struct Report {
 /// conversation.
 template <class Subject, class T>
 struct Finding {
-  /// The format, or the class of the conversation, that the functions get.
+  /// Type of the object that `put` and `put_left` get besides the result: the format, or a base class of the
+  /// conversation.
   using Of = Subject;
   /// Type of the procedure's result.
   using Found = T;
 
   /// Puts the fields of the result of a successful procedure into the sink.
   void (*put)(FieldSink&, const Subject&, const T&) = nullptr;
-  /// Puts the changes that an interrupted procedure leaves in the encoder. Null: none.
+  /// Puts the fields of the changes that an interrupted procedure leaves in the encoder into the sink. Null: it leaves
+  /// none.
   void (*put_left)(FieldSink&, const Subject&, const T&) = nullptr;
-  /// Returns a sentence about the changes that a failed procedure leaves; "": none. Null: never.
+  /// Returns a sentence about the changes that a failed procedure leaves; "": it leaves none. Null: no procedure leaves
+  /// any.
   std::string_view (*left)(const T&) = nullptr;
 };
 
@@ -200,7 +204,7 @@ struct CommandOf {
   using Request = typename P::Request;
 
   Command info;  ///< Description of the command.
-  /// Returns the main request of the command, or an error. Null: no request is known beforehand.
+  /// Returns the main request of the command, or an error. Null: the request is not known before the command runs.
   Result<Request> (*request)(const Format&, Arguments);
   /// Constructs the conversation in the storage. Returns an empty Any if the storage is too small.
   Any<Conversation> (*make)(const Format&, Arguments, std::span<std::byte>);
@@ -209,7 +213,7 @@ struct CommandOf {
   std::string_view (*missing)(const Format&) = nullptr;
   /// Constructs the conversation instead of `make` for formats for which `is_other` is true.
   Any<Conversation> (*make_other)(const Format&, Arguments, std::span<std::byte>) = nullptr;
-  /// Returns whether `make_other` makes the conversation for this format; null: never.
+  /// Returns whether `make_other` makes the conversation for this format. Null: `make` always does.
   bool (*is_other)(const Format&) = nullptr;
   /// Returns whether the command is possible with this format. Null: it always is.
   bool (*possible)(const Format&) = nullptr;
@@ -226,7 +230,7 @@ struct CommandOf {
     one.possible = is_possible;
     return one;
   }
-  /// Returns a copy that the conversation of `other` executes for formats for which `is` is true.
+  /// Returns a copy of this command that runs the conversation of `other` for formats for which `is` returns true.
   [[nodiscard]] constexpr CommandOf or_when(bool (*is)(const Format&), const CommandOf& other) const {
     CommandOf one = *this;
     one.is_other = is;
@@ -234,7 +238,8 @@ struct CommandOf {
     one.size = std::max(size, other.size);
     return one;
   }
-  /// Returns whether the request can be sent, as far as it is known.
+  /// Returns false if the command's request has neither bytes nor a pulse, so that it cannot be sent. Returns true if
+  /// the request is not known before the command runs.
   [[nodiscard]] bool can_ask(const Format& format, Arguments arguments) const {
     if constexpr (std::is_same_v<Request, NoRequest>) {
       return true;
@@ -244,8 +249,8 @@ struct CommandOf {
       return !asked || !P::encode(format, *asked).empty() || asks_by_pulse<P>(format, *asked);
     }
   }
-  /// Constructs the conversation of the command in `storage`. It is a Refusal if the encoder lacks the command. May
-  /// return an empty Any.
+  /// Constructs the conversation of the command in `storage`. It is a Refusal if the encoder lacks the command. Returns
+  /// an empty Any if the command is impossible with this format or these arguments, or if `storage` is too small.
   [[nodiscard]] Any<Conversation> run(const Format& format, Arguments arguments, std::span<std::byte> storage) const {
     const std::string_view why = missing != nullptr ? missing(format) : std::string_view{};
     if (!why.empty()) return make_host<Refusal<ItemOf<P>>>(storage, Error::unsupported, why);
@@ -284,7 +289,8 @@ Any<Conversation> make_run(const typename Machine::Format& format, Arguments arg
 template <const auto& unit_report>
 using ReportedProtocol = typename std::remove_cvref_t<decltype(unit_report)>::Protocol;
 
-/// Returns the declaration of a command that `Reader` executes with the `request` of the format.
+/// Returns the declaration of a command that takes no arguments: `Reader` sends the request that `request` makes of the
+/// format.
 template <const auto& unit_report, auto request, class Reader = ReadPosition<ReportedProtocol<unit_report>>>
 [[nodiscard]] constexpr CommandOf<ReportedProtocol<unit_report>> reading(const Command& info) {
   using P = ReportedProtocol<unit_report>;

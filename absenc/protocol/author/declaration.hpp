@@ -53,15 +53,15 @@ struct Declaration {
   LineSettings (*line)(const Format&) = nullptr;
   /// Returns the resolution of the encoder. Null: `format.resolution()` does.
   Resolution (*resolution)(const Format&) = nullptr;
-  /// Returns whether the options do not contradict each other. Null: always.
+  /// Returns whether the options do not contradict each other. Null: they never do.
   bool (*is_usable)(const Format&) = nullptr;
   /// Returns the request that a reply captured without one is taken to answer, or an error.
   Result<Request> (*guess_request)(const Format&, Bytes reply) = nullptr;
-  /// Returns the length of the reply that begins with `begin`; 0: none does. Null: P::longest_reply.
+  /// Returns the length in bytes of the reply that begins with `begin`; 0: no reply begins so. Null: P::longest_reply.
   std::size_t (*reply_size)(const Format&, Bytes begin) = nullptr;
-  /// Returns the error to report for the reply to an invalid request. Null: the request's error `error`.
+  /// Returns the error to report for the reply to an invalid request. Null: `error`, the request's own error.
   Error (*answer_to_bad)(const Format&, Bytes request, Error error, Bytes reply) = nullptr;
-  /// Checks a frame and puts its fields into the sink. Null: the protocol and the report do.
+  /// Checks a frame and puts its fields into the sink. Null: the functions of P check it, and `report` puts the fields.
   Error (*decode)(const Format&, Frame request, Frame reply, FieldSink&) = nullptr;
   /// For clocked links with `control_bit`: checks the exchanged bits and puts their fields.
   Error (*decode_control)(Frame request, Frame reply, FieldSink&) = nullptr;
@@ -72,9 +72,10 @@ struct Declaration {
 
   // ---- As in Unit (protocol/unit.hpp)
 
-  /// Returns where a frame ends. Null: the lengths decide; on clocked links all bytes are one frame.
+  /// Returns where a frame ends. Null: the lengths of requests and replies decide; on clocked links all bytes are one
+  /// frame.
   FrameEnd (*frame_end)(const Options&, Direction, Bytes) = nullptr;
-  /// Returns whether a request is answered.
+  /// Returns whether the encoder answers a request. Null: as Protocol::manner states, if the host sends requests.
   bool (*is_answered)(const Options&, Frame request) = nullptr;
   /// Returns whether the checks must detect a flip of this bit of a valid reply; null: every bit.
   bool (*is_checked)(const Options&, Frame request, Frame reply, std::size_t bit) = nullptr;
@@ -82,18 +83,18 @@ struct Declaration {
   BitRanges (*bits)(const Options&, Frame request, Frame reply, const FieldInfo&) = nullptr;
   /// Finds the values of options that fit captured frames; null: frames do not show option values.
   bool (*probe)(Options&, std::span<const Capture>, EvidenceSink&) = nullptr;
-  /// Returns whether the encoder sends unsolicited replies; null: never.
+  /// Returns whether the encoder sends replies without a request; null: it never does.
   bool (*streams)(const Options&) = nullptr;
   /// Returns the wires beside the data line that an encoder with these options needs; null: none.
   ExtraWires (*extra_wires)(const Options&) = nullptr;
   /// For clocked links: returns the index of the bit of a reply that answers the level of the clock line in the pause;
   /// null: no reply has one.
   std::optional<std::size_t> (*control_bit)(const Options&, Frame reply) = nullptr;
-  /// Returns the alarms that an encoder with these options can report; null: all.
+  /// Returns the alarms that an encoder with these options can report; null: it can report all.
   std::uint32_t (*reportable)(const Options&) = nullptr;
   /// Completes a reading by values of earlier readings; null: each reading is complete.
   Reading (*remembered)(const Reading& before, Reading now) = nullptr;
-  /// Constructs a Follower for frames that several exchanges carried; null: there are none.
+  /// Constructs a Follower, which finds frames that are composed of several exchanges; null: there are no such frames.
   Follower* (*follower)(const Options&, std::span<std::byte>) = nullptr;
   std::size_t follower_storage = 0;           ///< Bytes of storage that `follower` needs.
   const FieldInfo* status = nullptr;          ///< Field that describes the flags of Reading::status; null: none.

@@ -298,7 +298,7 @@ TEST(Declaration, SizesReplies) {
   EXPECT_EQ(end.size, 9u);
 }
 
-// With a `decode` and no `is_answered`, the Unit has neither `is_answered` nor `pause`.
+// A Declaration with its own `decode` and without `is_answered` gives a Unit with neither `is_answered` nor `pause`.
 TEST(Declaration, DecodesByItself) {
   NoFields sink;
   constexpr Unit made = Descriptor<decoding>::make();

@@ -10,7 +10,7 @@ namespace {
 constexpr std::string_view turn_rule = "request during the encoder's transmission";
 // Shortest time that a host is assumed to wait: a pseudo-terminal alone may delay by this time.
 constexpr Time least_patience = std::chrono::milliseconds(1);
-// Greatest number of consecutive replies for which a delay of this program is an excuse.
+// Greatest number of consecutive replies during which a request is no rule breach because this program may be late.
 constexpr unsigned most_excuses = 2;
 }  // namespace
 
@@ -29,7 +29,7 @@ ByteStep Responder::next(Time) {
     return {.kind = ByteStep::Kind::transfer, .out = reply_, .at = reply_at_};
   }
   ByteStep step{.expect = 1, .at = never};
-  // Another encoder that is addressed may be absent, so any pause ends its reply.
+  // A request may be for another encoder that is absent, so no bytes are expected: any pause ends its reply.
   if (damaged_ || skipping_ != 0) step.expect = 0;
   if (!damaged_ && !request_.empty()) step.expect = request_size(request_) - request_.size();
   if (damaged_ || !request_.empty() || skipping_ != 0 || refusing_) {
@@ -115,13 +115,13 @@ void Responder::receive_byte(std::uint8_t byte, Time at) {
   request_.clear();
 }
 
-// Bytes that arrive together do not show the pause between them.
+// Checks the pause before each frame of a request. Bytes that arrive together do not show this pause.
 void Responder::check_frame_pause(Time at, Time before) {
   if (times_.frame == 0 || request_.empty() || request_.size() % times_.frame != 0 || at == before) return;
   expect(at - times_.character - (before - late_) >= times_.frame_pause, times_.frame_rule, at);
 }
 
-// Searches for a request at the later received bytes: none begins at the first byte.
+// Drops the first received byte, at which no request begins, and searches for a request from the second byte on.
 void Responder::search_again(Time at) {
   refusing_ = is_refused(Flaw::unknown, request_);
   const ByteBuffer<32> heard = request_;
@@ -130,7 +130,8 @@ void Responder::search_again(Time at) {
   for (const std::uint8_t byte : heard.view().subspan(1)) receive_byte(byte, at);
 }
 
-// This program may have been delayed so long that the host rightly repeated its request.
+// Reports a request during the encoder's reply as a rule breach, unless this program may have been delayed so long that
+// the host rightly repeated its request.
 void Responder::receive_while_transmitting(std::uint8_t byte, Time at) {
   if (!interruption_.begins_request(request_size({&byte, 1}), at, times_.character)) return;
   ++interrupted_;

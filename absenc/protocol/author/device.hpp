@@ -18,16 +18,17 @@ namespace absenc::author {
 
 /// Times of a virtual encoder: those of its document, or assumed where it states none.
 struct DeviceTimes {
-  /// Duration of a byte, `format.line().byte_time()`: half a character of more than 8 bits.
+  /// Duration of one byte on the line: `format.line().byte_time()`. A character of more than 8 bits counts as two
+  /// bytes.
   Time character{};
   Time answer_time{};  ///< time from the end of a request to the begin of its reply
   Time start_time{};   ///< time from power on until requests are answered
-  /// Pause that ends an incomplete request, or the reply of another encoder; 0: two bytes. It is
-  /// longer than `frame_pause`.
+  /// Pause that ends an incomplete request, or the reply of another encoder; 0: the duration of two bytes. It is longer
+  /// than `frame_pause`.
   Time gap{};
   std::uint8_t frame = 0;         ///< bytes of each frame of a request; 0: a request is one frame
   Time frame_pause{};             ///< shortest pause between two frames of a request
-  std::string_view frame_rule{};  ///< rule that hosts must keep this pause
+  std::string_view frame_rule{};  ///< words of the rule that hosts keep `frame_pause`
   /// Whether requests received during a transmission are stored and answered afterwards.
   bool keeps_requests = false;
 };
@@ -71,7 +72,8 @@ class Responder : public EncoderOn<std::uint8_t> {
   };
   /// Sets that the present reply begins later by `time`. To be called from `respond`.
   void take_longer(Time time) { longer_ = time; }
-  /// States that all encoders answer in turn: this one `delay` later, all of them within `all`. Call it from `respond`.
+  /// States that all encoders on the line answer the request in turn: this encoder `delay` later than it answers alone,
+  /// all of them within `all`. To be called from `respond`.
   void take_turn(Time delay, Time all) {
     longer_ = delay;
     turns_ = all;
@@ -88,7 +90,7 @@ class Responder : public EncoderOn<std::uint8_t> {
   };
   /// Returns whether the encoder replies to an invalid request. `heard`: the received bytes. By default false.
   virtual bool is_refused(Flaw, Bytes /*heard*/) { return false; }
-  /// Writes the reply to a refused request, when the line is silent. By default empty.
+  /// Writes the reply to a refused request, when the line is silent. By default writes nothing.
   virtual void refuse(Time, ByteBuffer<64>& /*reply*/) {}
 
  private:
@@ -106,18 +108,19 @@ class Responder : public EncoderOn<std::uint8_t> {
   ByteBuffer<32> request_;
   bool damaged_ = false;  // a character of the request was damaged: the rest is ignored until the line is silent
   Time received_at_{};
-  Time late_{};               // longest delay with which the last bytes were delivered
+  Time late_{};               // the last bytes were delivered at most this long after they had arrived
   std::size_t skipping_ = 0;  // characters left of another encoder's reply
   bool skip_begins_ = false;  // the first character of another encoder's reply is still to be received
-  bool refusing_ = false;     // a request was refused, and is answered when the line is silent
+  bool refusing_ = false;     // a request was refused; `refuse` writes the reply when the line is silent
   ByteBuffer<64> reply_;
   Time reply_at_{};
   Time longer_{};
   Time turns_{};              // duration of the replies of all encoders to the present request; 0: only one answers
   Time turns_end_{};          // bytes received before this time are replies of other encoders
-  ByteBuffer<64> stored_;     // bytes received during the present transmission, if they are kept
+  ByteBuffer<64> stored_;     // bytes received during the present transmission, if DeviceTimes::keeps_requests is true
   unsigned interrupted_ = 0;  // number of requests received during the present transmission
-  unsigned interruptions_in_a_row_ = 0;  // transmissions in a row before the present one in which a request came
+  // Number of consecutive transmissions, before the present one, during which a request was received.
+  unsigned interruptions_in_a_row_ = 0;
   bool reply_pending_ = false;
   bool transmitting_ = false;
   Interruption interruption_;

@@ -56,7 +56,7 @@ class HostOf : public Engine {
     reading.received = received_at();
     return reading;
   }
-  /// Returns false: the explanation of a reply is added to the error's texts.
+  /// Returns false: the unit's explanation of the last reply is always added to the texts of an error.
   [[nodiscard]] static constexpr bool is_alone() { return false; }
 
  protected:
@@ -169,7 +169,7 @@ class DialogOf : public HostOf<P>, public Routine {
     [[nodiscard]] bool await_ready() const { return false; }
     /// Sets that the request is sent next.
     void await_suspend(std::coroutine_handle<>) { dialog_.ask_it(must); }
-    /// Returns the reply; without `must` the reply or the error.
+    /// Returns the reply or, without `must`, the reply or the error of the exchange.
     auto await_resume() const {
       if constexpr (must) {
         return dialog_.last();
@@ -203,7 +203,8 @@ class DialogOf : public HostOf<P>, public Routine {
     };
     return Rest{*this, pause};
   }
-  /// Sets whether no other machine's request may come between each further request and the one behind it.
+  /// Sets whether the host keeps the line between further requests, so that no other machine's request comes in
+  /// between.
   void hold_line(bool yes) { holds_line_ = yes; }
   /// Sets that the caller gets the present result (step `emit`).
   void emit() { HostOf<P>::emit(); }
@@ -236,7 +237,8 @@ class DialogOf : public HostOf<P>, public Routine {
   }
   [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
   [[nodiscard]] std::string_view advice() const override { return outcome_.advice; }
-  /// Returns whether the explanation of the last reply is left out (`only`).
+  /// Returns whether the texts of the outcome stand alone, without the unit's explanation of the last reply; see
+  /// `only`.
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
   [[nodiscard]] ChangeSent change_sent() const final { return change(); }
   [[nodiscard]] Reading carried() const final {
@@ -245,7 +247,7 @@ class DialogOf : public HostOf<P>, public Routine {
   }
   /// Declares whether the procedure, when asked to end early, restores the encoder first: it must check `is_aborted`.
   void restores(bool yes = true) { restores_ = yes; }
-  /// Returns whether the caller has asked the procedure to end early, after `restores`.
+  /// Returns whether the caller has asked the procedure to end early; false if `restores` was not called before.
   [[nodiscard]] bool is_aborted() const { return aborted_; }
   bool abort() final {
     aborted_ = aborted_ || restores_;
@@ -322,8 +324,8 @@ struct ProcedureDialog<P> {
 template <class P>
 using ProcedureDialog = typename detail::ProcedureDialog<P>::Type;
 
-/// A conversation that runs `procedure(dialog, found, bound..., arguments)`, or without the arguments. Its result is
-/// `Found`.
+/// A conversation that runs `procedure(dialog, found, bound..., arguments)`, or the same without `arguments` if the
+/// procedure takes none. The result is `found`, of type `Found`.
 template <class P, class Found, auto procedure, auto... bound>
 class Run : public ProcedureDialog<P> {
  public:
@@ -342,7 +344,7 @@ class Run : public ProcedureDialog<P> {
   [[nodiscard]] const Found& found() const { return found_; }
   /// Returns the counts of a procedure that streams; null: it ends by itself.
   [[nodiscard]] const StreamCounts* stream() const final { return goes_on ? &counts_ : ProcedureDialog<P>::stream(); }
-  /// Returns whether `Found` has a member `streams`.
+  /// Returns whether the procedure streams, with a request for each result: `Found` then has a member `streams`.
   [[nodiscard]] bool asks() const final { return goes_on; }
   /// Returns `Found::reading` if it has a position or turns; null after an error, or if there is none.
   [[nodiscard]] const Reading* reading() const final {

@@ -14,7 +14,7 @@ namespace absenc::author {
 template <class Item>
 class EncoderOn : public Device<Item> {
  public:
-  /// Switches the encoder on at `now`; it is ready after the start-up time, at once with `skip`.
+  /// Switches the encoder on at `now`. It is ready after the start-up time or, with PowerOn::skip, at once.
   void power_on(Time now, typename Device<Item>::PowerOn kind) override {
     power_ = Power::starting;
     ready_at_ = kind == Device<Item>::PowerOn::skip ? now : now + start_time_;
@@ -47,9 +47,9 @@ class EncoderOn : public Device<Item> {
 
   /// Records whether the host kept a rule of the document, and returns `kept`.
   bool expect(bool kept, std::string_view rule, Time at) { return rules_.expect(kept, rule, at); }
-  /// Notifies the observer that the host kept or broke a rule; breaking it is no violation.
+  /// Notifies only the observer whether the host kept `rule`; a breach is not counted as a violation.
   void note(bool kept, std::string_view rule) { rules_.note(kept, rule); }
-  /// Returns the rules of the encoder, for parts of it that check some of them.
+  /// Returns the recorder of rule breaches, for objects inside the encoder that check rules.
   [[nodiscard]] HostRules& rules() { return rules_; }
   /// Restarts the encoder, as a reset does: it ignores everything until the time `until`.
   void restart(Time until) {

@@ -80,7 +80,8 @@ void Engine::wake(Time now) {
   }
 }
 
-// A request that waits for no silence is returned at once: its step has the earliest time.
+// Returns the time until which the host must wait. A request that needs no silent line is returned at once: its step
+// says when to send it.
 Time Engine::rest_end() const {
   if (state_ == State::ready && times_.silence != Time{}) return std::max(received_at_ + times_.silence, earliest_);
   return state_ >= State::sleeping && state_ != State::over ? earliest_ : Time::min();
@@ -134,14 +135,14 @@ void Engine::feed(const ByteEvent& event) {
   if (noisy_) end_noise(before);
 }
 
-// Returns true if the event needs no further handling.
+// Handles an event that arrives while no reply is awaited. Returns true if the event needs no further handling.
 bool Engine::handle_unawaited(const ByteEvent& event) {
   const bool damaged = event.kind == ByteEvent::Kind::line_error;
   if (state_ == State::listening) {
     heard(damaged ? Bytes{} : event.items);
     return true;
   }
-  // While a pulse is still active, the reply may already follow the pulse's first edge.
+  // A reply may arrive while the pulse is still active, because an encoder may answer the pulse's first edge.
   const bool pulsing = state_ == State::sending && manner_.pulse != Time{};
   if (!pulsing) disturbed_ = true;
   return false;
@@ -180,7 +181,7 @@ void Engine::conclude() {
     if (disturbed_) return conclude_with(Error::bad_framing);
     return conclude_with(manner_.any_reply ? Error::none : Error::timeout);
   }
-  // The received bytes may be more than the reply.
+  // On a disturbed or noisy line the received bytes may be more than the reply.
   if (disturbed_ || noisy_) return conclude_with(Error::wrong_length);
   conclude_with(manner_.any_reply ? Error::none : check());
 }

@@ -13,7 +13,7 @@
 namespace absenc::author {
 
 /// Time limits and pauses of a host: those of the protocol's document, or chosen. A pause begins
-/// with the last sent or received character. Which member has it:
+/// with the last sent or received character. The member for each demand:
 ///
 ///   | the document demands                           | member                                     |
 ///   |------------------------------------------------|--------------------------------------------|
@@ -44,8 +44,8 @@ struct Manner {
   bool any_reply = false;
   bool holds_line = false;  ///< whether no other machine's request may come before the next one of this conversation
   Time answer_limit{};      ///< longest time until the reply begins; 0: HostTimes::answer_limit
-  /// How long the encoder may be busy with the request after an error: the conversation ends so
-  /// much later, and no command begins before. After a valid reply it has no effect.
+  /// How long the encoder may still execute the request if no valid reply arrives: the conversation then ends this much
+  /// later, so that no other command begins before. Not used after a valid reply.
   Time hold{};
   std::uint8_t frame = 0;  ///< if not 0, the request is sent in frames of this number of bytes
   Time frame_pause{};      ///< pause between two frames of the request
@@ -65,18 +65,18 @@ class Engine : public Conversation<std::uint8_t> {
   /// Returns the next step that the port must take.
   Step<std::uint8_t> next(Time now) final;
   [[nodiscard]] Error error() const final { return error_; }
-  /// Puts nothing, so that the names and texts of fields are linked only where needed.
+  /// Puts no fields, so that the names and texts of fields are linked only where they are needed.
   void report(FieldSink&) const override {}
-  /// Returns the last request, none after `listen`, and the bytes of `reply`.
+  /// Returns the last request, which is empty after `listen`, and the bytes of `reply`.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const final { return {out_, reply(), sent_at_, received_at_}; }
 
   /// Returns the time at which the last request was due to begin.
   [[nodiscard]] Time begun_at() const { return begun_at_; }
   /// Returns the end of the last sent request; for a pulse, its end minus Manner::pulse.
   [[nodiscard]] Time sent_at() const { return sent_at_; }
-  /// Returns the time from which pauses are measured.
+  /// Returns the time from which pauses are measured: the end of the last sent or received character, or of listening.
   [[nodiscard]] Time received_at() const { return received_at_; }
-  /// Returns the bytes received last, valid or not, as far as there is room.
+  /// Returns the bytes received since the last request, valid or not; bytes beyond the storage are dropped.
   [[nodiscard]] Bytes reply() const { return Bytes(storage_).first(size_); }
   /// Returns whether the last exchange was given up because the line seemed never silent.
   [[nodiscard]] bool is_noisy() const { return noisy_; }
@@ -92,13 +92,13 @@ class Engine : public Conversation<std::uint8_t> {
   void send(Bytes request, const Manner& manner, Time earliest);
   /// Sets that the caller gets the present result, by the step `emit`.
   void emit() { emitting_ = true; }
-  /// Sets that this end of the line is next switched to `rate` bits per second; 0: it is not.
+  /// Sets that this end of the line is next switched to `rate` bits per second; 0: the rate stays.
   void set_rate(std::uint32_t rate) { rate_ = rate; }
   /// Replaces the time limits, for example after a change of the rate.
   void set_times(const HostTimes& times) { times_ = times; }
-  /// Sets that nothing is sent until `time`, and that `woken` is called then.
+  /// Sets that nothing is sent until `time`, and that `woken` is then called.
   void sleep(Time time);
-  /// Sets that the line is listened to for `duration`; `heard` gets what is received.
+  /// Sets that the host listens for `duration` without sending; `heard` gets the received bytes.
   void listen(Time duration);
   /// Continues to listen until the end of the time. To be called after `heard`.
   void listen_on() { state_ = State::listening; }
@@ -128,7 +128,7 @@ class Engine : public Conversation<std::uint8_t> {
     sending,    ///< the request is being sent
     sleeping,
     listening,
-    ending,  ///< the result is known; the conversation ends after a time that the encoder needs
+    ending,  ///< the result is known; the conversation ends when the time `hold` of `finish` is over
     over,
   };
 

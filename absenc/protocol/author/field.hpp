@@ -52,7 +52,7 @@ constexpr FieldInfo::Kind kind_of() {
 }
 }  // namespace detail
 
-/// Returns the declaration of a field with the value of `member`; an empty optional is not put.
+/// Returns the declaration of a field with the value of `member`. A value that is an empty optional is not put.
 template <auto member>
 [[nodiscard]] constexpr FieldOf<member> field(std::string_view name, std::string_view unit, std::string_view meaning,
                                               Role role = Role::other) {

@@ -10,18 +10,18 @@
 
 namespace absenc::author {
 
-/// The document's demands on requests in a row, and what a virtual encoder accepts.
+/// Demands of a document on a command that is executed by several equal requests in a row.
 struct InARow {
-  /// From where to where hosts keep `interval`.
+  /// The two events between which hosts keep `interval`.
   enum class IntervalBounds : std::uint8_t {
     reply_and_request,  ///< from the end of a reply to the begin of the next request
     requests,           ///< from the begin of a request to the begin of the next one
   };
 
   unsigned requests = 0;  ///< number of equal requests that execute the command, 2 or more
-  Time interval{};        ///< shortest time before the next request of the row, as hosts keep it
+  Time interval{};  ///< shortest time that hosts keep before the next request of the row, measured as `between` states
   IntervalBounds between = IntervalBounds::reply_and_request;  ///< the events between which hosts keep `interval`
-  /// Shortest time from the request before, or its reply, to a request that a virtual encoder accepts.
+  /// Shortest time from the previous request, or its reply, to a request that a virtual encoder accepts.
   Time accepted{};
   std::string_view number_rule{};    ///< rule of the virtual encoder: the host sent too few requests
   std::string_view interval_rule{};  ///< rule of the virtual encoder: the host sent two requests too fast
@@ -46,7 +46,7 @@ class RowCounter {
   }
   /// Measures the time to the next request from `at`, the end of a reply.
   void measure_from(Time at) { since_ = at; }
-  /// Ends the row; one that is too short breaks `number_rule`.
+  /// Ends the row; a row with too few requests breaks `number_rule`.
   void end() {
     if (sent_ > 0 && sent_ < row_->requests) rules_->note(false, row_->number_rule);
     forget();
@@ -58,8 +58,9 @@ class RowCounter {
   const InARow* row_;
   HostRules* rules_;
   unsigned code_ = 0;
-  unsigned sent_ = 0;     // requests of the row
-  unsigned counted_ = 0;  // requests since the last execution, from the last one that was sent too fast on
+  unsigned sent_ = 0;  // number of requests in the present row
+  // Number of requests that count for the next execution; a request that is sent too fast restarts this count at 1.
+  unsigned counted_ = 0;
   Time since_{};
 };
 
@@ -79,7 +80,7 @@ Part<bool> send_in_a_row(DialogOf<P>& dialog, typename P::Request request, const
                             "nothing: see that with `absenc read` before you try again"});
     }
     if (row.between == InARow::IntervalBounds::requests) {
-      // The request may have begun later than its step said, so its end counts.
+      // The interval is counted from the end of the request, which may have begun later than its step said.
       pause = dialog.sent_at() + row.interval - dialog.received_at();
     }
   }

@@ -11,7 +11,7 @@
 
 namespace absenc::author::testing {
 
-/// Answers each request with `reply`, in one piece or byte by byte. Returns the requests.
+/// Runs `reader`, answers each request with `reply` in one piece or byte by byte, and returns the requests.
 template <class Reader>
 std::vector<std::vector<std::uint8_t>> talk(Reader& reader, const std::vector<std::uint8_t>& reply, bool whole) {
   using Kind = Event<std::uint8_t>::Kind;

@@ -23,7 +23,7 @@ namespace absenc::author {
   return std::any_of(areas.begin(), areas.end(), [&](const MemoryArea& each) { return page - each.page < each.pages; });
 }
 
-/// Returns the number of bytes of the areas, each of one page, for which `counts(area)` is true.
+/// Returns the number of bytes of all areas for which `counts(area)` is true. Each area has one page.
 template <class Counts>
 [[nodiscard]] constexpr std::size_t size_of(std::span<const MemoryArea> areas, Counts counts) {
   std::size_t bytes = 0;

@@ -22,12 +22,12 @@ struct PagedMemory {
   Time write_time;          ///< How long the memory is busy after a write, except of an immediate byte.
   /// Shortest time from fetching a byte to reading it; 0: bytes are read without fetching.
   Time fetch_time{};
-  /// Whether only the busy time of the last page change or write runs; false: both may run.
+  /// Whether a page change ends the busy time of a write, and a write that of a page change; false: both may run.
   bool exclusive = true;
   /// Returns whether a byte is immediate: accessed without fetching, and during writes; null: no byte is.
   bool (*is_immediate)(unsigned page, unsigned address) = nullptr;
-  std::string_view page_rule;          ///< Rule for the host: access waits for `page_time`.
-  std::string_view write_rule;         ///< Rule for the host: a write follows the write before by `write_time`.
+  std::string_view page_rule;          ///< Rule for the host: after a page change it waits for `page_time`.
+  std::string_view write_rule;         ///< Rule for the host: it waits for `write_time` between two writes.
   std::string_view refused_rule{};     ///< Rule: a read that came during a write is repeated; "": no such rule.
   std::string_view fetch_rule{};       ///< Rule: a byte that is being fetched is read again; "": no such rule.
   std::string_view fetch_time_rule{};  ///< Rule: a fetched byte is read only after `fetch_time`; "": no such rule.
@@ -76,7 +76,7 @@ class PagedMemoryDevice : public Responder {
 
   const PagedMemory* memory_;
   std::uint8_t page_ = 0;
-  bool page_changed_ = false;  // no access was received yet after the busy time of the last page change
+  bool page_changed_ = false;  // the host has not accessed the memory since the busy time of the last page change ended
   Time page_ready_at_{};
   Time written_at_{};  // end of the busy time of the last write; 0: none
   // Address of the last request if it was a read during a write, for `refused_rule`.

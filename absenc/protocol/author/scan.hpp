@@ -19,7 +19,7 @@ struct Nodes {
   std::array<bool, addresses> clash{};
 };
 
-/// Request of `scan` for protocols in which no address reaches every encoder.
+/// Value of `request_to_all` in `scan` for protocols in which no address reaches every encoder.
 struct NoneReachesAll {};
 
 /// Sends the request `request_to(i)` to each address i, and stores in `nodes` which addresses answered. An address that

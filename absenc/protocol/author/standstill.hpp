@@ -15,10 +15,10 @@ namespace absenc::author {
 inline constexpr Time between_looks = std::chrono::milliseconds(10);
 /// Greatest difference of two positions of a standing shaft, caused by noise, in 1/1000 degree.
 inline constexpr std::uint32_t standstill_millidegrees = 20;
-/// Largest distance from 0 after a zero was set, in 1/1000 degree.
+/// Greatest distance of the position from 0 after a zero was set, in 1/1000 degree.
 inline constexpr std::uint32_t zero_millidegrees = 350;
 
-/// Returns an angle in counts of a circle with 2^bits counts; at least 1.
+/// Returns an angle of `millidegrees` (1/1000 degree) in counts of a circle with 2^bits counts; at least 1.
 [[nodiscard]] constexpr std::int64_t counts_of_angle(unsigned bits,
                                                      std::uint32_t millidegrees = standstill_millidegrees) {
   const unsigned more = bits > 40 ? bits - 40 : 0;
@@ -40,7 +40,8 @@ inline constexpr std::uint32_t zero_millidegrees = 350;
   return {Error::not_still, "nothing was changed"};
 }
 
-/// Returns why a zero must not be set after these two readings: invalid_argument or not_still; no error: it may.
+/// Returns why a zero must not be set after these two readings: invalid_argument or not_still. No error: a zero may be
+/// set.
 [[nodiscard]] constexpr Outcome objection_to_zero(const Reading& first, const Reading& second) {
   for (const Reading& look : {first, second}) {
     if (!look.ready) {

@@ -36,12 +36,12 @@ void open_bytes_of_a_frame_are_not_consecutive();
 /// Is never defined: a call at compile time is an error that names this function.
 void this_model_has_an_option_or_a_value_that_the_unit_does_not_have();
 
-/// Calls `take(name, value)` for each "name=value" of `text`, until a call returns false. Returns whether no call did,
-/// and `text` has this form.
+/// Calls `take(name, value)` for each "name=value" of `text`, until a call returns false. Returns true if no call
+/// returned false and the whole text has this form.
 template <class Take>
 constexpr bool for_each_value(std::string_view text, Take&& take) {
   while (!text.empty()) {
-    const std::size_t equals = text.find('=');  // npos: there is no equals sign, which is refused below
+    const std::size_t equals = text.find('=');  // npos if there is no equals sign; the check below then returns false
     const std::size_t next = text.find('=', equals + 1);
     const std::size_t end = next == std::string_view::npos ? text.size() : text.rfind(' ', next);
     if (end < equals || end > text.size()) return false;
@@ -99,8 +99,9 @@ struct VectorParts {
   ByteBuffer<128> reply{};        ///< Bytes of the reply.
   Buffer<Expected, 24> fields{};  ///< Expected fields with their values.
   Error error = Error::none;      ///< Expected error; `Error::none`: fields are expected.
-  OpenBytes open_request{};       ///< Bytes of the request that are left open.
-  OpenBytes open_reply{};         ///< Bytes of the reply that are left open.
+  /// Consecutive bytes of the request that the author of the vector left open, written as `..`.
+  OpenBytes open_request{};
+  OpenBytes open_reply{};  ///< Consecutive bytes of the reply that the author of the vector left open, written as `..`.
 
  private:
   static constexpr void leave_open(OpenBytes& open, std::size_t index) {

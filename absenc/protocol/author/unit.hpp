@@ -240,7 +240,7 @@ struct Descriptor {
   /// Returns the settings of the line with these options.
   static constexpr LineSettings settings(const Options& values) { return line_of(declared.format(values)); }
 
-  /// Returns false if Protocol::manner expects no reply to the request, or accepts any.
+  /// Returns false if Protocol::manner states that the request has no reply, or that any reply is accepted; else true.
   static bool is_answered(const Options& values, Frame asked) {
     const Format f = declared.format(values);
     const Result<Request> request = P::decode_request(f, asked.bytes);
@@ -286,7 +286,8 @@ struct Descriptor {
     }
   }
 
-  /// Sets `values` to the defaults, then `model`, then `text`; returns whether `text` is good.
+  /// Sets `values` to the defaults of the options, then to the values of `model`, then to those of `text`. Returns
+  /// whether the whole `text` is valid.
   static constexpr bool resolve(std::string_view text, std::span<const OptionValue> model, Options& values) {
     for (std::size_t i = 0; i < declared.options.size(); ++i) {
       values.values[i] = declared.options[i].default_value;
@@ -306,7 +307,7 @@ struct Descriptor {
                        [&](const OptionValue& one) { return values.values[one.option] == one.value; });
   }
 
-  /// Returns whether a vector is right, as far as its open bytes permit to tell.
+  /// Returns whether a vector decodes to what it expects; of a vector with open bytes only the options are checked.
   static constexpr bool holds(const Vector& vector) {
     Options values;
     bool known = resolve(vector.options, {}, values);
@@ -322,7 +323,7 @@ struct Descriptor {
     VectorCheck check(vector.fields);
     return known && decode_vector(values, vector, check) == vector.error && check.all();
   }
-  /// Number, from 0, of the first vector that does not decode to what it says; if all do, the number of vectors.
+  /// Number, from 0, of the first vector that does not decode to what it expects; the number of vectors if all do.
   static constexpr std::size_t first_wrong_vector = static_cast<std::size_t>(
       std::find_if_not(Made::vectors.begin(), Made::vectors.end(), holds) - Made::vectors.begin());
   static_assert(first_wrong_vector == Made::vectors.size(),
@@ -334,7 +335,8 @@ struct Descriptor {
     return std::max(times.silence, times.pause);
   }
 
-  /// Returns the times of the virtual encoder; if the protocol states none, times that break no rule below.
+  /// Returns the times of the virtual encoder; default times, which pass the checks of `make`, if the protocol states
+  /// none.
   static constexpr DeviceTimes device_times() {
     if constexpr (requires { P::device_times(Format{}); }) return P::device_times(Format{});
     return {};

@@ -25,7 +25,7 @@ using Numbers = std::map<std::string, std::int64_t>;
 
 inline Wire wire(Bytes bytes) { return {bytes.begin(), bytes.end()}; }
 
-/// Result and fields of a command. Real numbers are truncated to integers and stored with them.
+/// Result and fields of a command. `numbers` has real numbers, too, truncated to integers.
 struct RunResult : FieldSink {
   void put(const FieldValue& value) override {
     const std::string name(value.info->name);
@@ -108,7 +108,7 @@ class Talk {
   Conversation<Item>* made_ = nullptr;
 };
 
-/// Function that changes the bytes of the event or frame number `nth`, from 0.
+/// Function that changes the bytes of a received event or a sent frame; `nth` is its number, from 0.
 using Tamper = std::function<void(unsigned nth, Wire& bytes)>;
 
 /// A virtual encoder with functions that change the bytes that it receives and sends.
@@ -161,7 +161,7 @@ struct HostedLine : sim::Line<std::uint8_t> {
   bool converse(Machine<std::uint8_t>& host) {
     put_on(host);
     const bool ended = run(*node, now() + 60s);
-    run_until(now());  // the device's own `sent` event has the same time
+    run_until(now());  // executes the device's `sent` event, which has the same time as the end of the conversation
     replace(*node, idle);
     return ended;
   }
@@ -186,7 +186,7 @@ struct UnitBench {
     line.attach(sim::NodeRole::device, tampered);
   }
 
-  /// Runs a command; one that sends a request for each result ends at its first result.
+  /// Runs a command to its end; a command that sends a request for each result ends at its first result.
   RunResult run(std::string_view name, const std::vector<std::int64_t>& arguments = {}, const OnEmit& on_emit = {}) {
     const Talk<std::uint8_t> talk(unit, options, name, arguments);
     return run(*talk, on_emit);

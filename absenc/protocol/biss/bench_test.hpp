@@ -16,7 +16,7 @@ struct TestShaft final : Shaft {
   ShaftState state{};
 };
 
-/// Clocks one transfer of any number of bits and records the samples of SLO.
+/// A host that clocks one transfer of any number of bits and records the samples of SLO.
 class RawHost final : public Machine<std::uint8_t> {
  public:
   RawHost(std::size_t bits, Time at, std::uint32_t rate) : bits_(bits), at_(at), rate_(rate) {}

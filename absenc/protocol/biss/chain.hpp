@@ -19,8 +19,9 @@ struct ChainFormat {
   std::uint16_t register_delay_us = 0;  ///< Time until a virtual encoder has a requested register ready, in us.
   /// Whether SLO of a virtual encoder stays idle until the start sequence.
   bool start_sequence = false;
-  Timeout timeout{};                 ///< BiSS timeout: how long the encoder holds SLO low after the last clock.
-  StopBit stop_bit = StopBit::next;  ///< The bit P that a virtual encoder sends after each register.
+  Timeout timeout{};  ///< BiSS timeout: how long the encoder holds SLO low after the last clock.
+  /// How a virtual encoder sets the bit P after each register (1: the next register is refused).
+  StopBit stop_bit = StopBit::next;
   // ---- The following members mean the same as in Format.
   std::uint32_t ma_khz = 1000;  ///< Clock MA in kHz.
   /// Longest time until the positions are ready, with the line's delay; the number of clocks depends on it.
@@ -76,7 +77,8 @@ struct ChainReply {
   return error == Error::none ? Result(reply) : error;
 }
 
-/// Appends the frame of `reply`, without the words of `silent`: bit n is slave n. Returns false if `out` is too small.
+/// Appends the frame of `reply` to `out`, without the words of the slaves in the mask `silent` (bit n is slave n).
+/// Returns false if `out` is too small.
 template <std::size_t Capacity>
 constexpr bool encode(const ChainFormat& format, const ChainReply& reply, BitBuffer<Capacity>& out,
                       std::uint8_t silent = 0) {

@@ -61,7 +61,7 @@ template <class Bits>
   return static_cast<std::uint16_t>(remainder ^ (check.inverted ? mask : 0));
 }
 
-/// Returns the CRC of `count` bits from `first` on, as sent. `Source` as in word.hpp.
+/// Returns the CRC of `count` bits from `first` on, as the encoder sends it. `Source`: Given or Known of word.hpp.
 template <class Source, class Bits>
 [[nodiscard]] constexpr std::uint16_t crc_as_sent(const Source& source, const Bits& bits, std::size_t first,
                                                   std::size_t count) {

@@ -78,7 +78,7 @@ inline constexpr auto timeout_option = author::or_zero(author::decimal<
 /// Option: whether the BiSS timeout adapts to the clock.
 inline constexpr auto adaptive_timeout_option = author::option<&TimeoutSettings::adaptive_timeout>(
     "adaptive_timeout", "it is one and a half periods of the clock instead, however fast that is");
-/// Option of the virtual encoder: the bit P that it sends after a register.
+/// Option of the virtual encoder: how it sets the bit P after a register (1: the next register is refused).
 template <auto member>
 inline constexpr auto stop_bit_option = author::option<member>(
     "stop_bit",
@@ -171,7 +171,8 @@ template <class F>
   }
 }
 
-/// Returns false for the last idle sample, the ACK and the start bit, where errors may pass.
+/// Returns whether the checks must detect a wrong sample `bit`: false for the last idle sample, the ACK and the start
+/// bit, whose errors may remain undetected.
 [[nodiscard]] inline bool is_behind_ack(Frame reply, std::size_t bit) {
   const BitView samples = author::to_bits(reply);
   const std::size_t idle = samples[0] ? samples.end_of_run(0) : 0;

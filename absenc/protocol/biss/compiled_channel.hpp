@@ -12,7 +12,7 @@
 
 namespace absenc::biss {
 
-/// A word and its check, compiled. `Entry` and `rows` are those of BitCrc.
+/// A word and its check, compiled. `Entry` and `rows` are the template arguments of its CRC table, BitCrc.
 template <class Entry = std::uint16_t, std::size_t rows = 16>
 class CompiledChannel {
  public:
@@ -22,7 +22,7 @@ class CompiledChannel {
     return format.word.bits() + (format.check.life_counter ? life_counter_bits : 0);
   }
 
-  /// Compiles the members `word` and `check` of `format`, if `is_possible()`.
+  /// Compiles the members `word` and `check` of `format`; does nothing if `is_possible()` is false.
   template <class Described>
   constexpr explicit CompiledChannel(const Described& format)
       : covered_(covered_bits(format)), width_(format.check.width), life_counter_(format.check.life_counter) {
@@ -53,7 +53,7 @@ class CompiledChannel {
   [[nodiscard, gnu::always_inline]] constexpr bool is_right(const Bits& sent) const {
     return sent.crc == crc_(sent.covered) && word_.is_parity_right(sent.covered);
   }
-  /// Returns the values of the word. `Values`: WordWith.
+  /// Returns the values of the word. `Values`: an instance of the template WordWith.
   template <class Values>
   [[nodiscard, gnu::always_inline]] constexpr Values values_of(const Bits& sent) const {
     return word_.values_of<Values>(sent.covered);

@@ -12,7 +12,7 @@ class CompiledFormat {
  public:
   /// Compiles `format`, which is copied.
   constexpr explicit CompiledFormat(const Format& format) : format_(format), channel_(format) {}
-  /// Returns the format.
+  /// Returns the format that was compiled.
   constexpr operator const Format&() const { return format_; }
 
   /// Decodes a frame with the same result as biss::decode by the format.
@@ -22,7 +22,7 @@ class CompiledFormat {
   }
 
  private:
-  // Decodes long words, unusual frames, and frames with an error.
+  // Decodes a frame that the compiled format cannot decode: a long word, unusual bits before the word, or an error.
   [[nodiscard, gnu::noinline]] constexpr Result<Reply> decode_otherwise(const BitView& samples, Cds cds) const {
     return biss::decode(format_, samples, cds);
   }
@@ -46,7 +46,7 @@ class CompiledSafetyFormat {
         cpw_(format.cpw),
         spw_(format.spw),
         is_possible_(is_usable(format) && cpw_.is_possible() && spw_.is_possible()) {}
-  /// Returns the format.
+  /// Returns the format that was compiled.
   constexpr operator const SafetyFormat&() const { return format_; }
 
   /// Decodes a frame with the same result as biss::decode by the format.
@@ -73,7 +73,7 @@ class CompiledSafetyFormat {
   [[nodiscard]] static constexpr ChannelData data_of(const CompiledChannel<>& channel, const Bits& sent) {
     return {channel.values_of<Word>(sent), channel.life_counter_of(sent), sent.crc};
   }
-  // Zeros alone are no word where words have a CRC: see take_channel.
+  // Returns false if the word has a CRC and all its bits are 0, because zeros alone are no word: see take_channel.
   [[nodiscard]] static constexpr bool is_sent(const CompiledChannel<>& channel, const Bits& bits) {
     return !channel.has_crc() || (bits.covered | bits.crc) != 0;
   }
@@ -82,7 +82,7 @@ class CompiledSafetyFormat {
            life_counter_follows(format_, spw_.life_counter_of(spw)) &&
            positions_agree(format_, cpw_.values_of<WordWith<0>>(cpw), spw_.values_of<WordWith<0>>(spw));
   }
-  // Decodes long words, unusual frames, and frames with an error.
+  // Decodes a frame that the compiled format cannot decode: a long word, unusual bits before the word, or an error.
   [[nodiscard, gnu::noinline]] constexpr Result<SafetyReply> decode_otherwise(const BitView& samples, Cds cds) const {
     return biss::decode(format_, samples, cds);
   }

@@ -35,7 +35,7 @@ ChannelData random_data(sim::Random& random) {
   return {.word = random_values(random), .life_counter = static_cast<std::uint8_t>(random.next() & 0x3F)};
 }
 
-// Returns the samples, at random unchanged, cut, extended, or with one to three flipped bits.
+// Returns the samples with a random change: none, the end cut off, bits appended, or one to three bits flipped.
 Samples disturbed(const Samples& samples, sim::Random& random) {
   Samples changed;
   const std::uint64_t kind = random.below(8);
@@ -69,7 +69,7 @@ void expect_equal_data(const Data& data, const Data& expected) {
   EXPECT_EQ(data.crc, expected.crc);
 }
 
-// Returns a number of ACK bits, at times too many for the first machine word.
+// Returns a random number of ACK bits, sometimes so many that they end beyond the first 64 samples.
 unsigned random_ack(sim::Random& random) {
   return static_cast<unsigned>(1 + random.below(random.below(4) == 0 ? 90 : 20));
 }
@@ -128,7 +128,7 @@ TEST(BissCompiledSafetyFormat, EqualsFormatForRandomFormatsAndFrames) {
     const CompiledSafetyFormat compiled(format);
     for (unsigned j = 0; j < 8; ++j) {
       SafetyReply sent{.ack_bits = random_ack(random), .cpw = random_data(random), .spw = random_data(random)};
-      // Makes the words agree, and mostly the life counter follow the previous one.
+      // Makes the positions of both words agree, and in most frames the life counter follow the previous one.
       const unsigned spw_bits = format.spw.word.bits_of(Meaning::position);
       const unsigned cpw_bits = format.cpw.word.bits_of(Meaning::position);
       const std::uint64_t upper = sent.cpw.word.position & low_mask(cpw_bits);

@@ -53,7 +53,7 @@ bool ControlMaster::next(bool cds) {
 }
 
 void ControlMaster::fail(Error error) {
-  zeros_ = 0;  // Slaves that missed this frame begin to count zeros with the next one.
+  zeros_ = 0;  // Slaves that missed this position frame begin to count zeros with the next frame.
   end(error);
 }
 
@@ -116,7 +116,7 @@ bool ControlMaster::direction(bool cds) {
   }
 }
 
-// Before the first written byte the encoder must send its start bit at once.
+// Handles the wait for the encoder's start bit. Before the first written byte the encoder must not be late.
 bool ControlMaster::started(bool cds) {
   const bool write = frame_.request.operation == Operation::write;
   if (!cds) {
@@ -157,7 +157,7 @@ bool ControlMaster::end_byte(bool is_last) {
 
 bool ControlMaster::acknowledge(bool cds) {
   const unsigned at = at_++;
-  if (at == direction_at) return true;  // the host's start bit S
+  if (at == direction_at) return true;  // this 1 is the host's start bit S
   if (frame_.request.slaves == 0) {
     frame_.executed = true;
     end(Error::none);
@@ -251,7 +251,7 @@ bool ControlSlaves::direction(bool cdm, ControlTarget& target) {
   }
 }
 
-// The encoder may delay each byte but the first written one.
+// Begins a byte, or waits if the target is not ready. The first written byte must not wait.
 bool ControlSlaves::begin_byte(ControlTarget& target) {
   const bool write = request_.operation == Operation::write;
   const bool may_wait = !write || bytes_ > 0;
@@ -275,7 +275,7 @@ bool ControlSlaves::next_allowed(const ControlTarget& target) const {
          target.allows(request_.slave, next, request_.operation == Operation::write);
 }
 
-// After P, a start bit of the host asks for the next register.
+// After the bit P, a 1 from the host is a start bit that asks for the next register.
 bool ControlSlaves::read(bool cdm, ControlTarget& target) {
   const unsigned at = at_++;
   if (at < byte_bits) return (bits_ >> (byte_bits - 1 - at) & 1) != 0;

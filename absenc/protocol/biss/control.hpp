@@ -14,7 +14,7 @@
 
 namespace absenc::biss {
 
-/// Zeros of CDM before a start bit; within a control frame, this many zeros end it.
+/// Number of zeros of CDM before the start bit of a control frame; as many zeros within a control frame end it.
 inline constexpr unsigned control_pause = 14;
 inline constexpr unsigned control_slaves = 8;    ///< Greatest number of slaves that can have an ID.
 inline constexpr std::size_t control_most = 64;  ///< Greatest number of data bytes of one control frame.
@@ -58,7 +58,8 @@ inline constexpr unsigned header_bits = 15;  ///< Number of header bits after th
   return static_cast<std::uint16_t>(bits << 4 | crc4_of(bits, 11));
 }
 
-/// Decodes a header, which does not tell read from write. Error: bad_checksum.
+/// Decodes the header of a control frame, which does not show whether registers are read or written. Error:
+/// bad_checksum.
 [[nodiscard]] constexpr Result<ControlRequest> request_of_header(std::uint16_t header) {
   const std::uint32_t bits = header >> 4;
   if (crc4_of(bits, 11) != (header & 0xF)) return Error::bad_checksum;
@@ -138,7 +139,7 @@ class ControlMaster {
   std::uint16_t header_ = 0;
   std::uint16_t in_ = 0;  // Bits of the present data byte and its CRC that were received so far.
   std::uint16_t out_ = 0;
-  std::size_t count_ = 0;  // Number of data bytes to transfer.
+  std::size_t count_ = 0;  // Number of data bytes to transfer in this control frame.
   // Number of frames since the start bit of the control frame, or of the data byte.
   unsigned at_ = 0;
   unsigned zeros_ = 0;
@@ -146,14 +147,15 @@ class ControlMaster {
   State state_ = State::header;
   bool only_counts_slaves_ = false;
   bool over_ = true;
-  bool answered_ = false;  // First of the two direction bits in CDS.
+  bool answered_ = false;  // Value of the first of the two direction bits in CDS.
   Error error_ = Error::none;
 };
 
-/// Appends the CDM bits of a begun control frame, for `slaves` encoders that answer at once.
+/// Appends to `out` the CDM bits of the control frame that `master` has begun, for `slaves` encoders that answer at
+/// once.
 void append_cdm(ControlMaster master, unsigned slaves, BitBuffer<1024>& out);
 
-/// Registers and commands of virtual encoders; `slave` is always the ID of an existing slave.
+/// Registers and commands of virtual encoders. Its functions are called only with the ID `slave` of an existing slave.
 struct ControlTarget {
   /// Returns whether the register of `slave` at `address` may be read, or written if `write`.
   [[nodiscard]] virtual bool allows(unsigned slave, unsigned address, bool write) const = 0;
@@ -161,7 +163,8 @@ struct ControlTarget {
   [[nodiscard]] virtual std::uint8_t read(unsigned slave, unsigned address) = 0;
   /// Writes `value` to the register of `slave` at `address`.
   virtual void write(unsigned slave, unsigned address, std::uint8_t value) = 0;
-  /// Returns the bit P after a register. `next_allowed`: whether the next one may be accessed.
+  /// Returns the bit P that an encoder sends after a register. `next_allowed`: whether the next register may be
+  /// accessed.
   [[nodiscard]] virtual bool stop_bit(bool next_allowed) const { return !next_allowed; }
   /// Returns whether the next data byte can begin now.
   [[nodiscard]] virtual bool is_ready() const = 0;

@@ -30,7 +30,8 @@ void decode_lock_bits(ControlFrame& frame, const ControlBits& cds) {
 
 // Decodes the bytes of a register access. For a read, their values are taken from `cds` alone.
 Error decode_bytes(const ControlBits& cdm, const ControlBits& cds, bool write, ControlFrame& frame) {
-  bool refused = false;  // P refused the next register; some encoders send it all the same
+  // The encoder refused the next register by P = 1; some encoders send that register nevertheless.
+  bool refused = false;
   for (unsigned due = direction_at + 3;; due += byte_bits + 2) {
     unsigned at = due;
     for (unsigned zeros = 0; !cds[at]; ++at) {
@@ -53,7 +54,7 @@ Error decode_bytes(const ControlBits& cdm, const ControlBits& cds, bool write, C
   }
 }
 
-// The host repeats its start bit while an encoder is not ready.
+// Decodes the written bytes from CDM alone, in which the host repeats its start bit while an encoder is not ready.
 Error decode_written(const ControlBits& cdm, ControlFrame& frame) {
   for (unsigned at = direction_at + 3;; at += byte_bits + 2) {
     while (!frame.data.empty() && cdm.has(at + byte_bits) && cdm[at] && !is_good_byte(cdm.load(at, byte_bits))) ++at;

@@ -35,7 +35,8 @@ class NumberList {
   Buffer<char, 96> text_;  // Text of the list; characters that do not fit are dropped.
 };
 
-/// The two characters of a manufacturer as text; some are shown as hexadecimal digits.
+/// The two characters of a manufacturer as text; a character that cannot be printed is shown as \x and two hexadecimal
+/// digits.
 class MakerName {
  public:
   /// Appends these bytes of the manufacturer registers.
@@ -80,7 +81,7 @@ struct ControlResults {
   NumberList acknowledged;                      ///< IDs of the slaves that acknowledged a command.
   std::optional<bool> executed{};               ///< Whether the host let the slaves execute the command (bit EX).
   // ---- Results of procedures
-  /// False: the register had this value already.
+  /// Whether the register was written; false: it had this value already.
   std::optional<bool> written{};
   /// True: the encoder refused to read the register; otherwise no value.
   std::optional<bool> missing{};

@@ -48,7 +48,7 @@ std::string cdm_of(const ControlMaster& master) {
   return text;
 }
 
-// At least 14 zeros, and no 1, must follow the last drawn 1.
+// Compares CDM with the bits of the document up to their last 1; then at least 14 zeros, and no 1, must follow.
 TEST(BissControl, EncodesRequestsOfTheDocument) {
   const auto expect = [](const ControlMaster& master, std::string_view drawn) {
     const std::string cdm = cdm_of(master);
@@ -88,7 +88,7 @@ TEST(BissControl, DecodesWrittenDataFromCdmAlone) {
 }
 
 TEST(BissControl, DetectsEachFlippedBitOfAnAnswer) {
-  // Flips one bit of CDS at a time, from the answer to R to the CRC of the byte.
+  // Flips one bit of CDS at a time, from the answer to the bit R (read) to the CRC of the byte.
   for (std::size_t i = 14 + 17; i < 14 + 32; ++i) {
     std::string cds(read_44_answer);
     cds[i] = cds[i] == '1' ? '0' : '1';
@@ -170,7 +170,8 @@ TEST(BissControl, HostAndSlavesSendBitsOfTheTable) {
   EXPECT_EQ(transcript.cdm.size(), 14u + 33u);
 }
 
-/// Encoders that send P = 1 after each register, and send the next register all the same.
+/// Encoders that send P = 1 (the next register is refused) after each register, but send the next register
+/// nevertheless.
 struct Stopping final : Target {
   [[nodiscard]] bool stop_bit(bool) const override { return true; }
 };
@@ -185,7 +186,7 @@ TEST(BissControl, DecodesHostThatContinuesAfterStopBit) {
   EXPECT_EQ((run(master, slaves, target), master.error()), Error::request_rejected);
   EXPECT_EQ(master.frame().data.size(), 1u);
   EXPECT_EQ(master.frame().data[0], 10);
-  // A host that ignores P, as LENZ's does, reads the next register.
+  // A host that ignores the bit P, as hosts of LENZ do, reads the next register.
   BitBuffer<256> cdm;
   BitBuffer<256> cds;
   slaves.reset();
@@ -195,7 +196,7 @@ TEST(BissControl, DecodesHostThatContinuesAfterStopBit) {
     slaves.take(c == '1', target);
   }
   for (unsigned i = 0; i < 44; ++i) {
-    const bool goes_on = i == 13;  // the host continues in the frame of P
+    const bool goes_on = i == 13;  // the host sends its start bit for the next register in the frame of the bit P
     cdm.append(goes_on ? 1 : 0, 1);
     cds.append(slaves.cds() ? 1 : 0, 1);
     slaves.take(goes_on, target);
@@ -306,7 +307,7 @@ TEST(BissControl, ExecutesCommandWhenAllSlavesAcknowledge) {
   EXPECT_EQ(master.frame().slaves, 3);
 }
 
-// Bits are counted from the start bit, as in TI's table.
+// Bits are counted from the start bit, as in the table of Texas Instruments.
 TEST(BissControl, DecoderChecksEachRuleOfAControlFrame) {
   const auto transcript_of = [](auto begin) {
     Target target;
@@ -342,7 +343,7 @@ TEST(BissControl, DecoderChecksEachRuleOfAControlFrame) {
   EXPECT_EQ(error(flipped(read.cdm, {18}), read.cds), Error::timeout);       // the host sends no start bit S
   EXPECT_EQ(error(late(read.cdm, 13), late(read.cds, 13)), Error::none);     // start bit S of the encoder is late
   EXPECT_EQ(error(late(read.cdm, 14), late(read.cds, 14)), Error::timeout);  // 14 zeros end the frame
-  // P refuses the next register, but the host requests it.
+  // The encoder refuses the next register by P = 1, but the host requests it.
   EXPECT_EQ(error(flipped(read.cdm, {32}), flipped(read.cds, {32})), Error::request_rejected);
   // a delay is not allowed for the first written byte
   EXPECT_EQ(error(write.cdm, late(write.cds, 1)), Error::bad_framing);
@@ -370,7 +371,7 @@ TEST(BissControl, DecoderChecksEachRuleOfAControlFrame) {
 TEST(BissControl, SlaveDoesNotStoreByteWithWrongCrc) {
   Target target;
   ControlSlaves slaves(1);
-  // A write of 0x55 to 0x48 with one wrong data bit.
+  // CDM of a write of 0x55 to the register 0x48, with one wrong data bit.
   for (const char c : std::string_view("0000000000000011000100100010100110101000100100000"))
     slaves.take(c == '1', target);
   EXPECT_EQ(target.writes, 0);

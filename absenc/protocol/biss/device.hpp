@@ -16,7 +16,8 @@ struct Behaviour {
   Time latency = 10us;  ///< Time that the encoder needs for a position, from the second rising edge of MA.
   /// Delay of the line, there and back.
   Time line_delay{};
-  Time edge_noise = 20ns;       ///< A sample closer than this to a delayed edge may read the old or the new bit.
+  /// A sample that is taken less than this time from a delayed edge may read the old or the new bit.
+  Time edge_noise = 20ns;
   Time register_delay{};        ///< Time from the request for a register until it is ready.
   bool start_sequence = false;  ///< Whether SLO stays idle after power on until the start sequence.
 };
@@ -24,7 +25,7 @@ struct Behaviour {
 /// Samples of SLO, one per clock of MA.
 using Samples = author::DrivenBits;
 
-/// Delays samples as a line does.
+/// Delays the samples of SLO as the line between encoder and host does.
 class LineDelay {
  public:
   /// Delays `samples`, which were taken at this period of MA, by `behaviour.line_delay`.
@@ -54,7 +55,7 @@ class EncoderOf {
     reply.ack_bits = head_bits(format_, behaviour_.latency, period);
     reply.cds = cds;
     show(format_, shaft_->at(at), alarms_, life_counter_, reply);
-    if (!encode(format_, reply, samples, data_off_)) {  // the frame does not fit
+    if (!encode(format_, reply, samples, data_off_)) {  // a frame that does not fit is sent without a start bit
       samples.clear();
       samples.append(low_mask(idle_bits), idle_bits);
       while (samples.size() < Samples::capacity()) samples.append(0, 1);
@@ -212,7 +213,8 @@ class VirtualEncoderOf final : public author::ClockedDevice {
     clocked_before_ = false;
     start_sequence_received_ = false;
   }
-  // Eight clocks count too, because many SPI controllers only clock whole bytes.
+  // Returns whether the host has sent the start sequence. Eight clocks count, too, because many SPI controllers only
+  // clock whole bytes.
   static bool is_start_sequence(std::size_t clocks) { return clocks == start_pulses || clocks == 8; }
 
   EncoderOf<F> encoder_;

@@ -62,7 +62,7 @@ TEST(BissDevice, ReportsBrokenTimingRules) {
 }
 
 TEST(BissDevice, UsesTimeoutOfFormat) {
-  // `pause` begins after the last period, half of which lies after the last edge.
+  // `pause` begins at the end of the last clock period, half a period after the last rising edge.
   const auto allows = [](Timeout timeout, std::uint32_t rate, Time pause) {
     Format format = bits_19;
     format.timeout = timeout;
@@ -113,9 +113,9 @@ unsigned good_frames(Time line_delay, Time period) {
 TEST(BissDevice, LineDelayCorruptsFramesAtHighClocks) {
   EXPECT_EQ(good_frames(300ns, 1us), 100u);
   EXPECT_EQ(good_frames(300ns, 330ns), 100u);
-  EXPECT_LT(good_frames(300ns, 315ns), 20u);  // an edge falls on the sample, which reads the old bit or the new bit
+  EXPECT_LT(good_frames(300ns, 315ns), 20u);  // each sample is taken at an edge, so it reads the old bit or the new bit
   EXPECT_LT(good_frames(300ns, 290ns), 20u);
-  EXPECT_EQ(good_frames(300ns, 227ns), 0u);  // a whole bit late: SLO goes low one sample late
+  EXPECT_EQ(good_frames(300ns, 227ns), 0u);  // the line is a whole bit late, so SLO goes low one sample late
 }
 
 TEST(BissDevice, LineDelayOfAWholeBitAddsAnIdleSample) {

@@ -27,17 +27,17 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
     };
     return Frame{*this};
   }
-  /// Sets the CDM bit that is sent after the last frame.
+  /// Sets the CDM bit that the host sends after the frame that was received last.
   void set_cdm(bool cdm) { cdm_ = cdm; }
-  /// Returns the number of frames; a stuck one before the start sequence does not count.
+  /// Returns the number of received frames, except a stuck frame that caused the start sequence.
   [[nodiscard]] std::uint32_t frames() const { return frames_; }
-  /// Returns the number of frames that were refused.
+  /// Returns the number of received frames that had an error.
   [[nodiscard]] std::uint32_t bad_frames() const { return bad_frames_; }
   /// Returns the time at which the last frame was received.
   [[nodiscard]] Time now() const { return this->received_at(); }
   [[nodiscard]] std::string_view detail() const override { return outcome_.detail; }
   [[nodiscard]] std::string_view advice() const override { return outcome_.advice; }
-  /// Returns whether no explanation of the last reply is added to the outcome's texts.
+  /// Returns whether the texts of the outcome stand alone, without the unit's explanation of the last reply.
   [[nodiscard]] bool is_alone() const { return outcome_.alone; }
   [[nodiscard]] ChangeSent change_sent() const final { return this->change(); }
   [[nodiscard]] Reading carried() const final { return has_position_ ? this->position() : Reading{}; }
@@ -73,7 +73,7 @@ class ControlDialog : public author::ClockedHostOf<ProtocolOf<F>>, public author
     if (last_) {
       const unsigned head = last_->delay_bits + last_->ack_bits;
       const unsigned expected = head_bits(this->format(), this->format().latency, this->format().period());
-      // Called for every decoded frame: a late frame is confirmed by the delay of the one before.
+      // `is_again` is called for every decoded frame, because the delay of the previous frame confirms a late one.
       const bool again = late_.is_again(head);
       if (head > expected && !again) last_ = Error::truncated;
     }

@@ -89,7 +89,7 @@ struct Format {
   /// Whether the encoder is linear, and the length of a count.
   Scale scale{};
   std::uint16_t ma_khz = 1000;  ///< Clock MA in kHz, 10 to 10 000.
-  // These members fit into padding, so that a reader of positions needs no more memory.
+  // The members from here to `start_sequence` fit into padding bytes, so that they do not enlarge the format.
   std::uint8_t slave = 0;  ///< Slave whose registers are accessed: 0 to 7, counted from the end of the chain.
   RegisterOrder register_order = RegisterOrder::big;  ///< Byte order of a number that several registers hold.
   std::uint16_t register_delay_us = 0;  ///< Virtual encoder: time in us until a requested register is ready.
@@ -99,8 +99,9 @@ struct Format {
   /// Longest time until the position is ready, with the delay of the line; up to 1 ms.
   Time latency = 10us;
   // ---- Members for the virtual encoder
-  StopBit stop_bit = StopBit::next;  ///< The bit P that the virtual encoder sends after each register.
-  std::uint32_t line_delay_ns = 0;   ///< Virtual encoder: delay of the line there and back, in nanoseconds.
+  /// How the virtual encoder sets the bit P after each register (1: the next register is refused).
+  StopBit stop_bit = StopBit::next;
+  std::uint32_t line_delay_ns = 0;  ///< Virtual encoder: delay of the line there and back, in nanoseconds.
   Time ready{};  ///< Virtual encoder: time that it needs for a position; 0: as `latency`, but at most 10 us.
 
   /// Returns the period of MA.
@@ -187,7 +188,7 @@ constexpr Error take_head(const BitView& samples, std::size_t size, Cds cds, Rep
   const std::size_t idle = samples[0] ? samples.end_of_run(0) : 0;
   if (idle == samples.size) return Error::line_stuck;
   const std::size_t start = samples.end_of_run(idle);
-  if (start == samples.size) return idle == 0 ? Error::line_stuck : Error::bad_framing;  // no start bit
+  if (start == samples.size) return idle == 0 ? Error::line_stuck : Error::bad_framing;  // the frame has no start bit
   first = start + 2;
   if (first > samples.size) return Error::truncated;
   head.cds = samples[first - 1];
@@ -222,15 +223,15 @@ constexpr auto decode_by(const Source& source, const BitView& samples, Cds cds) 
 
 // The samples before the data of a frame without errors.
 struct Head {
-  unsigned idle = 0;      // samples before the ACK
-  unsigned ack_bits = 0;  // zeros between them and the start bit
+  unsigned idle = 0;      // number of samples before the ACK
+  unsigned ack_bits = 0;  // number of zeros between the idle samples and the start bit
   bool cds = false;
 
   [[nodiscard]] constexpr std::size_t first() const { return std::size_t{idle} + ack_bits + 2; }
   [[nodiscard]] constexpr unsigned delay_bits() const { return idle > idle_bits ? idle - idle_bits : 0; }
 };
 
-// Finds the data, `size` bits; returns false for a frame that the fast way cannot decode.
+// Finds where the `size` bits of data begin. Returns false for a frame that only the slow decoder can decode.
 [[nodiscard, gnu::always_inline]] constexpr bool find_data(const BitView& samples, std::size_t size, Cds cds,
                                                            Head& head) {
   if (samples.bytes.size() < sizeof(std::size_t)) return false;
@@ -304,10 +305,10 @@ constexpr bool append_head(const ReplyType& head, std::size_t size, BitBuffer<Ca
   return detail::decode_by(Given<Format>{format, format.word}, samples, cds);
 }
 
-/// Decodes a frame whose format is known at compile time; errors as for any format.
+/// Decodes a frame whose format is known at compile time; the errors are those of a format known at run time.
 template <const Format& format>
 [[nodiscard]] constexpr Result<ReplyTo<format>> decode(const BitView& samples, Cds cds = Cds::zero) {
-  // Processors without registers of 64 bits have one way only, to save memory.
+  // Processors without registers of 64 bits get only one decoder, to save memory.
   if constexpr (BitView::register_bits >= 64 && detail::known_channel<format>.is_possible()) {
     return detail::decode_compiled<typename Known<format>::Word>(
         detail::known_channel<format>, samples, cds, [&] { return detail::decode_known<format>(samples, cds); });
@@ -316,8 +317,8 @@ template <const Format& format>
   }
 }
 
-/// Appends the frame of `reply`, with a computed CRC. Bit 0 of `silent`: without word and check. Returns false if `out`
-/// is too small.
+/// Appends the frame of `reply`, with a computed CRC. If bit 0 of `silent` is set, the frame has no word and no check.
+/// Returns false if `out` is too small.
 template <std::size_t Capacity>
 constexpr bool encode(const Format& format, const Reply& reply, BitBuffer<Capacity>& out, std::uint8_t silent = 0) {
   if (!detail::append_head(reply, data_bits(format), out)) return false;
@@ -352,7 +353,7 @@ template <const Format& format>
   constexpr unsigned bits = data_bits(format);
   return bits;
 }
-/// Decodes a frame whose format is known at compile time; errors as for any format.
+/// Decodes a frame whose format is known at compile time; the errors are those of a format known at run time.
 template <const Format& format>
 [[nodiscard]] constexpr Result<ReplyTo<format>> decode(const KnownFormat<format>&, BitView samples, Cds cds) {
   return decode<format>(samples, cds);
@@ -364,7 +365,8 @@ template <const Format& format>
   return to_reading(contents, reply.word, format.scale);
 }
 
-/// Returns whether zeros alone follow the CDS bit, as without process data. Sets `head`.
+/// Returns whether only zeros follow the CDS bit, as in a frame of an encoder whose process data are switched off.
+/// Stores the bits before the zeros in `head`.
 template <class ReplyType>
 [[nodiscard]] constexpr bool is_empty_frame(BitView samples, ReplyType& head) {
   std::size_t first = 0;

@@ -71,10 +71,11 @@ template <const Format& format>
   return format.check.life_counter ? reply.life_counter : -1;
 }
 
-/// Confirms a late frame by the delay of the next: a single one may have lost its start bit.
+/// Confirms late frames: a single late frame may have lost its start bit, so the next frame must be as late.
 class LateFrames {
  public:
-  /// Returns whether the delay differs by at most one clock from that of the call before; first call: false.
+  /// Returns whether the delay `head`, in clocks, differs by at most one from that of the previous call; first call:
+  /// false.
   [[nodiscard]] bool is_again(unsigned head) {
     const unsigned before = std::exchange(seen_, head);
     return before != 0 && head + 1 - before <= 2;
@@ -84,7 +85,7 @@ class LateFrames {
   unsigned seen_ = 0;
 };
 
-/// Decides to send the start sequence: once, if the first frame is stuck.
+/// Decides whether the start sequence is sent: once, if the line is stuck in the first frame.
 class StartSequence {
  public:
   /// Processes the error of a frame and returns whether the start sequence must be sent next.

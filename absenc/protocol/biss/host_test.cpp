@@ -126,7 +126,7 @@ Error clock_out(Reader& read, std::span<const BitBuffer<128>> frames) {
   return read.error();
 }
 
-// Expects that the reader of a known format behaves like that of any format.
+// Expects that the reader of a format known at compile time gives the same results as the reader of any format.
 template <const Format& format>
 void reads_as_any_format() {
   std::array<BitBuffer<128>, 2> good;
@@ -194,7 +194,8 @@ TEST(BissHost, RejectsLateFramesThatDoNotAgree) {
   EXPECT_EQ(read.reading(), nullptr);
 }
 
-// README, timing: with default options a host gives the clocks of an encoder that needs 10 us.
+// README, section Timing: with default options a host gives enough clocks for an encoder that needs 10 us for a
+// position.
 template <class F>
 void expect_ten_microseconds() {
   testing::ClockedBench<VirtualEncoderOf<F>> bench(line_settings, F{}, Behaviour{.latency = 10us});
@@ -208,7 +209,7 @@ TEST(BissHost, AssumesLatencyOfTenMicroseconds) {
   expect_ten_microseconds<ChainFormat>();
 }
 
-// The host pauses 40 us before and after the two pulses.
+// The host pauses 40 us before and after the two pulses of the start sequence.
 TEST(BissHost, SendsStartSequenceWhenFirstFrameIsStuck) {
   Format format = turns_19;
   format.start_sequence = true;
@@ -278,7 +279,7 @@ TEST(BissHost, ExplainsErrors) {
   EXPECT_NE(found(Error::truncated, 10'000).find("raise it"), std::string_view::npos);
   EXPECT_NE(found(Error::bad_checksum, 10'000).find("try another one"), std::string_view::npos);
   EXPECT_NE(found(Error::invalid_argument, 1'000'000).find("lower latency_us"), std::string_view::npos);
-  // A frame of few clocks has no explanation: the invalid argument is then the word format.
+  // invalid_argument has no explanation if a frame has few clocks, because the word format is then invalid.
   EXPECT_EQ(found(Error::invalid_argument, 10'000), "");
   EXPECT_EQ(found(Error::line_stuck, 10'000), "");
 }

@@ -16,7 +16,7 @@ using author::Outcome;
 using author::Part;
 using author::Procedure;
 
-/// Longest time until an encoder's start bit, by the document; the host waits twice as long.
+/// Longest time that the document permits an encoder for the start bit of a register; the host waits twice as long.
 inline constexpr Time start_limit = 20ms;
 /// Greatest number of attempts of a control frame that may be repeated.
 inline constexpr unsigned control_attempts = 4;
@@ -93,13 +93,14 @@ Part<Error> read_registers(ControlDialog<F>& dialog, ControlMaster& master, Byte
     if (!stopped) co_return Error::none;
     first += static_cast<unsigned>(data.size());
     count -= data.size();
-    attempts = control_attempts + 1;  // the next register has all attempts
+    attempts = control_attempts + 1;  // the remaining registers get all attempts again
     before = {};
   }
   co_return error;
 }
 
-/// Writes a register; unless that is refused, the value read back decides.
+/// Writes a register and reads it back; the value read back decides whether the write failed. A refused write is not
+/// read back.
 template <class F>
 Part<Error> write_register(ControlDialog<F>& dialog, ControlMaster& master, unsigned address, std::uint8_t value) {
   const std::array<std::uint8_t, 1> bytes{value};
@@ -195,7 +196,8 @@ Procedure write_memory(ControlDialog<F>& dialog, ControlResults& found, Argument
   co_return done;
 }
 
-/// Reads the named register at `address`; a refusal is a result: `missing`.
+/// Reads the named register at `address`. If the encoder refuses that, the procedure succeeds with the result
+/// `missing`.
 template <class F>
 Procedure read_setting(ControlDialog<F>& dialog, ControlResults& found, unsigned address) {
   ControlMaster master;
@@ -257,7 +259,8 @@ Procedure read_info(ControlDialog<F>& dialog, ControlResults& found) {
   co_return done;
 }
 
-/// Sends a command to the slaves of a mask; 0: to all. Reads one frame more, with which slaves take the last CDM bit.
+/// Sends a command to the slaves of a mask; 0: to all slaves. Then reads one more frame, because slaves take the last
+/// CDM bit only when the next frame begins.
 template <class F>
 Procedure send_command(ControlDialog<F>& dialog, ControlResults& found, Arguments arguments) {
   ControlMaster master;

@@ -47,7 +47,7 @@ TEST(BissProcedures, WaitsFortyMillisecondsForStartBit) {
   asked(42'000, Error::busy);
 }
 
-// Some encoders send P = 1 after each register.
+// Some encoders send P = 1 (the next register is refused) after each register.
 TEST(BissProcedures, ReadsOnAfterStopBit) {
   for (const StopBit stop_bit : {StopBit::next, StopBit::zero, StopBit::one}) {
     Format format = testing::bits_24;

@@ -49,7 +49,7 @@ struct HostRecord {
   std::uint32_t reads = 0;
   std::uint32_t writes = 0;
   std::uint32_t failures = 0;
-  std::uint32_t wrong = 0;  // accepted bytes with a wrong value
+  std::uint32_t wrong = 0;  // number of accepted bytes with a wrong value
   std::array<bool, registers::bank_size> read{};
   std::array<bool, registers::bank_size> written{};
   std::array<std::uint8_t, registers::bank_size> known{};
@@ -118,7 +118,7 @@ struct Watched final : absenc::Machine<std::uint8_t> {
 struct Outcome {
   std::uint64_t positions = 0;
   std::uint64_t wrong = 0;
-  std::uint64_t gaps = 0;  // frames that did not begin exactly one timeout after the previous frame
+  std::uint64_t gaps = 0;  // number of frames that did not begin exactly one timeout after the previous frame
   std::uint64_t damaged = 0;
   sim::FaultCounts faults{};
   // number of registers whose value differs from the one that the host believes to have written
@@ -242,7 +242,8 @@ TEST(BissRegisters, FaultsCauseNoWrongRegisterByte) {
   EXPECT_LE(static_cast<double>(seen.wrong), computed + 5 * std::sqrt(computed));
   EXPECT_EQ(record.wrong, 0u);
   EXPECT_EQ(seen.wrong_bytes, 0u);
-  EXPECT_LT(record.failures, (record.reads + record.writes) / 4);  // a write is not repeated
+  // Some accesses fail, because a write is never repeated.
+  EXPECT_LT(record.failures, (record.reads + record.writes) / 4);
   expect_all_of_the_bank(record);
 }
 

@@ -48,9 +48,10 @@ struct SafetyFormat {
   std::uint16_t register_delay_us = 0;  ///< Time until a virtual encoder has a requested register ready, in us.
   /// Whether SLO of a virtual encoder stays idle after power on until the start sequence.
   bool start_sequence = false;
-  Timeout timeout{};                 ///< BiSS timeout: how long the encoder holds SLO low after the last clock.
-  StopBit stop_bit = StopBit::next;  ///< The bit P that a virtual encoder sends after each register.
-  std::uint8_t slave = 0;            ///< Slave whose registers are accessed: 0 safety word, 1 control word.
+  Timeout timeout{};  ///< BiSS timeout: how long the encoder holds SLO low after the last clock.
+  /// How a virtual encoder sets the bit P after each register (1: the next register is refused).
+  StopBit stop_bit = StopBit::next;
+  std::uint8_t slave = 0;  ///< Slave whose registers are accessed: 0 safety word, 1 control word.
   RegisterOrder register_order = RegisterOrder::big;  ///< Byte order of a number that several registers hold.
 
   /// Returns the period of MA.
@@ -73,14 +74,15 @@ struct SafetyReply {
 
 namespace detail {
 
-// With a CRC, zeros are no word, even if the CRC fits them: SLO is low after a frame.
+// Decodes one word and its check. If the word has a CRC, zeros alone are no word, even if the CRC fits them, because
+// SLO is low after a frame.
 constexpr Error take_channel(const Channel& channel, BitView samples, std::size_t first, ChannelData& data) {
   const std::size_t end = first + data_bits(channel);
   if (channel.check.width != 0 && !samples[first] && samples.end_of_run(first) >= end) return Error::line_stuck;
   return take_data(Given<Channel>{channel, channel.word}, samples, first, data);
 }
 
-// Includes turns, because near zero one count changes them.
+// Returns the upper `bits` bits of the position, preceded by the turns, because near zero one count changes the turns.
 template <std::size_t size>
 constexpr std::uint64_t compared_bits(const Channel& channel, const WordWith<size>& word, unsigned bits,
                                       unsigned turns) {
@@ -97,7 +99,8 @@ constexpr std::uint64_t compared_bits(const Channel& channel, const WordWith<siz
          format.compare_bits <= format.spw.word.bits_of(Meaning::position);
 }
 
-/// Returns whether position and the turns that both words have differ by at most one, with wrap-around.
+/// Returns whether the upper `compare_bits` bits of both positions, with the turns if both words have them, differ by
+/// at most one count, with wrap-around.
 template <std::size_t size>
 [[nodiscard]] constexpr bool positions_agree(const SafetyFormat& format, const WordWith<size>& cpw,
                                              const WordWith<size>& spw) {
@@ -131,8 +134,8 @@ template <std::size_t size>
   return reply;
 }
 
-/// Appends the frame of `reply`; bit 0 of `silent`: without the SPW, bit 1: without the CPW. Returns false if `out` is
-/// too small.
+/// Appends the frame of `reply`. If bit 0 of `silent` is set, the SPW is left out; if bit 1 is set, the CPW. Returns
+/// false if `out` is too small.
 template <std::size_t Capacity>
 constexpr bool encode(const SafetyFormat& format, const SafetyReply& reply, BitBuffer<Capacity>& out,
                       std::uint8_t silent = 0) {

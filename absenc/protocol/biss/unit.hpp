@@ -11,8 +11,10 @@ extern const Unit unit;  ///< BiSS-C with one encoder and one position word.
 extern const Unit safety_unit;
 /// BiSS-C with several encoders in a chain.
 extern const Unit chain_unit;
-extern const Clauses unit_clauses;         ///< The demands on BiSS-C.
-extern const Clauses safety_unit_clauses;  ///< The demands on BiSS Safety.
-extern const Clauses chain_unit_clauses;   ///< The demands on a chain.
+extern const Clauses unit_clauses;  ///< The document's demands on encoders and hosts of BiSS-C, for conformance tests.
+/// The document's demands on encoders and hosts of BiSS Safety, for conformance tests.
+extern const Clauses safety_unit_clauses;
+/// The document's demands on encoders and hosts of chains, for conformance tests.
+extern const Clauses chain_unit_clauses;
 
 }  // namespace absenc::biss

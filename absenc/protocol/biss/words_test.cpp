@@ -94,7 +94,8 @@ TEST(BissWords, SafetyComparesPositionsAndLifeCounter) {
   EXPECT_EQ(error(0x123456, 0x1234, 1), Error::sequence_mismatch);
 }
 
-// Expects enough clocks for an encoder that needs 10 us, but not for two periods more.
+// Expects that hosts with default options give enough clocks for an encoder that needs 10 us for its position, but not
+// for one that needs two clock periods more.
 template <class F>
 void expect_clocks_of_ten_microseconds() {
   for (const std::uint16_t khz : std::to_array<std::uint16_t>({100, 1'000, 4'400, 10'000})) {

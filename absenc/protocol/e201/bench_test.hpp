@@ -29,7 +29,7 @@ inline Tamper answering(char letter, const std::vector<TextReply>& answer) {
   return [=](char asked) { return asked == letter ? std::optional(answer) : std::nullopt; };
 }
 
-/// The virtual interface, with commands that `tamper` may answer instead.
+/// The virtual interface; `tamper` may answer a command in its place.
 class TamperedInterface final : public Machine<std::uint8_t> {
  public:
   explicit TamperedInterface(Device<std::uint8_t>& device) : device_(device) {}

@@ -82,7 +82,7 @@ author::Responder::Answer VirtualInterface::respond(Bytes bytes, Time at, ByteBu
     case letter::hexadecimal:
       append_hexadecimal(reply, (counts(at) - zero_) & low_mask(width_), width_);
       break;
-    default: {  // `?`, and the first position of a stream: a signed number if a zero is set
+    default: {  // the reply to `?` and to `1` is the position, which is signed if a zero is set
       const std::uint64_t number = counts(at) - zero_;
       const bool negative = zero_ != 0 && static_cast<std::int64_t>(number) < 0;
       append_text(reply, negative ? "-" : "");

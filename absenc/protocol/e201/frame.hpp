@@ -44,7 +44,7 @@ inline constexpr std::uint8_t width = 'b';
 /// Command that sets the width of the position in bits.
 inline constexpr std::uint8_t set_width = 'B';
 inline constexpr std::string_view all = "4vse?>mbnfza01MB";  ///< Letters of all commands.
-/// Letters of the commands, apart from `4`, whose reply is one line of text.
+/// Letters of the commands whose reply is one line of text; the hexadecimal reply to `4` is no such line.
 inline constexpr std::string_view answered_by_a_line = "vse?>mb";
 
 /// Returns whether `letters` contains the letter `one`.
@@ -66,7 +66,7 @@ inline constexpr Time answer_limit = 50ms;  ///< Timeout of a reply; the 64 cloc
 inline constexpr Time gap_limit = 20ms;     ///< Timeout between two characters of a reply.
 inline constexpr Time reply_limit = 100ms;  ///< Longest duration of a reply, even if characters still arrive.
 inline constexpr Time silent_limit = 10ms;  ///< Timeout of a command that may have no reply.
-/// Time that is assumed to be enough after the encoder's supply is switched.
+/// Assumed time from switching the encoder's supply until the state of the supply is right.
 inline constexpr Time supply_time = 200ms;
 
 /// Returns the period of MA at clock number 1 to 8.
@@ -184,7 +184,7 @@ inline constexpr unsigned widest = 64;  ///< Greatest width of a position in bit
   return reply;
 }
 
-/// The protocol as author/dialog.hpp and author/device.hpp demand it.
+/// The E201-9S protocol, with the members that author/dialog.hpp and author/device.hpp demand.
 struct Protocol {
   /// Layout of the encoder's frames and properties of the interface.
   using Format = e201::Format;

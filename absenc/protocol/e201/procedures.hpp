@@ -56,7 +56,8 @@ struct InterfaceResults {
       advice = "280 or 560 kHz are recommended for Renishaw Resolute";
     }
   }
-  /// Returns the middle of the longest run of clocks, 1 to 8, with good frames only; 0: none.
+  /// Returns the number, 1 to 8, of the clock in the middle of the longest run of clocks at which every frame was
+  /// valid; 0: there is no such clock.
   [[nodiscard]] unsigned recommended() const;
 };
 
@@ -71,7 +72,8 @@ author::Procedure set_clock(Dialog& dialog, InterfaceResults& found, Arguments a
 author::Procedure switch_supply(Dialog& dialog, InterfaceResults& found, bool on);
 /// Sets the zero of `?` with `z`. Errors: those of the exchanges, not_still, invalid_argument, cross_check_failed.
 author::Procedure set_zero(Dialog& dialog, InterfaceResults& found);
-/// Reads frames at each clock, and emits the results after each; at the end sets the old clock.
+/// Reads frames at each clock, and emits the results after each clock; at the end restores the clock that was set
+/// before.
 author::Procedure sweep_clocks(Dialog& dialog, InterfaceResults& found, Arguments arguments);
 
 /// Advice if the line is never silent or a reply has a wrong length: the interface may stream.

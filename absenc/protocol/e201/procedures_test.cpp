@@ -105,7 +105,7 @@ TEST(E201Read, ExplainsEachError) {
   EXPECT_EQ(bench.run_tampered(once, "position").error, "none");
 }
 
-// No document gives these timeouts.
+// The timeouts of a reply are assumed, because no document states any.
 TEST(E201Read, UsesReplyTimeouts) {
   Bench bench("singleturn_bits=19");
   const std::string good = "c0014328ff300000\r";
@@ -221,7 +221,7 @@ TEST(E201Zero, ReadsZeroBack) {
   EXPECT_EQ(bench.run("decimal").fields, (Fields{{"counts", 275086}}));
 }
 
-// The limit is 0.02 degrees (29 counts of 19 bits), or one count.
+// The limit is the greater of 0.02 degrees (29 counts of 19 bits) and one count.
 TEST(E201Zero, RefusesMovingEncoder) {
   struct Case {
     std::string bits;
@@ -232,7 +232,7 @@ TEST(E201Zero, RefusesMovingEncoder) {
                                            {"19", {"129", "100", "-29"}, "none"},
                                            {"19", {"100", "130"}, "not_still"},
                                            {"19", {"130", "100"}, "not_still"},
-                                           // the second position is one turn further
+                                           // the second position is one turn further than the first
                                            {"19", {"100", "524388"}, "not_still"},
                                            {"19", {"100", "100", "30"}, "cross_check_failed"},
                                            {"19", {"100", "100", "524288"}, "cross_check_failed"},

@@ -157,7 +157,7 @@ constexpr auto own_fields = fields_of<InterfaceResults>(
     field<khz<recommended>>("recommended_khz", "kHz", "that clock"),
     field<restored>("restored_clock", "", "clock before the sweep, which is restored"),
     field<aborted>("aborted", "", "the sweep was ended early: not all clocks were tried"));
-// Fields that are reported after a sweep was interrupted.
+// Fields that are reported after a clock sweep was interrupted.
 constexpr auto left_fields = fields_of<InterfaceResults>(
     field<left>("left_clock", "", "the clock that the sweep set last"),
     field<khz<left>>("left_khz", "kHz", "that clock"),
@@ -258,7 +258,8 @@ constexpr std::size_t size_of_reply(const Format&, Bytes begin) {
 }
 constexpr Result<Request> guess_request(const Format&, Bytes) { return Request{letter::samples}; }
 
-// Bits after the CRC are ignored, and upper and lower case digits are the same.
+// Returns whether the checks must detect a wrong bit. They need not in an SSI word, in the bits after the CRC, and in a
+// digit that only changes between lower and upper case.
 bool is_checked(const Options& values, Frame, Frame reply, std::size_t bit) {
   const Format f = format_by(values);
   const Result<std::uint64_t> samples = decode_samples(reply.bytes);

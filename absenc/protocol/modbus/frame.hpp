@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Modbus RTU frames. Sources: MODBUS over Serial Line V1.02 (S), MODBUS Application Protocol V1.1b3 (A).
+// Modbus RTU frames. Sources: MODBUS over Serial Line V1.02, MODBUS Application Protocol V1.1b3.
 #pragma once
 
 #include <array>
@@ -13,20 +13,21 @@
 
 namespace absenc::modbus {
 
-/// CRC of Modbus RTU (S 6.2.2).
+/// CRC of Modbus RTU (MODBUS over Serial Line, 6.2.2).
 inline constexpr CrcParameters crc_parameters{16, 0x8005, 0xFFFF, true, true, 0x0000};
 
-inline constexpr std::size_t frame_capacity = 256;  ///< Length of the longest frame in bytes (S 2.5.1).
-inline constexpr std::size_t shortest_frame = 4;    ///< Length of the shortest frame in bytes: address, function, CRC.
-inline constexpr std::size_t crc_size = 2;          ///< Length of the CRC in bytes.
+/// Length of the longest frame in bytes (MODBUS over Serial Line, 2.5.1).
+inline constexpr std::size_t frame_capacity = 256;
+inline constexpr std::size_t shortest_frame = 4;  ///< Length of the shortest frame in bytes: address, function, CRC.
+inline constexpr std::size_t crc_size = 2;        ///< Length of the CRC in bytes.
 /// Bytes of one frame.
 using FrameBytes = ByteBuffer<frame_capacity>;
 
 inline constexpr std::uint8_t first_address = 1;   ///< Lowest address of a server; 0 is broadcast and never answered.
-inline constexpr std::uint8_t last_address = 247;  ///< Highest address of a server (S 2.2).
+inline constexpr std::uint8_t last_address = 247;  ///< Highest address of a server (MODBUS over Serial Line, 2.2).
 
 inline constexpr std::uint8_t read_holding_registers = 0x03;  ///< Function code that reads holding registers.
-/// Greatest number of registers in one read request (A 6.3).
+/// Greatest number of registers in one read request (MODBUS Application Protocol, 6.3).
 inline constexpr std::uint16_t most_registers = 125;
 /// Bit of the function code that marks a refusal; functions of the standard are below it.
 inline constexpr std::uint8_t refusal_bit = 0x80;
@@ -52,7 +53,7 @@ constexpr void append_crc(ByteBuffer<Capacity>& frame, CrcOrder order = CrcOrder
   frame.push_back(static_cast<std::uint8_t>(low_first ? crc >> 8 : crc));
 }
 
-/// Codes with which the virtual servers refuse a request (A 7); `none`: not refused.
+/// Codes with which the virtual servers refuse a request (MODBUS Application Protocol, 7); `none`: not refused.
 enum class Exception : std::uint8_t {
   none = 0,
   illegal_function = 1,
@@ -60,13 +61,13 @@ enum class Exception : std::uint8_t {
   illegal_data_value = 3,
 };
 
-/// Returns the code in a refusal of `function`; no value for another frame. Ignores the CRC.
+/// Returns the code in a frame that refuses the function `function`; no value for any other frame. Ignores the CRC.
 [[nodiscard]] constexpr std::optional<std::uint8_t> refusal_code(Bytes frame, std::uint8_t function) {
   if (frame.size() != shortest_frame + 1 || frame[1] != (function | refusal_bit)) return std::nullopt;
   return frame[2];
 }
 
-/// Returns cause and advice for the code of a refusal (A 7).
+/// Returns cause and advice for the code of a refusal (MODBUS Application Protocol, 7).
 [[nodiscard]] constexpr Explanation explain_refusal(std::uint8_t code) {
   switch (code) {
     case 0x01:

@@ -158,7 +158,7 @@ TEST(ModbusLine, ServerAnswersOnlyFramesBetweenSilences) {
   EXPECT_EQ(bench.server.violation_count(), 0u);
 }
 
-/// Sends characters with a pause before one character and records the reply.
+/// A host that sends a frame with a pause before one of its characters, and records the reply.
 class PausingHost final : public Machine<std::uint8_t> {
  public:
   PausingHost(const Wire& bytes, std::ptrdiff_t before, Time pause)

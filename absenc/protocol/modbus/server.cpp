@@ -7,7 +7,7 @@ namespace {
 
 // Time between the silence that ends a request and the reply; the standard states none.
 constexpr Time answer_time = 200us;
-// Delay of the report of a silence after which the request counts as late: the client may have timed out.
+// If a silence is reported later than this, the client may have timed out, so its next request breaks no timing rule.
 constexpr Time late = 20ms;
 constexpr std::string_view turn_rule = "something was sent during the encoder's transmission";
 

@@ -43,7 +43,7 @@ class Server : public Device<std::uint8_t> {
 
   /// Sets that the baud rate changes to `rate` as soon as this server transmits nothing.
   void set_rate(std::uint32_t rate);
-  /// Records whether the host kept `rule`; returns `satisfied`.
+  /// Records whether the host kept `rule`, as `satisfied` states. Returns `satisfied`.
   bool expect(bool satisfied, std::string_view rule, Time at) { return rules_.expect(satisfied, rule, at); }
   /// Checks the timing of the frame that is being handled. Call it for frames to this server.
   void check_line_rules(Time at);
@@ -66,7 +66,7 @@ class Server : public Device<std::uint8_t> {
 
   FrameBytes frame_;
   bool damaged_ = false;          // the present frame has a damaged character, or too many characters
-  bool follows_traffic_ = false;  // the silence after earlier traffic is known, so it is checked
+  bool follows_traffic_ = false;  // the length of the silence before the present frame is known, so it is checked
   bool began_too_soon_ = false;   // the silence before the present frame was shorter than 3.5 characters
   bool has_gap_ = false;          // two characters of the present frame were further apart than `character_gap`
   bool line_was_used_ = false;    // anything was received or sent since power on

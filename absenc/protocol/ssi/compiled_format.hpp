@@ -15,10 +15,10 @@ class CompiledFormat {
       : format_(format), bits_(format.word.bits()), is_possible_(bits_ >= 1 && bits_ <= CompiledWord::maximum_bits) {
     if (is_possible_) word_ = CompiledWord(format.word);
   }
-  /// Returns the format.
+  /// Returns the format that was compiled.
   constexpr operator const Format&() const { return format_; }
 
-  /// Decodes a reading, as `decode`.
+  /// Decodes the bits of one reading, with the same result as ssi::decode.
   [[nodiscard]] constexpr Result<Word> decode(const BitView& bits) const {
     if (!is_possible_ || format_.extra_clocks != 0 || bits.size != bits_) return decode_otherwise(bits);
     const std::uint64_t number = bits.load_quickly(0, bits_);
@@ -29,7 +29,7 @@ class CompiledFormat {
   }
 
  private:
-  // Decodes readings for which `word_` is not enough.
+  // Decodes readings that the compiled word cannot decode: extra clocks, another number of bits, or an error.
   [[nodiscard, gnu::noinline]] constexpr Result<Word> decode_otherwise(const BitView& bits) const {
     return ssi::decode(format_, bits);
   }

@@ -27,8 +27,10 @@ class VirtualEncoder final : public author::ClockedDevice {
   Format format_;
   const Shaft* shaft_;
   Word latched_{};
-  std::size_t shifted_ = 0;  // clocks since `latched_` was stored; modulo two words if clocked again too soon
-  Time free_at_{};           // end of the monoflop time after the last clock
+  // Number of clocks since the word `latched_` was stored; modulo two words if the host clocks again within the
+  // monoflop time.
+  std::size_t shifted_ = 0;
+  Time free_at_{};  // end of the monoflop time after the last clock
 };
 
 }  // namespace absenc::ssi

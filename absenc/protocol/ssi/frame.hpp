@@ -24,7 +24,7 @@ enum class AfterWord : std::uint8_t {
   repeat,
   zero,
   one,
-  separated,  ///< A zero, then the word again.
+  separated,  ///< The encoder sends a zero, then the word again.
 };
 
 class CompiledFormat;
@@ -40,7 +40,7 @@ struct Format {
   /// Whether the last bit is a parity bit that the encoder inverts if its position is wrong.
   bool error_parity = false;
   bool padded = false;  ///< Whether skipped bits of the word must be zero.
-  /// Highest speed of the shaft, in rpm, between two words that confirm the position; 0: reads one word.
+  /// Highest speed of the shaft, in rpm, at which a second word confirms the first; 0: the host reads only one word.
   std::uint32_t confirm_rpm = 0;
   // ---- Values that vary by product (RAA38S6 3.5, note)
   /// Longest pause of the clock after which the old word may still continue (monoflop time Tm).
@@ -58,7 +58,8 @@ inline constexpr std::size_t frame_capacity = 2 * WordFormat::maximum_bits;  ///
 /// Returns the number of clocks of one reading: the word and the extra clocks.
 [[nodiscard]] constexpr unsigned clocks(const Format& format) { return format.word.bits() + format.extra_clocks; }
 
-/// Returns bit `index` (from 0) of an endless clock sequence whose word begins at `first`.
+/// Returns bit number `index`, from 0, that an encoder sends if the clock never stops. Its word begins at bit `first`
+/// of `word`.
 [[nodiscard]] constexpr bool bit_after_word(const Format& format, BitView word, std::size_t index,
                                             std::size_t first = 0) {
   const std::size_t bits = format.word.bits();
@@ -77,7 +78,7 @@ namespace detail {
   const std::size_t both = 2 * word + (format.after_word == AfterWord::separated ? 1 : 0);
   const bool twice = format.extra_clocks == 0 && bits.size == both;
   if (bits.size == clocks(format) || twice) return Error::none;
-  // A number with a bit above the width of the word exceeds any position.
+  // If one of the bits before the last `word` bits is 1, the number that was read exceeds every position.
   for (std::size_t i = 0; i + word < bits.size; ++i) {
     if (bits[i]) return Error::out_of_range;
   }
@@ -155,7 +156,8 @@ constexpr bool encode_whole(const Format& format, const Word& word, BitBuffer<Ca
   return true;
 }
 
-/// Appends `count` bits of the word and those after it. Returns false if `out` is too small.
+/// Appends the first `count` bits that an encoder sends: the word, then the bits after it. Returns false if `out` is
+/// too small.
 template <std::size_t Capacity>
 constexpr bool encode(const Format& format, const Word& word, std::size_t count, BitBuffer<Capacity>& out) {
   BitBuffer<WordFormat::maximum_bits> coded;
@@ -167,7 +169,8 @@ constexpr bool encode(const Format& format, const Word& word, std::size_t count,
 /// Whether a word has an error bit, and the level of the bit that reports an error.
 enum class ErrorBit : std::uint8_t { none, active_high, active_low };
 
-/// Returns the tree format: `turns` bits and then `steps` bits, filled up with zeros; may be empty.
+/// Returns the tree format: turns in `turns` bits, then the position in `steps` bits, both filled up with zeros; an
+/// empty format if turns or position have more bits.
 [[nodiscard]] constexpr WordFormat tree_format(const PositionBits& bits, unsigned turns, unsigned steps) {
   WordFormat word;
   const auto fill = [&word](unsigned count) {
@@ -188,7 +191,7 @@ enum class ErrorBit : std::uint8_t { none, active_high, active_low };
   if (parity != Parity::none) word.add({"parity", Meaning::parity, 1, parity == Parity::odd});
   return word;
 }
-/// Returns the format of a word with the counts of `bits`, and the chosen further bits.
+/// Returns the format of a word with turns and position of `bits`, and the chosen error bit and parity bit.
 [[nodiscard]] constexpr WordFormat word_with(const PositionBits& bits, bool gray, ErrorBit error, Parity parity) {
   return word_with(word_format(bits), gray, error, parity);
 }

@@ -18,7 +18,7 @@ BitBuffer<256> bits(std::string_view text) {
 
 Result<Word> decode(const Format& format, std::string_view text) { return ssi::decode(format, bits(text).view()); }
 
-// Paragraph 3.5: 8 clocks, converted with the formula for 12, are at most 22.4121 degrees.
+// RAA38S6, paragraph 3.5: the number that 8 clocks give, taken for 12 bits, is at most 22.4121 degrees.
 TEST(SsiFrame, RejectsTooFewClocks) {
   EXPECT_NEAR(degrees(255, 12), 22.4121, 0.0001);
   for (std::size_t size = 0; size < 12; ++size) {
@@ -26,7 +26,7 @@ TEST(SsiFrame, RejectsTooFewClocks) {
   }
 }
 
-// Paragraph 3.5: with too many clocks the position can be thousands of degrees.
+// RAA38S6, paragraph 3.5: with too many clocks the position can be thousands of degrees.
 TEST(SsiFrame, RejectsTooManyClocks) {
   for (std::uint64_t position = 0; position < 4096; ++position) {
     BitBuffer<64> read;

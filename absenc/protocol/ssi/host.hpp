@@ -9,7 +9,7 @@
 
 namespace absenc::ssi {
 
-/// The protocol, as author layers use it: word, clocks and times.
+/// SSI as the classes of protocol/author use it: word, clocks and times.
 struct Protocol {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = ssi::Format;
@@ -38,7 +38,7 @@ struct Protocol {
   }
 };
 
-/// Returns whether a shaft with at most `confirm_rpm` can have moved from `before` to `after`.
+/// Returns whether a shaft with at most `confirm_rpm` can have moved from `before` to `after` in the time `between`.
 [[nodiscard]] constexpr bool can_follow(const Format& format, const Word& before, const Word& after, Time between) {
   const unsigned bits = format.word.bits_of(Meaning::position);
   const unsigned turns = format.word.bits_of(Meaning::multiturn);

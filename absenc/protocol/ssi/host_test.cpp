@@ -124,7 +124,7 @@ TEST(SsiHost, ExplainsErrors) {
   EXPECT_THAT(detail_of(Error::out_of_range, {{"tree_turns", "12"}, {"tree_steps", "13"}}),
               HasSubstr("fills the word up"));
   EXPECT_THAT(detail_of(Error::out_of_range, {}), HasSubstr("more clocks than the word has bits"));
-  // The unit does not explain these errors.
+  // The unit does not explain line_stuck and wrong_length.
   for (const Error error : {Error::line_stuck, Error::wrong_length}) EXPECT_EQ(detail_of(error, {}), "");
 }
 

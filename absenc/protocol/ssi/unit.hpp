@@ -6,7 +6,7 @@
 
 namespace absenc::ssi {
 
-extern const Unit unit;             ///< The protocol as a unit, for the list of units.
-extern const Clauses unit_clauses;  ///< The demands of the protocol's document.
+extern const Unit unit;             ///< SSI as a unit, for the list of units.
+extern const Clauses unit_clauses;  ///< The document's demands on SSI encoders and hosts, for conformance tests.
 
 }  // namespace absenc::ssi
