@@ -12,7 +12,7 @@ const yes = document.getElementById("dialog-yes");
 const no = document.getElementById("dialog-no");
 const WRITING_MS = 300;  // time without a key press, in milliseconds, after which the encoder is asked for the value
 
-/** Asks the user. `agree` runs when the user agrees, and returns "" or an error text. Resolves to whether the user agreed. */
+/** Asks the user. `agree` runs on consent and returns "" or an error text. Resolves to whether the user agreed. */
 function ask(words, button, nodes, agree) {
   title.textContent = words;
   body.replaceChildren(...nodes);
@@ -64,7 +64,10 @@ export async function askAcknowledge(name, alarm) {
   return ask(`Acknowledge ${plain(alarm)}: ${name}`, "Acknowledge", nodes, async () => (who === null ? tryToken(token.value.trim()) : ""));
 }
 
-/** Asks the user for the arguments of a command. Resolves to the arguments; null if the user does not agree. `now` and `then` return the value before and after the command. */
+/**
+ * Asks the user for the arguments of a command. Resolves to the arguments; null if the user does not agree. `now` and
+ * `then` return the value before and after the command.
+ */
 export async function askCommand(name, command, now, then) {
   const {name: who} = await tokenInfo();
   const fields = command.arguments.map((argument) => element("input", {
