@@ -14,7 +14,7 @@ import unittest
 from command_support import Emulator, absenc, end, read_line
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "firmware"))
-import call_graph  # noqa: E402: as figures
+import call_graph  # noqa: E402: the module is in the same folder as figures
 import figures  # noqa: E402: the module is in the folder of the programs that it measures
 
 FOLDER = os.path.abspath(os.environ.get("ABSENC_FIRMWARE", "build/arm/firmware"))

@@ -257,7 +257,7 @@ TEST(EmulatorPort, IsNotReplacedWhileItLives) {
     }
     EXPECT_EQ(fs::read_symlink(link), terminal);
   }
-  // A program that is no emulator has the terminal number of a killed emulator.
+  // The pseudo-terminal number of a killed emulator now belongs to a program that is no emulator.
   const Descriptor other(::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC));
   std::array<char, 64> name{};
   ASSERT_EQ(::grantpt(other.get()), 0);
@@ -266,7 +266,7 @@ TEST(EmulatorPort, IsNotReplacedWhileItLives) {
   fs::create_symlink(name.data(), link);
   const EmulatorPort third(link);
   EXPECT_NE(fs::read_symlink(link), name.data());
-  // An emulator with another link has the terminal number of a killed emulator.
+  // The pseudo-terminal number of a killed emulator now belongs to an emulator with another link.
   const fs::path stale = directory.path() / "stale";
   fs::create_symlink(fs::read_symlink(link), stale);
   const EmulatorPort fourth(stale);

@@ -189,7 +189,7 @@ TEST(SocketCan, DoesNotSetBitRate) {
   EXPECT_EQ(failure_of([&] { port.begin({.kind = FrameStep::Kind::pulse}); }).kind(), Failure::Kind::unsupported);
 }
 
-// Tests the system call on a UDP socket, which every kernel has.
+// Tests the read of a frame with the kernel's time stamp; uses a UDP socket, which every kernel has.
 TEST(SocketCan, KernelStampIsTimeOfReception) {
   const Descriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
   sockaddr_in address{};

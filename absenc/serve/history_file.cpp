@@ -69,7 +69,8 @@ std::uint32_t big_endian(std::string_view bytes) {
 
 HistoryFile::HistoryFile(const std::string& path) : path_(path), owned_file_(lock(path)) {
   sqlite_.emplace("the history", path, Sqlite::For::writing);
-  // With a write-ahead log, committed rows survive a kill, and others can read meanwhile.
+  // With a write-ahead log, committed rows survive a kill, and other programs can read the history while it is
+  // written.
   sqlite_->run("PRAGMA auto_vacuum = INCREMENTAL; PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL");
   const std::int64_t found = sqlite_->number("PRAGMA user_version");
   if (found > version) throw Failure(fmt::format("the history {} was written by a newer absenc", path));

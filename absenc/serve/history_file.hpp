@@ -12,7 +12,7 @@
 
 namespace absenc::serve {
 
-/// Thrown when another server writes to the same file.
+/// Thrown when another server writes to the same history file.
 struct HistoryInUse : client::Failure {
   using client::Failure::Failure;
 };

@@ -87,7 +87,7 @@ class MqttSender {
   Time connected_at_{};
   bool connection_reported_ = false;  // whether an event has reported the current connection
   Time next_connection_report_{};
-  // Reasons of lost connections that events have reported since an event reported a connection.
+  // Reasons of lost connections that events have reported since the last event about a new connection.
   std::set<std::string> reported_losses_;
 
   mutable std::mutex mutex_;  // mutex that guards all members below except `thread_`
