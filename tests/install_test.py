@@ -226,7 +226,7 @@ class Installed(Case):
         for header in (self.root / "include").rglob("*.hpp"):
             text = header.read_text()
             for included in re.findall(r"^#include <(.+)>", text, re.MULTILINE):
-                # The headers include none of another library or of the operating system.
+                # The installed headers include no header of another library or of the operating system.
                 self.assertRegex(included, r"^(\w+|bits/chrono\.h)$", header)
             for included in re.findall(r'^#include "(.+)"', text, re.MULTILINE):
                 self.assertTrue((self.root / "include" / included).is_file(), f"{header}: {included}")

@@ -59,7 +59,7 @@ void give_up(unsigned capability, __rlimit_resource resource, rlim_t most = 0) {
   rlimit limit{};
   ::getrlimit(resource, &limit);
   const rlimit raised{most, std::max(limit.rlim_max, most)};
-  // the hard limit stays as it is if it is lower: only root may raise it
+  // setrlimit fails if the hard limit must be raised, which only root may do
   if (::setrlimit(resource, &raised) == 0) return;
   limit.rlim_cur = std::min(limit.rlim_max, most);
   ASSERT_EQ(::setrlimit(resource, &limit), 0);

@@ -25,7 +25,7 @@ class Headers {
   [[nodiscard]] std::string_view ambiguity(std::string_view version) const;
   /// Returns the length of the request body in bytes, as announced; 0 without Content-Length.
   [[nodiscard]] std::uint64_t announced_length() const;
-  /// Copies the headers that access control needs to `request`.
+  /// Copies into `request` those headers that access control needs.
   void copy_to(Request& request) const;
 
  private:

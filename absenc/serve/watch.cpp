@@ -182,7 +182,7 @@ void Watch::work(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     try {
       read_on(stop);
-    } catch (const os::Interrupted&) {  // the program ends; this exception ends the other threads, too
+    } catch (const os::Interrupted&) {  // the program ends; os::interrupted() also stops the other threads
       return;
     } catch (const os::Ended&) {  // the reading thread was requested to end during a wait
       return;
