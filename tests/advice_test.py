@@ -44,7 +44,8 @@ class NamedCommands(unittest.TestCase):
                 continue
             verb = tuple(words[1:3] if words[1] in TWO_WORDS else words[1:2])
             if not re.fullmatch(r"[a-z-]+", verb[0]) or verb[0].startswith("-"):
-                continue  # the word after `absenc` is a placeholder for a verb, or an option
+                # the quoted command is not run: behind `absenc` stands an option, or a placeholder for the verb
+                continue
             verbs.setdefault(verb, f"{source}: `{quoted}`")
         self.assertGreater(len(verbs), 15)
         for verb, where in verbs.items():
@@ -66,7 +67,7 @@ class NamedCommands(unittest.TestCase):
             for text in literals(source):
                 rest = re.sub(r"`[^`]*(`|$)", "", text)
                 if text.startswith("sudo "):
-                    continue  # a text that is only an example command
+                    continue  # the whole text is an example command, so `sudo` needs no backquotes
                 with self.subTest(f"{source.relative_to(ROOT)}: {text}"):
                     self.assertNotRegex(rest, r"\bsudo \w")
 

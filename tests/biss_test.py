@@ -203,7 +203,7 @@ class Registers(Case):
             path = os.path.join(directory, "drive.vcd")
             self.assert_good(absenc("wave", "biss?motion=rpm=600", path, "--command", "memory-read 68 0 4"))
             rows = json_lines(absenc("decode", "biss", path, "--json").stdout)
-            # A line of output is one bit with its time; the clock pauses after each frame.
+            # sigrok-cli prints one bit with its time in each line. A frame ends where the clock pauses.
             seen = subprocess.run(["sigrok-cli", "-I", "vcd", "-i", path, "--protocol-decoder-samplenum", "-P",
                                    "spi:clk=clock:miso=data:cpol=1:cpha=1:wordsize=1", "-A", "spi=miso-data"],
                                   capture_output=True, text=True, timeout=60, check=True).stdout.splitlines()
@@ -418,7 +418,7 @@ class LifeCounter(Case):
                 self.assertEqual(self.errors(unit, of([62, 63, 0, 1])), [None] * 4)
                 self.assertEqual(self.errors(unit, of([7] * 24)), [None] + [wrong] * 23)
                 self.assertEqual(self.errors(unit, of([1, 2, 5, 6, 6, 7])), [None, None, wrong, None, wrong, None])
-                # After a damaged frame the next counter may have any value except that of the last good frame.
+                # The frame after a damaged one may have any counter except that of the last good frame.
                 damaged = of([1, 2, 3, 5])
                 damaged[2] = damaged[2][:3] + ("0" if damaged[2][3] == "1" else "1") + damaged[2][4:]
                 self.assertEqual(self.errors(unit, damaged), [None, None, "bad_checksum", None])
@@ -483,7 +483,7 @@ class StartSequence(Case):
             rows = json_lines(absenc("decode", "biss", path, "--json").stdout)
         self.assertEqual([(len(row["reply"]), row["ok"]) for row in rows],
                          [(41, False), (2, False), (41, True), (41, True)])
-        # Idle time before and after the pulses is 40 us; SLO is sampled half a clock after an edge.
+        # The clock rests for 40 us between two frames; the data line is sampled half a clock period after an edge.
         for before, after in zip(rows[:2], rows[1:]):
             self.assertAlmostEqual(after["time_s"] - before["end_s"], 40.5e-6, delta=0.1e-6)
 
@@ -586,7 +586,8 @@ class ControlFrames(Case):
             fields = answer["fields"]
             self.assertEqual((fields["operation"], fields["slave_id"], fields["address"], fields["data"]),
                              ("write" if write else "read", slave, address, data.hex()))
-            reported = numbers(fields["start_delay"])  # the start_delay field has room for at least 48 delays
+            # the field start_delay shows all delays of a shorter frame; of a long one, it shows at least 48
+            reported = numbers(fields["start_delay"])
             self.assertEqual(reported, delays[:max(48, len(reported))])
             self.assertTrue(fields["next_address_accepted"])
         for slaves, command in ((0, 0), (0, 1), (1, 0), (0b101, 1), (0xFF, 3)):

@@ -81,7 +81,7 @@ class Reader(Case):
     def test_node_ignores_extended_and_remote_frames(self):
         self.bus.send(message(0x220, 0x80, 0x20, is_extended_id=True))
         self.bus.send(can.Message(arbitration_id=0x220, is_remote_frame=True, dlc=8, is_extended_id=False))
-        # Node 0x21 answers this request, which is sent after the frames that 0x20 must ignore.
+        # A reply of node 0x21 to this request shows that node 0x20 has ignored the frames before it.
         self.bus.send(message(0x221, 0x80, 0x21))
         while True:
             received = self.bus.recv(PATIENCE)

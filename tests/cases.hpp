@@ -7,8 +7,8 @@
 
 namespace absenc {
 
-/// Returns `all` times the percentage in ABSENC_CASES_PERCENT (default 100), at least 1. Only for numbers of similar
-/// cases.
+/// Returns the part of `all` cases that the environment variable ABSENC_CASES_PERCENT states in percent (default
+/// 100), at least 1. Use it only for numbers of cases that are alike.
 inline unsigned test_cases(unsigned all) {
   const char* const percent = std::getenv("ABSENC_CASES_PERCENT");
   if (percent == nullptr) return all;

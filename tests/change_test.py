@@ -88,7 +88,8 @@ class Journal(Case):
         result = self.absenc("changes")
         self.assert_good(result)
         self.assertIn("no changes are in " + self.journal, result.stdout)
-        self.assert_good(self.absenc("zero", "sim:tformat"))  # a change of a virtual encoder is not recorded
+        # a change of a virtual encoder is not recorded in the journal
+        self.assert_good(self.absenc("zero", "sim:tformat"))
         self.assertEqual(self.changes(), [])
 
     def test_every_kind_of_change_can_be_put_back(self):
@@ -153,7 +154,7 @@ class Journal(Case):
         with Emulator(self.directory) as encoder:
             for journal in ("/dev/full", self.file("no")):
                 if journal != "/dev/full":
-                    os.mkdir(journal)  # a folder with the journal's name, so that the file cannot be created
+                    os.mkdir(journal)  # the journal's path is that of a folder, so that the journal cannot be written
                 result = self.absenc("zero", f"tformat:{encoder.path}?latency=300", "--yes", ABSENC_CHANGES=journal)
                 self.assertEqual(result.returncode, 0)
                 self.assertIn("singleturn", result.stdout)

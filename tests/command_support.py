@@ -17,7 +17,7 @@ import tty
 import unittest
 
 ABSENC = os.path.abspath(os.environ.get("ABSENC", "build/release/bin/absenc"))
-os.environ.setdefault("ABSENC_CHANGES", "none")  # tests do not write to the user's journal of changes
+os.environ.setdefault("ABSENC_CHANGES", "none")  # the tests must not write to the user's journal of changes
 # Usual time limit of a wait, in seconds.
 PATIENCE = float(os.environ.get("ABSENC_PATIENCE", "60"))
 
@@ -164,7 +164,7 @@ class BabblingLine(FakeLine):
     def serve(self):
         due = time.monotonic()
         for piece in itertools.cycle(self.pieces):
-            # If sending was delayed, the next period begins now instead of when it was due.
+            # If this thread was late, the next period begins now, and not at the time at which it was due.
             due = max(due + self.period, time.monotonic())
             writable = [self.master] if self.period == 0 else []
             timeout = None if self.period == 0 else max(due - time.monotonic(), 0)

@@ -24,7 +24,8 @@ class Conform(EncoderCase):
         answer = json.loads(result.stdout)
         self.assertEqual((answer["ok"], answer["protocol"], answer["left"]), (True, "tformat", []))
         for clause in answer["clauses"]:
-            # The reply arrives before the port has its former rate again, so the clause bad-delimiter is untested.
+            # The clause bad-delimiter is not tested on this kind of port: the reply arrives before the port is back
+            # at its own rate.
             expected = "untested" if clause["id"] == "bad-delimiter" else "kept"
             self.assertEqual(clause["verdict"], expected, clause)
             self.assertTrue(clause["document"] and clause["paragraph"] and clause["evidence"], clause)
@@ -110,7 +111,7 @@ class ConformHost(EncoderCase):
         end(host, signal.SIGTERM)
         answer = json.loads(out)
         verdicts = {one["id"]: one["verdict"] for one in answer["clauses"]}
-        # A host that only reads positions sends no request for a reset or for memory.
+        # The clauses about resets and memory stay untested: a host that only reads positions sends no such request.
         read = {"asks", "silence", "damage", "turn", "refusal"}
         self.assertEqual(verdicts, {name: "kept" if name in read else "untested" for name in verdicts}, err)
         self.assertEqual((judge.returncode, answer["ok"]), (0, True))

@@ -70,7 +70,7 @@ class CrcFind(Case):
             ("as it is", (6, 3, 0, 0x3F), []),
             ("with --option crc_width=16 --option crc_poly=37081 --option crc_init=21 --option crc_inverted=false",
              (16, 0x90D9, 21, 0), ["crc_width=16", "crc_poly=37081", "crc_init=21", "crc_inverted=false"]),
-            # No option is reported for this CRC, because no option inverts only some bits of a CRC.
+            # This CRC inverts only some of its bits, which no option of the protocol describes.
             (None, (8, 0x97, 0, 0x55), None),
         ):
             with self.subTest(name):

@@ -206,7 +206,7 @@ class Text(Case):
         self.assert_wrong_usage(absenc("decode", "e201", capture, "--bits"), "does not say where")
 
     def test_bit_positions_of_one_frame(self):
-        # The field is big-endian: its high bits are in the earlier byte and are printed first.
+        # The high bits of this big-endian field are in the earlier byte; their positions are printed first.
         result = absenc("decode", "raa38", "--hex", "ff81017f00", "--bits", "--option", "bits=14")
         self.assert_good(result)
         self.assertRegex(result.stdout, r"singleturn +383 counts +bits 16-21 24-31")
@@ -214,7 +214,7 @@ class Text(Case):
                         "--bits", "--json")
         self.assert_good(result)
         self.assertEqual(json.loads(result.stdout)["bits"]["singleturn"], [{"first": 0, "count": 13}])
-        # Except on clocked lines, bit numbers count from the lowest bit of each byte.
+        # Bit positions count from the lowest bit of each byte, except on clocked lines.
         for arguments, field, places in (
             (["encolink", "--hex", "003e825200"], "warning", [{"first": 16, "count": 1, "inverted": True}]),
             (["raa38-modbus", "--hex", "0103021234B533"], "singleturn",

@@ -48,10 +48,10 @@ class Documents(unittest.TestCase):
                     names.append(opened[1])
                     name = "::".join(names)
                     internal = names[-1] in ("detail", "script", "shown", "vector_texts") or name in ("absenc::esl::choices", "absenc::esl::request")
-                    # Doxyfile.in lists the internal namespaces.
+                    # Doxyfile.in lists the internal namespaces; these need no description.
                     if not internal:
                         opened_in[name] = path
-                    if before.startswith("///"):  # one description in any header is enough
+                    if before.startswith("///"):  # the namespace needs a description in only one of its headers
                         described.add(name)
                 elif line.startswith("}  // namespace"):
                     names.pop()

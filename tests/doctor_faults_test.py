@@ -14,24 +14,26 @@ import fault_proxy as faults
 from command_support import Case, Emulator, absenc, character_units
 
 ALL = "--all" in sys.argv
-PATIENT = "latency=40"  # milliseconds that a busy machine may add to a reply
+PATIENT = "latency=40"  # latency in milliseconds: a busy machine may delay a reply by this much
 
 # Protocols whose check bits accept many damaged replies.
 WEAK_CHECK = {"amt21"}
 
-# By protocol and fault: a further finding that explains the damaged frames.
+# A finding that doctor may also report as the cause of damaged frames, by protocol and fault.
 ALSO = {
-    # Byte 00 of channel 2 is outside the checksum.
+    # If a byte 00 of channel 2, which the checksum does not cover, is lost, the settings look wrong.
     ("encolink", "NUL lost"): "wrong_settings",
-    # A late reply to `v`, in front of the next reply, looks like extra bytes.
+    # A late reply to the command `v` may arrive just before the next reply, which then seems to have extra bytes.
     ("e201", "randomly late"): "extra_bytes",
 }
 
-# Each row: name, fault, ids that the verdict may name. "good": doctor finds no fault.
+# Each row: name, fault of the line, ids of the findings that doctor may report first. The id "good": doctor finds no
+# fault.
 PROXIED = [
     ("healthy", faults.Fault, "good"),
     ("split in packets", faults.Split, "good"),
-    ("own echo", faults.Echo, "good wrong_echo"),  # wrong_echo: on four wires, where no echo is expected
+    # wrong_echo is reported on a line with four wires, where no echo is expected
+    ("own echo", faults.Echo, "good wrong_echo"),
     ("dead", faults.Dead, "no_answer"),
     ("line low", faults.LineLow, "line_inverted"),
     ("only the echo", faults.OnlyEcho, "only_echo"),
@@ -40,7 +42,7 @@ PROXIED = [
     ("NMEA", faults.Nmea, "modem_answers never_silent"),
     ("chatter", faults.Chatter, "never_silent"),
     ("always late", faults.AlwaysLate, "reply_late"),
-    # sometimes_silent: a late reply may come after the host has ended to listen for it.
+    # sometimes_silent is also right: a late reply may arrive after the host has stopped listening for it.
     ("randomly late", faults.SometimesLate, "sometimes_late reply_late sometimes_silent"),
     ("loose contact", faults.LooseContact, "comes_and_goes sometimes_silent"),
     ("starting", faults.Starting, "good starting"),
@@ -120,11 +122,12 @@ class DoctorFaults(Case):
         with Emulator(self.directory, "--motion", "rpm=20", protocol=unit, name=name) as emulator, \
              faults.FaultProxy(make(), emulator.path) as proxy:
             found = self.examine(f"{unit}:{proxy.path}?{PATIENT}")
-            # A fault that changed few replies may be overlooked, or be found as another kind.
+            # If the fault changed only a few replies, doctor may overlook it or take it for another one.
             also = "good sometimes_damaged" if proxy.changed <= 1 else "sometimes_damaged" if proxy.changed < 10 else ""
             if unit in WEAK_CHECK and wanted in BYTE_CHANGES:
                 also += " sometimes_damaged damaged_bits damaged_bursts"
-            if what == "chatter" and proxy.requests == 0:  # a stream is never silent either
+            # an encoder that sends unsolicited frames is never silent, even without this fault
+            if what == "chatter" and proxy.requests == 0:
                 also += " always_damaged sometimes_damaged"
             also += f" {ALSO.get((unit, what), '')}"
             self.assert_first(found, f"{wanted} {also}", f"{unit}: {what}")
@@ -143,7 +146,8 @@ class DoctorFaults(Case):
         with Emulator(self.directory, *(["--model", actual] if actual else []), "--motion", "rpm=20", protocol=unit,
                       name=f"{unit}-{actual}-{said}") as emulator:
             found = self.examine(f"{unit}:{emulator.path}?{PATIENT}" + (f"&model={said}" if said else ""))
-            # stuck_bits: the encoder has fewer bits than the model, and always sends zeros in their place.
+            # Doctor may report stuck_bits: the encoder has fewer bits than the model in the address, and always sends
+            # zeros in their place.
             self.assert_first(found, "wrong_settings good stuck_bits", f"{unit}: {actual} read as {said}")
             return f"{unit:14} {actual or 'usual'} read as {said or 'usual'}: {found['verdict'][:100]}"
 
@@ -171,8 +175,8 @@ class DoctorFaults(Case):
     def examine_protocol(self, unit, other):
         with Emulator(self.directory, "--motion", "rpm=20", protocol=unit, name=f"{unit}-as-{other}") as emulator:
             found = self.examine(f"{other}:{emulator.path}?{PATIENT}")
-            # AMT21 is not always proven by its two-bit check. Characters of 16 bits are tried only if the other protocol
-            # has them, too.
+            # Two protocols may stay unproven: AMT21 has only two check bits, and Nikon's characters of 16 bits are
+            # tried only if the protocol in the address has them, too.
             is_unproven = unit in ("amt21", "nikon")
             self.assert_first(found, "no_answer other_protocol" if is_unproven else "other_protocol", f"{unit} read as {other}")
             self.assertIn("absenc identify" if found["findings"][0]["id"] == "no_answer" else f"{unit}:", found["verdict"])

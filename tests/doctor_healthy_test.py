@@ -28,7 +28,8 @@ class Healthy(Case):
     def examine(self, unit, model, number):
         """Returns doctor's verdict and findings for a healthy encoder; "" if the verdict is good."""
         name = model["name"]
-        motion = "still" if model["maximum_rpm"] == 0 else "rpm=20"  # a linear encoder has no speed in rpm
+        # a linear encoder has no speed in rpm, so it stands still
+        motion = "still" if model["maximum_rpm"] == 0 else "rpm=20"
         with Emulator(self.directory, *(["--model", name] if name else []), "--motion", motion, protocol=unit,
                       name=f"{unit}-{name}-{number}") as emulator:
             address = f"{unit}:{emulator.path}?{PATIENT}" + (f"&model={name}" if name else "")

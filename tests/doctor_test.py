@@ -130,7 +130,7 @@ class Named(EncoderCase):
                 return
             setpriv = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"]
             command = [ABSENC, "doctor", f"tformat:{line.path}", "--json"]
-            # A user without access to the folder of the command cannot run it.
+            # The test is skipped if another user cannot run the command, because he has no access to its folder.
             probe = subprocess.run([*setpriv, ABSENC, "list"], capture_output=True, check=False)
             if probe.returncode != 0:
                 self.skipTest("another user cannot run the command here")
@@ -244,7 +244,7 @@ class Named(EncoderCase):
             doctor(f"tformat:{line.path}")
         self.assertTrue(requests)
         self.assertIn(b"\x1A", requests)
-        # first bytes of changing requests: resets of alarms, position and turns, EEPROM write
+        # first bytes of requests that change the encoder: resets of alarms, position and turns, and EEPROM write
         changing = {0xBA, 0xC2, 0x62, 0x32}
         self.assertEqual({request[0] for request in requests} & changing, set())
 

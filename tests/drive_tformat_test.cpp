@@ -73,7 +73,8 @@ namespace {
 
 TEST(DriveGuide, ElectricalAngleFollowsShaftAndMissingRepliesStopTheDrive) {
   sim::Motion motion = sim::Motion::constant_speed(std::int64_t{5} << 32, 3000);
-  motion.begin_at(5ms);  // an encoder that is switched on while it turns has no valid position
+  // the shaft stands still at first, because an encoder that is switched on while it turns has no valid position
+  motion.begin_at(5ms);
   tformat::VirtualEncoder device(Axis::format, motion);
   device.power_on(time_now, Device<std::uint8_t>::PowerOn::skip);
   encoder.start(device, time_now);
@@ -86,13 +87,14 @@ TEST(DriveGuide, ElectricalAngleFollowsShaftAndMissingRepliesStopTheDrive) {
     const auto found = static_cast<std::int32_t>(
         control_cycle(instant) -
         (static_cast<std::uint32_t>(motion.at(instant).position) * Axis::pole_pairs + Axis::offset));
-    // The limit is four counts of the encoder: two, and the rounding of the speed over a cycle and a half.
+    // The limit is four counts of the encoder: two counts, and two for the rounding of the speed over one and a half
+    // cycles.
     EXPECT_LT(std::abs(found), 4 * static_cast<int>(Axis::pole_pairs) * (1 << (32 - Axis::format.singleturn_bits)))
         << i;
   }
   EXPECT_FALSE(is_stopped);
   EXPECT_EQ(axis.cycles.cycle().stale, 0u);
-  // A PWM event begins the next cycle earlier than the plan.
+  // A PWM event begins the next cycle earlier than planned.
   const Time early = time_now + 30us;
   axis.cycles.begin_next_at(early);
   axis.carrier.wake(time_now);

@@ -101,7 +101,7 @@ class Interface(InterfaceCase):
             return self.run_json(path, "run", "decimal")["fields"]["counts"]
         with self.emulator("--singleturn", "1000") as emulator:
             self.assertEqual(counts(emulator.path), 1000)
-            # The zero of `set-zero` does not affect `read`, so E201 has no command `zero`.
+            # The command `set-zero` does not affect `read`, so E201 has no command `zero`.
             self.assert_wrong_usage(absenc("zero", f"e201:{emulator.path}", "--yes"), "set-zero")
             self.assertEqual(counts(emulator.path), 1000)
             self.assert_good(absenc("run", f"e201:{emulator.path}", "set-zero", "--yes"))
@@ -190,7 +190,7 @@ class ClockSweep(InterfaceCase):
                 raise AssertionError(f"in vain waited for {words}: {text}")
             try:
                 text += os.read(descriptor, 4096).decode()
-            except OSError:  # no process has the other end of the terminal open
+            except OSError:  # reading fails because no process has the other end of the terminal open any more
                 if words is None:
                     return text
                 raise AssertionError(f"{words} never came: {text}") from None

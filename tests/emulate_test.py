@@ -23,7 +23,8 @@ from command_support import ABSENC, PATIENCE, Case, Emulator, absenc, end, read_
 REPLY_LENGTH = {0x0: 6, 0x1: 6, 0x2: 4, 0x3: 11, 0x6: 4, 0x7: 6, 0x8: 6, 0xC: 6, 0xD: 4}
 ALARMS = ["over_speed", "full_absolute_status", "counting_error", "counter_overflow", "over_heat", "multiturn_error",
           "battery_error", "battery_alarm"]
-COUNTING_ERROR, ALARM = 0x10, 0x20  # bits of the status field SF: counting error, and summary of the alarms
+# bits of the status field SF: counting error, and the bit that is set if any alarm is raised
+COUNTING_ERROR, ALARM = 0x10, 0x20
 
 
 def rate_of(terminal):
@@ -199,7 +200,8 @@ class DataIds(EmulateCase):
     def test_nine_resets_have_no_effect(self):
         client = self.client("--alarm", "over_speed", "--multiturn", "7")
         self.reset(client, 0x7, 9)
-        self.assertEqual(client.exchange(3)[9], 0x01)  # another data ID restarts the count of reset requests
+        # a request with another data ID restarts the count of consecutive reset requests
+        self.assertEqual(client.exchange(3)[9], 0x01)
         self.reset(client, 0x7, 9)
         self.assertEqual(client.exchange(3)[9], 0x01)
         self.reset(client, 0xC, 5)
@@ -208,7 +210,7 @@ class DataIds(EmulateCase):
 
     def test_clear_alarms(self):
         client = self.client("--alarm", "multiturn_error", "--multiturn", "7")
-        # The reply to the tenth reset request still shows the alarm.
+        # The reply to the tenth reset request still shows the alarm, which that request clears.
         self.assert_reply(self.reset(client, 0x7, 10), 0x7, ALARM, [0, 0, 0])
         self.assert_reply(client.exchange(3), 3, 0, [0, 0, 0, 0x11, 7, 0, 0, 0])
 
@@ -240,7 +242,9 @@ class DataIds(EmulateCase):
         client.write_memory(5, 0x5A)
         reply = client.write_memory(6, 0x77)
         client.wait_until_written(5)
-        if reply[1] & 0x80:  # the EEPROM is still busy, unless this machine took more than 18 ms
+        # the EEPROM is busy and has refused the second write, unless this machine took more than 18 ms between the
+        # two
+        if reply[1] & 0x80:
             self.assertEqual(reply[2], 0)
             self.assertEqual(client.read_memory(6), (False, 0))
 
@@ -260,7 +264,8 @@ class DataIds(EmulateCase):
         client.select_page(7)
         self.assertEqual(client.read_memory(5), (False, 35))
         self.assertEqual(client.read_memory(4), (False, 0xDA))
-        # Sets the overheat threshold to 20 degC, below the encoder's temperature of 35 degC.
+        # The written byte sets the overheat threshold to 20 degC, which is below the encoder's temperature of 35
+        # degC.
         client.write_memory(4, 0x80 + 20)
         client.wait_until_written(4)
         self.assertEqual(client.exchange(3)[9], 0x10)
@@ -301,7 +306,8 @@ class Behaviour(EmulateCase):
             replies = [client.exchange(3) for _ in range(20)]
         good = bytes([0x1A, 0, 0, 0, 0, 0x11, 0, 0, 0, 0, 0x0B])
         self.assertTrue(all(len(reply) == 11 and reply != good for reply in replies))
-        # The checksum is the XOR of the bytes, so two flipped bits in the same column cancel out.
+        # The checksum does not detect every fault: it is the XOR of all bytes, so two flipped bits in the same column
+        # cancel out.
         self.assertGreater(sum(crc(reply[:-1]) != reply[-1] for reply in replies), 10)
         self.assertIn("faults injected: 20 corrupt\n  replies with faults: 20\n", emulator.end()[2])
 
@@ -518,7 +524,7 @@ class Console(EmulateCase):
     def test_closed_output_does_not_end_emulator(self):
         emulator, _ = self.console()
         emulator.process.stdout.close()
-        # `end` reads this file instead of the emulator's standard output.
+        # Emulator.end reads /dev/null instead of the closed standard output.
         emulator.process.stdout = open(os.devnull, "rb")
         emulator.process.stdin.write(b"temperature=50\ntemperature=60\n")
         place = f"tformat:{emulator.path}?latency=300"
@@ -530,7 +536,7 @@ class Console(EmulateCase):
     def test_ignores_terminal_of_foreground_program(self):
         path = self.file("encoder")
         child, master = pty.fork()
-        if child == 0:  # the child process acts as a shell and runs the emulator in the background
+        if child == 0:  # the child process acts as a shell that runs the emulator in the background
             program = ("import os, signal, subprocess, sys\n"
                        "emulator = subprocess.Popen(sys.argv[1:], preexec_fn=os.setpgrp)\n"
                        "print('pid', emulator.pid, flush=True)\n"
@@ -609,7 +615,7 @@ class SerialPort(EmulateCase):
         for _ in range(4):
             reply = client.exchange(0)
             self.assert_reply(reply, 0, 0, [0xE8, 0x03, 0])
-            client.send(reply)  # a reply that begins with the first byte of a request
+            client.send(reply)  # sends the encoder its own reply, whose first byte is also that of a request
         _, _, err = emulator.end()
         self.assertIn("4 requests answered", err)
         self.assertNotIn("rules", err)
@@ -730,7 +736,8 @@ class Lifecycle(EmulateCase):
         with Client.open(emulator.path) as client:
             client.send([0xEA, 0x05, 0xEF])
             client.receive(11, 0.2)
-        self.assertIn("3 request_corrupt", emulator.end()[2])  # each damaged byte counts, as the help states
+        # each of the three damaged bytes counts as a fault, as the help states
+        self.assertIn("3 request_corrupt", emulator.end()[2])
 
     def test_reports_violations(self):
         emulator = self.emulator()
@@ -863,7 +870,7 @@ class MemoryFile(EmulateCase):
         with Client.open(emulator.path) as client:
             shutil.rmtree(self.file("sub"))
             client.send(bytes.fromhex("32 05 5a 6d"))
-            self.assertEqual(client.receive(4), b"")  # no byte arrives before the emulator has ended
+            self.assertEqual(client.receive(4), b"")  # the emulator ends without a reply
         self.assertEqual(emulator.process.wait(PATIENCE), 1)
         self.assert_sentence(emulator.end()[2], "memory file", "No such file")
 

@@ -35,8 +35,8 @@ class Client:
         self.port = os.open(path, os.O_RDWR | os.O_NOCTTY)
         case.addCleanup(os.close, self.port)
         tty.setraw(self.port)
-        self.pending = b""  # bytes for channel 3, still to be sent
-        # Bytes of channel 2 in its current cycle.
+        self.pending = b""  # bytes for channel 3 that are still to be sent
+        # Bytes of channel 2 received in the current cycle.
         self.cycle = None
         self.cycles = []  # complete cycles of channel 2: (turns, position, status, byte of channel 3)
 
@@ -54,7 +54,7 @@ class Client:
         reply = self.read(self.size)
         position, turns = self.decode(reply[:-2], reply[-2])
         if config == RESET_CHANNELS:
-            self.cycle = b""  # the byte of channel 2 in this frame belongs to the previous cycle
+            self.cycle = b""  # a new cycle of channel 2 begins with the next frame
         elif self.cycle is not None:
             self.channel2(reply[-1], position, turns)
         return turns, position >> 2, not position & 2, not position & 1

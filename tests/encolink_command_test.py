@@ -106,7 +106,7 @@ class Identity(Case):
         self.assertRegex(result.stdout, r"(?m)^resolution +17 bits in a turn$")
         info = json.loads(absenc("info", uri, "--json").stdout)
         self.assertEqual(info["resolution"], {"singleturn_bits": 17, "multiturn_bits": 0})
-        # No position is shown if the options contradict the identity.
+        # `info` shows no position if the options contradict the encoder's identity.
         for settings in ("?resolution=20&multiturn_bits=0", "?resolution=20"):
             with self.subTest(settings):
                 result = absenc("info", uri + settings, "--json")

@@ -16,13 +16,13 @@ LENGTH = {POSITION: 18, QUICK: 6, TEMPERATURE: 4, READ: 4, WRITE: 4}
 READY, CHANNEL_2 = 0x40, 0x20
 REQUEST = "0875"  # request with ID 1 to address 0
 REPLY = "084000efcdab34125646b3086000abd6cd84"
-# Frames of another profile (crc_bit_order=msb), and a reply with one wrong bit in channel 2.
+# Two examples: frames of a profile with crc_bit_order=msb, and a reply with one wrong bit in channel 2.
 MSB_REQUEST, MSB_REPLY = "0857", "084000efcdab341255277e086000abd57f67"
 WRONG_CHANNEL_2 = "084000efcdab3412553b5e086000afd5b069"
 
 
 def control_field(data_id, address=0):
-    parity = (bin(data_id).count("1") + 1) & 1  # parity bit that makes the number of ones in ID and parity bit odd
+    parity = (bin(data_id).count("1") + 1) & 1  # the parity is odd over the data ID and the parity bit
     return parity << 7 | (data_id & 0xF) << 3 | address
 
 
@@ -102,7 +102,7 @@ class VirtualEncoder(EslCase):
         self.assertEqual(one[9:], crc16(one[:9], 0x0000), reply.hex(" "))
         self.assertEqual(two[5:], crc16(two[:5], 0xFFFF), reply.hex(" "))
         self.assertEqual((one[0], two[0]), (control_field(POSITION, address),) * 2)
-        # Compares the status fields without their error bits.
+        # The status fields are compared without their error bits.
         self.assertEqual((one[1] & ~0x0C, two[1] & ~0x0C), (READY, READY | CHANNEL_2))
         self.assertEqual((one[2], two[2]), (alarms, alarms))
         self.assertEqual(int.from_bytes(one[3:6], "little"), singleturn)
@@ -174,7 +174,7 @@ class VirtualEncoder(EslCase):
         client = self.client("--singleturn", "1000", "--also", "address=3&singleturn=70000&multiturn=7",
                              "--also", "address=5&alarm=multiturn_error", "--also", "address=6&singleturn=0x5555",
                              "--also", "address=6&singleturn=0xAAAA")
-        for _ in range(3):  # requests follow each other without a pause
+        for _ in range(3):  # the requests follow each other without a pause
             self.check_position(client.exchange(POSITION, address=0), 1000, 0)
             self.check_position(client.exchange(POSITION, address=3), 70000, 7, address=3)
             self.check_position(client.exchange(POSITION, address=5), 0, 0, address=5, alarms=2)
@@ -204,7 +204,7 @@ class Command(EslCase):
         encoder = self.encoder("--singleturn", "0x500000", "--multiturn", "5", "--alarm", "multiturn_error")
         self.assert_wrong_usage(absenc("zero", encoder), "--yes")
         for verb in ["zero", "reset-multiturn", "clear-alarms"]:
-            # On a busy machine the requests of a reset may arrive faster than the encoder allows.
+            # On a busy machine the emulator may receive the requests of a reset faster than the encoder allows.
             results = [absenc(verb, encoder, "--yes")]
             while results[-1].returncode != 0 and len(results) < 4:
                 results.append(absenc(verb, encoder, "--yes"))
@@ -420,7 +420,8 @@ class SafePositions(EslCase):
                                   "--rate", "0", "--json").stdout)
         self.assertEqual([one["singleturn"] for one in lines], [5] * 20)
         self.assertTrue(all(one["singleturn_valid"] for one in lines))
-        self.assertTrue(all("multiturn" not in one for one in lines), lines[0])  # a safe position reply has no turns
+        # the reply to safe-position has no turns
+        self.assertTrue(all("multiturn" not in one for one in lines), lines[0])
 
     def test_stuck_counter_is_an_error_each_time(self):
         encoder = "sim:esl?condition=ch1_sequence=5&condition=ch2_sequence=5&command=safe-position"
@@ -522,7 +523,8 @@ class TwoChannels(EslCase):
         reading = self.good_json("read", encoder)
         self.assertEqual(self.flags_of(reading), wanted)
         self.assertFalse(reading["singleturn_valid"])
-        info = json.loads(absenc("info", encoder, "--json").stdout)  # the fake encoder answers no other request
+        # `info` fails for all other requests, because the fake encoder answers only `position`
+        info = json.loads(absenc("info", encoder, "--json").stdout)
         self.assertEqual(self.flags_of(info["answers"]["position"]), wanted)
         text = absenc("read", encoder).stdout
         self.assertIn("no ch1_alarms", text)
@@ -581,8 +583,11 @@ class SharedLine(EslCase):
         self.assertEqual([one["errors"] for one in last[:2]], [{}, {}])
         self.assertEqual(set(last[3]["errors"]), {"timeout"})
         least, most = sorted(one["readings"] for one in last[:2])
-        self.assertGreater(least, 10)  # timeouts of other encoders on the line limit the number of readings
-        self.assertLess(most, 5 * least)  # both encoders get readings; a busy computer may delay one thread
+        # the number of readings is small, because the timeouts of the other encoders on the line take most of the
+        # time
+        self.assertGreater(least, 10)
+        # the readings are shared among both encoders; a busy computer may delay one thread
+        self.assertLess(most, 5 * least)
 
     def test_names_of_one_bus(self):
         path = self.emulator("--also", "address=3&singleturn=70000").path
@@ -627,7 +632,7 @@ class SharedLine(EslCase):
         for command in (["memory", "read", "elbow", "0"], ["memory", "write", "elbow", "0", "1", "--yes"]):
             self.assert_failed(absenc(*command, env=env), "unsupported", "several encoders on the line", "nothing was sent")
         result = json.loads(absenc("run", "elbow", "led-or-lissajous", "--json", env=env).stdout)["fields"]
-        # The flags come from the field SF of a reply, without a memory access.
+        # These flags were read from the field SF of a reply, not from memory.
         self.assertEqual((result["led_error"], result["lissajous_error"]), (False, False))
         self.assert_good(absenc("memory", "read", "knee", "0", env=env))
         self.assert_failed(absenc("memory", "read", "elbow?bus=false", "0", env=env), "timeout")

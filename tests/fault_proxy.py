@@ -8,14 +8,14 @@ import time
 
 from command_support import FakeLine
 
-GAP = 0.003  # seconds of silence that end a reply
+GAP = 0.003  # time of silence that ends a reply, in seconds
 
 
 class Fault:
     """Forwards all bytes unchanged; each derived class is one fault. Times are in seconds."""
 
-    whole = False  # whether `reply` gets whole replies, collected until a pause of GAP
-    chatter = None  # (period in seconds, bytes) of unsolicited bytes sent to the host; None: no such bytes
+    whole = False  # whether the function `reply` gets whole replies, which are collected until a silence of GAP
+    chatter = None  # unsolicited bytes sent to the host, as (period in seconds, bytes); None: no such bytes
 
     def request(self, data, now):  # pylint: disable=unused-argument
         """Returns the bytes to forward to the encoder for the host's bytes `data`."""
@@ -38,9 +38,10 @@ class FaultProxy(FakeLine):
         self.fault = fault
         self.encoder = os.open(encoder, os.O_RDWR | os.O_NOCTTY) if encoder else None
         os.set_blocking(self.master, False)
-        self.requests = 0  # number of pieces received from the host
-        self.unread = 0  # number of bytes for the host that did not fit into the pseudo-terminal and were dropped
-        self.changed = 0  # number of pieces that the fault altered, dropped, delayed or added
+        self.requests = 0  # number of pieces of requests received from the host
+        self.unread = 0  # number of bytes for the host that were dropped, because the pseudo-terminal was full
+        # number of pieces of requests and replies that the fault has changed, dropped, delayed or added
+        self.changed = 0
 
     def __exit__(self, *_):
         super().__exit__(*_)
@@ -59,7 +60,7 @@ class FaultProxy(FakeLine):
             os.write(self.encoder, data)
 
     def serve(self):
-        due = []  # heap of (time, number, bytes) to send to the host
+        due = []  # heap of (time to send, number, bytes) for the host
         number = 0
         gathered = b""
         gathered_at = None

@@ -14,7 +14,7 @@ import unittest
 from command_support import Emulator, absenc, end, read_line
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "firmware"))
-import call_graph  # noqa: E402: as figures
+import call_graph  # noqa: E402: the module is in the same folder as figures
 import figures  # noqa: E402: the module is in the folder of the programs that it measures
 
 FOLDER = os.path.abspath(os.environ.get("ABSENC_FIRMWARE", "build/arm/firmware"))
@@ -27,7 +27,7 @@ ALL = bool(os.environ.get("ABSENC_FIRMWARE_ALL"))
 CORES = ("m0plus", "m4f") if ALL else ("m0plus",)
 MACHINES = {"microbit": "microbit", "m0plus": "mps2-an385", "m4f": "mps2-an386", "rv32": "virt"}
 SINGLETURN, MULTITURN = 74565, 4660
-LATENCY = 250  # ms; long, because busy machines delay replies
+LATENCY = 250  # milliseconds; the latency is long, because a busy machine delays replies
 
 
 def emulator_of(program, machine, *arguments, serial="null", more=()):
@@ -86,11 +86,12 @@ class Drive(unittest.TestCase):
         self.assertEqual(counted["wrong"], 0, everything)
         self.assertEqual(counted["unasked"], 0, everything)
         answered = int(re.search(r"(\d+) requests answered", summary)[1])
-        # The program ends while a cycle runs, whose request may still be on its way.
+        # One request may be unanswered: the program ends during a cycle.
         self.assertIn(counted["requests"] - answered, (0, 1), everything)
         damaged = int(re.search(r"replies with faults: (\d+)", summary)[1])
         noticed = counted["silences"] + counted["implausible"]
-        # A reply that a busy machine delays may count as a missing one.
+        # The program may notice more faults than the emulator made: a reply that a busy machine delays counts as
+        # missing.
         self.assertGreaterEqual(noticed, damaged, everything)
         self.assertLessEqual(noticed, damaged + 3 + POSITIONS // 400, everything)
         if POSITIONS >= 1000:
@@ -117,10 +118,11 @@ class Cycles(unittest.TestCase):
         self.assertGreaterEqual(sum(counted[kind] for kind in ("fresh", "invalid", "missing", "repeated")), CYCLES)
         self.assertEqual((counted["wrong"], counted["far"], counted["rules"], counted["invalid"]), (0, 0, 0, 0), output)
         self.assertGreater(counted["faults"], CYCLES // 200, output)
-        # A damaged reply costs its cycle, and the next one if the line must be silent first.
+        # A damaged reply costs one cycle, or two if the line must be silent before the next request.
         self.assertLessEqual(counted["missing"], 2 * counted["faults"], output)
         self.assertGreater(counted["bytes"], 0, output)
-        # The first position, and those behind damage that the checks miss, are confirmed by no other.
+        # Few positions are implausible because no other confirms them: the first one, and those after damage that the
+        # checks have missed.
         self.assertLessEqual(counted["implausible"], 1 + counted["faults"] // 100, output)
         return counted, output
 
@@ -128,7 +130,8 @@ class Cycles(unittest.TestCase):
         for cpu in ("microbit", *CORES):
             with self.subTest(cpu):
                 counted, output = self.check("tformat", cpu)
-                # A command takes a cycle for each of its requests, and never two in a row but for ten resets.
+                # Each request of a command takes one cycle from the positions, and never two consecutive cycles
+                # except for ten resets.
                 self.assertGreater(counted["repeated"], 0, output)
                 self.assertLessEqual(counted["longest_stale"], 16, output)
                 self.assertGreater(counted["temperatures"], 0, output)
@@ -184,7 +187,7 @@ class Encoder(unittest.TestCase):
                 self.assertNotIn("memory access", rules)
 
     def test_keeps_clauses_of_document(self):
-        # The silence that ends an invalid request must be over before the host's timeout.
+        # The host's timeout is set longer than the silence that ends an invalid request.
         process, encoder = self.start("m0plus", 0, LATENCY // 5, 8 * LATENCY)
         output = self.run_well("conform", encoder)
         self.assertRegex(output, r"\b[1-9]\d* kept, 0 broken, 1 untested")
@@ -203,7 +206,8 @@ class Encoder(unittest.TestCase):
 class FloatingPoint(unittest.TestCase):
     """Tests which functions of the compiler's library the readers link."""
 
-    # The functions of ARM's run-time ABI (__aeabi_dadd, __aeabi_i2f) and of libgcc (__adddf3, __fixdfdi).
+    # Matches soft-float functions: those of ARM's run-time ABI (__aeabi_dadd, __aeabi_i2f) and of libgcc (__adddf3,
+    # __fixdfdi).
     SOFT = re.compile(r" (__aeabi_c?[df]\w+|__aeabi_u?[il]2[df]|__\w+[sd]f\w*[23i]\w*|__float\w+)$", re.MULTILINE)
 
     def soft_functions(self, program):
@@ -222,7 +226,7 @@ class FloatingPoint(unittest.TestCase):
                 self.assertEqual(self.soft_functions(reader), [])
 
     def test_all_units_together_link_some(self):
-        # The search finds them in a program that has fields with real numbers.
+        # The search does find such functions in a program of units that have fields with real numbers.
         found = self.soft_functions("vectors-m0plus")
         self.assertIn("__aeabi_dmul", found)
         self.assertIn("__floatdidf", found)
@@ -320,7 +324,9 @@ class CallGraph(unittest.TestCase):
                         program = os.path.join(FOLDER, f"reader-{reader}-{cpu}.elf")
                         printed, measured = figures.run(plugin, program, cpu, "count")
                         graph = figures.graph_of(program, printed)
-                        for function in graph.find("machine"):  # the machine runs before or after the measurement
+                        # the functions of the machine run before or after the measurement, so their stack does not
+                        # count
+                        for function in graph.find("machine"):
                             graph.depths[function.address] = 0
                         computed = graph.depth(graph.find("^start$")[0])
                         self.assertLessEqual(measured, computed)

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Instantiates templates of the freestanding layers, to show which library functions they need.
+// Instantiates templates of the freestanding layers, so that tests/freestanding.sh sees which library functions they
+// need.
 #include <array>
 #include <cstdint>
 
@@ -56,7 +57,7 @@ std::uint64_t helpers(Bytes bytes, MutableBytes out) {
          static_cast<std::uint64_t>(wrapped_difference(1, 2, 17)) + static_cast<std::uint64_t>(degrees(1, 17));
 }
 
-// Parses a word format that is only known at run time.
+// Parses a word format from a text that is known only at run time.
 Result<Word> word_of_text(std::string_view text, BitView bits) {
   WordFormat format;
   if (!parse_word_format(text, format).reason.empty()) return Error::invalid_argument;

@@ -7,14 +7,14 @@ set -euo pipefail
 nm=${NM:-arm-none-eabi-nm}
 size=${SIZE:-arm-none-eabi-size}
 
-# __aeabi_atexit stands for a global destructor.
+# The symbol __aeabi_atexit, which registers destructors of global objects, is forbidden.
 forbidden='^__aeabi_atexit$'
 allowed=(
   memcpy memmove memset memcmp strlen
   '__aeabi_[a-z0-9_]+'
   '__gnu_thumb1_case_[a-z]+'
-  '__[a-z]+[sd]i[23]'  # libgcc: __popcountsi2, __clzdi2 ...
-  __cxa_pure_virtual   # in the table of every abstract class; never called
+  '__[a-z]+[sd]i[23]'  # functions of libgcc, such as __popcountsi2 and __clzdi2
+  __cxa_pure_virtual   # is in the virtual table of every abstract class, and never called
 )
 pattern=$(IFS='|'; echo "^(${allowed[*]})\$")
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Provides the first inputs ("seeds") of every fuzz target: the vectors of all units.
+// Provides the first inputs ("seeds") of every fuzz target: the test vectors of all units.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@ namespace absenc {
 
 using Seed = std::vector<std::uint8_t>;
 
-/// Returns seeds for fuzzers, from the vectors of all units.
+/// Returns seeds for fuzzers, made from the test vectors of all units.
 inline std::vector<Seed> fuzz_seeds() {
   std::vector<Seed> seeds;
   std::uint8_t number = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Main program that runs a fuzz target as a plain test.
+// A main program that runs a fuzz target as an ordinary test, without a fuzzer.
 #include "tests/fuzz_seeds.hpp"
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace {
 
 std::size_t runs = 0;
 
-// The copy has exactly the input's size, so that the address sanitizer detects reads beyond it.
+// The seed is copied into memory of exactly its size, so that the address sanitizer detects reads beyond it.
 void run(absenc::Bytes input) {
   const absenc::Seed copy(input.begin(), input.end());
   LLVMFuzzerTestOneInput(copy.data(), copy.size());

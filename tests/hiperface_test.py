@@ -12,12 +12,13 @@ class Frames(Case):
         return row
 
     def test_frames_of_others(self):
-        # HPMicro, hpm_sdk: log of the virtual encoder, then log of an SKM36 (checksum printed with its bits reversed).
+        # Replies from logs in HPMicro's hpm_sdk: one of its virtual encoder, then two of an SKM36 (checksum printed
+        # with its bits reversed).
         for reply, turns, position in (("40420000a5a502", 10, 0x5A5), ("40420027255151", 0x272, 0x551),
                                        ("404200271c023b", 0x271, 0xC02)):
             fields = self.decoded("404202", reply)["fields"]
             self.assertEqual((fields["multiturn"], fields["singleturn"]), (turns, position), reply)
-        # Nilab: type label of an encoder that data field FF describes.
+        # Reply from a capture by Nilab: type label of an encoder that is described by its data field FF.
         label = self.decoded("405212", "4052e4ff800188")["fields"]
         self.assertEqual((label["type"], label["memory_size"], label["baud"]), (0xFF, 2048, 9600))
 
@@ -52,7 +53,8 @@ class Readings(Case):
         self.assertTrue(all(row["ok"] for row in rows), rows)
         alone, first, complete = (row for row in rows if row["fields"]["command"] == "position")
         self.assertEqual((alone["singleturn_valid"], alone["alarms"]), (None, None))
-        # Another alarm could follow the first status code; it comes again instead.
+        # The alarms of the first reading are incomplete: another status code could follow. They are complete when the
+        # same code is reported again.
         self.assertEqual((first["singleturn_valid"], first["alarms"]), (None, ["temperature"]))
         self.assertEqual((complete["singleturn_valid"], complete["alarms"]), (True, ["temperature"]))
         self.assertEqual(complete["fields"]["singleturn"], 1024)

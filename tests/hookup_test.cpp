@@ -26,7 +26,7 @@ constexpr auto reply = std::to_array<std::uint8_t>({0x1A, 0x00, 0x45, 0x23, 0x01
 struct Uart {
   bool drives = false;
   std::vector<std::uint8_t> transmitted{};
-  MutableBytes buffer{};  // the receive buffer while the DMA runs, otherwise empty
+  MutableBytes buffer{};  // the buffer into which the DMA receives; empty while the DMA does not run
   std::size_t count = 0;
 
   void drive(bool on) { drives = on; }
@@ -44,7 +44,7 @@ struct Uart {
   }
   void set_rate(std::uint32_t) {}
 
-  // Delivers bytes from the encoder into the DMA buffer. Returns whether the buffer is full.
+  // Delivers bytes from the encoder into the buffer of the DMA. Returns whether the buffer is full.
   bool deliver(Bytes bytes) {
     EXPECT_FALSE(drives);
     for (const std::uint8_t byte : bytes) {
@@ -73,7 +73,8 @@ struct UartDmaTest : testing::Test {
 };
 
 TEST_F(UartDmaTest, WholeReplyEndsTransfer) {
-  EXPECT_TRUE(uart.deliver(reply));  // the buffer is full with the reply's last character, before the line becomes idle
+  // the DMA's buffer is full at the last character of the reply, before the line becomes idle
+  EXPECT_TRUE(uart.deliver(reply));
   line.arrived(56us);
   expect_position();
 }
@@ -106,7 +107,7 @@ struct Spi {
     ++transfers;
   }
   void set_rate(std::uint32_t) {}
-  // Fills the receive buffer with `idle` one bits, then the bits of the word, then one bits.
+  // Fills the receive buffer of the SPI controller with `idle` one bits, then the bits of the word, then one bits.
   void deliver(Bytes bytes, unsigned idle) {
     for (std::size_t bit = 0; bit < 8 * buffer.size(); ++bit) {
       const std::size_t at = bit - idle;
@@ -138,7 +139,7 @@ TEST(SpiDmaTest, ReadsBiss) {
   ASSERT_NE(read.reading(), nullptr) << static_cast<int>(read.error());
 }
 
-// `bits` does not contain the idle level of the first clock.
+// The array `bits` begins behind the idle level that the controller samples at the first clock.
 TEST(SpiDmaTest, ReadsSsiAfterIdleClock) {
   constexpr auto bits = std::to_array<std::uint8_t>({0x1E, 0xF0, 0x00, 0x00});
   ssi::ReadPosition read{ssi::Format{}};

@@ -37,7 +37,7 @@ def cases(unit):
     for role in ("encoder", "rate"):
         for option in with_role(unit["options"], role):
             if role == "rate" and unit["link"] == "can":
-                continue  # the slcan adapter of a pseudo-terminal has no rate
+                continue  # the slcan adapter on a pseudo-terminal has no rate on the bus to search for
             yield {option["name"]: another(option)}, {option["name"]: another(option)}
 
 
@@ -48,7 +48,7 @@ def usual(unit, settings):
     return "?" + "&".join(texts) if texts else ""
 
 
-# Clocked and SPI encoders are excluded: they need an SPI controller.
+# Encoders on clocked and SPI links are left out, because they need an SPI controller.
 ENCODERS = [(unit, *case) for unit in UNITS if unit["link"] not in ("exchange", "clocked") for case in cases(unit)]
 
 # Time limit of an identify search in seconds, long enough for a busy machine.
@@ -74,7 +74,7 @@ class IdentifyOnLine(EncoderCase):
             # The added latency allows for a busy machine that delays the emulator.
             verb, encoder = found["candidates"][0]["command"].replace('"', "").split()[1:3]
             again = absenc(verb, encoder + ("&" if "?" in encoder else "?") + "latency=1000", "--json")
-            # A pseudo-terminal has no baud rate, so a read at the default rate may succeed too.
+            # Reading at the default rate may succeed, too, because a pseudo-terminal has no baud rate.
             at_usual_rate = absenc("read", f"{protocol}:{place}{usual(unit, settings)}", "--json").returncode == 0
             return found["candidates"], again, at_usual_rate
 
@@ -96,7 +96,7 @@ class IdentifyOnLine(EncoderCase):
         self.assertTrue(best["found"])
         self.assertGreater(best["explained"], 0.9 * best["tried"])
         if best["unasked"] and not best["encoder"]:
-            return  # the unsolicited replies reveal only the position
+            return  # unsolicited replies reveal only the position, and no options
         for option in shown:
             if option["name"] in wanted:
                 self.assertEqual(best["options"][option["name"]], wanted[option["name"]])
@@ -261,12 +261,12 @@ class Frames(Case):
         result, found = identify(*[argument for word in moving for argument in ("--hex", word)])
         self.assertEqual(result.returncode, 0, result.stdout)
         self.assertEqual(found["candidates"][0]["protocol"], "ssi")
-        # Identify must not explain a word without turns also by the option that places the turns.
+        # No turns are in these words, so identify must not list a candidate for each place at which turns could be.
         ssi = [one["options"] for one in found["candidates"] if one["protocol"] == "ssi"]
         self.assertEqual({options["multiturn_first"] for options in ssi}, {ssi[0]["multiturn_first"]})
 
     def test_two_protocols_explain_a_frame(self):
-        # A captured frame of EncoLink may come from UART or SPI, because both carry the same frames.
+        # A captured frame of EncoLink may be from a UART or from SPI, because both carry the same frames.
         frames = ["0000000d131e00", "0000029c735600", "0000036a439e00", "0000052bd3ec00"]
         arguments = [argument for frame in frames for argument in ("--hex", frame)]
         result, found = identify(*arguments)

@@ -28,9 +28,9 @@ FREESTANDING_HEADERS = set(
     """algorithm array bit bits/chrono.h cfloat chrono climits compare concepts coroutine cstddef cstdint cstring initializer_list iterator
     limits new numbers numeric optional ratio span string_view tuple type_traits utility version""".split()
 )
-# Layers all of whose headers are public.
+# Layers in which every header is public.
 WHOLLY_PUBLIC = {"core", "link", "protocol", "host", "sim"}
-# Headers of other libraries that are slow to compile.
+# Headers of other libraries that take long to compile.
 HEAVY = ("CLI/", "toml++/", "nlohmann/", "microhttpd.h", "sqlite3.h", "mosquitto.h")
 LIGHT = {"nlohmann/json_fwd.hpp"}
 OS_HEADER = re.compile(
@@ -38,7 +38,7 @@ OS_HEADER = re.compile(
     r"^(unistd|fcntl|termios|poll|pty|utmp|pwd|grp|netdb|dirent|gpiod|spawn|sched|pthread|signal)\.h(pp)?$"
 )
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
-# clang-format puts types at namespace scope at the beginning of a line.
+# The patterns rely on clang-format, which puts types at namespace scope at the beginning of a line.
 NAMESPACE = re.compile(r"^namespace ([\w:]+) \{", re.MULTILINE)
 DECLARED = re.compile(r"^(?: +friend )?(?:class|struct|union|enum class|enum) (\w+)(?: : [\w:]+)?;", re.MULTILINE)
 DEFINED = re.compile(r"^(?:class|struct|union|enum class|enum) (\w+)[^;{()]*\{", re.MULTILINE)

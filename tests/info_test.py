@@ -107,7 +107,8 @@ class Info(EncoderCase):
         self.assertEqual({answer["error"] for answer in answers.values()}, {"timeout"})
 
     def test_one_failure_does_not_stop_the_rest(self):
-        # Replies to memory requests are accepted, because they have no encoder ID.
+        # Replies to memory requests are accepted although the encoder ID is wrong, because they contain no encoder
+        # ID.
         result = absenc("info", self.encoder(more="&encoder_id=23"), "--all")
         self.assert_failed(result, "unexpected_reply", "set model=TS5700N8500")
         self.assertRegex(result.stdout, r"(?m)^encoder-id +FAILED +unexpected_reply: ")
@@ -142,14 +143,14 @@ class Alarms(EncoderCase):
             "  battery_alarm: the battery is below 3.1 V. What to do: replace the battery with the encoder switched on; "
             "without a battery set battery=false\n"
             "status:\n"
-            # The output of `alarms` omits the status's advice to read the alarms.
+            # `alarms` does not print the advice of the status flag, which is to read the alarms.
             "  alarm: over-heat, multi-turn error, battery error or battery alarm\n")
 
     def test_status_refers_to_alarms_only_if_not_shown(self):
         address = self.encoder("--alarm", "over_heat")
         status = json.loads(absenc("alarms", address, "--json").stdout)["status"]
         self.assertEqual([(flag["name"], flag["action"]) for flag in status], [("alarm", "")])
-        alone = absenc("run", address, "encoder-id")  # the reply to encoder-id has no alarms
+        alone = absenc("run", address, "encoder-id")  # the reply to the request `encoder-id` contains no alarms
         self.assertIn("battery error or battery alarm: `absenc alarms` names the cause", alone.stdout)
         both = absenc("decode", "tformat", "--request", "1a", "--hex", "1a2000000011000000103b")
         self.assertIn("let it cool, then `absenc clear-alarms`", both.stdout)

@@ -21,7 +21,7 @@ VERSION = re.search(r"^project\(absenc VERSION ([\d.]+)", (SOURCE / "CMakeLists.
 GUIDE = {f"share/man/man7/absenc-{page.stem}.7" for page in (SOURCE / "docs").glob("*.md")}
 
 BY_NAME = SOURCE / "examples/read_by_name.cpp"
-# The example prints the speed as soon as its averaging window is full.
+# Expected output of the example: it prints the speed as soon as enough positions for an average were read.
 BY_NAME_SAYS = r"^(0\.0000 degrees\n)+0\.0 rpm, within \d"
 # A program like firmware, with a virtual encoder whose shaft is at 7.25 turns.
 FIRMWARE = """
@@ -146,7 +146,7 @@ if((ABSENC_CLIENT AND NOT TARGET absenc::client) OR (NOT ABSENC_CLIENT AND TARGE
   message(FATAL_ERROR "ABSENC_CLIENT is not what decides")
 endif()
 """
-# A script that emulates the tab key of bash, because `compopt` only works during completion.
+# A script that acts as the tab key in bash; it replaces `compopt`, which works only during a completion.
 COMPLETE = r"""
 source "$1"
 shift
@@ -226,7 +226,7 @@ class Installed(Case):
         for header in (self.root / "include").rglob("*.hpp"):
             text = header.read_text()
             for included in re.findall(r"^#include <(.+)>", text, re.MULTILINE):
-                # The headers include none of another library or of the operating system.
+                # The installed headers include no header of another library or of the operating system.
                 self.assertRegex(included, r"^(\w+|bits/chrono\.h)$", header)
             for included in re.findall(r'^#include "(.+)"', text, re.MULTILINE):
                 self.assertTrue((self.root / "include" / included).is_file(), f"{header}: {included}")

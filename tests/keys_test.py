@@ -43,10 +43,10 @@ class Keys(Case):
         shown = header(absenc("read", encoder, "--count", "1", "--csv").stdout)
         with open(self.recorded(encoder, "csv"), encoding="utf-8") as file:
             columns = header(file.read())
-        # A recording has the columns of `read` in the same order, and further ones.
+        # A recording has the columns of `read` in the same order, and further columns.
         self.assertEqual([name for name in columns if name in shown], shown)
         with open(self.recorded(encoder, "jsonl"), encoding="utf-8") as file:
-            # Rows whose `ok` is missing or false are no readings.
+            # A row whose `ok` is missing or false is no reading.
             rows = [row for row in map(json.loads, file) if row.get("ok")]
         self.assertEqual(len(rows), 3)
         computed = set(columns) - set(shown) - ONLY_IN_ROWS
@@ -55,7 +55,7 @@ class Keys(Case):
         for suffix in ("csv", "jsonl", "h5"):
             self.assertEqual(list(library.load(self.recorded(encoder, suffix)).keys()), columns, suffix)
 
-        # In Python, the flags of a channel are elements of lists, not members.
+        # The Python module has the flags of a channel in lists, so columns of flags have no member of their own.
         with library.open(encoder) as opened:
             sample = next(iter(opened.samples(rate=200)))
         for name in set(columns) - ONLY_IN_ROWS | json_keys - ONLY_IN_JSON:

@@ -42,7 +42,7 @@ const std::vector<Kind>& kinds() {
 struct Lateness {
   const char* name;
   Time time;
-  double share;  // share of the replies that are late, 0 to 1
+  double share;  // share of the replies that are late, from 0 to 1
 };
 
 struct Outcomes {
@@ -65,7 +65,7 @@ class DelayedSession {
         port(line, std::move(delay)),
         session(unit, options, port, host_storage, host::EchoMode::automatic) {}
 
-  /// Runs one command that reports a position. If `confirmed`, unconfirmed readings do not count.
+  /// Runs one command that reports a position. With `confirmed`, a reading that is not confirmed does not count.
   void read(const Command& command, bool confirmed, Outcomes& outcomes) {
     const Conversation<Item>* ended = confirmed ? session.read(command) : session.run(command);
     if (ended->error() != Error::none) {
@@ -80,7 +80,8 @@ class DelayedSession {
     if (age > 3ms) ++outcomes.stale;
   }
 
-  /// Returns by how much more than one count the reading's timestamp is wrong, or 0.
+  /// Returns how wrong the timestamp of the reading is, computed from the shaft's position, beyond the time of one
+  /// count; 0 if less.
   Time age_of(const Reading& reading) const {
     const auto fraction = static_cast<std::uint32_t>(reading.singleturn << (32 - reading.singleturn_bits));
     const auto truth = static_cast<std::uint32_t>(shaft.at(reading.latched).position);
@@ -127,7 +128,7 @@ double fraction(sim::Random& random) { return static_cast<double>(random.below(1
 
 bool is_on_can(const Kind& kind) { return find_unit(kind.unit)->link == LinkKind::can; }
 
-/// Reads at most every `period` while a share of the replies is late.
+/// Reads positions, at most one in each `period`, while a share of the replies is late.
 template <class Item>
 Outcomes run_at_period(const Kind& kind, const Lateness& lateness, Time period, unsigned count) {
   sim::Random random(1);
@@ -148,7 +149,7 @@ Outcomes run(const Kind& kind, const Lateness& lateness, Time period, unsigned c
                          : run_at_period<std::uint8_t>(kind, lateness, period, count);
 }
 
-/// Runs random commands that read, with random pauses, while some replies are late.
+/// Runs random commands that report a position, with random pauses, while some replies are late.
 template <class Item>
 Outcomes run_random_commands(const Kind& kind, unsigned count, std::uint64_t seed) {
   sim::Random random(seed);
@@ -176,7 +177,7 @@ class LateReply : public ::testing::TestWithParam<std::size_t> {
   const Kind& kind = kinds()[GetParam()];
 };
 
-// With some delays a late reply arrives exactly when the next reply is due.
+// Some combinations of delay and period make a late reply arrive exactly when the next reply is due.
 TEST_P(LateReply, NeverAnswersLaterRequest) {
   constexpr unsigned readings = 40;
   for (const Time period : {Time{}, Time{1ms}, Time{10ms}, Time{100ms}, Time{500ms}, Time{2s}}) {
@@ -223,7 +224,8 @@ TEST_P(LateReply, WithRandomDelayNeverAnswersLaterRequest) {
   EXPECT_GT(all.good, all.failed / 10);
 }
 
-/// Reads over a line that stalls. `longest_silence` is the longest time between good readings.
+/// Reads positions over a line that stalls for 2 s every 7 s. `longest_silence`: the longest time between two good
+/// readings.
 template <class Item>
 Outcomes run_with_stalls(const Kind& kind, bool only_first_arrives, Time& longest_silence) {
   constexpr Time stall = 2s;
@@ -263,7 +265,7 @@ TEST_P(LateReply, ReadingsResumeSoonAfterStall) {
                 only_first_arrives ? "one reply " : "all of them", outcomes.good, outcomes.failed, outcomes.stale,
                 static_cast<double>(silence.count()) / 1e9);
     EXPECT_EQ(outcomes.stale, 0u);
-    // The longest silence is limited only if the other delayed replies are lost, and not on CAN.
+    // The longest silence is limited only if just one delayed reply arrives and the others are lost, and not on CAN.
     if (only_first_arrives && !is_on_can(kind)) {
       EXPECT_LT(silence, 3s);
     }

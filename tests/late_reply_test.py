@@ -13,7 +13,7 @@ import unittest
 
 from command_support import Emulator, absenc, end
 
-ENCODERS = {  # unit, options, bytes in a position request and in its reply; None: not stated
+ENCODERS = {  # Each value: unit, options, number of bytes of a position request, and of its reply; None: not checked
     "tformat": ("tformat", "", 1, 11),
     "esl": ("esl", "", 2, 18),
     "e201": ("e201", "", 1, 17),
@@ -28,9 +28,10 @@ class DelayingRelay(threading.Thread):
     def __init__(self, host, encoder, delay):
         super().__init__(daemon=True)
         self.host, self.encoder, self.delay = host, encoder, delay
-        self.requests = 0  # number of bursts (requests) received from the host so far
-        self.forwarded = []  # replies: (number of the burst answered, bursts received by then, bytes)
-        self.delayed = []  # replies: (time at which to forward, number of the burst, bytes)
+        self.requests = 0  # number of requests (bursts of bytes) received from the host so far
+        # replies sent to the host: (number of the request, number of requests received by then, bytes)
+        self.forwarded = []
+        self.delayed = []  # replies to be sent to the host: (time to send, number of the request, bytes)
         self.replies = 0
         self.stop, self.wake = os.pipe()
 
@@ -157,7 +158,7 @@ class LateReplyTest(unittest.TestCase):
                 self.check(encoder, relay, rows)
                 self.assertEqual(done.returncode, 1, done.stdout)
                 self.assertIn("latency=", rows[-1]["advice"], rows)
-                # With the latency that the message advises, the encoder must be readable.
+                # With the latency that the advice names, the encoder must be readable.
                 latency = re.search(r"latency=(\d+)", rows[-1]["advice"]).group(1)
                 joined = "&" if "?" in address else "?"
                 done = absenc("read", f"{address}{joined}latency={latency}", "--count", "3", "--json")
@@ -177,7 +178,7 @@ class LateReplyTest(unittest.TestCase):
     def test_over_tcp(self):
         for encoder in ("tformat", "e201"):
             with self.subTest(encoder):
-                # The timeout over a network is 250 ms, and 50 ms more for E201.
+                # The replies are delayed by 0.6 s; the timeout over a network is 250 ms, and 300 ms for E201.
                 address = self.tcp_relay(encoder, lambda n: 0.6)
                 done = absenc("read", address, "--count", "5", "--rate", "10", "--json")
                 rows = [json.loads(line) for line in done.stdout.splitlines()]

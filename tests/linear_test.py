@@ -8,7 +8,7 @@ import unittest
 from command_support import Case, absenc, json_lines
 from monitor_test import Terminal
 
-# Range of the scale of SLOW: 32 bits of 0.05 um are 214748.3648 mm.
+# The scale of the encoder SLOW is 214748.3648 mm long: 32 bits of 0.05 um.
 SLOW = "sim:biss?model=linear-32-0.05um&singleturn=1579271"
 FAST = "sim:biss?model=linear-26-1um&motion=rpm=60"
 
@@ -67,13 +67,13 @@ class Reading(Case):
 class Recording(Case):
     def record(self, name, *more):
         path = os.path.join(self.directory, name)
-        # The carriage moves down from 0.1 mm, so that the position passes 0 at once.
+        # The carriage moves from 0.1 mm downwards, so that its position passes 0 at once.
         self.assert_good(absenc("record", "sim:biss?model=linear-26-1um&motion=rpm=-60&singleturn=100", "--output", path,
                                 "--for", "0.5", *more))
         return path
 
     def assert_motion(self, rows):
-        # Leaves out the rows for gaps, which a busy machine may cause.
+        # Rows for gaps are left out, because a busy machine may cause gaps.
         rows = [row for row in rows if row.get("event") != "gap"]
         first = rows[0]
         for row in rows[5:]:
@@ -143,7 +143,7 @@ class Monitor(Case):
         self.assertNotIn("speed_rpm", shown)
 
     def test_screen(self):
-        # The carriage is in the middle of the scale.
+        # The carriage stands in the middle of the scale.
         terminal = Terminal(self, "sim:biss?model=linear-26-1um&singleturn=33554432")
         screen = terminal.wait_for(r"live +33554\.43")
         self.assertRegex(screen, r"state +mm +turns +mm/s +a second")

@@ -157,7 +157,8 @@ class Bytes(MemoryCase):
         try:
             while True:
                 shown += os.read(terminal, 1024)
-        except OSError:  # the process has closed its end of the terminal, and all text was read
+        # reading fails when the process has closed its end of the terminal, after all its output was read
+        except OSError:
             os.close(terminal)
         return process.wait(PATIENCE), shown.decode()
 

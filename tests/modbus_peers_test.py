@@ -123,7 +123,7 @@ class LibmodbusClient(PeerCase):
                            ("Illegal data address", lambda: client.read(0, 3))):
             with self.assertRaisesRegex(OSError, words):
                 ask()
-        # libmodbus refuses to send this invalid request, so the test sends its bytes.
+        # libmodbus refuses to send this invalid request, so the test sends the bytes itself.
         client.check(MODBUS.modbus_send_raw_request(client.context, bytes([1, 3, 0, 0, 0, 0]), 6))
         reply = ctypes.create_string_buffer(260)
         size = client.check(MODBUS.modbus_receive_confirmation(client.context, reply))
@@ -155,7 +155,7 @@ class LibmodbusServer:
     def __init__(self, registers, address=1):
         self.master, self.slave = os.openpty()
         tty.setraw(self.slave)
-        # libmodbus needs a path to open, so it gets one end of a second pseudo-terminal.
+        # libmodbus opens a path itself, so it gets one end of a second pseudo-terminal.
         self.inner, self.inner_slave = os.openpty()
         tty.setraw(self.inner_slave)
         self.path = os.ttyname(self.slave)

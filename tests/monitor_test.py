@@ -19,7 +19,8 @@ class Terminal:
 
     def __init__(self, case, *arguments, columns=80, rows=24, environment=""):
         self.case = case
-        number = len(os.listdir(case.directory))  # number for the terminal's name, because a test may open several
+        # number in the names of this terminal's files, because a test may open several terminals
+        number = len(os.listdir(case.directory))
         self.socket = os.path.join(case.directory, f"tmux-{number}")
         self.status = os.path.join(case.directory, f"status-{number}")
         command = f"env {environment} {shlex.join([ABSENC, 'monitor', *arguments])}; echo $? >{self.status}; read wait"
@@ -246,7 +247,7 @@ class Screen(MonitorCase):
         self.assertNotRegex(screen, r"(?m)^  .*\bsingleturn \d")
         terminal.resize(64, 16)
         screen = terminal.wait_for(rf"\A(.*\n){{15}}{KEYS}")
-        # Even the smallest screen has a line of the trace above the keys.
+        # Even on the smallest screen, at least one line of the trace is above the line of keys.
         self.assertRegex(screen.splitlines()[14], r"^ +\d+\.\d{3}  ")
         terminal.press("e")
         terminal.wait_for("no exchange has failed")

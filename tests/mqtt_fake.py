@@ -28,7 +28,7 @@ class Connection:
 
     def __init__(self, connection):
         self.socket = connection
-        self.old = False  # true: the client speaks MQTT 3.1.1; false: MQTT 5
+        self.old = False  # whether the client speaks MQTT 3.1.1; otherwise MQTT 5
         self.socket.settimeout(PATIENCE)
 
     def read(self, count):
@@ -82,7 +82,8 @@ class FakeBroker:
 
     def __init__(self, answer=None):
         self.answer = answer
-        self.payloads = {}  # received messages: lists of payloads by topic, as JSON or None, in the order of arrival
+        # payloads of the received messages in the order of arrival, by topic; each is parsed JSON, or None if empty
+        self.payloads = {}
         self.connections = 0
         self.lock = threading.Lock()
         self.open = set()

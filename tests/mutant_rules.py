@@ -25,14 +25,18 @@ from typing import NamedTuple
 from cpp_source import CLOSING, OPENING, Source
 
 ASSIGNMENT = {"=", "+=", "-=", "*=", "/=", "%=", "&=", "|=", "^=", "<<=", ">>="}
-# Tokens that bound an operand of `&&` or `||`, besides brackets and these operators.
+# Tokens that end an operand of `&&` or `
+#
+# `; brackets, `&&` and `
+#
+# ` end it, too.
 ENDS_OPERAND = {";", ",", "?", ":", "return", "co_return", "case", "else"} | ASSIGNMENT
 COARSE = {"never", "skip", "half", "twice", "zero", "ten"}
-ARITHMETIC = {"bit", "shift", "sign"}  # rules on arithmetic, of which at most one mutant is made for a line
+ARITHMETIC = {"bit", "shift", "sign"}  # rules that change arithmetic; they make at most one mutant for a line
 EDGE = {"<": "<=", "<=": "<", ">": ">=", ">=": ">"}
 REFUSES = re.compile(r"fail|failed|refuse\w*|reject\w*|settle\w*")
 NOTHING = {"returnfalse;", "returnstd::nullopt;", "returnnullptr;", "return{};", "std::nullopt", "nullptr"}
-# Words in the declaration of a table, whose numbers are not mutated.
+# Words that show that a declaration is a table; numbers in tables are not mutated.
 TABLES = {"array", "to_array", "Option", "option", "Argument", "Command", "Fields"}
 DURATION = re.compile(r"[\d'.]+(ns|us|ms|s|min|h)")
 INTEGER = re.compile(r"(0[xX][\da-fA-F']+|0[bB][01']+|[\d']+)(?:u|U|l|L|ul|UL|z|uz)?")
@@ -48,7 +52,7 @@ class Switch(NamedTuple):
 
 
 class Mutant(NamedTuple):
-    file: str  # path of the source below the source folder, as in the id
+    file: str  # path of the source file, relative to the folder of sources, as in the id
     rule: str
     line: int
     start: int
@@ -57,7 +61,7 @@ class Mutant(NamedTuple):
     after: str
     id: str
     switch: "Switch | None"
-    # Name of the constant outside functions that the mutant changes, if any.
+    # Name of the constant at namespace scope that the mutant changes; None if it changes none.
     constant: "str | None" = None
 
     def applied_to(self, text):
@@ -66,7 +70,7 @@ class Mutant(NamedTuple):
 
 def with_switches(text, numbered):
     """Returns `text` with the switches inserted. `numbered`: pairs of number and mutant."""
-    # The switch of a nested mutant is inside that of the outer one.
+    # If one mutant is inside another, its switch is inserted inside the switch of the other.
     inserted = []
     for order, (number, mutant) in enumerate(numbered):
         start, end, before, behind = mutant.switch
@@ -166,7 +170,8 @@ class Finder:
             if line in self._calculating:
                 return
             self._calculating.add(line)
-        # The id depends on the code of the lines, not on their numbers or comments.
+        # The id is computed from the code of the mutant's lines, so that it does not change with line numbers or
+        # comments.
         begin, behind = self.source.tokens_of_lines(line, self.source.line_of(end - 1))
         context = [token.text for token in tokens[begin:behind]]
         description = "\n".join([rule, after, str(first - begin), *context])
@@ -310,7 +315,7 @@ class Finder:
             if source[i] != "Time" or source[i + 2] != "=" or source.tokens[i + 1].kind != "word" or self.left_alone[i]:
                 continue
             end = source.right(i + 3, {";", ","})
-            # A value that a function computes is left alone.
+            # Only a constant or a member that is a single number is mutated, not a value that a function computes.
             is_member = source[i - 1] in (";", "{", "}") and source.tokens[i + 3].kind == "number" and end == i + 4
             if source[i - 1] == "constexpr" or is_member:
                 self._times(i + 3, end, "" if is_member or self._is_local(i) else source[i + 1])
@@ -330,7 +335,7 @@ class Finder:
                 continue
             for j in range(body, source.partner[body]):
                 end = source.right(j + 1, {";"})
-                # A statement that returns a single token, such as a name, is left alone.
+                # A return statement is mutated unless it returns a single token, such as a name.
                 if source[j] == "return" and end > j + 2 and not self.left_alone[j]:
                     self._times(j + 1, end)
                     for k in range(j, end):
@@ -400,7 +405,7 @@ class Finder:
                 return False
             index = begin - 1
             if source[index - 1] in (")", ":", "const", "noexcept"):
-                return False  # a value inside a function is no constant
+                return False  # the value is inside a function, so it is no constant at namespace scope
         return False
 
     def _around(self, index):

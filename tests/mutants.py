@@ -25,9 +25,9 @@ import mutant_rules
 ROOT = Path(__file__).resolve().parent.parent
 COPIED = ("CMakeLists.txt", "absenc", "cmake", "tests")
 NO_SOURCE = re.compile(r"_(test|fuzz|bench)\.|^(test_|testing|vectors|fields|explain|texts)")
-# Matches errors of the compiler from checks at compile time, such as a static_assert.
+# Matches compiler errors that come from checks at compile time, such as a static_assert.
 STATIC_CHECK = re.compile(r"static.assert|constant.expression|non-constant|non-.constexpr|duplicate case value")
-# Switched mutants run only the first series of faults (tests/kit).
+# GoogleTest filter: programs with switched mutants run only the first series of faults (tests/kit).
 FIRST_SERIES = "-" + ":".join(f"*/{series}_*" for series in range(1, 10))
 HANGS = (-signal.SIGXCPU, -signal.SIGKILL)
 SWITCH_HEADER = Path("absenc/chosen_mutant.hpp")
@@ -44,7 +44,7 @@ OUTCOMES = ("static_assert", "kit", "own", "time", "known", "new", "no C++")
 class Program(NamedTuple):
     name: str
     is_own: bool
-    tests: str = "*"  # GoogleTest filter of the tests to run
+    tests: str = "*"  # GoogleTest filter that selects the tests to run
 
 
 def unit_folders():
@@ -114,7 +114,7 @@ class Tree:
 
     def prepare(self):
         self.source.mkdir(parents=True, exist_ok=True)
-        # File lock on this copy of the sources, held until this process ends.
+        # A lock file next to this copy of the sources, locked until this process ends.
         self.lock = open(self.source.parent / "lock", "w", encoding="utf-8")
         try:
             fcntl.flock(self.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -181,7 +181,8 @@ class Tree:
         """Returns, for each source, the constants that can become functions."""
         functions = {}
         for path, name in {(path, mutant.constant) for mutant, path, _ in numbered.values() if mutant.constant}:
-            # Every unit depends on the folder author, so users of its constants are searched in all units.
+            # Constants of the folder author may be used in every unit, so users are searched in all folders of
+            # protocols.
             folder = path.parent.parent if path.parent.name == "author" else path.parent
             users = [*folder.rglob("*.hpp"), *folder.rglob("*.cpp")] if path.suffix == ".hpp" else [path]
             users = [user for user in users if re.search(rf"\b{name}\b", user.read_text(encoding="utf-8"))]
@@ -210,7 +211,7 @@ class Tree:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
-        # Ends a program that waits for an event that never occurs.
+        # Kills a program that waits for an event that never occurs and so uses no processor time.
         too_long = threading.Timer(10 * cpu_limit, running.kill)
         too_long.start()
         _, status, usage = os.wait4(running.pid, 0)
@@ -270,7 +271,7 @@ class Tree:
     def outcome(self, mutant, path, text, programs):
         """Returns the outcome of a mutant that is compiled alone, and what killed it."""
         self.write(self.source / path.relative_to(ROOT), mutant.applied_to(text).encode())
-        # The unit's vectors are checked when its unit.cpp is compiled.
+        # The object of unit.cpp is built first, because it checks the unit's test vectors at compile time.
         unit = path.relative_to(ROOT).with_name("unit.cpp")
         library = "absenc-" + unit.relative_to("absenc/protocol").parts[0] if (ROOT / unit).exists() else ""
         first = [f"CMakeFiles/{library}.dir/{unit}.o"] if library else []
@@ -283,7 +284,7 @@ class Tree:
             first = []
             if outcome := self.killed(program):
                 if program.is_own:
-                    # A program that kills one mutant often kills the next ones, so it runs first from now on.
+                    # A program that has killed a mutant often kills the next ones, too, so it runs first from now on.
                     self.last_own = program
                 return outcome, program.name
         return "survived", ""

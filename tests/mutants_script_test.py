@@ -118,7 +118,7 @@ class Rules(unittest.TestCase):
         broken = {lines[found.line - 1] for found in mutant_rules.find("toy.hpp", TOY)}
         for begin in ("//", "#define", "static_assert", "    return fail"):
             self.assertFalse([line for line in broken if line.startswith(begin)], begin)
-        # Loop headers, template brackets and raw strings also have no mutant.
+        # No mutant changes loop headers, template brackets or raw strings.
         self.assertEqual(changes("void f() { for (int i = 0; i < 3 && i + 1 < n; ++i) g(i); }"), [])
         self.assertEqual(changes('void f() { g(h<pair<int, 4>>(1), R"(a && b < 2ms)", "1s", \'&\'); }'), [])
 
@@ -129,7 +129,8 @@ class Rules(unittest.TestCase):
             ("co_await dialog.ask();", "if (chosen_mutant(1)) {} else co_await dialog.ask();"),
             ("rest(10ms);", "rest((chosen_mutant(1) ? Time(Time(10ms) / 2) : Time((chosen_mutant(2) ? "
              "Time(Time(10ms) * 2) : Time(10ms)))));"),
-            ("constexpr Time pause = 40us;", None),  # mutants of a function's local constant have no switch
+            # a mutant of a constant inside a function cannot be switched at run time
+            ("constexpr Time pause = 40us;", None),
         )
         for line, expected in lines:
             text = f"void f() {{ {line} }}"

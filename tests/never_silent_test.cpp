@@ -17,7 +17,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// Function that returns the next byte on the line. `request` is the last one of the host.
+/// A function that returns the next byte on the line. `request`: the last request of the host.
 using ByteSource = std::function<std::uint8_t(Bytes request)>;
 
 struct Outcome {
@@ -25,7 +25,7 @@ struct Outcome {
   Time duration{};
 };
 
-/// Runs the conversation on a line with a byte every `period`.
+/// Runs the conversation on a line that carries one byte in each `period`.
 Outcome run(Conversation<std::uint8_t>& conversation, Time period, const ByteSource& byte_source) {
   constexpr unsigned most_bytes = 2'000'000;
   Time now = 1s;
@@ -79,7 +79,7 @@ Options defaults_of(const Unit& unit, std::span<const OptionText> settings = {})
   return options;
 }
 
-/// Returns the defaults, and variants of them in one option with choices.
+/// Returns the default options of the unit, and variants in which one option that has choices has another value.
 std::vector<Options> all_options(const Unit& unit) {
   std::vector<Options> all{defaults_of(unit)};
   for (const Option& option : unit.options) {
@@ -114,7 +114,7 @@ class NeverSilent : public ::testing::TestWithParam<const Unit*> {
       };
       EXPECT_TRUE(outcome.ended) << what() << "has not ended after " << outcome.duration / 1s << " s";
       EXPECT_LE(outcome.duration, 30s) << what();
-      // Bytes that repeat the request may form a valid frame by chance, so the command may succeed.
+      // A line that repeats the request may form a valid reply by chance, so the command may succeed.
       if (kind.name == echo) continue;
       EXPECT_NE(made.bytes->error(), Error::none) << what() << "taken for good";
     }

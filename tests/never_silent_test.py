@@ -8,8 +8,8 @@ import unittest
 
 from command_support import BabblingLine, Case, absenc
 
-LIMIT = 40.0  # seconds, for a busy machine
-AT_ONCE = 8  # number of commands that run in parallel: they mostly wait
+LIMIT = 40.0  # time limit of a command in seconds, long enough for a busy machine
+AT_ONCE = 8  # number of commands that run in parallel; they mostly wait
 
 
 def units():
@@ -63,7 +63,7 @@ class NeverSilentTest(Case):
                 with self.subTest(arguments=arguments):
                     self.assertLess(duration, LIMIT)
                     self.assertIn(result.returncode, (0, 1), result.stderr)
-                    # A command that expects no reply may succeed.
+                    # A command of the verb `run` may expect no reply and so succeed.
                     if arguments[0] != "run":
                         self.assert_failed(result)
 

@@ -71,7 +71,7 @@ class Nikon(Case):
         self.assertAlmostEqual(fields["singleturn"] * 360 / 2**17, 237.961120605)
 
     def scanned(self, line):
-        found = absenc("scan", f"nikon:{line}?latency=50", "--json")  # a busy machine has 50 ms for a reply
+        found = absenc("scan", f"nikon:{line}?latency=50", "--json")  # the latency of 50 ms allows for a busy machine
         self.assert_good(found)
         return [encoder["encoder_address"] for encoder in json_lines(found.stdout)[0]["encoders"]]
 

@@ -70,7 +70,7 @@ class PlatformIO(Case):
     def test_builds_all_sources(self):
         chosen = set()
         for sign, pattern in (re.match(r"([+-])<(.+)>$", one).groups() for one in self.library["build"]["srcFilter"]):
-            # A srcFilter that names a folder includes everything below it.
+            # A srcFilter that names a folder selects all source files below the folder.
             matched = set()
             for path in glob.glob(str(ROOT / pattern), recursive=True):
                 below = Path(path).rglob("*.cpp") if os.path.isdir(path) else [Path(path)]
@@ -209,7 +209,7 @@ class Arduino(Case):
     def test_sketch_reads_positions(self):
         sketch = self.library / "examples/ReadTFormat/ReadTFormat.ino"
         program = self.folder / "sketch.cpp"
-        # Makes a program of the sketch as Arduino does.
+        # Makes a C++ program of the sketch, as the Arduino tools do.
         program.write_text(f'#include <Arduino.h>\n#include "{sketch}"\n'
                            "int main() { setup(); for (int i = 0; i < 20000; ++i) loop(); }\n")
         exported = self.library / "src"
@@ -217,12 +217,13 @@ class Arduino(Case):
             self.folder / "sketch", program, exported / "absenc/protocol/host_rules.cpp",
             *sorted((exported / "absenc/protocol/author").rglob("*.cpp")))
         output = run(self.folder / "sketch").splitlines()
-        # Every third reply is damaged, and the one after it prints no position.
+        # Every third reply is damaged (tests/arduino/Arduino.h), and the reply after a damaged one prints no
+        # position, so positions and errors alternate in the output.
         self.assertEqual(output[:6], ["4660 74565", "bad_checksum"] * 3)
 
 
 class FetchContent(Case):
-    # Folders of absenc/protocol that tformat does not need.
+    # Folders of absenc/protocol that the unit tformat does not need.
     OTHERS = {path.name for path in (ROOT / "absenc/protocol").iterdir() if path.is_dir()} - {"author", "tformat"}
 
     def built(self, library, *options):
@@ -255,7 +256,7 @@ class FetchContent(Case):
         self.assertIn("absenc::tformat::", symbols)
         for unit in self.OTHERS:
             self.assertNotIn(f"absenc::{unit}::", symbols)
-        # A program that is linked only with the needed sources must have the same size.
+        # A program linked only with the sources it needs must have the same size, so nothing superfluous was linked.
         alone = self.folder / "alone"
         flags = "-mcpu=cortex-m0plus -mthumb -std=c++20 -Os -DNDEBUG -ffreestanding -ffunction-sections -fdata-sections"
         run("arm-none-eabi-g++", *flags.split(), "-fno-exceptions", "-fno-rtti", "-fno-threadsafe-statics",

@@ -96,7 +96,7 @@ class CanBus(Case):
         zero = self.fields("zero", address, "--yes")
         self.assertEqual((zero["before"], zero["after"], zero["written"], zero["answered"]), (5000, 0, True, True))
         self.assertEqual(self.singleturn(address), 0)
-        # Nothing is written, because the position is zero already.
+        # The second `zero` writes nothing, because the position is zero already.
         self.assertFalse(self.fields("zero", address, "--yes")["written"])
         # After the zero command the node sends cyclic frames again.
         self.assertEqual(self.singleturn(address + "&listen=true"), 0)
@@ -117,7 +117,8 @@ class CanBus(Case):
         again = absenc("config", "set", address + "&node=0x42", "node", "0x42", "--yes")
         self.assert_good(again)
         self.assertIn("nothing was sent, because it is so already", again.stderr)
-        self.assert_no_rule_broken()  # the summary shows a rule violation if the host wrote a setting twice
+        # the emulator's summary would show a rule violation if the host had written the setting twice
+        self.assert_no_rule_broken()
 
     def test_force_writes_node_again(self):
         address = self.bus()
@@ -220,7 +221,7 @@ class CanBus(Case):
         """The adapter gets garbage and an incomplete command before absenc uses it."""
         address = self.bus("--singleturn", "9799")
         with open(self.node.path, "wb", buffering=0) as other:
-            other.write(b"garbage\rt22")  # another program sends garbage and an incomplete adapter command
+            other.write(b"garbage\rt22")  # another program has left garbage and an incomplete command in the adapter
         self.assertEqual(self.singleturn(address), 9799)
 
     def test_bench(self):

@@ -41,7 +41,7 @@ FRAMES = [
     ("bits=14", REQUEST_1, framed("01830b"), "request_rejected", "behind the gateway", "gateway"),
     ("bits=14", REQUEST_1, framed("018377"), "request_rejected", "the standard does not have", "manual"),
 ]
-# Exchanges that no reading has: request, reply, expected error, evidence in the message.
+# Exchanges of other commands than `read`. Each row: request, reply, expected error, evidence in the message.
 OTHER_FRAMES = [
     (framed("ffa0"), framed("ffa000"), "out_of_range", "from 1 to 247"),
     (framed("ffa0"), framed("ffa001")[:-1], "wrong_length", "several encoders"),
@@ -204,7 +204,8 @@ class Settings(ModbusCase):
         emulator = self.emulator("--also", "address=2")
         result = absenc("config", "set", self.uri(emulator), "address", "2", "--yes")
         self.assert_failed(result, "invalid_argument", "answers at that address already", "nothing was sent")
-        # Two encoders on the line give no clear reply to the request A0.
+        # The address is set although the line has two encoders, which reply to the broadcast request A0 at the same
+        # time.
         self.set(self.uri(emulator), "address", "3")
         self.assert_good(absenc("read", self.uri(emulator, "&address=2")))
         self.assertEqual(self.violations(emulator), [])
@@ -287,7 +288,7 @@ class Frames(ModbusCase):
     def test_silence_and_noise(self):
         with FakeEncoder({0x01: b""}) as encoder:
             self.assert_failed(absenc("read", f"raa38-modbus:{encoder.path}"), "timeout", "nobody answers", "scan")
-        with FakeEncoder({0x01: REQUEST_1}) as encoder:  # a fake encoder that only returns the echo of the request
+        with FakeEncoder({0x01: REQUEST_1}) as encoder:  # the fake encoder returns only the echo of the request
             self.assert_failed(absenc("read", f"raa38-modbus:{encoder.path}"), "request itself came back")
 
     def test_decode_without_request(self):

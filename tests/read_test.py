@@ -102,7 +102,7 @@ class Readings(EncoderCase):
         readings = json_lines(absenc("read", address, "--json", "--count", "20", "--rate", "200").stdout)
         for before, after in zip(readings, readings[1:]):
             turned = (after["angle_deg"] - before["angle_deg"]) % 360
-            # The tolerance is large, because the encoder samples later than the timestamp.
+            # The tolerance is large: the encoder may sample the position later than at the time in `time_s`.
             self.assertAlmostEqual(turned, 360 * (after["time_s"] - before["time_s"]), delta=360 * 0.3)
             self.assertGreater(turned, 0)
 
@@ -152,7 +152,7 @@ class Simulator(EncoderCase):
         self.assertEqual(len(readings), 6)
         for one in readings:
             away = min(one["singleturn"], 4096 - one["singleturn"])
-            # Damaged words may confirm each other by chance.
+            # Two damaged words with nearly the same position may confirm each other by chance.
             self.assertTrue(not one["confirmed"] or away <= 4, one)
         doubtful = [one for one in readings if not one["confirmed"]]
         self.assertTrue(doubtful)
@@ -268,7 +268,7 @@ class ErrorMessages(EncoderCase):
 
     def test_nothing_listens_on_tcp_port(self):
         with socket.socket() as listener:
-            listener.bind(("127.0.0.1", 0))  # reserves a TCP port on which no program listens
+            listener.bind(("127.0.0.1", 0))  # reserves a TCP port, on which no program listens then
             result = absenc("read", f"tformat:tcp:127.0.0.1:{listener.getsockname()[1]}")
         self.assert_failed(result, "nothing listens on 127.0.0.1")
 
@@ -335,7 +335,7 @@ class OrdinaryUser(EncoderCase):
             self.first_line(first)
             second = self.as_user("read", address)
             self.assert_failed(second, emulator.path, "in use", f"process {first.pid}")
-            # The first `read` continues although a second one tried to open the same port.
+            # The first `read` continues, although a second `read` tried to open the same port.
             self.assertIsNotNone(read_line(first.stdout, time.monotonic() + PATIENCE))
         finally:
             end(first)
@@ -388,7 +388,7 @@ class Termination(EncoderCase):
         wait_for_handler(process)
         status, _, err = end(process, signal.SIGINT)
         self.assertEqual(status, 1)
-        # The interrupted command had only sent read requests.
+        # `zero` was interrupted while it still read the position, so no change was sent.
         self.assert_sentence(err, "interrupted in the middle of zero", "Change: not sent")
 
     def test_interrupted_wait_for_reply(self):
@@ -418,7 +418,8 @@ class Termination(EncoderCase):
         result = subprocess.run(["sh", "-c", '"$0" read "tformat:$1?latency=300" >&-', ABSENC, emulator.path],
                                 capture_output=True, text=True, timeout=PATIENCE, check=False)
         self.assert_failed(result, "standard output cannot be written")
-        # Only the two position requests reached the emulator, not the text of a reading.
+        # Only the two position requests reached the emulator: the text of the reading was not written to the port in
+        # place of the closed output.
         self.assertIn("absenc: 2 requests answered", emulator.end()[2])
 
 

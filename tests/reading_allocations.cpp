@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counts the allocations of reading loops. After the first readings there are none, so that a loop in a real-time
-// thread never waits for the allocator.
+// Counts the memory allocations of loops that read. After the first readings there must be none, so that a loop in a
+// real-time thread never waits for the allocator.
 #include <gtest/gtest.h>
 
 #include <cstddef>
@@ -14,14 +14,14 @@
 
 namespace {
 
-// Allocations of this thread.
+// Number of memory allocations of this thread.
 thread_local std::uint64_t allocations = 0;  // NOLINT: operator new must reach it
 
 }  // namespace
 
 #ifndef ABSENC_COUNTS_MALLOC
 
-// Sanitizers replace malloc, so only operator new is counted with them.
+// Sanitizers replace malloc, so in builds with them only operator new is counted.
 void* operator new(std::size_t size) {
   ++allocations;
   if (void* const memory = std::malloc(size == 0 ? 1 : size)) return memory;
@@ -32,7 +32,8 @@ void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 #else
 
-// operator new of the standard library calls malloc. The functions of the GNU C library do the work.
+// malloc and its relatives are replaced to count their calls, also those by operator new. The functions __libc_* of
+// the GNU C library allocate the memory.
 extern "C" {
 void* __libc_malloc(std::size_t size);
 void* __libc_calloc(std::size_t count, std::size_t size);

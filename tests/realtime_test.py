@@ -47,7 +47,7 @@ def policies(process):
         try:
             policy = os.sched_getscheduler(int(thread)) & ~os.SCHED_RESET_ON_FORK
             key = ("fifo" if policy == os.SCHED_FIFO else "other", os.sched_getparam(int(thread)).sched_priority)
-        except ProcessLookupError:  # the thread has ended meanwhile
+        except ProcessLookupError:  # the thread has ended since the list of threads was read
             continue
         counted[key] = counted.get(key, 0) + 1
     return counted
@@ -157,9 +157,9 @@ class Punctuality(EncoderCase):
     def test_bench_sees_pause_of_process(self):
         process = self.start("bench", ENCODER, "--rate", "100", "--seconds", "2", "--json")
         time.sleep(1)
-        os.kill(process.pid, 19)  # SIGSTOP
+        os.kill(process.pid, 19)  # SIGSTOP, which pauses the process
         time.sleep(0.3)
-        os.kill(process.pid, 18)  # SIGCONT
+        os.kill(process.pid, 18)  # SIGCONT, which continues the process
         cycle = json.loads(self.first_line(process))["cycle_us"]
         end(process)
         self.assertGreater(cycle["deviation_max"], 200_000)

@@ -55,7 +55,7 @@ class Abuse(ServeCase):
         for half in halves:
             half.sendall(b"GET /api/encoders HTTP/1.1\r\nHost: local")
         self.assert_well()
-        # The server closes incomplete requests after a time, even if bytes still arrive.
+        # The server closes a connection whose request stays incomplete, even if bytes still arrive.
         talker = halves[0]
         talker.settimeout(0.2)
         deadline = time.monotonic() + PATIENCE
@@ -135,14 +135,14 @@ class Abuse(ServeCase):
         self.allow_many_files()
         for _ in range(2000):
             self.connect()
-        # A new connection replaces the oldest idle one of the same address, so no client is refused.
+        # A new connection replaces the oldest idle connection of the same IP address, so no client is refused.
         self.assertEqual([self.status() for _ in range(20)], [200] * 20)
 
         def longest():
             begin = time.monotonic()
             self.assertEqual(self.status("/api/encoders", "127.0.0.2"), 200)
             return time.monotonic() - begin
-        # Repeated, because a busy machine replies later.
+        # The measurement is repeated until it is good, because a busy machine replies later.
         wait_until(lambda: max(longest() for _ in range(20)) < 0.1, "another address is served within 100 ms")
 
     def test_idle_connections_of_many_addresses_do_not_block_others(self):
@@ -152,14 +152,14 @@ class Abuse(ServeCase):
                 self.connect(f"127.0.1.{i + 1}")
         begin = time.monotonic()
         self.assertEqual([self.status("/api/encoders", f"127.0.2.{i + 1}") for i in range(20)], [200] * 20)
-        # Limit in seconds. The idle connections would end by themselves only after 10 s.
+        # 5 s is less than the 10 s after which the server closes idle connections in any case.
         self.assertLess(time.monotonic() - begin, 5)
 
     def test_unread_streams_leave_room_for_other_addresses(self):
         statuses = self.open_streams(300)
         self.assertEqual((statuses.count(200), statuses.count(503)), (200, 100))
         self.assertEqual(self.open_streams(100, "127.0.0.2"), [200] * 100)
-        # The limit of 200 streams is for one address, so streams of another address are accepted.
+        # The limit of 200 streams is for each IP address, so streams of another address are accepted.
         self.assertEqual(self.open_streams(20, "127.0.0.3"), [200] * 20)
         self.assertEqual(self.status(address="127.0.0.4"), 200)
 

@@ -12,7 +12,7 @@ from mqtt_support import numbers
 from serve_support import ServeCase, wait_until
 
 ONE = "sim:tformat?motion=rpm=60"
-DEADLY = {  # packets that fail an assertion of libmosquitto 2.0.11, which once ended the server
+DEADLY = {  # packets at which an assertion of libmosquitto 2.0.11 fails and ends the process
     "CONNACK with an unknown property": bytes.fromhex("20050000027f00"),
     "DISCONNECT with an unknown property": bytes.fromhex("e00487027f00"),
     "PUBACK with an unknown property": bytes.fromhex("4006000100027f00"),
@@ -177,7 +177,8 @@ class RefusedMessages(BrokerCase):
         self.assertEqual(broker.connections, 1)
         self.assertEqual(len([one for one in self.events(broker) if "plant/bad/state" in one]), 1)
         self.assertIn("(plant/bad/state)", self.mqtt(server)["trouble"])
-        # The state of an encoder that is removed meanwhile must be cleared when the broker accepts it.
+        # If an encoder is removed while the broker refuses its state, the state must be cleared when the broker
+        # accepts it again.
         self.configure("good")
         server.process.send_signal(signal.SIGHUP)
         wait_until(lambda: len(server.json("/api/encoders")["encoders"]) == 1, "it is no longer served")

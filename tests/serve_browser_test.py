@@ -28,7 +28,7 @@ class Page(ServeCase):
         super().setUp()
         self.emulator = Emulator(self.directory, "--singleturn", "1000")
         self.addCleanup(lambda: self.emulator.end())
-        self.name = f"tformat:{self.emulator.path}?latency=300"  # encoder with a latency that allows for a busy machine
+        self.name = f"tformat:{self.emulator.path}?latency=300"  # the latency allows for a busy machine
         self.served = self.server(self.name, "sim:esl?motion=rpm=60", "sim:tformat?alarm=over_heat&fault=corrupt=0.2",
                                   "--token-file", self.tokens(), "--history", self.file("history"))
         self.window.window(1200, 900)
@@ -120,7 +120,8 @@ class Page(ServeCase):
         wait_until(lambda: self.browser.execute_script(cards) == 5, "all are shown")
 
     def test_grid_labels_are_distinct(self):
-        name = "sim:encolink?multiturn=60000&motion=rpm=0.5"  # an encoder with large turns that change slowly
+        # the turns are large numbers that change slowly, so that the labels need many digits
+        name = "sim:encolink?multiturn=60000&motion=rpm=0.5"
         served = self.without_history(name)
         self.window.go(served.url, encoder=name, unit="turns")
 
@@ -128,7 +129,7 @@ class Page(ServeCase):
             return self.browser.execute_script("""
                 return Array.from(document.querySelectorAll('.dygraph-axis-label-y'), (label) => label.textContent);""")
         wait_until(lambda: any(float(one) > 59000 for one in labels()), "the turns are drawn")
-        for _ in range(20):  # repeats while the range of the graph grows
+        for _ in range(20):  # the check is repeated, because the range of the plot grows
             texts = labels()
             self.assertEqual(len(set(texts)), len(texts), texts)
         cut = """return Array.from(document.querySelectorAll('.dygraph-axis-label-y'))
@@ -260,7 +261,7 @@ class Page(ServeCase):
     def test_exchange_figures(self):
         self.window.go(self.served.url, encoder="sim:tformat?alarm=over_heat&fault=corrupt=0.2", range="10m", tab="exchanges")
         self.wait_for("bad checksum", ".histogram")
-        # The page may redraw the figures on every change, so they are read in one step.
+        # The tables are read in one step, because the page may redraw them at every change.
         labels = "return [...document.querySelectorAll('.histogram')].map((table) => table.getAttribute('aria-label'))"
         wait_until(lambda: self.browser.execute_script(labels) == ["replies by latency", "failed attempts by kind"], "there are both")
         widest = "return Math.max(...[...document.querySelectorAll('.histogram .bar')].map((bar) => bar.offsetWidth))"
@@ -302,7 +303,7 @@ class Page(ServeCase):
         yes = self.browser.find_element(By.ID, "dialog-yes")
         token = self.browser.find_element(By.ID, "dialog-token")
         token.send_keys("another-secret-than-that")
-        yes.click()  # the dialog refuses, because its checkbox about the machine's safety is not set
+        yes.click()  # the dialog does not accept the click: its checkbox about the safety of the machine is not set
         self.assertEqual(self.text("#dialog-wrong"), "")
         self.browser.find_element(By.ID, "dialog-safe").click()
         yes.click()
@@ -383,7 +384,7 @@ class Page(ServeCase):
         wait_until(lambda: "acknowledged" in self.text("#panel-history"), "the history has it")
         self.assertIn("anna from 127.0.0.1", self.text("#panel-history"))
         self.browser.get("about:blank")
-        self.open()  # opens the page again
+        self.open()  # opens the page again, as a second user would
         self.wait_for("Acknowledged by anna", self.card(name) + " .words")
         self.assertEqual(self.text(self.card(name) + " .state"), "▲ alarm, seen")
         self.assert_no_errors()

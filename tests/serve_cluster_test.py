@@ -26,7 +26,8 @@ class Cluster(ServeCase):
                 "cluster": {"name": "hall", "listen": f"127.0.0.1:{route}",
                             "routes": [f"nats://127.0.0.1:{one}" for one in routes]},
                 "mqtt": {"listen": f"127.0.0.1:{mqtt}"}}))
-            # A nats-server answers on its MQTT port only if others run.
+            # All servers are started before the first is waited for: a nats-server answers on its MQTT port only if
+            # others run.
             nodes.append((["nats-server", "-c", config], mqtt, os.path.join(self.directory, f"node{index}.log")))
         started = [Daemon(*one, wait=False) for one in nodes]
         for one in started:

@@ -54,7 +54,7 @@ class DisturbedFile(ServeCase):
 
     def reported_event(self, words):
         status, body = self.served.ask("/api/events")
-        if status == 503:  # the server is reopening the history
+        if status == 503:  # the server is opening the history again, so it cannot list events
             return None
         events = [event for event in json.loads(body)["events"] if event["kind"] == "history"]
         return next((one for one in events if words in one["text"] and one["at_ms"] > 1000 * self.disturbed_at), None)
@@ -145,7 +145,7 @@ class DisturbedFile(ServeCase):
             database.commit()
             database.execute("VACUUM")
         self.records_again_after(lambda: shutil.copyfile(copy, self.path), f"the history {self.path} ")
-        # The server sets the file aside only if the mixture is invalid.
+        # The server renames the overwritten file only if SQLite finds it invalid.
         if recorded := glob.glob(self.path + ".damaged-*Z"):
             self.assertEqual(seconds_in(copy), seconds_in(recorded[0]))
         self.assertTrue(seconds_in(self.path))
@@ -194,7 +194,7 @@ class UnusableFile(ServeCase):
             file.write(GARBAGE)
         server = self.assert_failing(path, "move it away")
         with open(path, "rb") as file:
-            # The server has not changed the file, which may belong to another program.
+            # The server has left the file unchanged, because it may belong to another program.
             self.assertEqual(file.read(), GARBAGE)
         os.rename(path, path + ".old")
         self.assert_well_again(server)
@@ -206,7 +206,7 @@ class UnusableFile(ServeCase):
         self.assert_well_again(server)
 
     def test_unwritable_folder(self):
-        # Not even root can create a file in /sys.
+        # The folder /sys stands for one in which nobody may create a file, not even root.
         self.assert_failing("/sys/absenc-history.sqlite", "/sys/absenc-history.sqlite")
 
     def test_full_disk(self):
@@ -245,7 +245,7 @@ class WrongSystemClock(ServeCase):
         library = glob.glob("/usr/lib/*/faketime/libfaketimeMT.so.1")
         self.assertTrue(library, "the package faketime is missing")
         self.settings = {"LD_PRELOAD": library[0], "FAKETIME_TIMESTAMP_FILE": self.file("clock"), "FAKETIME_NO_CACHE": "1",
-                         "NO_FAKE_STAT": "1",  # libfaketime does not change the times of files
+                         "NO_FAKE_STAT": "1",  # libfaketime must not change the times of files
                          "FAKETIME_DONT_FAKE_MONOTONIC": "1"}
         self.wrong_by(0)
 
@@ -295,9 +295,9 @@ class WrongSystemClock(ServeCase):
         self.wrong_by(-600)
         self.wait_for_event(server, "the clock jumped back by 10 minutes")
         self.wait_for_readings(server)
-        self.wrong_by(-602)  # a step of the clock that is too small to be reported: some seconds occur twice
+        self.wrong_by(-602)  # this step of the clock is too small to be reported; some seconds occur twice
         readings = self.wait_for_readings(server)
-        self.wait_for_readings(server)  # waits until the second that is being recorded is over
+        self.wait_for_readings(server)  # waits until the second in which the readings were recorded is over
         end(server.process)
         self.assertGreaterEqual(self.recorded(), readings)
 

@@ -14,7 +14,7 @@ from serve_support import ServeCase, wait_until
 WIDTHS = (390, 768, 1280, 1400, 1920, 3840)
 SCREENSHOTS = os.environ.get("ABSENC_SCREENSHOTS")
 
-# JavaScript that returns the faults of the rendered page as sentences.
+# JavaScript that checks the layout of the shown page, and returns its faults as sentences.
 MEASURE = """
 const wrong = [];
 const root = document.documentElement;
@@ -228,7 +228,9 @@ class Look(ServeCase):
               done([same, drawings]);
             })();""")
         self.assertEqual(same, 0)
-        self.assertIn(often, range(1, 6))  # in 2 s `show` is called 60 times, and the view redraws twice a second
+        # number of redraws in 2 s: `show` was called 60 times, but with many encoders the view redraws about twice a
+        # second
+        self.assertIn(often, range(1, 6))
 
     def test_one_encoder_and_none(self):
         path = self.file("absenc.toml", config({"elbow": ("tformat", "motion=rpm=60")}))
@@ -239,7 +241,7 @@ class Look(ServeCase):
         self.open(server, "document.querySelector('.one .plot canvas')", encoder="elbow")
         wait_until(lambda: "the server has no tokens" in self.browser.ask("return document.body.innerText"), "it says why")
         self.look("without-tokens", (390, 1400))
-        # The server never sends an empty list of encoders, but the page must handle one.
+        # The server never sends an empty list of encoders, but the page must be able to show one.
         self.open(server, self.READY)
         self.browser.driver.execute_async_script("""
             const done = arguments[0];

@@ -72,7 +72,7 @@ class Messages(MqttCase):
         seconds = now() - started
         all_of = {name: [one for one in receiver.all("readings") if one["encoder"] == name] for name in ("slow", "fast")}
         alone = [one for one in all_of["slow"] if len(one["readings"]) == 1]
-        # If a busy machine delays the server, it puts two readings into one message.
+        # A message may have two readings if a busy machine delays the server.
         self.assertGreater(len(alone), len(all_of["slow"]) / 2)
         self.assertLessEqual(len(all_of["fast"]), 10 * seconds + 2)
         for name, messages in all_of.items():
@@ -101,7 +101,7 @@ class Messages(MqttCase):
         good = {"Authorization": f"Bearer {TOKEN}"}
         self.assertEqual(server.ask(of(name, "acknowledge"), "POST", good, alarm="over_heat")[0], 200)
         server.command(name, "position", good)
-        # The server would publish an event of the acknowledgement before this event of the command.
+        # When this event of the command arrives, an event of the earlier acknowledgement would have arrived, too.
         receiver.until("event", lambda one: one["kind"] == "command")
         self.assertNotIn("acknowledged", [one["kind"] for one in receiver.all("event")])
         self.assertNotIn("acknowledged", [one for state in receiver.all("state") for alarm in state.get("alarms") or [] for one in alarm])
@@ -116,7 +116,7 @@ class State(MqttCase):
         server.process.kill()
         self.assertEqual(receiver.until("state", lambda one: one["state"] == "offline")["why"],
                          "the connection was lost")
-        # A receiver that subscribes after the message was sent receives it as a retained message.
+        # The receiver subscribes after the message was sent, so it gets the retained copy.
         late = self.receiver(broker, "plant/hall/state")
         self.assertEqual(late.until("state")["state"], "offline")
         self.assertTrue(late.messages[0][2])
@@ -168,13 +168,13 @@ class Spool(MqttCase):
         wait_until(lambda: self.numbers(receiver)[-1] >= goal, "they come")
         found = self.numbers(receiver)
         self.assertEqual(found, sorted(found))
-        # The killed broker may have accepted messages without forwarding them.
+        # Messages that the broker had accepted shortly before it was killed may be missing.
         missing = set(range(1, goal + 1)) - set(found)
         self.assertFalse([one for one in missing if not seen < one <= before], missing)
         self.assertEqual(self.mqtt(server)["dropped"], 0)
 
     def test_survives_kill(self):
-        port = free_port()  # a port on which no broker runs
+        port = free_port()  # the broker for this port is started later
         server = self.sender(f"mqtt://127.0.0.1:{port}", ONE, "--rate", "100")
         wait_until(lambda: self.taken(server) > 150, "they are spooled")
         shown = self.taken(server)
@@ -261,7 +261,7 @@ class Spool(MqttCase):
         result = absenc("serve", ONE, "--history", "none", "--listen", "127.0.0.1:0", "--mqtt-spool", self.spool(),
                         env={**os.environ, "ABSENC_CONFIG": path})
         self.assertEqual(result.returncode, 1, result.stderr)
-        # The server ends only because the file mqtt-login is missing, so it accepted all other settings.
+        # The only complaint is the missing file mqtt-login, so the server has accepted all other settings.
         self.assertIn("/etc/absenc/mqtt-login", result.stderr)
 
 
@@ -343,7 +343,7 @@ class Access(MqttCase):
         broker = self.broker("allow_anonymous true", f"acl_file {closed}")
         server = self.sender(broker.url, ONE)
         wait_until(lambda: "refuses a message" in self.mqtt(server)["trouble"], "it says so")
-        self.assertIn("(plant/hall/", self.mqtt(server)["trouble"])  # the reported trouble names the topic
+        self.assertIn("(plant/hall/", self.mqtt(server)["trouble"])  # the reported trouble names the refused topic
         self.assertGreater(self.mqtt(server)["waiting"], 0)
         self.assertEqual(self.mqtt(server)["sent"], 0)
         pathlib.Path(closed).write_text(pathlib.Path(rules).read_text(encoding="utf-8"), encoding="utf-8")

@@ -146,13 +146,13 @@ class Prometheus(ServeCase):
                 with urllib.request.urlopen(address, timeout=PATIENCE) as answer:
                     return json.load(answer)["data"]["result"]
             except urllib.error.HTTPError as refused:
-                self.assertEqual(refused.code, 503)  # status of Prometheus until it is ready
+                self.assertEqual(refused.code, 503)  # Prometheus answers with this status until it is ready
                 return []
         wait_until(lambda: [one for one in ask('up{job="absenc"}') if one["value"][1] == "1"], "it is scraped")
         dashboard = json.loads((SOURCE / "docs/grafana-dashboard.json").read_text(encoding="utf-8"))
         for panel in dashboard["panels"]:
             for target in panel["targets"]:
-                # Replaces the variables of the query, as Grafana does.
+                # The variables in the query are replaced, as Grafana does it.
                 query = target["expr"].replace("$encoder", ".*").replace("$__range", "5m")
                 self.assertNotIn("$", query)
                 found = wait_until(lambda q=query: ask(q), f"{panel['title']}: {query} has values")

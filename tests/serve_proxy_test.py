@@ -116,13 +116,14 @@ class Proxy(ServeCase):
             begin = time.time()
             lines = iter(connection.getresponse().readline, b"")
             state = json.loads(next(line for line in lines if b'"encoders"' in line)[6:])
-            # Limit in seconds. A proxy that buffers the stream of events would exceed it.
+            # At most this many seconds may pass until the first state arrives; a proxy that buffers the event stream
+            # takes longer.
             self.assertLess(abs(state["at_ms"] / 1000 - begin), 1 + BUSY)
         own = {**GOOD, "Origin": f"https://{SITE}", "Sec-Fetch-Site": "same-origin"}
         self.assertEqual(self.zero({**own, "Authorization": "Bearer " + "x" * 20})[0], 401)
         for evil in ({"Origin": "https://evil.example"}, {"Origin": f"http://{SITE}.evil.example"}, {"Sec-Fetch-Site": "cross-site"}):
             self.assertEqual(self.zero({**own, **evil})[0], 403, evil)
-        # The history must not contain an address that the client itself claims in a header.
+        # An IP address that the client itself states in a header must not be in the history.
         status, body = self.zero({**own, "X-Forwarded-For": "203.0.113.9"})
         self.assertEqual(status, 200, body)
         events = json.loads(self.ask("/api/events", headers=GOOD)[1])["events"]
@@ -141,7 +142,7 @@ class Proxy(ServeCase):
         self.assert_page_and_commands_work("caddy", False)
 
     def test_page_in_browser(self):
-        port = free_port()  # port of the public URL, which is a part of the browser's Origin header
+        port = free_port()  # port in the public URL; the browser sends it as part of the header Origin
         served = self.server(NAME, "--history", "none", "--token-file", self.tokens(), "--public-url", f"https://{SITE}:{port}")
         with unittest.mock.patch(f"{__name__}.free_port", return_value=port):
             self.start("nginx", False, served)

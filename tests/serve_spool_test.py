@@ -12,7 +12,7 @@ from command_support import absenc, end
 from mqtt_support import ONE, MqttCase, free_port, numbers, twice, waiting_in
 from serve_support import wait_until
 
-# Command that mounts a small file system, which only this process and its children see.
+# Command that mounts a small file system, visible only to the started program and its children.
 ON_DISK = ("unshare", "-Urm", "sh", "-c", 'mount -t tmpfs -o size=3m none "$0" && exec "$@"')
 
 
@@ -58,7 +58,7 @@ class FullDisk(SpoolCase):
         seen = f"/proc/{server.process.pid}/root{disk}"
         with open(f"{seen}/others", "wb", buffering=0) as others, self.assertRaises(OSError):
             while True:
-                others.write(bytes(65536))  # the disk is filled by another program
+                others.write(bytes(65536))  # the test fills the disk, as another program would
         wait_until(lambda: "No space left" in self.mqtt(server)["trouble"], "it says that the disk is full")
         self.assertEqual(server.json("/healthz")["mqtt"], "failing")
         self.assertFalse(server.json("/healthz")["ok"])
@@ -139,7 +139,7 @@ class Damage(SpoolCase):
         wait_until(lambda: os.path.exists(self.spool()), "it is made anew")
         wait_until(lambda: self.taken(server) > goal + 50, "it goes on")
         end(server.process, signal.SIGKILL)
-        # Messages of events may precede those of readings; they have no key `first`.
+        # Messages of events, which have no key `first`, may stand before the messages of readings.
         first = next(one["first"] for one in waiting_in(self.spool()) if "first" in one)
         self.assertEqual(first, 1, "what the open file had was written again")
 

@@ -243,7 +243,7 @@ class EncoderValues(ServeCase):
 class ApiDescription(ServeCase):
     """Tests that openapi.json describes every route, and that replies of the server match it."""
     NAME = "sim:tformat?motion=rpm=60&alarm=over_heat&fault=corrupt=0.1&seed=1"
-    # Values for the parameters that a route requires.
+    # Values of the parameters that a route of the API requires.
     VALUES = {"/api/encoders/{encoder}/command": {"command": "position"},
               "/api/encoders/{encoder}/acknowledge": {"alarm": "over_heat"}}
 
@@ -289,7 +289,7 @@ class ApiDescription(ServeCase):
 
     def check(self, server, method, path, values, kind, schema):
         if kind == "text/event-stream":
-            # Events other than "state" may come first in the stream.
+            # The first event of the stream may be another than "state".
             data = self.stream(server).until(lambda event, _: event == "state")
             self.assertTrue(data["encoders"])
             return
@@ -381,7 +381,7 @@ class PortInUse(ServeCase):
             self.assertEqual(json.loads(printed)["encoders"][0]["encoder"], f"tformat:{emulator.path}")
             folder = os.path.join(self.directory, "absenc")
             (notice,) = os.listdir(folder)
-            # A notice that names another process does not identify the holder of the port.
+            # A file of a server that names another process than the holder of the port must be ignored.
             with open(os.path.join(folder, notice), "w", encoding="utf-8") as file:
                 file.write("1 http://127.0.0.1:1/\n")
             refused = absenc("read", f"tformat:{emulator.path}").stderr
@@ -528,7 +528,8 @@ class AccessRights(ServeCase):
         good = {"Authorization": f"Bearer {TOKEN}"}
         status, body = server.command(self.name, "memory-read", good, argument=["5"])
         self.assertEqual(status, 200, body)
-        self.assertNotIn("change", body)  # the reply has no key "change", because memory-read changes nothing
+        # the reply of the command has no key "change", because memory-read changes nothing
+        self.assertNotIn("change", body)
         status, body = server.command(self.name, "memory-write", good, argument=["5", "66"])
         self.assertEqual((status, body["change"]), (200, "confirmed"))
         for command, argument in (("zerro", []), ("memory-read", ["x"]), ("memory-read", ["5", "6", "7", "8", "9"])):
@@ -539,7 +540,7 @@ class AccessRights(ServeCase):
     def test_removed_token_is_refused(self):
         path = self.tokens()
         server = self.without_history(self.name, "--token-file", path)
-        good = {"Authorization": f"bearer {TOKEN}"}  # letter case of the authorization scheme's name is ignored
+        good = {"Authorization": f"bearer {TOKEN}"}  # the authorization scheme may be written in upper or lower case
         self.assertEqual(self.command(server, good)[0], 200)
         with open(path, "w", encoding="utf-8") as file:
             file.write("berta another-secret-of-hers\n")
@@ -560,7 +561,7 @@ class AccessRights(ServeCase):
         self.assertEqual([self.command(server, wrong)[0] for _ in range(13)], [401] * 10 + [429] * 3)
         self.assertEqual(self.command(server, {"Authorization": f"Bearer {TOKEN}"})[0], 200)
         self.assertIn("absenc_wrong_tokens_total{} 13\n", server.ask("/metrics")[1])
-        # The limit counts the wrong tokens of an address at all paths together.
+        # Wrong tokens of one IP address are counted together for all paths.
         self.assertEqual(server.ask("/api/token", headers=wrong)[0], 429)
         self.assertIn("absenc_wrong_tokens_total{} 14\n", server.ask("/metrics")[1])
 
@@ -768,7 +769,8 @@ class EncoderAccess(ServeCase):
         answers = []
 
         def ask():
-            with contextlib.suppress(OSError, ValueError):  # the connection fails if the server ends before it replies
+            # the connection is lost if the server ends before it replies
+            with contextlib.suppress(OSError, ValueError):
                 answers.append(self.post(server, name))
         client = threading.Thread(target=ask)
         client.start()

@@ -22,7 +22,8 @@ using Kind = Event<Byte>::Kind;
 struct RequestReply : testing::Test {
   sim::Line<Byte> line{LinkKind::half_duplex, {.rate = 2'500'000}};
   std::vector<Byte> answer{0x1A, 0x00, 0x55};
-  std::string expected_counts;  // the number of missing bytes after each event of the host, one digit each
+  // number of bytes of the reply that are still missing after each event of the host, one digit each
+  std::string expected_counts;
   std::size_t missing = 3;
   ByteToy device{[this](ByteToy& self, const Event<Byte>& event) {
     if (event.kind == Kind::received) self.send(answer, event.at + microseconds(3));
@@ -40,7 +41,7 @@ struct RequestReply : testing::Test {
     host.idle.gap = microseconds(6);
     host.send({0x1A});
     EXPECT_TRUE(line.run(line.attach(NodeRole::host, host)));
-    line.run_until(line.now());  // runs the device's `sent` event, which is due at the same time
+    line.run_until(line.now());  // processes the event `sent` of the device, which has the same time as the end
   }
 };
 
@@ -63,7 +64,7 @@ TEST_F(RequestReply, ReportsSilenceWhenReplyStops) {
 }
 
 TEST_F(RequestReply, WaitsForCharacterThatHasBegun) {
-  host.idle.at = microseconds(9);  // the timer fires while a character is being received
+  host.idle.at = microseconds(9);  // the timer expires while a character is being received
   line.attach(NodeRole::device, device);
   host.idle.answer = microseconds(4);
   host.send({0x1A});
@@ -122,7 +123,7 @@ class SpiDevice final : public Machine<Byte> {
  private:
   void receive_byte(Byte request) {
     if (register_byte_ == 0x88) {
-      register_byte_ = static_cast<Byte>(address_ + 0x40);  // value of the requested register
+      register_byte_ = static_cast<Byte>(address_ + 0x40);  // the value that the register at this address has
     } else if (previous_ == 0xCD) {
       address_ = request;
       register_byte_ = 0x88;  // code for "read ready"
@@ -181,7 +182,7 @@ TEST(Spi, ReadsRegisterWithinPositionFrames) {
   std::string results;
   line.attach(NodeRole::device, device);
   const auto node = line.attach(NodeRole::host, host, [&] {
-    if (host.position == 50) host.read_register(0x4C);  // requests a register while the stream continues
+    if (host.position == 50) host.read_register(0x4C);  // requests a register, while the stream of positions continues
     results += std::to_string(line.now().count()) + (host.good ? " good " : " bad ") + std::to_string(host.position) +
                ' ' + std::to_string(host.value) + '\n';
     return host.value < 0;
@@ -197,7 +198,8 @@ struct Clocked : testing::Test {
   sim::Line<Byte> line{LinkKind::clocked, {.rate = 250'000}};
   std::string notes;
   ByteToy device{[this](ByteToy& self, const Event<Byte>& event) {
-    if (event.kind == Kind::selected) self.send({0x91, 0xA4, 0x8D, 0x3F});  // the word of 13 bits twice, then ones
+    // the device sends the word of 13 bits twice, then ones
+    if (event.kind == Kind::selected) self.send({0x91, 0xA4, 0x8D, 0x3F});
     if (event.kind == Kind::sent && event.bits < 13) notes += "too few clocks: " + std::to_string(event.bits);
   }};
   ByteToy host{[](ByteToy& self, const Event<Byte>& event) {
@@ -233,7 +235,7 @@ TEST_F(Clocked, ReportsTooFewClocksToDevice) {
 struct Can : testing::Test {
   sim::Line<CanFrame> line{LinkKind::can, {.rate = 250'000}};
   static CanFrame frame(std::uint32_t id, Byte data) { return {.id = id, .size = 1, .data = {data}}; }
-  // Node that starts on command 01 and then sends a frame every millisecond.
+  // A node that receives the command 01 and then sends a frame every millisecond.
   static CanToy::React cyclic(std::uint32_t id, Byte data) {
     return [=, at = Time{}](CanToy& self, const Event<CanFrame>& event) mutable {
       if (event.kind == CanToy::Kind::received && event.items[0].data[0] == 0x01) {

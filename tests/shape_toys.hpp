@@ -26,7 +26,7 @@ inline std::string text_of(const CanFrame& frame) {
   return text;
 }
 
-// A machine that reacts to each event by a function, logs it, and runs queued steps.
+// A machine that logs each event, calls a function with it, and returns the steps that the function has queued.
 template <class Item>
 class Toy final : public Machine<Item> {
  public:
@@ -60,7 +60,7 @@ class Toy final : public Machine<Item> {
   void emit() { push({.kind = Step<Item>::Kind::emit}); }
   void finish() { push({.kind = Step<Item>::Kind::done}); }
 
-  Step<Item> idle{};  // the step that the machine returns while its queue is empty
+  Step<Item> idle{};  // the step that the machine returns while no step is queued
   std::string log;
 
  private:

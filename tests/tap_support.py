@@ -28,7 +28,7 @@ class Relay:
             os.set_blocking(master, False)
         self.encoder = os.open(encoder_path, os.O_RDWR | os.O_NOCTTY)
         tty.setraw(self.encoder)
-        self.from_tap = bytearray()  # bytes sent by tap to the line; must stay empty
+        self.from_tap = bytearray()  # bytes that tap has sent to the line; there must be none
         self.wake, self.waker = os.pipe()
         self.thread = threading.Thread(target=self.run)
 
@@ -45,7 +45,8 @@ class Relay:
                 return
             if self.tap in ready:
                 self.from_tap += os.read(self.tap, 4096)
-            # The encoder is served first: the host may have sent bytes after its reply.
+            # The encoder's bytes are copied first: if both sides have sent, the host's bytes may be the request after
+            # this reply.
             for here, there in ((self.encoder, self.host), (self.host, self.encoder)):
                 if here in ready:
                     data = self.change(os.read(here, 4096), here == self.host)

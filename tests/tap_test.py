@@ -17,7 +17,7 @@ ALL = "--all" in sys.argv
 COUNT = 10_000 if ALL else 150
 
 
-# For each tested unit: options of the emulator, options of the host, number of readings.
+# Tested units, each with options of the emulator, options of the host, and the number of readings.
 UNITS = {
     "tformat": ([], "latency=1000", COUNT), "esl": ([], "latency=1000", COUNT), "e201": ([], "latency=1000", COUNT),
     "raa38": (["--option", "mode=bus"], "latency=1000&mode=bus", COUNT),
@@ -49,7 +49,8 @@ class EveryExchange(TapCase):
         # On a busy machine a reply may arrive after the host's timeout.
         repeated = [line for line in lines if line["kind"] == "request" and line.get("error") == "timeout"]
         exchanges = [line for line in lines if line["kind"] == "exchange"]
-        # tap shows a reply without its request if it comes after half a second (docs/tap.md).
+        # A reply that arrives more than half a second after its request is shown by tap without the request
+        # (docs/tap.md).
         late = [line for before, line in zip(lines, lines[1:])
                 if line["kind"] == "reply" and before in repeated and line["time_s"] - before["time_s"] >= 0.5]
         self.assertEqual([line for line in lines

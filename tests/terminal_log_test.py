@@ -15,7 +15,7 @@ def text_of(data):
     return "".join(chr(byte) if 0x20 <= byte < 0x7F else "." for byte in data)
 
 
-# Functions that format a line of a log from number, port, direction and bytes.
+# Functions that format a line of a terminal program's log from line number, port, direction and bytes.
 STYLES = {
     "port": lambda n, port, rx, data: f"{port}: {plain(data)}",
     "brackets": lambda n, port, rx, data: f"[17:55:{n:02}.125] [{port}] {'RX' if rx else 'TX'}: {plain(data)}",
@@ -60,7 +60,8 @@ class Logs(Case):
                     result = self.decode(protocol, self.log(style, exchanges))
                     found = json_lines(result.stdout)
                     self.assertEqual([one for one in found if one["ok"] is False and one["error"] != "sequence_mismatch"], [],
-                                     # The vectors are no real conversation: their sequence counters do not advance.
+                                     # The sequence counters of test vectors do not advance, so sequence errors are
+                                     # not counted.
                                      result.stderr)
                     self.assertEqual([(one["request"], one["reply"]) for one in found],
                                      [(request.hex(), reply.hex()) for request, reply in exchanges])

@@ -7,7 +7,7 @@ import unittest
 
 from command_support import Case, absenc, json_lines
 
-# Requests of T-format with their replies; the digit is the data ID.
+# Requests of T-format, each with its reply; the digit in the name is the data ID.
 CLEAR_3 = "1A 1A 00 45 23 01 11 34 12 00 00 4A"
 CLEAR_0 = "02 02 00 CD AB 01 65"
 ALARM_0 = "02 02 20 CD AB 01 45"
@@ -24,7 +24,7 @@ class EveryUnit(Case):
             alarms = next((names for name, names in flags.items() if name.endswith("alarms")), [])
             for alarm in filter(None, alarms):
                 refused = absenc("read", f"sim:{about['protocol']}?alarm={alarm}")
-                # An error "nothing in what ..." means that a word of the unit cannot carry the alarm.
+                # The error "nothing in what ..." means that the frame of this unit has no bit for the alarm.
                 if "nothing in what" not in refused.stderr:
                     yield about, alarm
 
@@ -54,7 +54,7 @@ class EveryUnit(Case):
                     file = self.file("wave.vcd")
                     wave = absenc("wave", f"{about['protocol']}?alarm={alarm}", file, "--force", "--command", command["name"])
                     if wave.returncode == 2:
-                        continue  # `wave` has no waveform of this command
+                        continue  # `wave` cannot write a waveform of this command
                     rows = json_lines(absenc("decode", about["protocol"], file, "--json").stdout)
                     for row in rows:
                         if "alarms" in row:

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests that a reading which claims to continue the previous one has the shaft's motion.
+// Tests the difference between consecutive readings: if a reading continues the previous one, it must have the
+// shaft's motion.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,9 +26,9 @@ struct Case {
   const Unit* unit;
   std::string_view model{};
   Settings encoder_options{};  // options of the virtual encoder
-  Settings host_options{};     // options that the host uses
+  Settings host_options{};     // options with which the host reads
   Take take = Take::newest;
-  unsigned turn_bits = 0;  // number of turn bits that the encoder really counts
+  unsigned turn_bits = 0;  // number of bits in which the encoder counts turns
 };
 
 void PrintTo(const Case& one, std::ostream* out) {
@@ -55,7 +56,7 @@ std::vector<Case> cases() {
     all.push_back(
         {.unit = find_unit(unit), .encoder_options = encoder_options, .host_options = host_options, .take = take});
   };
-  // The identity of these EncoLink encoders says that they count no turns.
+  // These EncoLink encoders count no turns; the host learns it from their identity.
   for (const std::string_view unit : {"encolink", "encolink-spi"})
     add(unit, {{"multiturn_bits", "0"}}, {}, Take::newest);
   for (const Take take : {Take::newest, Take::every}) {
@@ -68,7 +69,7 @@ std::vector<Case> cases() {
   return all;
 }
 
-/// A shaft that turns steadily after 1 ms, because some encoders must be switched on at rest.
+/// A shaft that begins to turn after 1 ms, at a steady speed: some encoders must be switched on at rest.
 struct SpinningShaft final : Shaft {
   explicit SpinningShaft(double speed) : rpm(speed) {}
   [[nodiscard]] ShaftState at(Time time) const override {
@@ -100,7 +101,7 @@ class TurningEncoder {
 
   void pause(Time time) { port_->line().run_until(port_->line().now() + time); }
 
-  /// Reads the position once, and returns how the unwrapper joined it to the previous one.
+  /// Reads the position once. Returns how the unwrapper has joined the reading to the previous one.
   Joined read() {
     const Conversation<Item>* conversation = session_->read(*find_command(*case_.unit, Verb::read), case_.take);
     EXPECT_EQ(text_of(conversation->error()).name, "none") << conversation->detail();
@@ -152,7 +153,7 @@ class Turns : public ::testing::TestWithParam<Case> {
         for (int i = 0; i < 3; ++i) bench.read();
         bench.pause(pause);
         const Joined joined = bench.read();
-        // A count of turns keeps the position known across the pause.
+        // An encoder that counts turns has a known position after the pause, too.
         const bool counts = GetParam().turn_bits > 0;
         if (counts) {
           EXPECT_EQ(joined, Joined::continued);

@@ -13,7 +13,7 @@ from cpp_source import Source
 
 SOURCE = Path(os.environ.get("ABSENC_SOURCE_DIR", Path(__file__).resolve().parent.parent))
 
-# Type names that several types share on purpose, each with the common meaning.
+# Names that several types may share, each with the meaning common to these types.
 SHARED = {
     "Bits": "the bits of a BiSS word with its check",
     "Candidate": "a guess that is to be tested further",
@@ -74,7 +74,7 @@ SHARED = {
     "value_type": "a name that C++ prescribes",
 }
 
-# Type names that still have several meanings; add no name.
+# Names that several types share without a common meaning. Add no name to this list.
 AMBIGUOUS = set("""
     Access Answer Ask BadRequest Burst Bus Carries Channel Check Condition Content Damage Descriptor Encoder Errors
     Finding Frames Known Layout Meaning Mode Open Order Part Place Rate Refusal Report Reported Run
@@ -82,7 +82,7 @@ AMBIGUOUS = set("""
 """.split())
 
 KEYS = ("struct", "class", "union", "enum")
-# Tokens after `struct NAME` that show that it has no body.
+# Tokens that, behind `struct NAME`, show that no body follows.
 NO_BODY = set(";(),>=&*")
 
 
@@ -93,16 +93,16 @@ def is_test(path):
 def type_name(source, index):
     """Returns (type name, index of its body) of the definition at `index`, or None."""
     i = index + 1
-    while source[i] in ("class", "struct"):  # second keyword of `enum class`
+    while source[i] in ("class", "struct"):  # the second keyword of `enum class`
         i += 1
-    while source[i] == "[":  # an attribute such as [[nodiscard]]
+    while source[i] == "[":  # skips an attribute such as [[nodiscard]]
         i = source.partner[i] + 1
     name = []
     while source.tokens[i : i + 1] and (source.tokens[i].kind == "word" or source[i] == "::"):
         if source[i] != "final":
             name.append(source[i])
         i += 1
-    if source[i] == "<":  # a template specialisation: its primary template is defined elsewhere
+    if source[i] == "<":  # a template specialisation is no definition of a new name
         return None
     while i < len(source.tokens) and source[i] != "{":
         if source[i] in NO_BODY:
@@ -150,7 +150,7 @@ def types_between(source, first, last, scope):
             end = source.right(i, {";"})
             yield (f"{scope}::{source[i + 1]}" if scope else source[i + 1]), source.span(i + 3, end)
             i = end + 1
-        elif word == "{":  # body of a function, or a braced value
+        elif word == "{":  # skips the body of a function, or a braced value
             i = source.partner.get(i, i) + 1
         else:
             i += 1

@@ -48,7 +48,7 @@ OwnedFrame as_frame(const Unit& unit, Bytes bytes) {
   return frame;
 }
 
-// With an error no field may be reported; a good frame must report at least one.
+// Decodes the input as request and reply. A frame with an error must report no field, a good frame at least one.
 void decode(const Unit& unit, const Options& options, Bytes input) {
   for (std::size_t split = 0; split <= input.size() && split <= 16; ++split) {
     const OwnedFrame request = as_frame(unit, input.first(split));
@@ -77,7 +77,7 @@ void probe(const Unit& unit, Options options, Bytes input) {
   (void)unit.probe(options, captures, nowhere);
 }
 
-/// Returns the input as items of the unit's link: bytes or CAN frames.
+/// Returns the input as items of the unit's link, which are bytes or CAN frames.
 template <class Item>
 std::vector<Item> items_of(const Unit& unit, Bytes bytes) {
   if constexpr (std::is_same_v<Item, CanFrame>) {
@@ -91,7 +91,7 @@ std::vector<Item> items_of(const Unit& unit, Bytes bytes) {
   }
 }
 
-// Runs a conversation in which each reply is the input, in pieces of `piece` items.
+// Runs a conversation. The reply to each request is the whole input, in pieces of `piece` items.
 template <class Item>
 void converse(const Unit& unit, const Options& options, const Command& command, Bytes input, std::size_t piece) {
   using Kind = typename Event<Item>::Kind;
@@ -163,14 +163,14 @@ void ask_device(const Unit& unit, const Options& options, Bytes input) {
       require(!step.out.empty());
       now = std::max(now, step.at);
       device->feed({.kind = Kind::sent, .at = now});
-      if (streams) break;  // a streaming encoder sends without end, so the loop ends here
+      if (streams) break;  // an encoder that sends unsolicited frames never stops, so the loop ends here
     }
   }
 }
 
 template <class Item>
 void run(const Unit& unit, const Options& options, const Command& command, Bytes input) {
-  // A scan sends hundreds of requests, so each of its replies is cut to eight bytes.
+  // A scan sends hundreds of requests, so only eight bytes of the input are used as each reply.
   const Bytes reply = input.first(std::min<std::size_t>(input.size(), command.verb == Verb::scan ? 8 : input.size()));
   converse<Item>(unit, options, command, reply, 1);
   converse<Item>(unit, options, command, reply, reply.size() + 1);

@@ -12,8 +12,8 @@ namespace absenc::os {
 
 using Addresses = std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)>;
 
-/// Returns the addresses of `host`: a name or an address, also in brackets. Throws Failure `not_found`, in whose text
-/// `before` and `behind` surround the host.
+/// Returns the addresses of `host`: a name or an address, also in brackets. Throws Failure `not_found`, whose text
+/// begins with `before`, the host and `behind`.
 [[nodiscard]] Addresses look_up(const std::string& host, std::uint16_t port, int socket_type, int flags,
                                 const std::string& before, const std::string& behind = {});
 

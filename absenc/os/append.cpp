@@ -24,7 +24,7 @@ bool ends_within_a_line(int file) {
 }  // namespace
 
 int append_line(const std::string& path, std::string_view line) {
-  std::error_code ignored;  // an error is ignored here: opening the file reports a missing folder
+  std::error_code ignored;  // no error is reported here: if the folder is missing, opening the file fails
   std::filesystem::create_directories(std::filesystem::path(path).parent_path(), ignored);
   const Descriptor file(::open(path.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC | O_NONBLOCK, 0600));
   if (!file) return errno;

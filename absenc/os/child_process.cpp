@@ -46,7 +46,8 @@ struct SpawnSteps {
     }
     ::posix_spawn_file_actions_adddup2(&files, channel, channel_of_child);
     ::posix_spawn_file_actions_addclosefrom_np(&files, channel_of_child + 1);
-    // Ctrl-C in a terminal signals parent and child at once, but the parent still needs the child.
+    // The child blocks these signals: Ctrl-C in a terminal signals parent and child at once, but the parent still
+    // needs the child.
     sigset_t blocked;
     ::sigemptyset(&blocked);
     for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE}) ::sigaddset(&blocked, signal);
@@ -97,7 +98,7 @@ bool Channel::send(std::string& bytes) const {
 }
 
 bool Channel::receive(std::string& bytes) const {
-  std::array<char, 65536> piece;  // not initialised, because only received bytes are read from it
+  std::array<char, 65536> piece;  // the array is not initialised, because only received bytes are read from it
   for (;;) {
     const ssize_t size = ::recv(end_.get(), piece.data(), piece.size(), MSG_DONTWAIT);
     if (size < 0 && errno == EINTR) continue;
@@ -141,11 +142,11 @@ std::string ChildProcess::end(Time longest) {
 }
 
 Channel become_child(const char* name, std::size_t bytes) {
-  // If the parent ended before this call, its end of the channel is closed: the child notices.
+  // If the parent ended before prctl(2), the child notices by the closed channel.
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   ::prctl(PR_SET_NAME, name);
   ::fcntl(channel_of_child, F_SETFD, FD_CLOEXEC);
-  limit(RLIMIT_CORE, 1);  // 0 would still start a program that collects core files; 1 does not (core(5))
+  limit(RLIMIT_CORE, 1);  // a core size of 0 would still start a program that collects core files; 1 does not (core(5))
   limit(RLIMIT_DATA, data_bytes() + bytes);
   return Channel(Descriptor(channel_of_child));
 }

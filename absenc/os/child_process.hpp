@@ -18,19 +18,20 @@ class Channel {
   explicit Channel(Descriptor end) : end_(std::move(end)) {}
 
   [[nodiscard]] int get() const { return end_.get(); }
-  /// Sends as many of `bytes` as there is room for and removes them. Returns false on an error.
+  /// Sends as many of `bytes` as the channel has room for, and removes the sent ones from `bytes`. Returns false on
+  /// an error.
   [[nodiscard]] bool send(std::string& bytes) const;
-  /// Appends received bytes to `bytes`. Returns false at their end or on an error.
+  /// Appends received bytes to `bytes`. Returns false if the other process has closed the channel, or on an error.
   [[nodiscard]] bool receive(std::string& bytes) const;
 
  private:
   Descriptor end_;
 };
 
-/// A second process that runs this program. It inherits no file, port or socket but its end of the channel.
+/// A second process that runs this program. Of the parent's open files it inherits only its end of the channel.
 class ChildProcess {
  public:
-  /// Starts the process with `arguments` for its `main`. Throws Failure.
+  /// Starts the process; its `main` gets `arguments`. Throws Failure.
   explicit ChildProcess(std::vector<std::string> arguments);
   /// Kills the process if it still runs.
   ~ChildProcess();
@@ -39,8 +40,8 @@ class ChildProcess {
 
   [[nodiscard]] const Channel& channel() const { return channel_; }
   [[nodiscard]] pid_t number() const { return number_; }
-  /// Waits up to `longest` for the process to end, then kills it. Returns its failure, for example "with status 1", or
-  /// "".
+  /// Waits up to `longest` for the process to end, then kills it. Returns how the process failed, for example "with
+  /// status 1"; "" if it succeeded.
   std::string end(Time longest);
 
  private:
@@ -48,8 +49,8 @@ class ChildProcess {
   pid_t number_ = -1;
 };
 
-/// Returns the child's end of the channel; the child must call this first. `name`: its name in process lists. `bytes`:
-/// about how much more memory it can allocate.
+/// Returns the child's end of the channel; the child must call this first. `name`: name of the child in process
+/// lists. `bytes`: about how much more memory the child can allocate.
 [[nodiscard]] Channel become_child(const char* name, std::size_t bytes);
 
 }  // namespace absenc::os

@@ -19,7 +19,7 @@ using namespace std::chrono_literals;
 constexpr Time wakeup_interval = 1ms;
 // Time between two bytes: the kernel's worker threads must have slept before each of them.
 constexpr Time byte_interval = 5ms;
-// More terminals see a delay sooner: the worker threads are late independently.
+// More pseudo-terminals see a delay sooner: the kernel's worker threads are late independently of each other.
 constexpr std::size_t loop_count = 4;
 
 }  // namespace
@@ -50,7 +50,6 @@ void DelayWatch::watch(const std::stop_token& stop) {
   }
 }
 
-// Receives the byte that is on its way, or sends the next one if it is due.
 void DelayWatch::exchange(ByteLoop& loop) {
   char byte = 'x';
   const Time time = now();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures how late this computer is: a reply that is no later may be punctual.
+// Measures this computer's own delays: a reply that seems late by no more than these may have been punctual on the
+// line.
 #pragma once
 
 #include <atomic>
@@ -14,18 +15,18 @@ namespace absenc::os {
 /// A thread that measures this computer's own delays as long as the object exists.
 class DelayWatch {
  public:
-  /// `terminals`: whether to measure pseudo-terminals, too, as far as they can be opened.
+  /// `terminals`: whether to measure the delays of pseudo-terminals, too, as far as they can be opened.
   explicit DelayWatch(bool terminals);
 
-  /// Returns the longest delay that was measured so far.
+  /// Returns the longest delay measured so far.
   [[nodiscard]] Time latest() const { return Time(latest_.load()); }
 
  private:
   /// A pseudo-terminal through which one byte at a time is sent, from its master to its slave.
   struct ByteLoop {
     TerminalPair terminal{};
-    Time due{};      // when the next byte is sent, if none is on its way
-    Time sent_at{};  // when the byte that is on its way was sent
+    Time due{};      // when the next byte is to be sent, if no byte is between master and slave
+    Time sent_at{};  // when the byte between master and slave was sent
     bool is_out = false;
   };
 

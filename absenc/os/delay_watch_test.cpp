@@ -26,14 +26,15 @@ int measured_while_stopped(bool terminals) {
   const pid_t child = ::fork();
   if (child == 0) {
     const DelayWatch watch(terminals);
-    while (watch.latest() == Time{}) sleep_until(now() + 1ms);  // until its thread runs
+    while (watch.latest() == Time{}) sleep_until(now() + 1ms);  // waits until the thread of the DelayWatch runs
     ::raise(SIGSTOP);
     for (const Time end = now() + 10s; watch.latest() < 50ms && now() < end;) sleep_until(now() + 1ms);
     ::_exit(watch.latest() < 50ms ? 1 : 0);
   }
   int status = 0;
   ::waitpid(child, &status, WUNTRACED);
-  sleep_until(now() + 60ms);  // the delay itself: the watch began its sleep of 1 ms before the process stopped
+  // 60 ms instead of 50: the DelayWatch may have begun a sleep of 1 ms before the process stopped
+  sleep_until(now() + 60ms);
   ::kill(child, SIGCONT);
   ::waitpid(child, &status, 0);
   return WIFEXITED(status) ? WEXITSTATUS(status) : 1;
@@ -55,7 +56,8 @@ std::set<std::string> open_slaves() {
   return paths;
 }
 
-/// Takes a byte away from one of the terminals, so that the watch waits for this byte for ever.
+/// Reads the byte that the DelayWatch sent through one of its pseudo-terminals, so that the DelayWatch waits for this
+/// byte for ever.
 TEST(DelayWatch, ByteThatDoesNotArriveIsLate) {
   const std::set<std::string> before = open_slaves();
   const DelayWatch watch(true);

@@ -61,7 +61,8 @@ Descriptor bind_name_of(const fs::path& link) {
 EmulatorPort::EmulatorPort(std::string link, std::optional<std::uint16_t> tcp_port) {
   set_latency(2ms);
   set_idle_latency(200us);
-  // The write wakes the host, which often answers before this program continues.
+  // The time of a sent reply counts from before write(2), which wakes the host: the next request often arrives before
+  // this program continues.
   set_read_at_once(true);
   open_terminal();
   if (tcp_port) listen_on(*tcp_port);
@@ -127,7 +128,8 @@ void EmulatorPort::make_link() {
 }
 
 std::size_t EmulatorPort::read_some(MutableBytes into, std::span<const int> ready) {
-  // Handled first, so that the reply to a request that is read below is not discarded.
+  // This call discards unread bytes, so it comes before requests are read: the replies to these must not be
+  // discarded.
   if (std::find(ready.begin(), ready.end(), watch_.get()) != ready.end()) users_changed();
   std::size_t filled = 0;
   for (const int descriptor : ready) {
@@ -180,7 +182,7 @@ void EmulatorPort::accept_client() {
   clients_.push_back(std::move(client));
 }
 
-// An exclusive mode (TIOCEXCL) that the last program left would lock out the next one.
+// Ends an exclusive mode (TIOCEXCL) that the last program left: it would lock out the next program.
 void EmulatorPort::users_changed() {
   std::array<std::byte, 4096> events;
   while (::read(watch_.get(), events.data(), events.size()) > 0) {

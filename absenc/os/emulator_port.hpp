@@ -17,8 +17,8 @@ namespace absenc::os {
 /// A pseudo-terminal and TCP clients as one line of a device.
 class EmulatorPort final : public StreamPort {
  public:
-  /// `link`: path of a symbolic link to the pseudo-terminal; empty: none. `tcp_port`: port to listen on at 127.0.0.1, 0
-  /// for any free one; empty: none. Throws Failure.
+  /// `link`: path of a symbolic link to create to the pseudo-terminal; empty: no link. `tcp_port`: port to listen on
+  /// at 127.0.0.1, 0 for any free port; empty: no TCP. Throws Failure.
   explicit EmulatorPort(std::string link = {}, std::optional<std::uint16_t> tcp_port = {});
   ~EmulatorPort() override;
 
@@ -26,7 +26,7 @@ class EmulatorPort final : public StreamPort {
   [[nodiscard]] const std::string& path() const { return link_.empty() ? terminal_.path : link_; }
   /// Returns the TCP port, or 0 when the port does not listen.
   [[nodiscard]] std::uint16_t tcp_port() const { return tcp_port_; }
-  /// Returns the number of bytes that a terminal or a TCP client did not take.
+  /// Returns the number of bytes of the device that a terminal or a TCP client did not accept in time.
   [[nodiscard]] std::uint64_t dropped() const { return dropped_; }
 
  private:
@@ -45,7 +45,7 @@ class EmulatorPort final : public StreamPort {
   void drop_client(int descriptor);
   void write_terminal(Bytes bytes);
 
-  TerminalPair terminal_;     // the slave is kept open: the master fails while no program has it open
+  TerminalPair terminal_;     // the slave stays open: reading the master fails while no program has the slave open
   Descriptor in_use_marker_;  // socket whose name marks the link as in use; empty without a link or after an error
   Descriptor watch_;          // inotify descriptor: reports programs that open or close the slave
   Descriptor listener_;
@@ -53,11 +53,11 @@ class EmulatorPort final : public StreamPort {
   std::string link_;
   std::uint16_t tcp_port_ = 0;
   RunDelay delay_;
-  Time delay_read_at_{};  // time at which `delay_` was last read
+  Time delay_read_at_{};
   Time lateness_{};
   Time lateness_until_{};
   std::uint64_t dropped_ = 0;
-  std::uint32_t device_rate_ = 0;  // bit rate that the device has set; 0: none
+  std::uint32_t device_rate_ = 0;  // bit rate that the device has set; 0: it has set none
 };
 
 }  // namespace absenc::os

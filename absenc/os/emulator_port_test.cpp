@@ -51,7 +51,7 @@ TEST(EmulatorPort, TalksToASerialPort) {
   const Data reply{1, 2, 3};
   device.begin(transfer(reply));
   EXPECT_EQ(receive(host), reply);
-  expect_quiet(device);  // the device receives no echo
+  expect_quiet(device);  // the device must not receive its own reply
   EXPECT_EQ(device.dropped(), 0u);
 }
 
@@ -103,8 +103,9 @@ TEST(EmulatorPort, IsOneLineForAllItsEnds) {
     EXPECT_EQ(receive(first), reply);
     EXPECT_EQ(receive(second), reply);
   }
-  expect_quiet(device);          // the device also notices here that `second` was closed
-  for (int i = 0; i < 2; ++i) {  // twice, because the first write to a closed connection succeeds
+  expect_quiet(device);  // the port also notices here that the TCP client `second` has closed its connection
+  // twice, because the first write to a connection that the other side has closed succeeds
+  for (int i = 0; i < 2; ++i) {
     device.begin(transfer(request));
     EXPECT_EQ(receive(first), request);
   }
@@ -166,11 +167,12 @@ TEST(EmulatorPort, ContinuesWhenAUserLeaves) {
 TEST(EmulatorPort, DiscardsBytesForTheNextUser) {
   EmulatorPort device;
   const Data frame(1000, 0x55);
-  while (device.dropped() == 0) device.begin(transfer(frame));  // no program reads, so bytes are dropped at last
+  // no program reads the terminal, so that the port drops bytes once the terminal is full
+  while (device.dropped() == 0) device.begin(transfer(frame));
   const Time written = now();
-  // Within 200 ms after a reply the port does not discard unread bytes.
+  // The port discards unread bytes of the previous program only if its last reply is at least 200 ms old.
   sleep_until(written + 200ms);
-  // Opens the terminal directly: a SerialPort would discard leftover bytes itself.
+  // The test opens the terminal directly: a SerialPort would discard the unread bytes itself.
   const Descriptor host(::open(device.path().c_str(), O_RDWR | O_NOCTTY));
   put(host.get(), request);
   EXPECT_EQ(receive(device), request);
@@ -195,7 +197,7 @@ TEST(EmulatorPort, IsNotLockedByAUserWhoLeft) {
     ASSERT_EQ(::ioctl(greedy.get(), TIOCEXCL), 0);
   }
   expect_quiet(device);
-  // The test reads the exclusive flag, because root can open the terminal in any case.
+  // The test reads the exclusive flag of the terminal, because root can open an exclusive terminal.
   const Descriptor next(::open(device.path().c_str(), O_RDWR | O_NOCTTY));
   int exclusive = 1;
   ASSERT_EQ(::ioctl(next.get(), TIOCGEXCL, &exclusive), 0);
@@ -228,7 +230,7 @@ TEST(EmulatorPort, IgnoresRatesAndWires) {
 TEST(EmulatorPort, LinksToItself) {
   const TemporaryDirectory directory;
   const fs::path link = directory.path() / "encoder";
-  fs::create_symlink("/dev/pts/999999", link);  // link left by an emulator that was killed
+  fs::create_symlink("/dev/pts/999999", link);  // a link left by an emulator that was killed
   {
     EmulatorPort device(link);
     EXPECT_EQ(device.path(), link);
@@ -255,7 +257,7 @@ TEST(EmulatorPort, IsNotReplacedWhileItLives) {
     }
     EXPECT_EQ(fs::read_symlink(link), terminal);
   }
-  // A program that is no emulator has the terminal number of a killed emulator.
+  // The pseudo-terminal number of a killed emulator now belongs to a program that is no emulator.
   const Descriptor other(::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC));
   std::array<char, 64> name{};
   ASSERT_EQ(::grantpt(other.get()), 0);
@@ -264,7 +266,7 @@ TEST(EmulatorPort, IsNotReplacedWhileItLives) {
   fs::create_symlink(name.data(), link);
   const EmulatorPort third(link);
   EXPECT_NE(fs::read_symlink(link), name.data());
-  // An emulator with another link has the terminal number of a killed emulator.
+  // The pseudo-terminal number of a killed emulator now belongs to an emulator with another link.
   const fs::path stale = directory.path() / "stale";
   fs::create_symlink(fs::read_symlink(link), stale);
   const EmulatorPort fourth(stale);

@@ -24,13 +24,14 @@ class Failure : public std::runtime_error {
     system,         ///< any other error of the operating system
   };
 
-  /// State of the CAN bus that caused a failure: `off` (after too many errors), `not_acknowledged`, or `unknown`.
+  /// State of the CAN bus that caused a failure: `off` (bus-off, after too many errors), `not_acknowledged` (no node
+  /// acknowledged a frame), or `unknown`.
   enum class Bus : std::uint8_t { unknown, off, not_acknowledged };
 
-  /// Kind of program that holds a port in use.
+  /// Kind of program that uses a port, so that this program cannot open it.
   enum class Holder : std::uint8_t { unknown, program, absenc, server, modem_manager };
 
-  /// Makes a failure with `sentence` as its text, and the state of the CAN bus if that caused it.
+  /// Makes a failure with `sentence` as its text. `bus`: state of the CAN bus, if that caused the failure.
   Failure(Kind kind, const std::string& sentence, Bus bus = Bus::unknown)
       : std::runtime_error(sentence), kind_(kind), bus_(bus) {}
   /// Makes a failure of kind `in_use`, with the kind of program that holds the port.
@@ -54,7 +55,7 @@ class Failure : public std::runtime_error {
   return {Failure::Kind::system, what + " failed: " + std::generic_category().message(error)};
 }
 
-// Code that catches std::exception and continues must catch the two classes below first.
+// Code that catches std::exception and continues must catch Interrupted and Ended first.
 
 /// Thrown after SIGINT or SIGTERM, once `catch_interrupts` (os/signals.hpp) was called.
 struct Interrupted : std::exception {

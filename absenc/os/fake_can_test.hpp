@@ -86,10 +86,10 @@ class FakeCan final : public CanKernel {
   short flags = IFF_UP;
   std::deque<int> write_errors;
   bool keep_last_error = false;
-  Time age{};  // age of each frame with a stamp: time since the kernel received it
+  Time age{};  // time between the kernel's stamp of a frame and the read of the frame
   bool has_stamps = true;
-  Time lead = std::chrono::hours(500'000);  // lead of the calendar clock over `now`
-  Time clock_step{};                        // change of the calendar clock after the next read
+  Time lead = std::chrono::hours(500'000);  // how far the calendar clock is ahead of os::now
+  Time clock_step{};                        // step by which the calendar clock is set after the next read
   int bound = 0;
   std::map<std::pair<int, int>, std::uint32_t> options;
   std::vector<can_frame> written;

@@ -20,7 +20,7 @@
 
 namespace absenc::os::testing {
 
-/// An SPI controller with one chip select, /dev/spidev0.0. A Spidev answers its messages.
+/// A simulated SPI controller with one chip select, /dev/spidev0.0. Its SPI messages are answered by a Spidev.
 class FakeSpi final : public SpiKernel {
  public:
   static constexpr const char* path = "/dev/spidev0.0";
@@ -38,7 +38,7 @@ class FakeSpi final : public SpiKernel {
     spidev_->settings() = before;
   }
 
-  // Each successful call opens a new file description, as for a device, so that locks work.
+  // Each successful call opens a new file description, as open(2) of a device does, so that locks work.
   int open(const std::string& name) override {
     if (name == path && open_error == 0) return ::open(file_.c_str(), O_RDWR | O_CLOEXEC);
     errno = open_error != 0 ? open_error : ENOENT;
@@ -64,9 +64,9 @@ class FakeSpi final : public SpiKernel {
   [[nodiscard]] SpidevSettings& settings() { return spidev_->settings(); }
   [[nodiscard]] SpiDevice& device() { return *device_; }
 
-  std::map<unsigned long, int> refusals;  // errno with which requests fail; the key is the number of the request
+  std::map<unsigned long, int> refusals;  // errno with which requests of ioctl fail, by request number
   int open_error = 0;
-  std::uint32_t mode_mask = ~0u;  // SPI mode bits outside the mask are accepted without effect
+  std::uint32_t mode_mask = ~0u;  // the controller accepts SPI mode bits outside this mask, but ignores them
   std::uint32_t highest_speed = ~0u;
   int missing = 0;       // number of bytes by which the result of a message is too short
   bool shorted = false;  // whether the data line is shorted to low
@@ -80,7 +80,7 @@ class FakeSpi final : public SpiKernel {
 
   static void* at(const UserMemory& memory) { return reinterpret_cast<void*>(memory.address); }
 
-  // Serves a request as CUSE does: copies the memory that the reply asks for.
+  // Serves a request of ioctl as CUSE does: copies the memory that the SpidevReply asks for.
   int carry(unsigned long request, void* argument) {
     Data in;
     std::vector<UserMemory> out;

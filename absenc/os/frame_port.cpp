@@ -11,7 +11,7 @@ namespace absenc::os {
 using namespace std::chrono_literals;
 
 namespace {
-// If this many events wait to be reported, the next one displaces the oldest.
+// Greatest number of unreported events; at this number a new event displaces the oldest.
 constexpr std::size_t most_pending = 4096;
 }  // namespace
 
@@ -69,7 +69,8 @@ Event<CanFrame> FramePort::wait(const Step<CanFrame>& step) {
     collect(std::min(waiting_.due(), end_));
     const Time time = os::now();
     if (time >= end_) throw Ended{};
-    // Received frames are reported before a silence or timer: this program may look late.
+    // Received frames are reported before a silence or a timer event: if this program was late, they may have arrived
+    // in time.
     if (!pending_events_.empty()) continue;
     if (const std::optional<Event<CanFrame>> event = waiting_.take_due(time)) return *event;
   }

@@ -11,8 +11,8 @@
 
 namespace absenc::os {
 
-/// Base class of the CAN ports in this folder. `now`, `begin` and `wait` throw Failure, Interrupted or Ended. `sent`
-/// has the time before the last frame was handed over.
+/// Base class of the CAN ports in this folder. `now`, `begin` and `wait` throw Failure, Interrupted or Ended. The
+/// event `sent` has the time before the last frame was handed to the kernel or adapter.
 class FramePort : public Port<CanFrame> {
  public:
   FramePort() = default;
@@ -24,11 +24,11 @@ class FramePort : public Port<CanFrame> {
   void begin(const Step<CanFrame>& step) final;
   [[nodiscard]] Event<CanFrame> wait(const Step<CanFrame>& step) final;
 
-  /// Returns the delay between bus and program, which is added to the answer and gap limits.
+  /// Returns the delay between bus and program, which is added to the limits Step::answer and Step::gap.
   [[nodiscard]] Time latency() const { return latency_; }
   void set_latency(Time latency) { latency_ = latency; }
 
-  /// Sets the slack: a transfer due within `slack` is sent at once. Default 0.
+  /// Sets the send slack: a transfer whose time is at most `slack` ahead is sent at once. Default 0.
   void set_send_slack(Time slack) { send_slack_ = slack; }
 
   /// Sets the time at which a wait of the port ends with Ended. Default `never`.
@@ -40,7 +40,8 @@ class FramePort : public Port<CanFrame> {
   virtual void send(const CanFrame& frame) = 0;
   virtual void apply(const LineSettings& settings) = 0;
 
-  /// Queues a received frame with its time, which may have been earlier by up to `late`; 0: not known.
+  /// Queues a received frame with the time `at`; the frame may have arrived earlier by up to `late`, 0: by an unknown
+  /// time.
   void push(const CanFrame& frame, Time at, Time late = {});
   /// Queues a `line_error`: a frame was destroyed on the bus or could not be sent.
   void push_error(Time at, Time late = {});
@@ -79,7 +80,7 @@ class FramePort : public Port<CanFrame> {
     static constexpr std::size_t usual = 512;  // number of events for which memory is reserved at first
 
     std::vector<PendingEvent> events_;
-    std::size_t first_ = 0;  // index of the oldest event; those before it were popped
+    std::size_t first_ = 0;  // index of the oldest event in `events_` that was not reported yet
   };
 
   Event<CanFrame> report_first();

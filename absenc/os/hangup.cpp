@@ -16,7 +16,7 @@ Descriptor catch_hangups() {
   sigset_t hangup;
   sigemptyset(&hangup);
   sigaddset(&hangup, SIGHUP);
-  // New threads inherit the signal mask, so SIGHUP reaches only the descriptor.
+  // SIGHUP is blocked; new threads inherit the signal mask, so the signal reaches only the descriptor.
   if (const int error = ::pthread_sigmask(SIG_BLOCK, &hangup, nullptr)) throw system_failure("pthread_sigmask", error);
   Descriptor descriptor(::signalfd(-1, &hangup, SFD_NONBLOCK | SFD_CLOEXEC));
   if (!descriptor) throw system_failure("signalfd", errno);

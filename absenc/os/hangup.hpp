@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// SIGHUP as a descriptor to wait for: the signal requests a service to read its files again.
+// SIGHUP as a descriptor that a program can wait for: the signal asks a service to read its files again.
 #pragma once
 
 #include "absenc/os/descriptor.hpp"

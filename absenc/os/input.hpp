@@ -10,8 +10,8 @@
 
 namespace absenc::os {
 
-/// Reads standard input as soon as bytes are available. Returns their number; 0 at the end, nothing at `deadline`.
-/// Throws Failure, Interrupted, Ended.
+/// Waits for bytes on standard input and reads them. Returns their number: 0 at the end of the input; nothing if no
+/// byte is available until `deadline`. Throws Failure, Interrupted, Ended.
 [[nodiscard]] std::optional<std::size_t> read_standard_input(MutableBytes into, Time deadline);
 
 }  // namespace absenc::os

@@ -15,7 +15,7 @@ namespace {
 constexpr std::size_t longest_line = 4096;
 }
 
-// With SIGTTIN ignored, a read in the background fails with EIO: it does not stop the program.
+// SIGTTIN is ignored: reading the terminal from the background then fails with EIO instead of stopping the program.
 InputLines::InputLines(int descriptor) : descriptor_(descriptor) {
   if (::isatty(descriptor) == 1) static_cast<void>(::signal(SIGTTIN, SIG_IGN));
 }
@@ -32,7 +32,7 @@ std::vector<std::string> InputLines::take() {
     const char c = read[static_cast<std::size_t>(i)];
     const bool ends = c == '\n';
     if (!ends) begun_ += c;
-    // A line feed behind a line that was cut here begins no other line.
+    // The line feed of a line that was cut at 4096 bytes begins no new line.
     const bool was_cut = std::exchange(cut_, begun_.size() == longest_line);
     if (cut_ || (ends && !was_cut)) lines.push_back(std::exchange(begun_, {}));
   }

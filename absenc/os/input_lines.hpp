@@ -20,7 +20,7 @@ class InputLines {
  private:
   int descriptor_;
   bool ended_ = false;
-  bool cut_ = false;   // whether the last line was cut at its greatest length
+  bool cut_ = false;   // whether the last line was cut at 4096 bytes
   std::string begun_;  // received bytes of a line that is not complete yet
 };
 

@@ -11,12 +11,12 @@
 
 namespace absenc::os {
 
-/// A new file that this process writes.
+/// An output file that this process creates and writes.
 class OutputFile {
  public:
   /// Waits until the content is on the disk, if the file system can do that. Throws Failure.
   void sync();
-  /// Throws Failure if the path no longer leads to this file or the file was cut, once it has its name.
+  /// Throws Failure if the file has its name, but the path no longer leads to it, or another program has cut it.
   void require_there() const;
 
   [[nodiscard]] const std::string& path() const { return path_; }
@@ -25,13 +25,15 @@ class OutputFile {
  protected:
   enum class Appears : std::uint8_t { at_once, later };
 
-  /// Creates the file at `path`; with `later`, BlockFile::appear gives it this name. Throws Failure.
+  /// Creates the file: at once under the name `path`, or nameless until BlockFile::appear gives it this name. Throws
+  /// Failure.
   OutputFile(const std::string& path, Appears appears);
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  /// Writes `bytes` at offset `at`. Returns 0, or a value of errno: a part may then be written.
+  /// Writes `bytes` at offset `at`. Returns 0 or a value of errno; after an error, some of the bytes may have been
+  /// written.
   [[nodiscard]] int put(std::uint64_t at, std::string_view bytes);
 
   std::string path_;
@@ -45,7 +47,7 @@ class OutputFile {
 class LineFile final : public OutputFile {
  public:
   explicit LineFile(const std::string& path) : OutputFile(path, Appears::at_once) {}
-  /// Writes `lines`, all or none if possible. Throws Failure.
+  /// Writes `lines`; if that fails, removes the part that was written, if possible. Throws Failure.
   void append(std::string_view lines);
 };
 

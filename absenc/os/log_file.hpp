@@ -17,7 +17,7 @@ class OwnedFolder {
   /// Creates the folder at `path` if it is missing, but not its parent, and locks it. Throws Failure.
   explicit OwnedFolder(const std::string& path);
 
-  /// Returns whether the path still leads to this folder.
+  /// Returns whether the path of the folder still leads to it.
   [[nodiscard]] bool is_there() const;
 
  private:
@@ -32,12 +32,12 @@ class LogFile {
   /// Creates the file at `path` (`fresh`) or opens it (`existing`). Throws Failure.
   LogFile(const std::string& path, Open how);
 
-  /// Appends `bytes`; on an error removes what was written of them, if possible. Returns 0 or a value of errno.
+  /// Appends `bytes`; on an error removes the part that was written, if possible. Returns 0 or a value of errno.
   [[nodiscard]] int append(std::string_view bytes);
   /// Replaces the existing byte at `offset`. Returns 0 or a value of errno.
   [[nodiscard]] int replace(std::size_t offset, char byte) const;
-  /// Replaces the content by `bytes`, which must not be longer. Returns false on an error; the content may then be a
-  /// mixture.
+  /// Replaces the content of the file by `bytes`, which must not be longer than the content. Returns false on an
+  /// error; the content may then be partly old and partly new.
   [[nodiscard]] bool shrink_to(std::string_view bytes);
   /// Returns up to `size` bytes of the file from `offset`; fewer at its end. Throws Failure.
   [[nodiscard]] std::string read(std::size_t offset, std::size_t size) const;

@@ -39,7 +39,8 @@ Ready wait_for_socket(int socket, bool for_writing, Time longest) {
   pollfd watched{socket, static_cast<short>(for_writing ? POLLIN | POLLOUT : POLLIN), 0};
   const auto wait = static_cast<int>(std::chrono::duration_cast<std::chrono::milliseconds>(longest).count());
   if (::poll(&watched, 1, wait) <= 0) return {};
-  // An error or the end counts as ready to read: the caller's read then reports the reason.
+  // A socket with an error, or closed by the other side, counts as ready to read: the caller's read then reports the
+  // reason.
   const bool over = (watched.revents & (POLLERR | POLLHUP | POLLNVAL)) != 0;
   return {over || (watched.revents & POLLIN) != 0, (watched.revents & POLLOUT) != 0};
 }

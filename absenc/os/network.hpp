@@ -15,7 +15,7 @@ namespace absenc::os {
 /// A sender of UDP datagrams to one address. Sending never blocks.
 class Datagrams {
  public:
-  /// Resolves `host`, a name or an address, once. Throws Failure: `not_found`, `system`.
+  /// Resolves `host`, a name or an address, to the address of all datagrams. Throws Failure: `not_found`, `system`.
   Datagrams(const std::string& host, std::uint16_t port);
 
   /// Sends `text` as one datagram. Returns false if the system did not take it.
@@ -33,7 +33,7 @@ struct Ready {
   bool to_read = false;
   bool to_write = false;
 };
-/// Waits until `socket` can be read, or with `for_writing` read or written, at most `longest`.
+/// Waits at most `longest` until `socket` can be read; with `for_writing` until it can be read or written.
 [[nodiscard]] Ready wait_for_socket(int socket, bool for_writing, Time longest);
 
 /// Returns the name of this computer; "" if it has none.

@@ -33,7 +33,7 @@ FileIdentity identity_of(const std::string& path) {
 OwnedFile::OwnedFile(const std::string& path) : path_(path) {
   constexpr int most_tries = 100;
   for (int tries = 0; tries < most_tries; ++tries) {
-    // Checked before opening, because opening a device may already have an effect.
+    // The type of the file is checked before opening, because opening a device may already have an effect.
     struct stat named {};
     const bool there = ::stat(path.c_str(), &named) == 0;
     if (there) require_regular(is_regular(named), path);
@@ -50,10 +50,10 @@ OwnedFile::OwnedFile(const std::string& path) : path_(path) {
       if (errno != EWOULDBLOCK) throw system_failure("locking " + path, errno);
       throw Failure(Failure::Kind::in_use, "another program keeps " + path);
     }
-    // The file may have been replaced before it was locked.
+    // Another process may have replaced the file before it was locked.
     if (identity_of(path) == identity_of(opened)) return;
   }
-  // A link to itself or to nothing, or another process replaces the file again and again.
+  // The path is a link to itself or to a missing file, or another process replaces the file again and again.
   struct stat named {};
   throw system_failure("opening " + path, ::stat(path.c_str(), &named) < 0 ? errno : ELOOP);
 }

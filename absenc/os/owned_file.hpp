@@ -31,15 +31,15 @@ class OwnedFile {
   /// Returns whether the constructor created the file, because it was missing.
   [[nodiscard]] bool made() const { return made_; }
 
-  /// Replaces the file by a new one with `content`. The path always leads to a complete file, with `Durable::yes` also
-  /// after a power failure. Throws Failure.
+  /// Replaces the file by a new one with `content`. The path leads to the complete old or the complete new file at
+  /// any time, with `Durable::yes` also after a power failure. Throws Failure.
   void replace(std::string_view content, Durable durable);
 
   /// Returns whether the path still leads to this file, and not to another or none.
   [[nodiscard]] bool has_its_name() const;
   struct State {
-    std::int64_t size = 0;         // size in bytes
-    std::int64_t modified_ns = 0;  // calendar time of the last write, in nanoseconds
+    std::int64_t size = 0;         // size of the file in bytes
+    std::int64_t modified_ns = 0;  // calendar time of the last write to the file, in nanoseconds
   };
   /// Returns the size and the time of the last write. Throws Failure.
   [[nodiscard]] State state() const;

@@ -40,7 +40,8 @@ void Poller::arm(Time deadline) {
 
 std::span<const int> Poller::wait(Time deadline) {
   if (interrupts_ < 0 && interrupt_descriptor() >= 0) add(interrupts_ = interrupt_descriptor());
-  // A useless wake-up at an earlier deadline costs less than setting the timer at every wait.
+  // A timer that is set to an earlier time stays so: one useless wake-up costs less than setting the timer at every
+  // wait.
   const bool over = deadline < armed_ && now() >= deadline;
   if (!over && deadline < armed_) arm(deadline);
   const Time patience = CancelCheck::interval();

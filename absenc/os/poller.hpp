@@ -24,8 +24,8 @@ class Poller {
   /// Stops watching `descriptor`; call it before the descriptor is closed.
   void remove(int descriptor);
 
-  /// Blocks until an added descriptor is readable and returns the readable ones; empty at `deadline`. Throws
-  /// Interrupted, Ended and Failure.
+  /// Blocks until an added descriptor is readable or has an error, and returns these descriptors; none if `deadline`
+  /// is reached. Throws Interrupted, Ended and Failure.
   [[nodiscard]] std::span<const int> wait(Time deadline);
 
  private:
@@ -34,7 +34,7 @@ class Poller {
   Descriptor epoll_;
   Descriptor timer_;
   Time armed_ = never;   // time at which `timer_` expires; `never` if it is not set
-  int interrupts_ = -1;  // descriptor that is readable after SIGINT or SIGTERM; -1 if not caught yet
+  int interrupts_ = -1;  // descriptor that is readable after SIGINT or SIGTERM; -1 while these signals are not caught
   std::array<int, most_ready> ready_{};
 };
 

@@ -14,7 +14,7 @@ using namespace std::chrono_literals;
 
 TEST(Poller, ReturnsAtTheDeadlineAndNeverBefore) {
   Poller poller;
-  // A timer left from one wait must not end another.
+  // The timer of one wait must not end the next wait early.
   for (const Time ahead : {5ms, 1ms, 10ms, 2ms}) {
     const Time deadline = now() + ahead;
     EXPECT_TRUE(poller.wait(deadline).empty());

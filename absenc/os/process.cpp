@@ -23,7 +23,7 @@ void protect_standard_streams() {
   std::signal(SIGXFSZ, SIG_IGN);
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     if (::fcntl(stream, F_GETFD) >= 0 || errno != EBADF) continue;
-    // open() returns the lowest free number, which is that of the closed stream.
+    // open(2) returns the lowest free number, which is that of the closed standard stream.
     if (::open("/dev/null", stream == STDOUT_FILENO ? O_RDONLY : O_RDWR) < 0) throw system_failure("/dev/null", errno);
   }
 }
@@ -37,7 +37,8 @@ int write_standard_output(std::string_view bytes) {
       const int error = errno;
       struct stat file {};
       const bool is_file = ::fstat(STDOUT_FILENO, &file) == 0 && S_ISREG(file.st_mode);
-      // Removes the written part from a regular file, unless another program has written behind it.
+      // If standard output is a regular file, a partly written text is removed, unless another program has written
+      // behind it.
       if (done > 0 && is_file && file.st_size == ::lseek(STDOUT_FILENO, 0, SEEK_CUR)) {
         [[maybe_unused]] const int ignored = ::ftruncate(STDOUT_FILENO, file.st_size - done);
         ::lseek(STDOUT_FILENO, -done, SEEK_CUR);
@@ -64,7 +65,8 @@ Time processor_time() {
 RunDelay::RunDelay() : file_(::open("/proc/thread-self/schedstat", O_RDONLY | O_CLOEXEC)) { (void)take(); }
 
 Time RunDelay::take() {
-  // Fields of schedstat: ns on a processor, ns ready to run but waiting, number of time slices.
+  // Fields of /proc/thread-self/schedstat: ns that the thread ran, ns that it was ready to run but waited, number of
+  // time slices.
   std::array<char, 64> text{};
   if (!file_ || ::pread(file_.get(), text.data(), text.size() - 1, 0) <= 0) return {};
   char* end = text.data();
@@ -86,7 +88,7 @@ std::string folder_of(const std::string& path) {
   return folder.empty() ? "." : folder;
 }
 
-// A file without a name leaves nothing behind, however the process ends.
+// A file without a name disappears when the process ends, however it ends.
 Descriptor open_nameless(const std::string& folder, mode_t mode) {
   return Descriptor(::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, mode));
 }

@@ -11,8 +11,8 @@
 
 namespace absenc::os {
 
-/// Protects this process from its standard streams: a closed pipe and a file at its size limit cause write errors
-/// instead of ending it, and closed streams lead to /dev/null. Throws Failure.
+/// Protects this process from the state of its standard streams: writing to a closed pipe, or to a file at its size
+/// limit, fails instead of ending the process, and closed streams are opened on /dev/null. Throws Failure.
 void protect_standard_streams();
 
 /// Writes `bytes` to standard output. Returns 0 or a value of errno.
@@ -27,7 +27,8 @@ void protect_standard_streams();
 class RunDelay {
  public:
   RunDelay();
-  /// Returns how long the thread waited since the last call or the constructor; 0 if the kernel does not say.
+  /// Returns how long the thread was ready to run but waited, since the last call or the constructor; 0 if the kernel
+  /// does not report it.
   [[nodiscard]] Time take();
 
  private:
@@ -49,10 +50,11 @@ class NewFile {
   NewFile& operator=(const NewFile&) = delete;
 
   [[nodiscard]] int descriptor() const { return file_.get(); }
-  /// Returns a path by which the new file can be opened before `take_place`.
+  /// Returns a path by which the new file can be opened before `take_place` gives it its name.
   [[nodiscard]] const std::string& path() const { return temporary_path_; }
   void write(std::string_view content);
-  /// Gives the file its name and returns its descriptor; with `Durable::yes` first waits for the disk.
+  /// Gives the new file its name and returns its descriptor; with `Durable::yes`, waits first until its content is on
+  /// the disk.
   Descriptor take_place(Durable durable);
 
  private:

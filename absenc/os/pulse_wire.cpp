@@ -36,7 +36,7 @@ PulseOutput::PulseOutput(PulseWire wire, int descriptor, std::string path, WireK
   if (wire_.kind == PulseWire::Kind::gpio) {
     open_gpio();
   } else {
-    drive(false);  // opening a port sets RTS and DTR, so the wire must be put to rest
+    drive(false);  // the kernel sets RTS and DTR when a port is opened, so the wire must be put to rest
   }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Wires beside the data wires on which a host sends pulses: RTS, DTR or a GPIO line.
+// Wires on which a host sends pulses, in addition to the data wires: RTS, DTR or a GPIO line.
 #pragma once
 
 #include <optional>
@@ -11,12 +11,13 @@ struct gpiod_line;
 
 namespace absenc::os {
 
-/// The user's choice of a wire for pulses. Levels of RTS and DTR are those of the UART's pins, where a set line is low.
+/// The user's choice of a wire for pulses. Levels of RTS and DTR are those of the UART's pins: the pin is low while
+/// the modem line is set.
 struct PulseWire {
   enum class Kind { none, rts, dtr, gpio } kind = Kind::none;
-  std::string name{};           // gpio: name of the line as `gpioinfo` lists it
-  bool active_high = false;     // whether the wire is high during the pulse; at rest it has the other level
-  std::optional<Time> width{};  // pulse width instead of that of the protocol; empty: the protocol's
+  std::string name{};           // name of the GPIO line as `gpioinfo` lists it; unused for RTS and DTR
+  bool active_high = false;     // whether the wire is high during a pulse and low at rest; if false, the opposite
+  std::optional<Time> width{};  // pulse width chosen by the user; empty: that of the protocol
 };
 
 /// The wires of ExtraWire::trigger and ExtraWire::clear.
@@ -41,7 +42,7 @@ struct WireKernel {
 /// An opened wire for pulses. It is at rest (inactive) until `drive(true)` is called.
 class PulseOutput {
  public:
-  /// `descriptor` belongs to the serial port `path`. Throws Failure.
+  /// Opens the chosen wire. `descriptor` is that of the serial port at `path`. Throws Failure.
   PulseOutput(PulseWire wire, int descriptor, std::string path, WireKernel& kernel);
   PulseOutput(const PulseOutput&) = delete;
   PulseOutput& operator=(const PulseOutput&) = delete;

@@ -51,9 +51,10 @@ bool has_capability(unsigned capability) {
 
 // Locks all memory. Returns 0 or a value of errno.
 int lock_all(rlim_t limit) {
-  // With a limit, later memory would not be locked but refused: a new thread or a large vector would fail.
+  // With a limit, the kernel would refuse later memory instead of not locking it: a new thread or a large vector
+  // would fail.
   if (limit != RLIM_INFINITY && !has_capability(CAP_IPC_LOCK)) return EPERM;
-  // Later pages are locked when they are used: whole stacks of later threads would cost 8 MB each.
+  // MCL_ONFAULT locks later pages when they are used: the whole stacks of later threads would cost 8 MB each.
   return ::mlockall(MCL_CURRENT) == 0 && ::mlockall(MCL_FUTURE | MCL_ONFAULT) == 0 ? 0 : errno;
 }
 
@@ -78,7 +79,8 @@ void lock_memory() {
 
 void require_realtime(int priority) {
   thread_local int present = 0;
-  // The kernel is asked, because a thread of a forked process is no real-time thread.
+  // The kernel is asked, too, because the thread of a forked process is no real-time thread, although its parent was
+  // one.
   if (priority <= present && ::sched_getscheduler(0) == policy) return;
   static std::mutex one_at_a_time;
   const std::lock_guard lock(one_at_a_time);

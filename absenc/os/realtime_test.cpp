@@ -21,7 +21,8 @@
 namespace absenc::os {
 namespace {
 
-// Runs `work` in a child process, with which its changes of limits end. Returns its text, or that of its Failure.
+// Runs `work` in a child process, so that its changes of limits do not last. Returns the text of `work`, or that of
+// the Failure that it throws.
 std::string in_child(const std::function<std::string()>& work) {
   std::array<int, 2> ends{};
   if (::pipe(ends.data()) != 0) return "no pipe";
@@ -48,7 +49,7 @@ std::string in_child(const std::function<std::string()>& work) {
   return text;
 }
 
-// Takes a capability from this process and sets a limit, so that the kernel refuses even root.
+// Removes a capability of this process and sets a resource limit, so that the kernel refuses real-time even to root.
 void give_up(unsigned capability, __rlimit_resource resource, rlim_t most = 0) {
   __user_cap_header_struct header{.version = _LINUX_CAPABILITY_VERSION_3, .pid = 0};
   std::array<__user_cap_data_struct, 2> data{};
@@ -58,7 +59,8 @@ void give_up(unsigned capability, __rlimit_resource resource, rlim_t most = 0) {
   rlimit limit{};
   ::getrlimit(resource, &limit);
   const rlimit raised{most, std::max(limit.rlim_max, most)};
-  if (::setrlimit(resource, &raised) == 0) return;  // only root may raise the hard limit
+  // setrlimit fails if the hard limit must be raised, which only root may do
+  if (::setrlimit(resource, &raised) == 0) return;
   limit.rlim_cur = std::min(limit.rlim_max, most);
   ASSERT_EQ(::setrlimit(resource, &limit), 0);
 }
@@ -73,7 +75,8 @@ std::string scheduling() {
          std::to_string(parameters.sched_priority);
 }
 
-// Returns whether the kernel gives this process what realtime needs, without the code under test.
+// Returns whether the kernel allows this process real-time priority and locked memory; does not use the code under
+// test.
 bool kernel_allows() {
   const std::string allowed = in_child([] {
     const sched_param parameters{.sched_priority = 7};
@@ -85,7 +88,7 @@ bool kernel_allows() {
   return allowed == "yes";
 }
 
-// Compares the result of `work` with `expected`, or with the refusal where the kernel of the test machine refuses.
+// Expects that `work` returns `expected`; on a test machine whose kernel refuses real-time, expects that refusal.
 void expect_or_refused(const std::string& expected, const std::function<std::string()>& work) {
   const std::string result = in_child(work);
   if (kernel_allows()) {
@@ -144,7 +147,7 @@ TEST(RealTime, MemoryIsLocked) {
     require_realtime(7);
     const std::string here = locked();
     return here + ", " + in_child([&] {
-             require_realtime(7);  // a child process does not inherit the lock
+             require_realtime(7);  // a child process does not inherit the memory lock
              return std::string(locked());
            });
   });

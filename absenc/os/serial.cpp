@@ -25,7 +25,7 @@ Descriptor open_terminal(const std::string& path, SerialUse use) {
   const int access = use == SerialUse::receive ? O_RDONLY : O_RDWR;
   Descriptor descriptor(::open(path.c_str(), access | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
   if (!descriptor) throw open_failure(path, errno);
-  // Checked before any wait: epoll refuses regular files with a less clear error.
+  // Whether the path is a terminal is checked before any wait: epoll refuses regular files with a less clear error.
   if (!terminal_state(descriptor.get())) throw open_failure(path, errno);
   return descriptor;
 }
@@ -42,7 +42,7 @@ bool uses_rts(const PulseWires& wires) {
   return wires.trigger.kind == PulseWire::Kind::rts || wires.clear.kind == PulseWire::Kind::rts;
 }
 
-// The device's end of a USB cable (u_serial.c of the kernel) has no line and accepts any rate.
+// A gadget port (ttyGS of u_serial.c) is the device's end of a USB cable: it has no line and accepts any rate.
 bool is_gadget(const std::string& path) {
   std::error_code ignored;
   return std::filesystem::canonical(path, ignored).filename().native().starts_with("ttyGS");
@@ -76,7 +76,7 @@ SerialPort::SerialPort(const std::string& path, const LineSettings& settings, Rs
   if (!before) throw open_failure(path, errno);
   before_ = *before;
   lock();
-  ::tcflush(descriptor(), TCOFLUSH);  // bytes that another program has not sent yet must not delay the first request
+  ::tcflush(descriptor(), TCOFLUSH);  // unsent bytes of another program must not delay the first request
   try {
     apply(settings);
     if (uses_rts(wires) && rs485 == Rs485::on) {
@@ -103,14 +103,15 @@ SerialPort::~SerialPort() {
   if (!pseudo_) ::ioctl(descriptor(), TIOCNXCL);
 }
 
-// flock keeps out programs that use flock, also those of root; TIOCEXCL all but those of root.
+// flock(2) keeps out programs that use flock, also those of root. TIOCEXCL keeps out all programs except those of
+// root.
 void SerialPort::lock() const {
   if (::flock(descriptor(), LOCK_EX | LOCK_NB) < 0) throw open_failure(path_, errno);
   // A virtual encoder keeps the slave open, so that TIOCEXCL would outlive this port.
   if (!pseudo_) ::ioctl(descriptor(), TIOCEXCL);
 }
 
-// Parity and stop bits belong to the wiring, so a change of the rate leaves both unchanged.
+// A change of the rate leaves parity and stop bits unchanged.
 void SerialPort::change_rate(std::uint32_t rate) {
   LineSettings settings = line_;
   settings.rate = rate;
@@ -174,7 +175,8 @@ void SerialPort::set_direction(Rs485 rs485) {
 }
 
 void SerialPort::shorten_latency() {
-  // On a pseudo-terminal two processes must be scheduled: 2 ms gave false timeouts.
+  // Over a pseudo-terminal, the host's and the encoder's process must be scheduled: a latency of 2 ms gave false
+  // timeouts.
   set_latency(pseudo_ ? 20ms : 10ms);
   if (pseudo_) return;
   serial_struct serial{};

@@ -17,16 +17,17 @@ namespace absenc::os {
 
 /// Selects the component that switches an RS-485 transceiver to sending.
 enum class Rs485 : std::uint8_t {
-  // The kernel switches with RTS if it can and RTS carries no pulses, else the adapter must.
+  // The kernel switches the transceiver with RTS if it can and RTS carries no pulses; else the adapter must switch
+  // it.
   automatic,
-  on,   // the kernel switches; throws `unsupported` if the port cannot do it
-  off,  // the kernel never switches; for full-duplex lines
+  on,   // the kernel switches the transceiver; opening throws `unsupported` if the port cannot do it
+  off,  // the kernel never switches the transceiver; for full-duplex lines
 };
 
 /// Directions in which a port is used.
 enum class SerialUse : std::uint8_t {
   both,
-  receive,  // opened for reading only, with RTS released
+  receive,  // the port is opened for reading only, with RTS released
 };
 
 /// Returns whether `path` is a pseudo-terminal, where characters take no time.
@@ -40,7 +41,7 @@ class SerialPort final : public DescriptorPort {
              const PulseWires& wires = {}, WireKernel& kernel = system_wires(), SerialUse use = SerialUse::both);
   ~SerialPort() override;
 
-  /// Returns hints about settings of this port that could be better, with the remedy.
+  /// Returns sentences about settings of this port that could be better, each with the remedy.
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
   /// Returns whether this port has made the kernel switch the transceiver's direction.
   [[nodiscard]] bool kernel_direction() const { return kernel_direction_; }

@@ -26,7 +26,7 @@ bool is_number(std::string_view text) {
   return !text.empty() && std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c) != 0; });
 }
 
-// Returns the first link in `folder` that leads to `file`; "" if none does.
+// Returns the first symbolic link in `folder` that leads to `file`; "" if no link does.
 std::string link_to(const fs::path& file, const fs::path& folder) {
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
@@ -35,7 +35,7 @@ std::string link_to(const fs::path& file, const fs::path& folder) {
   return {};
 }
 
-// Returns a text like "absenc serve (process 4711)", with a verb only for absenc.
+// Returns a text like "socat (process 4711)" or, for absenc with its verb, "absenc serve (process 4711)".
 std::string program(const std::string& process) {
   std::string name = first_line(fs::path("/proc") / process / "comm");
   if (name == "absenc") {
@@ -88,7 +88,7 @@ Failure in_use(const std::string& path) {
                                                              : Holder::program;
     return {what + holder + ": end it, or use another port", who};
   }
-  // No advice to end the server: it may read this encoder for several clients.
+  // The message does not advise to end the server, because the server may read this encoder for several clients.
   const std::string process = holder.substr(server.size(), holder.size() - server.size() - 1);
   const std::string page = page_of_server(path, process);
   const std::string where =
@@ -156,7 +156,7 @@ std::string holder_of(const std::string& path) {
   struct stat status {};
   std::string holder;
   if (::stat(path.c_str(), &status) == 0) holder = lock_holder(status);
-  // The program that made a pseudo-terminal always has it open, but does not block the port.
+  // A pseudo-terminal is always open in the program that made it, which does not block the port.
   if (holder.empty() && !file.native().starts_with("/dev/pts/")) holder = opener(file);
   return holder;
 }
@@ -182,7 +182,7 @@ Failure open_failure(const std::string& path, int error) {
     case ENXIO:
     case ENODEV:
       return no_port(path);
-    // A 16550 that is listed but does not exist, or a line that was hung up after opening.
+    // EIO: the kernel lists a 16550 that does not exist, or the line was hung up after opening.
     case EIO:
       return {Failure::Kind::not_found, "the port " + path +
                                             " is there, but no hardware is behind it, or not any more: check the name, "

@@ -13,20 +13,20 @@
 
 namespace absenc::os {
 
-/// Returns the terminals with hardware behind them, "/dev/ttyUSB0" and so on, sorted.
+/// Returns the paths of all terminals with hardware behind them, "/dev/ttyUSB0" and so on, sorted.
 [[nodiscard]] std::vector<std::string> serial_ports(const std::filesystem::path& sys = "/sys/class/tty");
 
 /// Returns for how many milliseconds a USB adapter holds back received bytes; empty if unknown.
 [[nodiscard]] std::optional<unsigned> latency_timer(const std::string& terminal,
                                                     const std::filesystem::path& sys = "/sys/class/tty");
 
-/// Returns the name of the driver of `terminal`, for example "ftdi_sio"; "" if unknown.
+/// Returns the name of the driver of `terminal` ("ttyUSB0"), for example "ftdi_sio"; "" if unknown.
 [[nodiscard]] std::string driver_of(const std::string& terminal, const std::filesystem::path& sys = "/sys/class/tty");
 
 /// Returns the program that holds the port at `path`, for example "absenc serve (process 4711)"; "" if none is found.
 [[nodiscard]] std::string holder_of(const std::string& path);
 
-/// Properties of a port that can be read without opening it: opening may reset a board.
+/// Properties of a serial port that are read without opening the port: opening may reset a board.
 struct ListedPort {
   std::string path{};
   // path "/dev/serial/by-id/...", which does not depend on the order of ports; "" if none

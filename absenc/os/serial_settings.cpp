@@ -30,7 +30,8 @@ void write_line(termios2& state, const LineSettings& settings) {
   if (settings.stop_bits == 2) state.c_cflag |= CSTOPB;
   state.c_ispeed = settings.rate;
   state.c_ospeed = settings.rate;
-  // With VMIN 1 a non-blocking read without data fails with EAGAIN: 0 means the end of the stream.
+  // VMIN 1 distinguishes two cases: a non-blocking read without data fails with EAGAIN, a read at the end of the
+  // stream returns 0.
   state.c_cc[VMIN] = 1;
   state.c_cc[VTIME] = 0;
 }

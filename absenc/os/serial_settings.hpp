@@ -23,18 +23,18 @@ using TerminalState = std::array<std::byte, 44>;
 /// Restores the saved settings of a terminal after all written bytes were sent. Ignores errors.
 void restore_terminal(int descriptor, const TerminalState& state);
 
-/// Sets raw mode and `settings` after all written bytes were sent. Returns the settings that the driver has applied;
-/// nothing on error, with errno set.
+/// Waits until all written bytes were sent, then sets raw mode and `settings`. Returns the settings that the driver
+/// has applied; nothing on error, with errno set.
 std::optional<LineSettings> set_terminal(int descriptor, const LineSettings& settings);
 
-/// Returns whether `given` differs from `requested` by at most 1 %.
+/// Returns whether the bit rate `given` differs from `requested` by at most 1 %.
 [[nodiscard]] constexpr bool rates_agree(std::uint32_t requested, std::uint32_t given) {
   const std::uint64_t difference = requested > given ? requested - given : given - requested;
   return difference * 100 <= requested;
 }
 
-/// Returns the rate to propose when the driver gave `given` instead of `requested`, which is not 0. `base`: highest
-/// rate of the baud generator, which divides it by whole numbers; 0 if unknown.
+/// Returns the bit rate to propose to the user when the driver applied `given` instead of `requested`, which is not
+/// 0. `base`: highest rate of the baud generator, which divides it by whole numbers; 0 if unknown.
 [[nodiscard]] constexpr std::uint32_t nearest_rate(std::uint32_t requested, std::uint32_t given, std::uint32_t base) {
   const auto distance = [requested](std::uint32_t rate) {
     return rate > requested ? rate - requested : requested - rate;
@@ -44,7 +44,7 @@ std::optional<LineSettings> set_terminal(int descriptor, const LineSettings& set
   for (const std::uint32_t candidate : {divisor, divisor + 1}) {
     if (candidate == 0 || base < candidate) continue;
     const std::uint32_t rate = base / candidate;
-    // If `base` promises a rate that the driver has just refused, `base` is wrong.
+    // `base` is wrong if the requested rate is one of its quotients, because the driver has just refused this rate.
     if (rates_agree(requested, rate)) return given;
     if (distance(rate) < distance(nearest)) nearest = rate;
   }

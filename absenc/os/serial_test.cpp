@@ -91,7 +91,7 @@ TEST(SerialPort, CarriesEveryByteUnchanged) {
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<std::uint8_t>(i);
   const Descriptor slave(::open(terminal.path.c_str(), O_RDWR | O_NOCTTY));
   set_terminal(slave.get(), fast);
-  put(terminal.master.get(), {0x55});  // this byte must be discarded when the port is opened
+  put(terminal.master.get(), {0x55});  // a byte received before the port is opened must be discarded
   pollfd readable{slave.get(), POLLIN, 0};
   ASSERT_EQ(::poll(&readable, 1, 5000), 1);
   SerialPort port(terminal.path, fast);

@@ -19,7 +19,7 @@ fs::path folder_in(const char* variable, const char* name) {
   return value == nullptr || *value == '\0' ? fs::path() : fs::path(value) / name;
 }
 
-// Returns the name of the file for `port`, the same for a link and for its target.
+// Returns the name of the file that records the server of `port`: the same for a symbolic link and for its target.
 std::string file_name(const std::string& port) {
   std::error_code error;
   const fs::path path = fs::canonical(port, error);
@@ -39,10 +39,10 @@ void ServedPorts::set(const std::vector<std::string>& ports) {
   for (const std::string& port : ports) {
     if (folder.empty()) break;
     std::string file = folder / file_name(port);
-    // Other programs may read the file at any time: it is written under another name first.
+    // The file is written under another name and renamed, because other programs may read it at any time.
     const std::string part = file + "." + std::to_string(::getpid());
     std::ofstream(part) << ::getpid() << " " << url_ << "\n";
-    // All users may read the file, even if the service creates its files for itself only.
+    // All users may read the file, even if the umask of the service denies that.
     fs::permissions(part, fs::perms::group_read | fs::perms::others_read, fs::perm_options::add, error);
     fs::rename(part, file, error);
     if (error) {

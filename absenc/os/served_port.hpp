@@ -7,7 +7,8 @@
 
 namespace absenc::os {
 
-/// The files of one server, at most one per port, in $RUNTIME_DIRECTORY or $XDG_RUNTIME_DIR/absenc.
+/// The files in which one server records the ports that it reads, at most one file per port, in $RUNTIME_DIRECTORY or
+/// $XDG_RUNTIME_DIR/absenc.
 class ServedPorts {
  public:
   /// `url` is the address of the server's page, for example "http://127.0.0.1:8420/".

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The signal handler makes an eventfd readable, which `wait_for` and Poller watch.
+// Waits that SIGINT and SIGTERM end: the signal handler makes an eventfd readable, which `wait_for` and Poller watch.
 #include "absenc/os/signals.hpp"
 
 #include <sys/eventfd.h>
@@ -93,7 +93,7 @@ bool wait_for(std::span<pollfd> watched, Time deadline) {
   std::array<pollfd, most_watched + 1> all;
   std::copy(watched.begin(), watched.end(), all.begin());
   pollfd& signal = all[watched.size()];
-  signal = {interrupt_descriptor(), POLLIN, 0};  // before `catch_interrupts` the number is -1, which poll ignores
+  signal = {interrupt_descriptor(), POLLIN, 0};  // before `catch_interrupts` the descriptor is -1, which poll ignores
   for (;;) {
     const Time patience = CancelCheck::interval();
     const Time poll_deadline = patience == never ? deadline : std::min(deadline, now() + patience);
@@ -101,7 +101,8 @@ bool wait_for(std::span<pollfd> watched, Time deadline) {
     if (poll_deadline != never) timeout = time_left(poll_deadline);
     const int ready = ::ppoll(all.data(), watched.size() + 1, poll_deadline == never ? nullptr : &timeout, nullptr);
     if (ready < 0) {
-      // SIGINT and SIGTERM have made the eventfd readable; other signals do not matter here.
+      // The wait continues after EINTR: SIGINT and SIGTERM have made the eventfd readable, and other signals do not
+      // end a wait.
       if (errno == EINTR) continue;
       throw system_failure("ppoll", errno);
     }
@@ -123,7 +124,7 @@ void sleep_until(Time time) {
 }
 
 void reach(Time time) {
-  // The kernel may wake a thread late by about this time: the clock is polled meanwhile.
+  // The kernel may wake a sleeping thread about this much too late, so the clock is polled for this last time.
   constexpr Time wake_up = std::chrono::microseconds(100);
   if (time - now() > wake_up) sleep_until(time - wake_up);
   while (now() < time) {

@@ -18,23 +18,24 @@ void catch_interrupts();
 /// Returns whether SIGINT or SIGTERM was received since `catch_interrupts`.
 [[nodiscard]] bool interrupted();
 
-/// Returns a descriptor that is readable after SIGINT or SIGTERM; -1 before `catch_interrupts`.
+/// Returns a descriptor that is readable after SIGINT or SIGTERM; -1 before `catch_interrupts` was called.
 [[nodiscard]] int interrupt_descriptor();
-/// Takes a pending signal out of `interrupt_descriptor`. Returns false if none is pending.
+/// Makes `interrupt_descriptor` unreadable again. Returns false if no signal was pending.
 bool take_interrupt();
 
-/// A condition that ends waits of this thread with Ended; checked after 20 ms without an event.
+/// A function that can end the waits of the current thread: a wait throws Ended if the function returns true. A wait
+/// calls it after each 20 ms without an event.
 class CancelCheck {
  public:
-  /// `over` must outlive the object; an empty function is never called.
+  /// `over` is the function; it must outlive the object. An empty function is never called.
   explicit CancelCheck(const std::function<bool()>& over);
   ~CancelCheck();
   CancelCheck(const CancelCheck&) = delete;
   CancelCheck& operator=(const CancelCheck&) = delete;
 
-  /// Returns how long a wait may take before it must call `check`; `never` if it need not.
+  /// Returns how long a wait may take before it must call `check`; `never` if this thread has no CancelCheck.
   [[nodiscard]] static Time interval();
-  /// Calls `over` of the newest CancelCheck of this thread. Throws Ended if it returns true.
+  /// Calls the function of the newest CancelCheck of this thread. Throws Ended if it returns true.
   static void check();
 
  private:
@@ -46,8 +47,8 @@ class CancelCheck {
 
 inline constexpr std::size_t most_watched = 32;
 
-/// Blocks until one of `watched` (at most `most_watched`) has an event and returns true; false if `deadline` is reached
-/// first. Throws Interrupted, Ended and Failure.
+/// Blocks until a descriptor in `watched` (at most `most_watched`) has an event, and returns true; returns false if
+/// `deadline` is reached first. Throws Interrupted, Ended and Failure.
 bool wait_for(std::span<pollfd> watched, Time deadline);
 
 /// Sleeps until `time` or somewhat longer, never shorter. Throws as `wait_for` does.

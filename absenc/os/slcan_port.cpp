@@ -15,9 +15,10 @@ using Kind = Failure::Kind;
 
 namespace {
 
-constexpr Time reply_timeout = 300ms;  // timeout for the reply of an adapter, which takes 1 or 2 ms on USB
+constexpr Time reply_timeout = 300ms;  // a USB adapter replies within 1 or 2 ms
 constexpr Time settling_time = 20ms;
-constexpr std::size_t most_queued = 64;  // greatest number of queued frames, as many as common adapters queue
+// greatest number of frames that the simulated adapter queues, as many as common adapters queue
+constexpr std::size_t most_queued = 64;
 // Limit of reads per call, so that a line that is never silent does not block the caller.
 constexpr unsigned most_reads = 1024;
 
@@ -32,11 +33,11 @@ void SlcanLine::write(Bytes text) { bytes_->begin({.kind = ByteStep::Kind::trans
 void SlcanLine::collect(Time deadline) {
   received_any_ = false;
   deadline = reach(bytes_->now()) ? Time{} : std::min(deadline, due());
-  // A past deadline means: read only what is there.
+  // If the deadline is past, only bytes that have already arrived are read.
   const bool everything = deadline <= bytes_->now();
   for (unsigned reads = 0; reads < most_reads && (everything || !received_any_); ++reads) {
     const Time now = bytes_->now();
-    // A byte port reports a timer only if it is in the future.
+    // A byte port reports a timer event only for a time in the future.
     const ByteEvent event = bytes_->wait({.at = deadline <= now ? now + 1ns : deadline});
     if (event.kind == ByteEvent::Kind::timer) {
       if (!everything) reach(event.at);
@@ -61,7 +62,7 @@ bool SlcanLine::receives_until(Time deadline) {
 
 SlcanPort::SlcanPort(std::shared_ptr<Port<std::uint8_t>> bytes, std::string name, const LineSettings& settings)
     : SlcanLine(std::move(bytes)), name_(std::move(name)) {
-  write(bytes_of("\r\r\r"));  // ends any command that another program has begun
+  write(bytes_of("\r\r\r"));  // a carriage return ends any command that another program has begun
   settle();
   apply(settings);
 }
@@ -69,7 +70,7 @@ SlcanPort::SlcanPort(std::shared_ptr<Port<std::uint8_t>> bytes, std::string name
 SlcanPort::~SlcanPort() {
   try {
     write(bytes_of("C\r"));
-  } catch (const Failure&) {  // the port may have disappeared, so the adapter cannot be closed
+  } catch (const Failure&) {  // the port may have disappeared; the adapter then stays open
   } catch (const Interrupted&) {
   } catch (const Ended&) {
   }
@@ -81,7 +82,7 @@ void SlcanPort::apply(const LineSettings& settings) {
     throw Failure(Kind::bad_rate, name_ + ": the adapter has no bit rate of " + std::to_string(settings.rate) +
                                       " bit/s: 10, 20, 50, 100, 125, 250, 500, 800 kbit/s and 1 Mbit/s are there");
   }
-  static_cast<void>(request("C\r"));  // many adapters refuse to close if they are closed already
+  static_cast<void>(request("C\r"));  // many adapters refuse the command to close if they are closed already
   settle();
   const std::string set{'S', static_cast<char>(*code), '\r'};
   const Reply rate = request(set);
@@ -101,7 +102,8 @@ void SlcanPort::apply(const LineSettings& settings) {
   }
 }
 
-// Replies carry no number: those to earlier commands must not arrive after the next command.
+// The adapter's replies carry no number, so the replies to earlier commands are awaited before the next command is
+// sent.
 void SlcanPort::settle() {
   constexpr unsigned most_replies = 64;
   bool any = true;
@@ -135,7 +137,7 @@ void SlcanPort::handle_line(LineEvent line_event, Bytes line, Time at) {
   } else if (awaiting_reply_ && (line_event == LineEvent::refused || line.empty())) {
     reply_ = line_event == LineEvent::refused ? Reply::refused : Reply::accepted;
   } else if (line_event == LineEvent::refused) {
-    push_error(at);  // the adapter could not send the frame
+    push_error(at);  // the adapter refused a frame
   }
 }
 
@@ -180,7 +182,7 @@ void SlcanAdapter::queue_frame(Bytes line, Time at) {
   waiting_.push_back(*frame);
 }
 
-// Reports at most one frame per call: between two frames a node must be able to send its own.
+// Reports at most one frame of the host per call, so that the device can send its own frame between two.
 bool SlcanAdapter::reach(Time now) {
   if (waiting_.empty() || bus_free_ > now) return false;
   push(waiting_.front(), bus_free_);
@@ -195,7 +197,7 @@ Time SlcanAdapter::duration(const CanFrame& frame) const {
   return Time(std::chrono::seconds(1)) * bits / std::max<std::int64_t>(1, rate_);
 }
 
-// Executes a command of the host. Returns false if it is to be refused.
+// Executes a command of the host. Returns false if the adapter must refuse it.
 bool SlcanAdapter::execute(Bytes line) {
   const auto letter = static_cast<char>(line[0]);
   switch (letter) {
@@ -229,7 +231,8 @@ bool SlcanAdapter::execute(Bytes line) {
       if (!open_) return false;
       send_reply("F00\r");
       return true;
-    case 's':  // bit timing registers, acceptance code and mask: accepted while closed, without effect
+    // bit timing registers, acceptance code and mask: accepted while the adapter is closed, but without effect
+    case 's':
     case 'M':
     case 'm':
       if (open_) return false;

@@ -12,18 +12,18 @@
 
 namespace absenc::os {
 
-/// The text lines of a CAN adapter over a byte port: frames and replies.
+/// Base class of both ends of a CAN adapter's text lines over a byte port: it reads frames and replies.
 class SlcanLine : public FramePort {
  protected:
   explicit SlcanLine(std::shared_ptr<Port<std::uint8_t>> bytes) : bytes_(std::move(bytes)) {}
 
   void write(Bytes text);
   void collect(Time deadline) final;
-  /// Calls `collect` and returns whether it received a line, a refusal or garbage.
+  /// Calls `collect`. Returns whether a line, a refusal or garbage was received.
   bool receives_until(Time deadline);
-  /// Returns the time of the next event without received bytes; `never` if none is due.
+  /// Returns the time of the next event that needs no received bytes; `never` if there is none.
   [[nodiscard]] virtual Time due() const { return never; }
-  /// Handles the event of `due()` if its time is reached. Returns whether one was pushed.
+  /// Pushes the event of `due()` if its time is reached. Returns whether an event was pushed.
   virtual bool reach(Time) { return false; }
   /// Handles a received line without its CR, a refusal by the adapter, or garbage.
   virtual void handle_line(slcan::LineReader::LineEvent line_event, Bytes line, Time at) = 0;
@@ -61,15 +61,16 @@ class SlcanPort final : public SlcanLine {
   unsigned garbage_ = 0;
 };
 
-/// A simulated CAN adapter between a host and the device that is driven on this port.
+/// A simulated CAN adapter: the host sends it text lines, and the virtual encoder uses it as its CAN port.
 class SlcanAdapter final : public SlcanLine {
  public:
   SlcanAdapter(std::shared_ptr<Port<std::uint8_t>> bytes, const LineSettings& settings)
       : SlcanLine(std::move(bytes)), device_rate_(settings.rate) {}
 
-  /// Returns the number of frames lost because the adapter was closed or had another bit rate.
+  /// Returns the number of frames of the device that were lost because the host had closed the adapter or set another
+  /// bit rate.
   [[nodiscard]] std::uint64_t lost() const { return lost_; }
-  /// Returns the number of frames refused because the queue was full.
+  /// Returns the number of frames of the host that were refused because the queue was full.
   [[nodiscard]] std::uint64_t overflowed() const { return overflowed_; }
   /// Returns how often the host sent something other than a known command or a valid frame.
   [[nodiscard]] std::uint64_t garbage() const { return garbage_; }
@@ -87,12 +88,12 @@ class SlcanAdapter final : public SlcanLine {
   [[nodiscard]] bool connected() const { return open_ && rate_ == device_rate_; }
 
   std::uint32_t device_rate_;
-  std::uint32_t rate_ = 0;  // bit rate set by the host; 0: not set yet
+  std::uint32_t rate_ = 0;  // bit rate set by the host; 0: the host has set none
   bool open_ = false;
   bool listen_only_ = false;
   bool with_time_ = false;
-  std::deque<CanFrame> waiting_;  // queued frames of the host; the first one is on the bus
-  Time bus_free_{};               // end of the frame that is on the bus or was there last
+  std::deque<CanFrame> waiting_;  // queued frames of the host; the first frame is being sent on the bus
+  Time bus_free_{};               // end of the frame that is being sent on the bus, or was sent last
   std::uint64_t lost_ = 0;
   std::uint64_t overflowed_ = 0;
   std::uint64_t garbage_ = 0;

@@ -26,7 +26,7 @@ const CanFrame request{.id = 0x220, .size = 8, .data = {0x80, 0x20}};
 
 FrameStep sending(const CanFrame& frame) { return {.kind = FrameStep::Kind::transfer, .out = {&frame, 1}}; }
 
-/// A byte port in memory that answers commands like an adapter.
+/// A byte port in memory that replies to commands as a CAN adapter does.
 class FakeAdapter final : public Port<std::uint8_t> {
  public:
   Time now() override { return os::now(); }
@@ -121,7 +121,7 @@ TEST(SlcanPort, ChangesItsBitRate) {
   EXPECT_EQ(adapter->written, "C\rS6\rO\r");
 }
 
-/// The simulated adapter, with the test as its host.
+/// The simulated adapter; the test acts as its host.
 struct Adapter : ::testing::Test {
   std::shared_ptr<FakeAdapter> host = std::make_shared<FakeAdapter>();
   SlcanAdapter port{host, bus};
@@ -143,7 +143,7 @@ struct Adapter : ::testing::Test {
 
 TEST_F(Adapter, AnswersLikeAdapters) {
   EXPECT_EQ(send_text("\r\r"), "\r\r");
-  EXPECT_EQ(send_text("O\r"), "\a");  // refused: no bit rate is set yet
+  EXPECT_EQ(send_text("O\r"), "\a");  // the adapter refuses to open, because no bit rate is set yet
   EXPECT_EQ(send_text("S5\r"), "\r");
   EXPECT_EQ(send_text("S9\r"), "\a");
   EXPECT_EQ(send_text("C\r"), "\a");
@@ -156,7 +156,7 @@ TEST_F(Adapter, AnswersLikeAdapters) {
   EXPECT_EQ(send_text("F\r"), "F00\r");
   EXPECT_EQ(send_text("t22088020000000000000\r"), "z\r");
   EXPECT_EQ(received, std::vector<CanFrame>{request});
-  EXPECT_EQ(send_text("T000002208\r"), "\a");  // refused: the 8 data bytes are missing
+  EXPECT_EQ(send_text("T000002208\r"), "\a");  // the adapter refuses the frame, because its 8 data bytes are missing
   EXPECT_EQ(send_text("T000002200\r"), "Z\r");
   EXPECT_EQ(send_text("r2208\r"), "z\r");
   EXPECT_TRUE(received[0].remote);

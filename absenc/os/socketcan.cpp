@@ -29,7 +29,7 @@ using Kind = Failure::Kind;
 
 namespace {
 
-// Time to wait for room in the queue: longer than a working bus needs to empty it.
+// Time to wait for room in the kernel's send queue: longer than a working bus needs to empty it.
 constexpr Time queue_patience = 500ms;
 constexpr Time queue_pause = 500us;
 constexpr std::size_t most_at_once = 256;
@@ -173,7 +173,7 @@ void SocketCan::set_options() {
 }
 
 void SocketCan::collect(Time deadline) {
-  // If the deadline is past, only available frames are read: the socket does not block.
+  // If the deadline is past, only frames that have already arrived are read; the socket does not block.
   if (deadline > os::now() && poller_.wait(deadline).empty()) return;
   ClockPair before = kernel_->clocks();
   for (std::size_t i = 0; i < most_at_once; ++i) {
@@ -185,7 +185,8 @@ void SocketCan::collect(Time deadline) {
     if (size < 0) fail("reading from " + interface_, errno);
     const ClockPair after = kernel_->clocks();
     const StampedTime at = stamps_.convert(stamp, std::exchange(before, after), after);
-    if (size != static_cast<ssize_t>(sizeof frame)) continue;  // a CAN FD frame, which is not enabled
+    // a frame of this size is a CAN FD frame, which is not enabled
+    if (size != static_cast<ssize_t>(sizeof frame)) continue;
     if ((frame.can_id & CAN_ERR_FLAG) != 0) {
       take_error(frame, at);
     } else {
@@ -225,7 +226,7 @@ void SocketCan::send(const CanFrame& from) {
   const Time limit = os::now() + queue_patience;
   for (;;) {
     if (kernel_->write(socket_.get(), frame) == static_cast<ssize_t>(sizeof frame)) return;
-    // poll(2) does not report when ENOBUFS (the queue is full) ends, so the write is repeated.
+    // The write is repeated, because poll(2) does not report when a full queue (ENOBUFS) has room again.
     const bool full = errno == ENOBUFS || errno == EAGAIN;
     if (!full && errno != EINTR) fail("sending on " + interface_, errno);
     if (os::now() >= limit) {

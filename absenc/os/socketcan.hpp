@@ -33,8 +33,9 @@ struct CanKernel {
 };
 [[nodiscard]] CanKernel& system_can_kernel();
 
-/// A port on a CAN interface. It does not set the bit rate. Received frames have the time of the kernel's stamp,
-/// or of the read if the stamp is missing or doubtful; the adapter's own delay before that is unknown.
+/// A port on a CAN interface. It does not set the bit rate. A received frame has the time of the kernel's stamp, or
+/// of the read if the stamp is missing or doubtful; how long the adapter held the frame back before the stamp is
+/// unknown.
 class SocketCan final : public FramePort {
  public:
   /// Opens the CAN interface `interface`. Throws Failure. `kernel` must outlive the port.
@@ -50,7 +51,7 @@ class SocketCan final : public FramePort {
   void set_options();
   void take(const can_frame& frame, const StampedTime& at);
   void take_error(const can_frame& frame, const StampedTime& at);
-  // A virtual interface has no bit rate: every rate is accepted.
+  // Returns whether the interface is virtual: it has no bit rate and accepts every one.
   [[nodiscard]] bool is_virtual() const { return interface_.starts_with("vcan") || interface_.starts_with("vxcan"); }
   [[nodiscard]] std::string up_command(std::uint32_t rate) const;
   [[noreturn]] void fail(const std::string& what, int error) const;

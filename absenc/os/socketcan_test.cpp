@@ -82,7 +82,8 @@ TEST(SocketCan, SendsAndReceives) {
   kernel.put(raw(0x120, {0x47, 0x26}));
   const FrameEvent sent = port.wait({.at = never});
   EXPECT_EQ(sent.kind, EventKind::sent);
-  EXPECT_LE(sent.at, kernel.written_at);  // the time before the write: a reply can be received before the call returns
+  // `sent` has the time before the write, because a reply can be received before write(2) returns
+  EXPECT_LE(sent.at, kernel.written_at);
   const FrameEvent received = port.wait({.at = never});
   ASSERT_EQ(received.kind, EventKind::received);
   EXPECT_GE(received.at, sent.at);
@@ -188,7 +189,7 @@ TEST(SocketCan, DoesNotSetBitRate) {
   EXPECT_EQ(failure_of([&] { port.begin({.kind = FrameStep::Kind::pulse}); }).kind(), Failure::Kind::unsupported);
 }
 
-// Tests the system call on a UDP socket, which every kernel has.
+// Tests the read of a frame with the kernel's time stamp; uses a UDP socket, which every kernel has.
 TEST(SocketCan, KernelStampIsTimeOfReception) {
   const Descriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
   sockaddr_in address{};
@@ -201,21 +202,22 @@ TEST(SocketCan, KernelStampIsTimeOfReception) {
   const int on = 1;
   ASSERT_EQ(system_can_kernel().set(socket.get(), SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on), 0);
   const can_frame frame = raw(0x120, {1, 2});
-  // The kernel enables time stamps some time later; until then a stamp is the time of the read.
+  // The kernel stamps frames at their arrival only some time after the option is set; until then a stamp is the time
+  // of the read.
   bool has_good_stamp = false;
   for (int attempt = 0; attempt < 100 && !has_good_stamp; ++attempt) {
     const StampClock stamps(read_clocks());
     const Time before = now();
     ASSERT_EQ(::sendto(socket.get(), &frame, sizeof frame, 0, generic, size), static_cast<ssize_t>(sizeof frame));
     const Time after = now();
-    reach(after + 10ms);  // the frame waits in the queue
+    reach(after + 10ms);  // the frame waits in the socket's queue
     can_frame received{};
     std::optional<Time> stamp;
     const ClockPair before_read = read_clocks();
     ASSERT_EQ(system_can_kernel().read(socket.get(), received, stamp), static_cast<ssize_t>(sizeof frame));
     EXPECT_EQ(received.can_id, 0x120u);
     const StampedTime time = stamps.convert(stamp, before_read, read_clocks());
-    EXPECT_GE(time.at, before);  // true with and without a stamp of the arrival
+    EXPECT_GE(time.at, before);  // holds whether the stamp is that of the arrival or that of the read
     EXPECT_LE(time.at - time.late, after);
     has_good_stamp = stamp.has_value() && time.late < 1ms;
   }
@@ -233,7 +235,7 @@ TEST(SocketCan, FrameHasTimeOfKernelStamp) {
   EXPECT_GE(event.at, before - 3ms);
   EXPECT_LE(event.at - event.late, after - 3ms);
   EXPECT_GT(event.late, Time{});
-  EXPECT_LT(event.late, 2ms);  // mostly below 1 us; the rest allows for a busy machine
+  EXPECT_LT(event.late, 2ms);  // `late` is mostly below 1 us; 2 ms allows for a busy machine
 }
 
 TEST(SocketCan, FrameHasTimeOfReadAndItsUncertaintyIfClockWasSet) {
@@ -244,12 +246,13 @@ TEST(SocketCan, FrameHasTimeOfReadAndItsUncertaintyIfClockWasSet) {
     reach(opened + 5ms);
     kernel.put(raw(0x120, {1}));
     kernel.age = 3ms;
-    kernel.clock_step = step;  // between the stamp and the next look at the clocks
+    // the calendar clock is set after the frame was stamped and before the port reads the clock again
+    kernel.clock_step = step;
     const Time before = now();
     const FrameEvent event = port.wait({.at = never});
     EXPECT_GE(event.at, before) << step.count();
     EXPECT_LE(event.at - event.late, before - 3ms) << step.count();
-    // Frames after the step have exact times again.
+    // Frames that arrive after the clock was set have exact times again.
     kernel.put(raw(0x120, {2}));
     EXPECT_LT(port.wait({.at = never}).late, 2ms) << step.count();
   }
@@ -277,7 +280,7 @@ TEST(SocketCan, ListsInterfaces) {
   EXPECT_TRUE(can_interfaces(sys.path() / "none").empty());
 }
 
-// The test machine may have no CAN, so the kernel may report one of two errors.
+// The kernel of the test machine may have no CAN, so one of two errors is accepted.
 TEST(SocketCan, RealKernelReportsMissingInterface) {
   const std::string what = failure_of([] { const SocketCan port("absenc-none", line); }).what();
   EXPECT_TRUE(what.find("there is no CAN interface absenc-none") != std::string::npos ||

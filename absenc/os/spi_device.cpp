@@ -11,9 +11,10 @@ namespace absenc::os {
 
 namespace {
 
-constexpr Time deselected_time = std::chrono::microseconds(10);  // time for which the kernel deselects the chip
+// time for which the chip is deselected between two transfers of a message
+constexpr Time deselected_time = std::chrono::microseconds(10);
 
-// Limit in bytes of what the device receives in one selection: no device reads more.
+// Greatest number of bytes of one selection that are passed to the device; no device reads more.
 constexpr std::size_t most_received = 4096;
 
 constexpr bool idles_high(std::uint8_t mode) { return (mode & 2) != 0; }
@@ -95,7 +96,7 @@ Time SpiDevice::clock(const SpiTransfer& transfer, Time at) {
   period_ = period_ == Time{} ? period : std::min(period_, period);
   received_.resize(std::min(received_.size() + transfer.size, most_received));
   std::fill(transfer.in.begin(), transfer.in.end(), std::uint8_t{0});
-  // If the host shifts at the edge at which the device samples, the device gets the old bit.
+  // If the host shifts out at the edge at which the device samples, the device samples the previous bit.
   const bool samples_late = samples_at_trailing_edge(transfer.mode) && !shifts_at_leading_edge(transfer.mode);
   for (std::size_t bit = 0; bit < 8 * transfer.size; ++bit, ++clocks_) {
     const std::uint8_t mask = mask_of(bit, transfer.lsb_first);
@@ -135,7 +136,7 @@ void SpiDevice::run_device(Time now) {
   }
 }
 
-// Modes 2 and 3 give a clocked device the same edges.
+// In modes 2 and 3 the clock line idles high, and a clocked device (SSI, BiSS) sees the same edges.
 bool SpiDevice::suits(std::uint8_t mode) const {
   return carries_bits(kind_) ? idles_high(mode) : mode == settings_.spi_mode;
 }
@@ -154,7 +155,7 @@ bool SpiDevice::driven(std::size_t clock, std::uint8_t mode) const {
   if (kind_ == LinkKind::spi) {
     before_first_bit = samples_at_trailing_edge(settings_.spi_mode) ? 1 : 0;
   } else if (!idles_high(mode) && shifts > 0) {
-    --shifts;  // the first rising edge precedes the edge at which the device latches
+    --shifts;  // in modes 0 and 1 the first rising edge comes before the falling edge at which the device latches
   }
   if (shifts < before_first_bit) return true;
   const std::size_t bit = shifts - before_first_bit;

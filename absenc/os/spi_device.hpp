@@ -19,27 +19,28 @@ struct SpiTransfer {
   std::uint32_t rate = 0;  // clock rate in Hz
   std::uint8_t mode = 0;   // SPI mode: 2 * CPOL + CPHA
   bool lsb_first = false;
-  Time delay{};           // pause behind the last bit of the transfer
-  bool deselect = false;  // deselects the chip after `delay`; in the last transfer: the chip stays selected
+  Time delay{};  // pause after the last bit of the transfer
+  // the chip is deselected after `delay`; in the last transfer of a message, the chip stays selected
+  bool deselect = false;
 };
 
-/// One device machine behind a controller, simulated edge by edge in every SPI mode.
+/// One virtual SPI or clocked encoder behind a controller, simulated edge by edge in every SPI mode.
 class SpiDevice {
  public:
-  /// `kind` must be spi or clocked, else throws std::invalid_argument. `device` must outlive this object.
+  /// `kind` must be spi or clocked: throws std::invalid_argument for other kinds. `device` must outlive this object.
   SpiDevice(LinkKind kind, const LineSettings& settings, Machine<std::uint8_t>& device);
 
-  /// Takes the device's first step: the device may request a timer.
+  /// Starts the device: executes its first step, which may request a timer.
   void begin(Time now) { run_device(now); }
-  /// Processes an SPI message and returns the time of its end.
+  /// Sends the transfers of an SPI message, beginning at `start`, and returns the time of its end.
   Time message(std::span<const SpiTransfer> transfers, Time start);
 
-  /// Notes that the clock line rests at the idle level of this mode between two messages.
+  /// Records that the clock line rests between two messages at the idle level of the SPI mode `mode`.
   void rest(std::uint8_t mode);
 
-  /// Returns the time at which `wake` must be called; `never` without a requested timer.
+  /// Returns the time at which `wake` must be called; `never` if the device has requested no timer.
   [[nodiscard]] Time timer() const { return timer_; }
-  /// Reports to the device that its timer has expired; does nothing before `timer()`.
+  /// Reports to the device that its timer has expired; does nothing before the time `timer()`.
   void wake(Time now);
 
   [[nodiscard]] const LineSettings& settings() const { return settings_; }
@@ -64,9 +65,9 @@ class SpiDevice {
   Time timer_ = never;
   std::uint64_t messages_ = 0;
   std::uint64_t wrong_modes_ = 0;
-  bool held_low_ = false;  // whether the clock line was low at some time since the last message
+  bool held_low_ = false;
 
-  // State since the chip was selected (spi) or since the first clock of a word (clocked).
+  // State since the chip was selected (SPI) or since the first clock of a word (clocked encoder).
   bool selected_ = false;
   std::vector<std::uint8_t> driven_;
   std::uint8_t after_driven_ = 0xFF;

@@ -22,7 +22,7 @@ constexpr LineSettings chip_settings{.rate = 1'000'000, .spi_mode = 1};
 const Data driven{0x95, 0xC6, 0x12};
 const Data sent{0xA7, 0x01, 0x80};
 
-// Reference model: both ends as shift registers on three wires, edge by edge.
+// A reference model of the SPI wires: controller and chip as shift registers, simulated edge by edge.
 struct Wires {
   explicit Wires(std::uint8_t host, std::uint8_t chip) : host_mode(host), chip_mode(chip) {}
 
@@ -242,7 +242,7 @@ TEST(SpiDevice, WakesTheDeviceOnceAtItsTimer) {
   EXPECT_EQ(toy.log, "");
   device.wake(6ms);
   EXPECT_EQ(toy.log, "6000000 timer");
-  EXPECT_EQ(device.timer(), never);  // a time in the past sets no timer
+  EXPECT_EQ(device.timer(), never);  // the device requested a time in the past, which sets no timer
 }
 
 TEST(SpiDevice, HasNoOtherLinks) {

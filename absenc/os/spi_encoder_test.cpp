@@ -49,7 +49,7 @@ TEST_F(SpiEncoder, SsiOfEveryLength) {
   }
 }
 
-// Clocks 1000 bits, more than the frame needs.
+// The host clocks 1000 bits, more than the BiSS frame has.
 TEST_F(SpiEncoder, SloIsLowBehindTheCrcOnEveryPort) {
   constexpr std::size_t clocks = 1000;
   const auto samples = [&](Port<std::uint8_t>& port) {
@@ -110,7 +110,7 @@ TEST_F(SpiEncoder, Biss) {
   EXPECT_EQ(encoder.violation_count(), 0u) << encoder.violations()[0].rule;
 }
 
-/// A BiSS encoder with registers behind the controller, and a host that reads them.
+/// A virtual BiSS encoder with registers behind a simulated SPI controller, and a host that reads the registers.
 struct BissRegisters {
   BissRegisters(FakeSpi& kernel, const Shaft& shaft) : encoder(biss::Format{}, shaft) {
     EXPECT_EQ(resolve_options(biss::unit, {}, {}, options).kind, OptionError::Kind::none);
@@ -187,7 +187,7 @@ TEST_F(SpiEncoder, Encolink) {
     encolink::VirtualEncoder shifted(format, shaft);
     EXPECT_EQ(read(shifted, {{}, mode}), Error::bad_checksum) << int{mode};
   }
-  // The time between chip select and the first clock does not count as a slow clock.
+  // The time between chip select and the first clock does not lower the measured clock rate.
   encolink::VirtualEncoder hurried(format, shaft);
   EXPECT_EQ(read(hurried, {4'100'000, {}}), Error::none);
   ASSERT_GT(hurried.violation_count(), 0u);

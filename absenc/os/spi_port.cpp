@@ -101,7 +101,7 @@ Time SpiPort::now() { return waiting_.now(); }
 void SpiPort::begin(const ByteStep& step) {
   switch (step.kind) {
     case ByteStep::Kind::transfer:
-      // A caller that reads without pauses never waits, so SIGINT and SIGTERM are checked here.
+      // SIGINT and SIGTERM are checked here, because a caller that reads without pauses never waits.
       if (interrupted() && take_interrupt()) throw Interrupted{};
       if (step.hold_low) {
         hold_low(step.at);
@@ -151,11 +151,11 @@ void SpiPort::transfer(const ByteStep& step) {
   if (received_pending_) waiting_.silence.received(sent_at_);
 }
 
-// Sends one message: the chip stays selected from its first transfer to its last.
+// Sends `out_` and receives `in_` in one SPI message: the chip stays selected from the first transfer to the last.
 void SpiPort::send_message(bool with_output) {
   std::array<spi_ioc_transfer, 2> transfers{};
   const auto lead = std::chrono::ceil<std::chrono::microseconds>(settings_.select_lead).count();
-  // The first transfer has no bytes: it only waits between chip select and the first clock.
+  // The first of two transfers has no bytes: it only waits between chip select and the first clock.
   transfers[0].delay_usecs = static_cast<std::uint16_t>(lead);
   spi_ioc_transfer& bytes = transfers[1];
   if (with_output) bytes.tx_buf = reinterpret_cast<std::uintptr_t>(out_.data());
@@ -164,7 +164,7 @@ void SpiPort::send_message(bool with_output) {
   const int result = lead > 0 ? control(SPI_IOC_MESSAGE(2), transfers.data()) : control(SPI_IOC_MESSAGE(1), &bytes);
   if (result == static_cast<int>(in_.size())) return;
   const int error = result < 0 ? errno : EIO;
-  // ENOTCONN and ECONNABORTED mean that a program (CUSE) served the device and has ended.
+  // ENOTCONN and ECONNABORTED: a program served this device with CUSE and has ended.
   if (error == ENODEV || error == ESHUTDOWN || error == ENOTCONN || error == ECONNABORTED) {
     throw Failure(Kind::lost, path_ + " went away: was its driver unloaded?");
   }
@@ -177,7 +177,8 @@ void SpiPort::send_message(bool with_output) {
   throw Failure(Kind::system, what + ": try another speed=HZ, and see what the kernel says in dmesg");
 }
 
-// Removes the bits of the idle clocks, and those behind `bits`.
+// Moves the requested bits to the beginning of the received bytes: drops the bits of the idle clocks before, and
+// those after `bits`.
 void SpiPort::extract_bits(std::size_t bits) {
   const BitView clocked{in_, in_.size() * 8};
   idle_low_ = settings_.idle_clocks > 0 && clocked.load(0, settings_.idle_clocks) == 0;
@@ -221,7 +222,7 @@ void SpiPort::set_mode(std::uint8_t mode) {
                                        reason(error) + ": " + advice);
 }
 
-// Some drivers apply the idle level only with the next message.
+// Some drivers apply a new idle level of the clock only with the next message.
 void SpiPort::hold_low(Time until) {
   const std::uint8_t mode = settings_.spi_mode;
   try {
@@ -240,7 +241,7 @@ void SpiPort::set_word() {
   std::uint8_t given = 0;
   const bool set = control(SPI_IOC_WR_BITS_PER_WORD, &wanted) >= 0;
   const int error = set ? EINVAL : errno;
-  // The kernel may report a word length of 8 as 0.
+  // The kernel may report a word length of 8 bits as 0.
   if (set && control(SPI_IOC_RD_BITS_PER_WORD, &given) >= 0 && (given == word_bits || given == 0)) return;
   throw Failure(Kind::unsupported, "the controller of " + path_ + " refused words of " + std::to_string(word_bits) +
                                        " bits" + reason(error) + ": use another controller");

@@ -30,8 +30,9 @@ struct SpiChoice {
   std::optional<std::uint8_t> mode;    // SPI mode, 0 to 3
 };
 
-/// A port on an SPI controller, locked against other programs that use locks. A clocked transfer has up to seven more
-/// clocks, because a controller clocks whole bytes. `begin` and `wait` throw Failure, Interrupted or Ended.
+/// A port on an SPI controller, locked against other programs that use flock(2). On clocked encoders (SSI, BiSS) a
+/// transfer has up to seven additional clocks, because a controller clocks whole bytes. `begin` and `wait` throw
+/// Failure, Interrupted or Ended.
 class SpiPort final : public Port<std::uint8_t> {
  public:
   /// Opens the controller at `path`, /dev/spidevB.C; `kind`: spi or clocked, else throws invalid_argument. `kernel`
@@ -66,17 +67,20 @@ class SpiPort final : public Port<std::uint8_t> {
   SpiChoice choice_;
   SpiKernel* kernel_;
   Descriptor descriptor_;
-  std::uint32_t board_flags_ = 0;  // mode flags of the board's wiring, which stay as they are
+  // mode flags that belong to the board's wiring (for example the polarity of chip select); they are never changed
+  std::uint32_t board_flags_ = 0;
   LineSettings settings_{};
 
   std::vector<std::uint8_t> out_;
   std::vector<std::uint8_t> in_;
   Waiting<std::uint8_t> waiting_;
-  Time sent_at_{};                 // end of the last transfer
-  Time sent_late_{};               // duration of the system call of the last transfer
+  Time sent_at_{};  // end of the last transfer
+  // duration of the system call of the last transfer: the transfer may have ended earlier by up to this
+  Time sent_late_{};
   bool sent_pending_ = false;      // whether the event `sent` is still to be reported
   bool received_pending_ = false;  // whether the event `received` is still to be reported, after `sent`
-  bool idle_low_ = false;          // whether the last clocked transfer had idle clocks, all with the data line low
+  // whether the last transfer of a clocked encoder had idle clocks, and the data line was low in all of them
+  bool idle_low_ = false;
 };
 
 /// Returns the paths of all spidev devices, "/dev/spidev0.0" and so on, sorted.

@@ -98,7 +98,7 @@ TEST_F(SpiPortTest, ExchangesAsManyBytesAsAreSentOrExpected) {
 
 TEST_F(SpiPortTest, WaitsBetweenChipSelectAndClock) {
   LineSettings slow = encoder_settings;
-  slow.select_lead = 4'500ns;  // this lead is rounded up to whole microseconds
+  slow.select_lead = 4'500ns;  // the time from chip select to the first clock is rounded up to whole microseconds
   SpiPort port = open(LinkKind::spi, slow);
   kernel.log.clear();
   port.begin({.kind = ByteStep::Kind::transfer, .expect = 3});
@@ -166,9 +166,9 @@ TEST_F(SpiPortTest, ReportsTimerGapAndAnswer) {
   const ByteStep quiet{.at = port.now() + 1h, .answer = 1h, .gap = 3ms};
   const ByteEvent silence = port.wait(quiet);
   EXPECT_EQ(silence.kind, ByteEvent::Kind::silence);
-  const Time again = port.now() + 5ms;  // each transfer reports at most one silence
+  const Time again = port.now() + 5ms;  // no second silence is reported after the same transfer
   EXPECT_EQ(port.wait({.at = again, .gap = 3ms}).kind, ByteEvent::Kind::timer);
-  port.begin({.kind = ByteStep::Kind::transfer});  // an empty transfer: nothing is received
+  port.begin({.kind = ByteStep::Kind::transfer});  // an empty transfer, in which nothing is received
   EXPECT_EQ(port.wait({}).kind, ByteEvent::Kind::sent);
   EXPECT_EQ(port.wait({.at = never, .answer = 1ms, .gap = 1h}).kind, ByteEvent::Kind::silence);
 }
@@ -193,7 +193,7 @@ TEST_F(SpiPortTest, ReportsRefusedMode) {
             "the controller of /dev/spidev0.0 refused SPI mode 3 (Invalid argument): swap the two wires of the clock "
             "pair and set spi_mode=1, or use another controller");
   kernel.refusals.clear();
-  kernel.mode_mask = SPI_CPHA;  // mode bits outside this mask are accepted without effect
+  kernel.mode_mask = SPI_CPHA;  // the controller accepts SPI mode bits outside this mask, but ignores them
   EXPECT_THAT(refusal(Kind::unsupported, LinkKind::clocked, biss_settings), HasSubstr("refused SPI mode 3"));
 }
 

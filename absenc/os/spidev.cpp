@@ -11,9 +11,10 @@ namespace absenc::os {
 
 namespace {
 
-// Greatest number of bytes of a message in each direction: the kernel's default of bufsiz.
+// Greatest number of bytes of an SPI message in each direction: the kernel's default of its parameter bufsiz.
 constexpr std::size_t most_bytes = 4096;
-// Greatest number of buffers: a FUSE request has 256, one of which holds the transfers.
+// Greatest number of buffers of an SPI message: a FUSE request may name 256 memory ranges, one of which is the list
+// of transfers.
 constexpr std::size_t most_buffers = 255;
 constexpr std::uint8_t most_wires = 1;
 constexpr std::uint32_t lsb_first = SPI_LSB_FIRST;
@@ -39,7 +40,7 @@ bool is_message(unsigned long request) {
   return _IOC_TYPE(request) == SPI_IOC_MAGIC && _IOC_NR(request) == 0 && _IOC_DIR(request) == _IOC_WRITE;
 }
 
-// Memory ranges of a message, and how many bytes it sends (`in`) and receives (`out`).
+// Memory ranges of an SPI message, and the number of bytes that the host sends (`in`) and receives (`out`).
 struct Buffers {
   SpidevReply reply{.again = true};
   std::size_t in = 0;
@@ -65,7 +66,7 @@ Buffers buffers_of(UserMemory list, std::span<const spi_ioc_transfer> transfers)
 int refused(std::span<const spi_ioc_transfer> transfers, const Buffers& buffers) {
   if (buffers.in > most_bytes || buffers.out > most_bytes) return EMSGSIZE;
   if (buffers.reply.in.size() - 1 + buffers.reply.out.size() > most_buffers) return EMSGSIZE;
-  std::uint64_t all = 0;  // number of bytes, including transfers without a buffer
+  std::uint64_t all = 0;  // number of bytes of all transfers, including those without a buffer
   for (const spi_ioc_transfer& transfer : transfers) {
     all += transfer.len;
     if (all > INT32_MAX) return EMSGSIZE;
@@ -151,7 +152,7 @@ int Spidev::set_mode(std::uint32_t wanted) {
   return 0;
 }
 
-// Another thread of the program may change the list of transfers between two calls.
+// The list is checked in each call: another thread of the calling program may change the list between two calls.
 SpidevReply Spidev::message(std::uint64_t address, std::size_t size, Bytes in, std::size_t room, Time now) {
   if (size % sizeof(spi_ioc_transfer) != 0) return error_reply(EINVAL);
   if (size == 0) return {};

@@ -10,7 +10,7 @@
 
 namespace absenc::os {
 
-/// A memory range of the program that made the request.
+/// A memory range of the program that called ioctl.
 struct UserMemory {
   std::uint64_t address;
   std::size_t size;
@@ -20,12 +20,12 @@ struct UserMemory {
 
 struct SpidevReply {
   int result = 0;  // return value of ioctl, read and write; negative: -errno
-  /// Whether the request must be repeated, with the content of `in` and with room for `out`.
+  /// Whether the request must be repeated with the content of the ranges `in` and with room for the ranges `out`.
   bool again = false;
   std::vector<UserMemory> in{};
   std::vector<UserMemory> out{};
-  std::vector<std::uint8_t> bytes{};  // bytes that were read, for the program
-  Time at{};                          // earliest time for the reply to the program: the end of the SPI message, if any
+  std::vector<std::uint8_t> bytes{};  // bytes that the program reads
+  Time at{};  // earliest time for the reply to the program: the end of the SPI message if there was one
 };
 
 /// Settings of the simulated controller, and the mode flags that it supports.
@@ -42,11 +42,11 @@ class Spidev {
   explicit Spidev(SpiDevice& device);
 
   void open() { ++users_; }
-  /// Closes the device for one program; the close of the last one resets the controller's speed.
+  /// Closes the device for one program. When the last program closes it, the controller's speed is reset.
   void close();
 
-  /// Handles an ioctl. `in`: content of the ranges `in` of the last SpidevReply, empty at first; `room`: total size of
-  /// its ranges `out`.
+  /// Handles an ioctl. `in`: content of the memory ranges SpidevReply::in of the previous reply, empty in the first
+  /// call; `room`: total size of its ranges SpidevReply::out, in bytes.
   [[nodiscard]] SpidevReply control(unsigned long request, std::uint64_t address, Bytes in, std::size_t room, Time now);
   [[nodiscard]] SpidevReply read(std::size_t size, Time now);
   [[nodiscard]] SpidevReply write(Bytes bytes, Time now);

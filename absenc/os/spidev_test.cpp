@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the replies of Spidev, and which memory of the program it requests.
+// Tests the replies of Spidev, and which memory of the calling program it requests.
 #include "absenc/os/spidev.hpp"
 
 #include <gmock/gmock-more-matchers.h>
@@ -161,7 +161,8 @@ TEST_F(SpidevTest, RequestsTransfersThenTheirBuffers) {
 
 TEST_F(SpidevTest, RequestsChangedListAgain) {
   Data in = bytes_of(TransferFields{.tx_buf = 0x2000, .len = 5});
-  in.insert(in.end(), {1, 2});  // bytes that were fetched for a list with a two-byte buffer
+  // the caller fetched a buffer of two bytes, but the list now names a buffer of five bytes
+  in.insert(in.end(), {1, 2});
   const SpidevReply reply = message(in, 1, 0);
   EXPECT_TRUE(reply.again);
   EXPECT_THAT(reply.in, ElementsAre(UserMemory{0x1000, 32}, UserMemory{0x2000, 5}));

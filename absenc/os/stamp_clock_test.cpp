@@ -12,7 +12,8 @@ using namespace std::chrono_literals;
 
 constexpr Time lead = 500'000h;
 
-// Clocks that were read at `at`, in `width`, while the calendar clock was ahead by `ahead`.
+// Returns a ClockPair whose reading began at `at` and took `width`, while the calendar clock was ahead of os::now by
+// `ahead`.
 ClockPair clocks(Time at, Time ahead = lead, Time width = 200ns) { return {at, at + ahead + width / 2, at + width}; }
 
 TEST(StampClock, TimeIsExactToWidthOfBothLooks) {

@@ -29,7 +29,7 @@ void StreamPort::begin(const ByteStep& step) {
       pulse(step);
       break;
     case ByteStep::Kind::configure:
-      reach(sent_at_);  // bytes that are not sent yet leave with the old settings
+      reach(sent_at_);  // bytes that are not sent yet must leave at the old rate
       change_rate(step.rate);
       break;
     case ByteStep::Kind::wait:
@@ -40,7 +40,7 @@ void StreamPort::begin(const ByteStep& step) {
 }
 
 void StreamPort::transfer(const ByteStep& step) {
-  // The first comparison avoids reading the clock for most transfers.
+  // Most transfers are due already; the first comparison shows this without reading the clock.
   if (step.at > waiting_.known_time() + send_slack_ && step.at > os::now() + send_slack_) reach(step.at);
   std::span<const std::uint8_t> out = step.out;
   for (; step.frame != 0 && out.size() > step.frame; out = out.subspan(step.frame)) {
@@ -69,7 +69,8 @@ ByteEvent StreamPort::wait(const ByteStep& step) {
     const Time time = os::now();
     if (time >= end_) throw Ended{};
     if (!ready.empty()) {
-      // Received bytes are reported before a silence or timer: this program may look late.
+      // Received bytes are reported before a silence or a timer event: if this program was late, they may have
+      // arrived in time.
       if (const std::size_t size = read_some(buffer_, ready); size > 0) {
         const Time at = std::max(time, sent_at_);  // an echo may be received before the computed end of sending
         waiting_.silence.received(at);
@@ -137,7 +138,7 @@ std::size_t DescriptorPort::read_some(MutableBytes into, std::span<const int>) {
 }
 
 void DescriptorPort::write_all(Bytes bytes) {
-  // After so long without room for any byte the peer counts as one that reads nothing.
+  // If the other side reads no byte for this long, it counts as lost.
   constexpr Time patience = 3s;
   for (;;) {
     const ssize_t size = write_some(bytes);

@@ -16,7 +16,7 @@
 
 namespace absenc::os {
 
-/// Base class of all byte stream ports. `begin` and `wait` throw Failure, Interrupted or Ended.
+/// Base class of all ports that carry a byte stream. `begin` and `wait` throw Failure, Interrupted or Ended.
 class StreamPort : public Port<std::uint8_t> {
  public:
   StreamPort(const StreamPort&) = delete;
@@ -27,13 +27,14 @@ class StreamPort : public Port<std::uint8_t> {
   void begin(const Step<std::uint8_t>& step) final;
   [[nodiscard]] Event<std::uint8_t> wait(const Step<std::uint8_t>& step) final;
 
-  /// Returns the delay between the line and this program.
+  /// Returns the delay between the line and this program, which is added to the limits Step::answer and Step::gap.
   [[nodiscard]] Time latency() const { return latency_; }
   void set_latency(Time latency) { latency_ = latency; }
-  /// Sets the delay, if less than `latency`, for the gap limit where `expect` is 0. Default `never`.
+  /// Sets a delay that replaces `latency` for the limit Step::gap in steps whose `expect` is 0, if it is less than
+  /// `latency`. Default `never`: no other delay.
   void set_idle_latency(Time latency) { idle_latency_ = latency; }
 
-  /// Sets the slack: a transfer due within `slack` is sent at once. Default 0.
+  /// Sets the send slack: a transfer whose time is at most `slack` ahead is sent at once. Default 0.
   void set_send_slack(Time slack) { send_slack_ = slack; }
 
   /// Sets the time at which a wait of the port ends with Ended. Default `never`.
@@ -47,23 +48,25 @@ class StreamPort : public Port<std::uint8_t> {
 
   /// Sets the duration of a character, from which the time of `sent` is computed. Default 0.
   void set_character_time(Time time) { character_time_ = time; }
-  /// Sets whether the time of a transfer counts from before its write. Default false.
+  /// Sets whether the time of a transfer is counted from the time before its write(2); else from the time after it.
+  /// Default false.
   void set_read_at_once(bool yes) { read_at_once_ = yes; }
   [[nodiscard]] Time end() const { return end_; }
-  /// Returns the end of the last transfer or pulse.
+  /// Returns the end of the last transfer or pulse, as computed from the duration of its characters.
   [[nodiscard]] Time sent_at() const { return sent_at_; }
 
-  /// Returns the poller; a derived port adds its descriptors.
+  /// Returns the poller that waits for this port; a derived class adds its descriptors to it.
   [[nodiscard]] Poller& poller() { return poller_; }
-  /// Reads bytes from the `ready` descriptors into `into`, and returns their number.
+  /// Reads bytes from those descriptors of this port that are in `ready`, and returns their number.
   virtual std::size_t read_some(MutableBytes into, std::span<const int> ready) = 0;
-  /// Returns how long the bytes read last may have waited for this program to run; 0 if unknown.
+  /// Returns how long the bytes that were read last may have waited because this program did not run; 0 if unknown.
   virtual Time lateness() { return {}; }
   virtual void write_all(Bytes bytes) = 0;
-  /// `drive` and `change_rate` throw Failure `unsupported` unless overridden.
+  /// `drive` sets a wire, and `change_rate` the bit rate; both throw Failure `unsupported` unless a derived class
+  /// overrides them.
   virtual void drive(ExtraWire wire, bool active);
   virtual void change_rate(std::uint32_t rate);
-  /// Returns the duration of a pulse: `requested`, unless overridden.
+  /// Returns the duration of a pulse: `requested`, unless a derived class overrides this.
   [[nodiscard]] virtual Time pulse_width(ExtraWire wire, Time requested) const;
 
  private:
@@ -83,7 +86,6 @@ class StreamPort : public Port<std::uint8_t> {
 
   Waiting<std::uint8_t> waiting_;
   Time sent_at_{};  // end of the last transfer or pulse
-  // Greatest time by which the last transfer or pulse may have ended before `sent_at_`.
   Time sent_late_{};
   bool sent_pending_ = false;  // whether the event `sent` is still to be reported
   std::array<std::uint8_t, 4096> buffer_;

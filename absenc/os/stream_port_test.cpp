@@ -98,7 +98,7 @@ TEST_F(StreamPortTest, ComputesTheEndOfSending) {
   EXPECT_GE(first, before + 2s);
   EXPECT_LE(first, now() + 2s);
   port_.begin(transfer(request_));
-  EXPECT_EQ(port_.wait({}).at, first + 2s);  // the second transfer was sent after the first one
+  EXPECT_EQ(port_.wait({}).at, first + 2s);  // the second transfer is sent after the end of the first one
 }
 
 TEST_F(StreamPortTest, AnEchoDoesNotComeBeforeTheEndOfSending) {
@@ -125,7 +125,7 @@ TEST_F(StreamPortTest, ReportsSilenceOnceWhenNoAnswerComes) {
 TEST_F(StreamPortTest, ReportsSilenceOnceAfterAGap) {
   port_.set_latency(2ms);
   put(peer_.get(), {1});
-  // Before the first byte no gap limit applies, so no silence is reported.
+  // The gap limit applies only after a received byte, so no silence is reported before the first byte.
   EXPECT_EQ(port_.wait({.at = never, .gap = 1ns}).kind, Kind::received);
   const ByteEvent silence = port_.wait({.at = never, .answer = 1ns, .gap = 1ms});
   ASSERT_EQ(silence.kind, Kind::silence);
@@ -184,7 +184,7 @@ TEST_F(StreamPortTest, ReportsTimerThatPassesWhileSending) {
 }
 
 TEST_F(StreamPortTest, ReportsEarlierOfTimerAndSilenceFirst) {
-  // The result must be the same if both times have passed before the port checks.
+  // The port must report the earlier event first, even if both times have passed before it checks.
   const auto first_of = [this](Time timer, Time answer) {
     port_.begin(transfer(request_));
     const Time sent = port_.wait({}).at;
@@ -205,7 +205,7 @@ TEST_F(StreamPortTest, WaitsForAnAnswerAfterEachTransfer) {
   port_.begin(transfer(request_));
   EXPECT_EQ(port_.wait({.at = never}).kind, Kind::sent);
   port_.set_end(now() + 5s);
-  // The answer limit ends the wait, although a byte was received before the transfer.
+  // Silence is counted from the transfer, although a byte was received before it.
   EXPECT_EQ(port_.wait({.at = never, .answer = 1ms}).kind, Kind::silence);
 }
 
@@ -230,7 +230,8 @@ TEST_F(StreamPortTest, EndsWhilePeerReadsNothing) {
   const Time end = now() + 5ms;
   port_.set_end(end);
   EXPECT_THROW(port_.begin(transfer(many)), Ended);
-  EXPECT_LT(now(), end + 2s);  // the port gave up before its own limit for a peer that reads nothing
+  // the time of `set_end` ended the write before the 3 s after which a silent reader counts as lost
+  EXPECT_LT(now(), end + 2s);
 }
 
 TEST_F(StreamPortTest, EndsWhileWaiting) {
@@ -248,7 +249,7 @@ TEST_F(StreamPortTest, IsLostWhenTheOtherSideCloses) {
   peer_.close();
   // Bytes received before the other side closed are not lost.
   EXPECT_EQ(port_.wait({.at = never}).kind, Kind::received);
-  errno = EAGAIN;  // like a value left by an earlier call: the end of a stream does not set errno
+  errno = EAGAIN;  // errno has a value of an earlier call, because a read at the end of a stream does not set errno
   const Failure failure = failure_of([&] { static_cast<void>(port_.wait({.at = never})); });
   EXPECT_EQ(failure.kind(), Failure::Kind::lost);
   EXPECT_STREQ(failure.what(), "the line went away: unplugged, or closed at the other end?");

@@ -19,7 +19,8 @@ namespace absenc::os {
   return line;
 }
 
-/// Returns the number of up to 32 bits at the beginning of the file at `path`; empty if none.
+/// Returns the number of up to 32 bits with which the file at `path` begins; empty if it does not begin with a
+/// number.
 [[nodiscard]] inline std::optional<std::uint32_t> first_number(const std::filesystem::path& path, int base = 10) {
   const std::string text = first_line(path);
   std::uint32_t number = 0;

@@ -9,7 +9,8 @@
 
 namespace absenc::os {
 
-/// A port for bytes on a TCP connection. Its default latency is 200 ms. Configure and pulse steps throw `unsupported`.
+/// A port on a TCP connection, which carries bytes only: steps that configure the line or send a pulse throw
+/// `unsupported`. Its default latency is 200 ms.
 class TcpPort final : public DescriptorPort {
  public:
   /// Connects to `host`: a name or an address, an IPv6 address also in brackets. Throws Failure, and as `wait_for`

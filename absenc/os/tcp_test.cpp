@@ -69,7 +69,8 @@ TEST(TcpPort, KnowsIpv6) {
 }
 
 TEST(TcpPort, ReportsRefusedConnection) {
-  const TestListener listener;  // the socket is bound, so that no other program takes the port
+  // the listener binds a port but does not listen, so that no other program can take the port
+  const TestListener listener;
   const Failure failure = failure_of([&] { const TcpPort port("127.0.0.1", listener.port); });
   EXPECT_EQ(failure.kind(), Kind::not_found);
   EXPECT_EQ(std::string(failure.what()), "nothing listens on 127.0.0.1 port " + std::to_string(listener.port) +
@@ -77,7 +78,7 @@ TEST(TcpPort, ReportsRefusedConnection) {
 }
 
 TEST(TcpPort, ReportsUnknownHost) {
-  // An invalid address, so the test needs no name server.
+  // The invalid address is refused without a name server.
   const Failure failure = failure_of([] { const TcpPort port("[::no]", 4001); });
   EXPECT_EQ(failure.kind(), Kind::not_found);
   EXPECT_NE(std::string_view(failure.what()).find("::no is not known"), std::string_view::npos) << failure.what();
@@ -86,7 +87,8 @@ TEST(TcpPort, ReportsUnknownHost) {
 TEST(TcpPort, TimesOutOnSilentServer) {
   const TestListener listener;
   listener.listen(0);
-  const TcpPort first("127.0.0.1", listener.port);  // the queue is full: further connection requests are dropped
+  // the first connection fills the queue of the listener, so the kernel drops further connection requests
+  const TcpPort first("127.0.0.1", listener.port);
   const Time begin = now();
   EXPECT_EQ(failure_of([&] { const TcpPort second("127.0.0.1", listener.port); }).kind(), Kind::lost);
   EXPECT_GE(now() - begin, 3s);
@@ -97,7 +99,8 @@ TEST(TcpPort, IsLostWhenTheServerCloses) {
   listener.listen(1);
   TcpPort port("127.0.0.1", listener.port);
   Descriptor server = listener.accept();
-  const linger reset{1, 0};  // with this setting the next write of the other side fails at once
+  // the server resets the connection when it closes, so the next write of the port fails at once
+  const linger reset{1, 0};
   ASSERT_EQ(::setsockopt(server.get(), SOL_SOCKET, SO_LINGER, &reset, sizeof reset), 0);
   server.close();
   EXPECT_EQ(failure_of([&] { static_cast<void>(port.wait({.at = never})); }).kind(), Kind::lost);

@@ -26,7 +26,7 @@ TerminalPair open_terminal_pair() {
   check(static_cast<bool>(pair.slave));
   termios settings{};
   check(::tcgetattr(pair.slave.get(), &settings) == 0);
-  ::cfmakeraw(&settings);  // with the terminal's echo, the host's requests would be sent back to it
+  ::cfmakeraw(&settings);  // with the terminal's echo on, requests would be sent back to the host
   check(::tcsetattr(pair.slave.get(), TCSANOW, &settings) == 0);
   return pair;
 }

@@ -64,7 +64,7 @@ inline void put(int descriptor, const Data& bytes) {
   ASSERT_EQ(::write(descriptor, bytes.data(), bytes.size()), static_cast<ssize_t>(bytes.size()));
 }
 
-/// Returns the bytes of one read; empty if nothing is received within `milliseconds`.
+/// Returns the bytes of one read from `descriptor`; empty if nothing is received within `milliseconds`.
 [[nodiscard]] inline Data get(int descriptor, int milliseconds = 5000) {
   pollfd readable{descriptor, POLLIN, 0};
   if (::poll(&readable, 1, milliseconds) <= 0) return {};

@@ -12,13 +12,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Returns the number in a file of four hexadecimal digits; 0 if it has none.
+// Returns the hexadecimal number in the file at `path`, at most 16 bits; 0 if the file has none.
 std::uint16_t number_of(const fs::path& path) { return static_cast<std::uint16_t>(first_number(path, 16).value_or(0)); }
 
 struct KnownChip {
   std::uint16_t vendor;
   std::uint16_t product;
-  std::uint16_t release;  // release number bcdDevice; 0: any
+  std::uint16_t release;  // the chip's release number bcdDevice; 0: the entry is for any release
   AdapterChip chip;
 };
 

@@ -13,7 +13,7 @@ namespace absenc::os {
 struct UsbAdapter {
   std::uint16_t vendor = 0;     // vendor number, from idVendor
   std::uint16_t product = 0;    // product number, from idProduct
-  std::uint16_t release = 0;    // bcdDevice: distinguishes chips with the same product number
+  std::uint16_t release = 0;    // release number bcdDevice, which distinguishes chips with the same product number
   std::string maker{};          // manufacturer's name, from iManufacturer
   std::string name{};           // product name, from iProduct
   std::string serial_number{};  // serial number, from iSerialNumber

@@ -11,7 +11,7 @@
 
 namespace absenc::os {
 
-/// Timing of a port: the time known to its machine, the requested timer, the silence limit.
+/// The timing of a port: the time that its state machine knows, the requested timer, the silence limit.
 template <class Item>
 class Waiting {
  public:
@@ -20,16 +20,16 @@ class Waiting {
 
   Silence silence;
 
-  /// Returns the time known to the machine: that of the last call of `now` or of the last event.
+  /// Returns the time that the state machine knows: that of the last call of `now` or of the last event.
   [[nodiscard]] Time known_time() const { return known_time_; }
   Time now() { return known_time_ = os::now(); }
-  /// Returns `event` and records its time as known to the machine.
+  /// Returns `event` and records its time as the time that the state machine knows.
   Event<Item> report(const Event<Item>& event) {
     known_time_ = event.at;
     return event;
   }
 
-  /// Starts a wait for the events that `step` requests.
+  /// Starts a wait for the timer and the silence that `step` requests. `latency` is added to the silence limits.
   void begin(const Step<Item>& step, Time latency = {}) {
     timer_ = step.at > known_time_ || step.at == timer_ ? step.at : never;
     silence_ = silence.due(step.answer, step.gap, latency);
@@ -49,8 +49,8 @@ class Waiting {
 
  private:
   Time known_time_{};
-  Time timer_ = never;    // time of the requested timer; `never` if there is none to report
-  Time silence_ = never;  // time at which silence is due in this wait
+  Time timer_ = never;    // time of the requested timer; `never` if no timer is to be reported
+  Time silence_ = never;  // time at which silence is to be reported
 };
 
 }  // namespace absenc::os

@@ -17,7 +17,7 @@ using namespace client;
 namespace {
 
 constexpr std::size_t shortest_token = 16;
-constexpr unsigned most_guesses = 10;  // wrong tokens allowed for one address within `time_of_guesses`
+constexpr unsigned most_guesses = 10;  // greatest number of wrong tokens from one IP address within `time_of_guesses`
 constexpr Time time_of_guesses = std::chrono::seconds(60);
 constexpr std::size_t most_addresses = 1000;
 constexpr std::string_view wrong_token = "the token is wrong: the server's token file has no such token";
@@ -29,7 +29,7 @@ bool equals_ignoring_case(std::string_view one, std::string_view other) {
                     [&](char a, char b) { return lower(a) == lower(b); });
 }
 
-// Returns whether two secrets are equal; the time does not show where they differ.
+// Returns whether two secrets are equal; the time that this takes does not show at which byte they differ.
 bool same_secret(std::string_view one, std::string_view other) {
   if (one.size() != other.size()) return false;
   unsigned difference = 0;
@@ -56,7 +56,7 @@ std::string_view authority_of(std::string_view origin) {
   return origin.substr(std::min(origin.find("//") + 2, origin.size()));
 }
 
-// Returns the origin of a URL without a usual port; "" for "". Throws UsageError.
+// Returns the origin of a URL, without the port if it is the usual one; "" for "". Throws UsageError.
 std::string origin_of(std::string_view url) {
   if (url.empty()) return {};
   const std::size_t host = url.starts_with("https://") ? 8 : url.starts_with("http://") ? 7 : 0;
@@ -101,7 +101,7 @@ std::uint64_t Access::wrong_tokens() const {
   return wrong_tokens_;
 }
 
-// Counts a wrong token, and returns whether the address may try again.
+// Counts a wrong token of an IP address, and returns whether the address may try again.
 bool Access::may_try_again(const std::string& peer) const {
   const Time now = os::now();
   const std::lock_guard lock(mutex_);
@@ -134,7 +134,7 @@ std::string Access::token_name(const Request& request) const {
   return name;
 }
 
-// Returns whether the header Host names this server, against DNS rebinding.
+// Returns whether the header Host names this server: the check against DNS rebinding.
 bool Access::names_this_server(std::string_view host) const {
   return names_loopback(host) || (!public_origin_.empty() &&
                                   equals_ignoring_case(host_name_in(host), host_name_in(authority_of(public_origin_))));
@@ -142,7 +142,7 @@ bool Access::names_this_server(std::string_view host) const {
 
 bool Access::is_from_own_page(const Request& request) const {
   if (!request.fetch_site.empty() && request.fetch_site != "same-origin" && request.fetch_site != "none") return false;
-  if (request.origin.empty()) return true;  // neither Sec-Fetch-Site nor Origin names another site
+  if (request.origin.empty()) return true;  // the browser names no other site as the source of the request
   return equals_ignoring_case(request.origin, "http://" + request.host) ||
          equals_ignoring_case(request.origin, "https://" + request.host) ||
          (!public_origin_.empty() && equals_ignoring_case(request.origin, public_origin_));
@@ -153,7 +153,7 @@ bool Access::needs_token(const Request& request, Right right) const {
   return has_tokens() && (request.is_forwarded || !public_origin_.empty());
 }
 
-// Returns the address of the client. Only the last entry of X-Forwarded-For is from the proxy.
+// Returns the IP address of the client. Only the last entry of X-Forwarded-For was written by the proxy.
 std::string Access::client_of(const Request& request) const {
   if (public_origin_.empty() || !is_loopback_address(request.peer)) return request.peer;
   const std::string& list = request.forwarded_for;

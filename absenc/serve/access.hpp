@@ -20,7 +20,7 @@ namespace absenc::serve {
 class Access {
  public:
   enum class Right : std::uint8_t {
-    open,    // the page itself and the health check: a request needs no token
+    open,    // the page itself and the health check: such requests need no token
     read,    // requests for data that the server has already read
     poll,    // requests that poll the encoder or interrupt its readings, without changing it
     change,  // requests that run a command of the encoder or acknowledge an alarm
@@ -31,7 +31,7 @@ class Access {
     std::string public_url{};  // URL at which a proxy on this computer shows the page; "": no proxy
     bool on_loopback = false;  // whether the server listens on loopback, so no other computer can reach it directly
   };
-  /// Throws Failure, UsageError. `server_events` must outlive this object.
+  /// Throws Failure if the token file cannot be used, and UsageError. `server_events` must outlive this object.
   Access(const Choices& choices, ServerEvents& server_events);
 
   /// Reads the token file again. Throws Failure; the previous tokens then stay valid.
@@ -39,11 +39,11 @@ class Access {
 
   /// Returns the response that refuses the request; nothing if it is allowed.
   [[nodiscard]] std::optional<Response> refusal(const Request& request, Right right) const;
-  /// Returns the address of the client, which a proxy on this computer may report.
+  /// Returns the IP address of the client: that of the connection, or the one that a proxy on this computer reports.
   [[nodiscard]] std::string client_of(const Request& request) const;
   /// Returns the name of the token in the request; "" without a valid token.
   [[nodiscard]] std::string token_name(const Request& request) const;
-  /// Returns the response to a missing or wrong token, and counts a wrong token.
+  /// Returns the response to a request with a missing or wrong token, and counts a wrong token.
   [[nodiscard]] Response refuse_token(const Request& request) const;
   [[nodiscard]] bool has_tokens() const { return !token_file_.empty(); }
   /// Returns the number of requests with a wrong token since the start.
@@ -65,7 +65,7 @@ class Access {
   ServerEvents* server_events_;
   mutable std::mutex mutex_;  // mutex that guards all members below
   std::vector<Secret> tokens_;
-  mutable std::map<std::string, Guesses> guesses_;  // counts of wrong tokens, by the address of the client
+  mutable std::map<std::string, Guesses> guesses_;  // counts of wrong tokens, by the IP address of the client
   mutable std::uint64_t wrong_tokens_ = 0;
 };
 

@@ -21,8 +21,9 @@ using namespace client;
 
 namespace {
 
-constexpr std::int64_t most_rows = 5000;         // greatest number of rows in one JSON response
-constexpr std::int64_t rows_of_a_page = 10'000;  // rows of CSV that are read from the history at a time
+constexpr std::int64_t most_rows = 5000;  // greatest number of rows in one JSON response
+// number of rows of a CSV response that are read from the history at a time
+constexpr std::int64_t rows_of_a_page = 10'000;
 
 /// An error that is answered with HTTP status 400.
 struct BadRequest : std::runtime_error {
@@ -52,7 +53,7 @@ std::int64_t number_in(const Request& request, const std::string& name, std::int
   throw BadRequest(fmt::format("{} must be a whole number from {} to {}", name, least, most));
 }
 
-// Returns the range in calendar seconds; by default it ends now and begins an hour before its end.
+// Returns the requested range of time in calendar seconds; by default it ends now and begins an hour before its end.
 Range range_in(const Request& request) {
   constexpr std::int64_t latest = 1'000'000'000'000;
   Range range;
@@ -235,7 +236,7 @@ Response Api::health() const {
                            .set("mqtt_dropped", mqtt.dropped));
 }
 
-// Returns a response with the name of the request's token; refuses a wrong token.
+// Returns the response that tells a client the name of its token; refuses a wrong token.
 Response Api::token(const Request& request) const {
   const std::string who = access_->token_name(request);
   if (who.empty() && !request.authorization.empty()) return access_->refuse_token(request);
@@ -287,7 +288,7 @@ void Api::doctor(Watch& watch, const Request& request, const Reply& reply) {
                        watch.name(), fmt::join(others, ", "), watch.name())));
 }
 
-// Queues `order` for the encoder of `watch`. The response has status 409 if the order is refused.
+// Queues `order` for the encoder of `watch`. If the order is refused, the response has HTTP status 409.
 void Api::give(Watch& watch, Order order, const Request& request, const Reply& reply) {
   const std::string who = access_->token_name(request);
   order.who = who.empty() ? request.peer : fmt::format("{} from {}", who, request.peer);
@@ -296,7 +297,7 @@ void Api::give(Watch& watch, Order order, const Request& request, const Reply& r
       reply.send(done.good ? json_response(done.json) : error_response(502, done.text));
     };
   }
-  // The history records who changed what: the response waits until that is stored, or cannot be.
+  // The response to a command waits until the history has recorded who ran the command, or cannot record it.
   if (chronicler_ != nullptr && order.kind == Order::Kind::command) {
     order.done = [chronicler = chronicler_, server_events = server_events_,
                   answer = std::move(order.done)](const OrderResult& done) {
@@ -330,7 +331,7 @@ void Api::past_as_csv(const std::string& encoder, const Request& request, const 
     std::weak_ptr<Stream> stream{};
   };
   const auto rest = std::make_shared<Rest>(Rest{encoder, range_in(request)});
-  // Queues the next page of rows; runs each time the queue of the stream is empty.
+  // Queues the next rows of a CSV response; runs each time the queue of the stream is empty.
   const auto next = [reader = &chronicler_->reader(), rest] {
     const std::shared_ptr<Stream> stream = rest->stream.lock();
     if (stream == nullptr || stream->over()) return;

@@ -17,7 +17,8 @@
 
 namespace absenc::serve {
 
-/// Returns the state of all encoders, as in the event `state`. `chronicler` may be null.
+/// Returns the state of all encoders as JSON, as in the event `state` of the event stream. `chronicler` is null
+/// without a history.
 [[nodiscard]] client::Json state_json(const Fleet& fleet, const Chronicler* chronicler);
 
 class Api {

@@ -69,7 +69,7 @@ void Chronicler::when_written(std::uint64_t added, std::function<void()> then) {
   changed_.notify_all();
 }
 
-// Returns whether a caller of `when_written` can be served. The mutex must be held.
+// Returns whether the action of a caller of `when_written` can run now. The caller must hold the mutex.
 bool Chronicler::has_ready_caller() const {
   return std::any_of(waiting_.begin(), waiting_.end(), [this](const auto& one) { return one.first <= added_; });
 }

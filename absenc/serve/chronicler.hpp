@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes the history in a thread of its own.
+// Writes the history of `absenc serve` in a thread of its own.
 #pragma once
 
 #include <chrono>
@@ -17,14 +17,14 @@
 
 namespace absenc::serve {
 
-/// A detector of jumps of the calendar clock.
+/// Detects jumps of the calendar clock.
 class ClockWatch {
  public:
   // Smallest change of the calendar clock that counts as a jump, in milliseconds.
   static constexpr std::int64_t smallest_jump_ms = 10'000;
 
-  /// Returns the jump of the calendar clock since the last call, in milliseconds; 0: below `smallest_jump_ms`. `now` is
-  /// a time of os::now.
+  /// Returns by how much the calendar clock has jumped since the last call, in milliseconds; 0 if by less than
+  /// `smallest_jump_ms`. `now` is a time of os::now.
   std::int64_t check(std::int64_t calendar_ms, Time now);
 
  private:
@@ -37,12 +37,14 @@ class Chronicler {
  public:
   /// `fleet` and `server_events` must outlive this object. Throws HistoryInUse.
   Chronicler(const std::string& path, const HistoryLimits& limits, const Fleet& fleet, ServerEvents& server_events);
-  /// Writes the remaining seconds and events.
+  /// Writes the remaining seconds and events into the history.
   ~Chronicler();
 
-  /// Adds events. `added`: number of events since the start with these (ServerEvents::added).
+  /// Adds events to be written. `added`: number of all events since the start of the server, including these
+  /// (ServerEvents::added).
   void add(const std::vector<ServerEvent>& server_events, std::uint64_t added);
-  /// Calls `then`, possibly in another thread, when the first `added` server events were written, or could not be.
+  /// Calls `then`, possibly in another thread, when the first `added` events of the server were written, or cannot be
+  /// written.
   void when_written(std::uint64_t added, std::function<void()> then);
 
   struct Health {
@@ -68,7 +70,7 @@ class Chronicler {
   std::uint64_t added_ = 0;  // number of events since the start, including those in `unwritten_events_`
   std::vector<std::pair<std::uint64_t, std::function<void()>>> waiting_;
   Health health_;
-  std::jthread thread_;  // last member, because the thread uses all others
+  std::jthread thread_;  // the last member, so that all members that the thread uses exist before it
 };
 
 }  // namespace absenc::serve

@@ -41,7 +41,8 @@ bool Connections::end_oldest_idle(Id excluded, const std::function<bool(const Op
   return true;
 }
 
-// Closes the oldest idle connection, outside the reserve, of the address with the most. Returns false if none is idle.
+// Closes the oldest idle connection of the IP address that has most idle connections; those of the reserve do not
+// count. Returns false if none is idle.
 bool Connections::end_oldest_idle_of_busiest(Id excluded) {
   std::unordered_map<std::string, std::size_t> idle;
   for (const auto& [id, one] : open_) {

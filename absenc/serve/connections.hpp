@@ -14,21 +14,24 @@ namespace absenc::serve {
 /// The open HTTP connections of the server. Not thread-safe.
 class Connections {
  public:
-  static constexpr std::size_t most = 480;  // greatest number of connections that may carry any request
-  // Greatest number of connections of one address that may carry any request: others need room, too.
+  // greatest number of connections outside the reserve; these may carry any request
+  static constexpr std::size_t most = 480;
+  // Greatest number of connections of one IP address outside the reserve, so that other addresses have room, too.
   static constexpr std::size_t most_of_address = 384;
-  static constexpr std::size_t reserve = 32;  // number of additional connections, which carry vital requests only
-  // Time limit for waiting for a request and receiving it whole, even if bytes still arrive.
+  // greatest number of connections in the reserve; these carry vital requests only
+  static constexpr std::size_t reserve = 32;
+  // Time within which a connection must send a complete request, even if bytes still arrive.
   static constexpr Time request_time = std::chrono::seconds(10);
 
   using Id = const void*;
-  /// `end` closes the connection of a socket; the server calls `remove` for it at once or later.
+  /// `end` shuts down the socket of a connection; the server calls `remove` for the connection at once or later.
   explicit Connections(std::function<void(int socket)> end) : end_(std::move(end)) {}
 
-  /// Adds a connection. May close idle ones, put this one into the reserve, or close it.
+  /// Adds a connection. To make room, may close idle connections, put the new connection into the reserve, or close
+  /// it.
   void add(Id id, int socket, std::string peer, Time now);
   void remove(Id id) { open_.erase(id); }
-  /// Records that a whole request was received: the connection is not idle until `await_request`.
+  /// Records that a whole request was received: the connection is not idle until `await_request` is called.
   void begin_request(Id id);
   void await_request(Id id, Time now);
   /// Returns whether the connection belongs to the reserve, which serves vital requests only.
@@ -40,7 +43,8 @@ class Connections {
   struct Open {
     int socket = -1;
     std::string peer{};
-    Time idle_since = never;  // time since which no request is being answered; `never` while one is
+    // time since which the connection waits for a request; `never` while a request is being answered
+    Time idle_since = never;
     bool in_reserve = false;
     bool ended = false;
   };

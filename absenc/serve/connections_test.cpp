@@ -17,7 +17,7 @@ struct Trial {
   Time now = 1s;
 
   static Connections::Id id(int socket) { return reinterpret_cast<Connections::Id>(std::intptr_t{socket}); }
-  // Adds `count` connections with the sockets from `first` on, one millisecond after the other.
+  // Adds `count` connections at intervals of one millisecond; their sockets are numbered from `first` on.
   void add(const char* peer, int first, std::size_t count, bool busy = false) {
     for (int socket = first; socket < first + static_cast<int>(count); ++socket) {
       connections.add(id(socket), socket, peer, now += 1ms);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Serializes numbers and texts one after the other, in the byte order of this computer.
+// Serializes numbers and texts into a sequence of bytes, and reads them back; in the byte order of this computer.
 #pragma once
 
 #include <cstddef>

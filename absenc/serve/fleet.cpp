@@ -23,7 +23,7 @@ namespace {
 
 bool is_named(std::string_view name) { return name.find_first_of(":?") == std::string_view::npos; }
 
-// Returns a text that is the same after a reload if no setting of the encoder has changed.
+// Returns a text of all settings of the encoder: it is the same after a reload if no setting has changed.
 std::string description_of(const NamedEncoder& named) {
   std::string text = fmt::format("{} {} {}", named.address, named.rate_hz, named.has_company);
   for (const auto* settings : {&named.settings, &named.defaults}) {
@@ -51,7 +51,7 @@ Fleet::~Fleet() { end(); }
 
 void Fleet::end() {
   const Watches watches = all();
-  // All are asked to stop before the first one is waited for.
+  // All reading threads are asked to stop before the first one is waited for, so that they stop at the same time.
   for (const auto& watch : watches) watch->request_stop();
   for (const auto& watch : watches) watch->wait();
 }
@@ -103,7 +103,8 @@ std::string Fleet::reload() {
       if (stays) unchanged.push_back(one);
     }
   }
-  // The old encoders are stopped first, because a new encoder may need the port of one of them.
+  // The encoders to remove are stopped before new ones start, because a new encoder may need the port of a removed
+  // one.
   for (const auto& watch : ending) watch->request_stop();
   for (const auto& watch : ending) watch->wait();
   std::vector<std::string> added;

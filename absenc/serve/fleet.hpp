@@ -16,15 +16,16 @@ class Fleet {
  public:
   using Watches = std::vector<std::shared_ptr<Watch>>;
 
-  /// `names`: names or addresses of encoders; empty: all of absenc.toml. `rate`: readings per second without `rate_hz`
-  /// in the file; 0: as fast as possible. `realtime`: real-time priority without `realtime` in the file; 0: none.
-  /// `server_events` must outlive this object. Throws UsageError, Failure, os::Interrupted.
+  /// `names`: names or addresses of encoders; empty: all of absenc.toml. `rate`: readings per second of encoders
+  /// without `rate_hz` in the file; 0: as fast as possible. `realtime`: real-time priority of encoders without
+  /// `realtime` in the file; 0: none. `server_events` must outlive this object. Throws UsageError, Failure,
+  /// os::Interrupted.
   Fleet(std::vector<std::string> names, double rate, int realtime, ServerEvents& server_events);
   ~Fleet();
   Fleet(const Fleet&) = delete;
   Fleet& operator=(const Fleet&) = delete;
 
-  /// Ends all reading threads and their orders.
+  /// Ends the reading threads of all encoders, and their orders.
   void end();
 
   /// Reads absenc.toml again; encoders with unchanged settings continue. Returns the changes in words. Throws
@@ -32,7 +33,7 @@ class Fleet {
   std::string reload();
 
   [[nodiscard]] Watches all() const;
-  /// Returns the encoder of this name; null if none is served under it.
+  /// Returns the encoder named `name`; null if no such encoder is served.
   [[nodiscard]] std::shared_ptr<Watch> find(std::string_view name) const;
   /// Returns the names of the other encoders on the same line as `watch`.
   [[nodiscard]] std::vector<std::string> others_on_line(const Watch& watch) const;

@@ -16,7 +16,7 @@ using namespace client;
 
 namespace {
 
-// A second can occur twice: the clock was set back, or the server was restarted.
+// A second of calendar time can occur twice: the clock was set back, or the server was restarted.
 constexpr const char* add_second = R"(
 INSERT INTO second SELECT id, ?, ?, ?, ?, ?, ?, ?, ?, ? FROM encoder WHERE name = ?
 ON CONFLICT (encoder, at) DO UPDATE SET
@@ -63,7 +63,7 @@ HistoryWriter::HistoryWriter(std::string path, const HistoryLimits& limits)
     open();
   } catch (const HistoryInUse&) {
     throw;
-  } catch (const std::runtime_error& failure) {  // client::Failure or os::Failure
+  } catch (const std::runtime_error& failure) {  // this is client::Failure or os::Failure
     trouble_ = failure.what();
     reader_.refuse(trouble_);
   }
@@ -71,7 +71,7 @@ HistoryWriter::HistoryWriter(std::string path, const HistoryLimits& limits)
 }
 HistoryWriter::~HistoryWriter() = default;
 
-// A file that is damaged at the first opening may belong to another program: it is kept.
+// A file that is damaged when the server starts is not renamed, because it may belong to another program.
 void HistoryWriter::open() {
   try {
     file_.emplace(path_);
@@ -178,7 +178,7 @@ void HistoryWriter::note_loss(std::size_t rows, const std::string& why) {
 void HistoryWriter::roll_back() {
   try {
     if (file_ && file_->sqlite().in_transaction()) file_->sqlite().run("ROLLBACK");
-  } catch (const Failure&) {  // the transaction has ended: SQLite has already rolled it back
+  } catch (const Failure&) {  // SQLite has already rolled the transaction back
   }
 }
 
@@ -199,7 +199,7 @@ void HistoryWriter::trim() {
   }
 }
 
-// Returns whether one encoder has rows in 24 different hours since `at_s`.
+// Returns whether an encoder has rows in at least 24 different hours since the calendar second `at_s`.
 bool HistoryWriter::has_day_of_rows_since(std::int64_t at_s) {
   constexpr std::int64_t hours = 24;
   Statement encoders(file_->sqlite(), "SELECT id FROM encoder");
@@ -215,7 +215,8 @@ bool HistoryWriter::has_day_of_rows_since(std::int64_t at_s) {
   return false;
 }
 
-// Returns the second before which a tenth of the rows of the encoder with most lie; without rows: of the events.
+// Returns the calendar second before which a tenth of the rows lie, of the encoder with most rows; if no encoder has
+// rows, a tenth of the events.
 std::int64_t HistoryWriter::end_of_oldest_tenth() {
   Sqlite& sqlite = file_->sqlite();
   const std::int64_t most = sqlite.number(
@@ -261,7 +262,7 @@ Sqlite& HistoryReader::database() {
 }
 
 Json HistoryReader::seconds(const std::string& encoder, Range range, std::int64_t most) {
-  // Rows begin at multiples of the step, so a range may touch one more than its length suggests.
+  // The rows of a response begin at multiples of the step, so a range may need one row more than its length suggests.
   most = std::max<std::int64_t>(1, most);
   std::int64_t step = std::max<std::int64_t>(1, (range.to_s - range.from_s) / most + 1);
   while (range.to_s / step - range.from_s / step >= most) ++step;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The history, one SQLite file: seconds of the encoders, and events.
+// The history of `absenc serve` in one SQLite file: values of each second of the encoders, and events.
 #pragma once
 
 #include <cstdint>
@@ -18,9 +18,10 @@
 namespace absenc::serve {
 
 struct HistoryLimits {
-  // Age in seconds above which rows and events are deleted, but only after a day of newer rows.
+  // Age in seconds above which rows and events are deleted, but only if a whole day of newer rows exists.
   std::int64_t seconds = 30LL * 24 * 3600;
-  std::int64_t bytes = 1024LL * 1024 * 1024;  // used bytes of the file above which the oldest rows are deleted
+  // size in bytes of the used part of the file above which the oldest rows are deleted
+  std::int64_t bytes = 1024LL * 1024 * 1024;
 };
 
 /// A range of calendar times in seconds, both ends included.
@@ -32,19 +33,19 @@ struct Range {
 /// A reader of the history, for use while HistoryWriter writes it. Thread-safe.
 class HistoryReader {
  public:
-  /// Opens no file yet: the queries do, and throw Failure if that is impossible.
+  /// Opens no file: the queries open it, and throw Failure if that is impossible.
   explicit HistoryReader(std::string path);
   ~HistoryReader();
   HistoryReader(const HistoryReader&) = delete;
   HistoryReader& operator=(const HistoryReader&) = delete;
 
-  /// Returns {"encoder","step_s","rows"} with at most `most` rows of `step_s` seconds: [[at_s, least, mean, greatest,
-  /// speed least, mean, greatest, readings, errors],...]
+  /// Returns the object {"encoder","step_s","rows"} with at most `most` rows, each for `step_s` seconds: [[at_s,
+  /// least, mean, greatest, speed least, mean, greatest, readings, errors],...]
   [[nodiscard]] client::Json seconds(const std::string& encoder, Range range, std::int64_t most);
   /// Returns at most `most` events of `encoder` in `range`, the newest first; `encoder` "": all events.
   [[nodiscard]] client::Json server_events(const std::string& encoder, Range range, std::int64_t most);
-  /// Returns up to `most` rows as CSV, and the time in seconds from which the next ones start; later than `range.to_s`:
-  /// there are none.
+  /// Returns up to `most` rows as CSV, and the calendar second at which the rows after these start; a second later
+  /// than `range.to_s` if there are no more rows.
   [[nodiscard]] std::pair<std::string, std::int64_t> csv(const std::string& encoder, Range range, std::int64_t most);
   [[nodiscard]] static std::string_view csv_header();
 
@@ -64,7 +65,7 @@ class HistoryReader {
 /// The writer of the history, used by one thread. A power failure can lose written rows; kill -9 does not.
 class HistoryWriter {
  public:
-  /// Throws HistoryInUse when another server writes to the file. Other errors are stored in `trouble`.
+  /// Throws HistoryInUse when another server writes to the file. Other errors are not thrown; `trouble` returns them.
   HistoryWriter(std::string path, const HistoryLimits& limits);
   ~HistoryWriter();
   HistoryWriter(const HistoryWriter&) = delete;
@@ -74,15 +75,15 @@ class HistoryWriter {
     std::string encoder;
     Second second;
   };
-  /// Writes all rows and events, or counts them as lost.
+  /// Writes all rows and events that were handed over, or counts them as lost.
   void write(const std::vector<Entry>& seconds, const std::vector<ServerEvent>& server_events);
   /// Deletes old rows and events, by the limits of age and size.
   void trim();
 
-  /// Returns the last error that no successful `write` has ended; "": none.
+  /// Returns the error because of which the history is not being written; "" if the last `write` has succeeded.
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
   [[nodiscard]] std::uint64_t lost() const { return lost_; }
-  /// Returns sentences about changes of the history file and about losses since the last call.
+  /// Returns sentences about changes of the history file and about lost rows since the last call.
   [[nodiscard]] std::vector<std::string> take_notes();
   [[nodiscard]] HistoryReader& reader() { return reader_; }
 
@@ -105,7 +106,7 @@ class HistoryWriter {
   HistoryLimits limits_;
   std::string trouble_;
   std::uint64_t lost_ = 0;
-  std::uint64_t unreported_losses_ = 0;  // number of rows and events lost since the last note about losses
+  std::uint64_t unreported_losses_ = 0;  // number of rows and events that were lost and are not in a note yet
   std::int64_t lost_since_ms_ = 0;
   std::vector<std::string> notes_;
 };

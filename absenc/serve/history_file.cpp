@@ -69,7 +69,8 @@ std::uint32_t big_endian(std::string_view bytes) {
 
 HistoryFile::HistoryFile(const std::string& path) : path_(path), owned_file_(lock(path)) {
   sqlite_.emplace("the history", path, Sqlite::For::writing);
-  // With a write-ahead log, committed rows survive a kill, and others can read meanwhile.
+  // With a write-ahead log, committed rows survive a kill, and other programs can read the history while it is
+  // written.
   sqlite_->run("PRAGMA auto_vacuum = INCREMENTAL; PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL");
   const std::int64_t found = sqlite_->number("PRAGMA user_version");
   if (found > version) throw Failure(fmt::format("the history {} was written by a newer absenc", path));
@@ -77,7 +78,7 @@ HistoryFile::HistoryFile(const std::string& path) : path_(path), owned_file_(loc
   sqlite_->run(fmt::format("PRAGMA user_version = {}", version));
   log_ = os::identity_of(log_of(path));
   index_ = os::identity_of(index_of(path));
-  // After kill -9 the database file has its full length only once the log was written into it.
+  // After kill -9 the database file has its full length only after its write-ahead log was written into it.
   const bool is_in_file = sqlite_->number("PRAGMA wal_checkpoint(FULL)") == 0;
   if (is_in_file && is_truncated()) throw DamagedFile(fmt::format("the history {} was cut off", path));
   note_written();
@@ -93,7 +94,7 @@ bool HistoryFile::is_truncated() const {
   return owned_file_->state().size < page * std::int64_t{big_endian(header.substr(28, 4))};
 }
 
-// Returns whether SQLite finds the database intact, read anew through a separate connection.
+// Returns whether SQLite finds the database file intact; reads it anew through a separate connection.
 bool HistoryFile::passes_quick_check() const {
   if (owned_file_->state().size == 0) return false;  // an empty database file is damaged; SQLite would delete its log
   try {
@@ -128,10 +129,10 @@ void HistoryFile::close_moved() {
   bool is_in_file = false;
   try {
     is_in_file = sqlite_->number("PRAGMA wal_checkpoint(FULL)") == 0;
-  } catch (const Failure&) {  // the log was not written into the file, so the log is renamed below
+  } catch (const Failure&) {  // the write-ahead log was not written into the database file, so the log is renamed below
   }
   close();
-  // SQLite would apply a log that stays beside the path to the next file there.
+  // If the write-ahead log stayed at its path, SQLite would apply it to the next history file there.
   if (is_in_file) {
     remove_if_same(log_of(path_), log_);
   } else if (os::identity_of(log_of(path_)) == log_ && log_.number != 0) {
@@ -147,7 +148,7 @@ std::string HistoryFile::set_aside() {
   return name;
 }
 
-// SQLite would write a log of the old name into the next file there.
+// The write-ahead log is renamed, too: under its old name, SQLite would write it into the next history file there.
 std::string HistoryFile::set_aside(const std::string& path) {
   std::string name = new_name_beside(path);
   rename_to(path, name);

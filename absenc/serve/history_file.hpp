@@ -12,7 +12,7 @@
 
 namespace absenc::serve {
 
-/// Thrown when another server writes to the same file.
+/// Thrown when another server writes to the same history file.
 struct HistoryInUse : client::Failure {
   using client::Failure::Failure;
 };
@@ -36,9 +36,10 @@ class HistoryFile {
   /// Stores the modification time of the history file. Call it after each transaction.
   void note_written();
 
-  /// Closes a history file in state `changed`, and changes neither the file nor its log.
+  /// Closes a history file in state `changed`, without a change of the file or of its write-ahead log.
   void close();
-  /// Closes a history file in state `gone` or `replaced`, and takes its log from the path.
+  /// Closes a history file in state `gone` or `replaced`, and removes its write-ahead log from the path, or renames
+  /// it.
   void close_moved();
   /// Renames and closes a damaged history file. Returns the new name. Throws Failure.
   std::string set_aside();

@@ -57,7 +57,7 @@ std::size_t seconds_in(HistoryWriter& writer, const std::string& encoder) {
   return static_cast<std::size_t>(std::count(rows.begin(), rows.end(), '\n'));
 }
 
-// After a start with a clock that is 400 days ahead, no older rows are deleted at first.
+// The server is started with a clock that is 400 days ahead: no older rows are deleted at first.
 TEST(History, DeletesOldRowsOnlyAfterADayOfNewerRows) {
   const std::string path = new_path();
   {
@@ -80,7 +80,7 @@ TEST(History, DeletesOldRowsOnlyAfterADayOfNewerRows) {
   remove_history(path);
 }
 
-// One row is years ahead, as after a wrong clock.
+// One row is years ahead, as a wrong clock would leave it.
 TEST(History, DeletesOldestTenthOfRowsBeyondSizeLimit) {
   const std::string path = new_path();
   HistoryLimits limits;
@@ -155,7 +155,7 @@ TEST(History, RowsOfARangeReachItsEnd) {
     HistoryReader reader(path);
     for (std::int64_t most = 1; most <= 5; ++most) {
       const std::string found = reader.seconds("one", {1'000'001, 1'000'004}, most).line();
-      const std::regex end_of_row(R"((\d+),\d+\])");  // readings and errors
+      const std::regex end_of_row(R"((\d+),\d+\])");  // a row ends with its numbers of readings and of errors
       std::int64_t rows = 0;
       int readings = 0;
       for (std::sregex_iterator at(found.begin(), found.end(), end_of_row); at != std::sregex_iterator(); ++at) {

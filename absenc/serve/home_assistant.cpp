@@ -14,7 +14,7 @@ using namespace client;
 
 namespace {
 
-/// Returns `text` in the characters of an object id.
+/// Returns `text` as an object id of Home Assistant: other characters than those allowed in one are replaced.
 std::string object_id(std::string_view text) {
   std::string id = topic_level(text);
   for (char& c : id) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A request that waits for its answer is a suspended connection, which needs no thread.
+// An HTTP server on libmicrohttpd. A request that waits for its answer is a suspended connection, which needs no
+// thread.
 #include "absenc/serve/http.hpp"
 
 #include <microhttpd.h>
@@ -20,13 +21,13 @@ namespace absenc::serve {
 
 namespace {
 
-// Above the limits of Connections: libmicrohttpd accepts no connection at its own limit.
+// Greater than the limits of Connections: at its own limit, libmicrohttpd would accept no connection.
 constexpr unsigned most_connections = Connections::most + Connections::reserve + 64;
-// Memory of a connection in bytes, for headers and unsent output.
+// Memory of each connection in bytes, for headers and unsent output.
 constexpr std::size_t memory_for_each = 64 * 1024;
 // Greatest size of a request body in bytes; no request to this server needs a body.
 constexpr std::uint64_t most_body = 4096;
-// Bytes of a request body of unknown length that are read before the connection is closed.
+// Greatest number of bytes that are read of a request body without announced length; then the connection is closed.
 constexpr std::uint64_t most_read = 1 << 20;
 constexpr unsigned idle_seconds = 15;
 constexpr std::size_t block = 16 * 1024;
@@ -95,7 +96,7 @@ struct Stream::Sending {
   bool over = false;   // whether the connection of the stream has ended
   std::uint64_t dropped = 0;
 
-  // The mutex must be held.
+  // The caller must hold the mutex.
   void resume() {
     if (suspended != nullptr) ::MHD_resume_connection(std::exchange(suspended, nullptr));
   }
@@ -299,7 +300,7 @@ struct HttpServer::Daemon {
       exchanges.emplace(exchange.get(), exchange);
       if (ending) return exchange->answer(Response{503, "text/plain", "the server is shutting down\n"}, nullptr);
     }
-    // If no copy of `reply` has answered, the deleter of the last one does.
+    // If all copies of `reply` are destroyed without an answer, the deleter of the last one answers with status 500.
     const Reply reply(std::shared_ptr<Exchange>(exchange.get(), [exchange](Exchange*) {
       exchange->answer(Response{500, "text/plain", "the request got no answer\n"}, nullptr);
     }));
@@ -372,7 +373,7 @@ struct HttpServer::Daemon {
         MHD_OPTION_NOTIFY_COMPLETED, &completed, this, MHD_OPTION_NOTIFY_CONNECTION, &connected, this, MHD_OPTION_END);
     if (daemon == nullptr)
       throw client::Failure("the web server cannot be started: too many files are open, or no memory");
-    static_cast<void>(listener.socket.release());  // the daemon closes the listening socket
+    static_cast<void>(listener.socket.release());  // libmicrohttpd closes the listening socket
   }
 
   // libmicrohttpd must not be stopped while connections are suspended.

@@ -22,7 +22,8 @@ struct Request {
   std::string method;  // HTTP method: "GET", "POST" ...
   std::string path;
   std::multimap<std::string, std::string> query;
-  std::string peer;  // IP address of the connected client; Api replaces it by the one that a proxy reports
+  // IP address of the other end of the connection; Api replaces it by the client's address that a proxy reports
+  std::string peer;
   std::string host;  // value of header Host; "" if it is missing; the same holds for the headers below
   std::string origin;
   std::string fetch_site;
@@ -41,13 +42,13 @@ struct Response {
   std::vector<std::pair<std::string, std::string>> headers{};
 };
 
-/// The body of a response, produced while it is sent. A full queue drops its second text.
+/// The body of a response, produced while it is sent: a queue of texts. A full queue drops its second-oldest text.
 class Stream {
  public:
   using Text = std::shared_ptr<const std::string>;
 
-  /// `most`: greatest number of queued texts, at least 2. `on_empty` runs in the connection thread and must return
-  /// quickly.
+  /// `most`: greatest number of queued texts, at least 2. `on_empty` is called when the queue is empty; it runs in
+  /// the thread of the connections and must return quickly.
   explicit Stream(std::string type, std::size_t most = 64, std::function<void()> on_empty = {});
   ~Stream();
   Stream(const Stream&) = delete;
@@ -61,7 +62,7 @@ class Stream {
   /// Returns whether the connection of the stream has ended.
   [[nodiscard]] bool over() const;
   [[nodiscard]] std::uint64_t dropped() const;
-  /// Returns when the connection last asked for data, or when the stream was made.
+  /// Returns when the connection last took data of the stream; before that, when the stream was made.
   [[nodiscard]] Time taken_at() const;
 
  private:
@@ -87,10 +88,10 @@ class HttpServer {
  public:
   using Handler = std::function<void(const Request&, Reply)>;
 
-  /// `handler` runs in the connection thread and must return quickly. `vital`: paths that connections of the reserve
-  /// may request. Throws client::Failure.
+  /// `handler` is called for each request; it runs in the thread of the connections and must return quickly. `vital`:
+  /// paths that connections of the reserve may request. Throws client::Failure.
   HttpServer(os::Listener listener, Handler handler, std::vector<std::string> vital);
-  /// Stops the server; responses that are still being sent may be cut off.
+  /// Stops the server; responses that are being sent may be cut off.
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;

@@ -61,7 +61,7 @@ void Headers::copy_to(Request& request) const {
   constexpr std::array names{"Forwarded",         "Via",      "X-Forwarded-For", "X-Forwarded-Host",
                              "X-Forwarded-Proto", "X-Real-IP"};
   request.is_forwarded = std::any_of(names.begin(), names.end(), [&](const char* name) { return count(name) != 0; });
-  // If X-Forwarded-For occurs twice, the client may have written one of the two itself.
+  // A header X-Forwarded-For that occurs twice is ignored: the client may have written one of the two itself.
   if (count("X-Forwarded-For") == 1) request.forwarded_for = first("X-Forwarded-For");
 }
 

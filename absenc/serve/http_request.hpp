@@ -23,9 +23,9 @@ class Headers {
 
   /// Returns why a proxy could interpret this request differently (RFC 9112, 3.2 and 6.3); "" if no reason is known.
   [[nodiscard]] std::string_view ambiguity(std::string_view version) const;
-  /// Returns the announced length of the body in bytes; 0 without Content-Length.
+  /// Returns the length of the request body in bytes, as announced; 0 without Content-Length.
   [[nodiscard]] std::uint64_t announced_length() const;
-  /// Copies the headers that access control needs to `request`.
+  /// Copies into `request` those headers that access control needs.
   void copy_to(Request& request) const;
 
  private:

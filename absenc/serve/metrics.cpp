@@ -13,7 +13,7 @@ using namespace client;
 
 namespace {
 
-/// Escapes `text` as the Prometheus format requires.
+/// Escapes `text` for a label value, as the Prometheus format requires.
 std::string label(std::string_view text) {
   std::string written;
   for (const char c : text) {
@@ -29,7 +29,8 @@ std::string label(std::string_view text) {
 
 class Page {
  public:
-  /// Begins a metric. Its lines must follow at once: the Prometheus format requires them together.
+  /// Writes the header of a metric. The caller must write its lines next: the Prometheus format requires them
+  /// together.
   void metric(std::string_view name, std::string_view kind, std::string_view help) {
     fmt::format_to(std::back_inserter(text), "# HELP {} {}\n# TYPE {} {}\n", name, help, name, kind);
   }
@@ -47,7 +48,7 @@ struct EncoderState {
   Snapshot snapshot;
 };
 
-// Cleared alarms are written too, as 0: without a line they would look unknown.
+// Cleared alarms are written, too, with the value 0: without a line, an alarm would look unknown.
 void add_alarms(Page& page, const EncoderState& encoder_state) {
   if (encoder_state.snapshot.state != State::live) return;
   for (const Flags& flags : alarms_of(*encoder_state.unit, encoder_state.snapshot.last.reading)) {

@@ -19,15 +19,15 @@ struct MqttHealth {
   std::string broker{};
   std::string prefix{};
   bool connected = false;
-  // Known trouble with the broker or the spool; "" if there is none.
+  // Why the broker or the spool does not work; "" if no trouble is known.
   std::string trouble{};
   bool failing = false;       // whether the disk refuses new readings, or readings were dropped within the last 30 s
   std::uint64_t waiting = 0;  // number of messages in the spool
   std::int64_t waiting_bytes = 0;
   std::uint64_t sent = 0;           // spooled messages that the broker has accepted since the start
-  std::uint64_t dropped = 0;        // readings lost since the start, for example because the spool was full
-  std::uint64_t client_deaths = 0;  // unexpected ends of the MQTT client process since the start
-  // By encoder: number of its last reading that is on disk or was sent.
+  std::uint64_t dropped = 0;        // number of readings lost since the start, for example because the spool was full
+  std::uint64_t client_deaths = 0;  // number of times since the start that the MQTT client process ended unexpectedly
+  // Number of the last reading that is in the spool on disk or was sent, by name of the encoder.
   std::map<std::string, std::uint64_t> taken{};
 
   /// Returns "none" (no broker is set), "failing", "good" or "away" (not connected).
@@ -41,7 +41,7 @@ class Mqtt {
  public:
   /// `fleet` and `server_events` must outlive this object. Throws Failure or os::Failure.
   Mqtt(const MqttSettings& settings, const Fleet& fleet, ServerEvents& server_events);
-  /// Spools the remaining readings and events. A connected broker has one second to receive them.
+  /// Writes the remaining readings and events to the spool. A connected broker has one second to receive them.
   ~Mqtt();
   Mqtt(const Mqtt&) = delete;
   Mqtt& operator=(const Mqtt&) = delete;

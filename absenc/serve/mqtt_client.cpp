@@ -19,10 +19,10 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Greatest size of a frame in bytes.
+// Greatest size in bytes of a frame from the MQTT client process.
 constexpr std::size_t most_in_frame = 4096;
 constexpr Time time_to_start = 10s;
-// Longest silence of the MQTT client process, which sends a sign of life each second.
+// If the MQTT client process is silent for longer, it counts as dead: it sends a sign of life each second.
 constexpr Time longest_silence = 10s;
 constexpr Time time_to_end = 500ms;
 
@@ -62,7 +62,7 @@ MqttClient::State MqttClient::work(Time longest) {
   if (state_ == State::lost) return state_;
   const os::Ready ready = os::wait_for_socket(process_.channel().get(), !outgoing_.empty(), longest);
   if (ready.to_read) receive();
-  // Receiving comes before sending: the last frames of an ended process may give the reason.
+  // Frames are received before others are sent: the last frames of an ended process may give the reason of its end.
   if (state_ != State::lost && !process_.channel().send(outgoing_)) note_end();
   if (state_ == State::connected && os::now() - last_frame_at_ > longest_silence) {
     process_.end({});

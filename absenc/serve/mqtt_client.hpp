@@ -45,18 +45,19 @@ class MqttClient {
   MqttClient& operator=(const MqttClient&) = delete;
 
   enum class State : std::uint8_t { connecting, connected, lost };
-  /// Queues a request to connect to `host`, a name or an address. `try_all`: each address of the name is tried in turn.
+  /// Queues a request to connect to `host`, a name or an address. With `try_all`, each IP address of the name is
+  /// tried in turn; else one.
   void connect(const std::string& host, bool try_all);
   /// Waits at most `longest`, then receives and sends. Returns the state of the connection.
   State work(Time longest);
-  /// Returns why the connection to the broker is lost; "" if it is not.
+  /// Returns why the connection to the broker is lost; "" if it is not lost.
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
-  /// Returns whether the broker does not support this version of MQTT.
+  /// Returns whether the broker has refused the version of MQTT.
   [[nodiscard]] bool wrong_version() const { return wrong_version_; }
   /// Returns whether the MQTT client process ended unexpectedly.
   [[nodiscard]] bool died() const { return died_; }
 
-  /// Queues a message. Returns the number that its acknowledgement has, if there is one.
+  /// Queues a message. Returns its number, which Acknowledgement::number repeats if the message is acknowledged.
   int publish(const std::string& topic, const std::string& payload, int qos, bool retain);
 
   struct Acknowledgement {
@@ -65,7 +66,8 @@ class MqttClient {
   };
   [[nodiscard]] std::vector<Acknowledgement> take_acknowledgements();
 
-  /// Has a DISCONNECT packet sent, so that the broker does not publish the will; waits at most 0.5 s for the end.
+  /// Requests a DISCONNECT packet, so that the broker does not publish the will; waits at most 0.5 s for the end of
+  /// the connection.
   void end();
 
  private:

@@ -18,9 +18,10 @@ using namespace client;
 namespace {
 
 constexpr std::size_t most_in_a_message = 250;  // greatest number of readings in a message, about 15 kB
-// Shortest time between two events about dropped readings; these events are messages too.
+// Shortest time between two events about dropped readings; the events need room in the spool, too.
 constexpr Time drop_report_interval = std::chrono::seconds(10);
-constexpr Time drop_display_time = std::chrono::seconds(30);  // the health of MQTT shows dropped readings for this time
+// time for which the health of MQTT mentions dropped readings
+constexpr Time drop_display_time = std::chrono::seconds(30);
 
 }  // namespace
 
@@ -42,7 +43,7 @@ MqttCollector::~MqttCollector() {
 
 void MqttCollector::add(const std::vector<ServerEvent>& server_events) {
   const std::lock_guard lock(mutex_);
-  // Acknowledged alarms are not published: subscribers receive the alarms themselves.
+  // The acknowledgement of an alarm is not published: subscribers receive the alarm itself.
   std::copy_if(server_events.begin(), server_events.end(), std::back_inserter(waiting_),
                [](const ServerEvent& one) { return one.kind != "acknowledged"; });
 }
@@ -63,7 +64,7 @@ void MqttCollector::work(const std::stop_token& stop) {
   }
 }
 
-// The run makes the id unique: after a power failure the spool may give a number again.
+// The text of the spool's run makes a message id unique: after a power failure, the spool may use a number again.
 std::string MqttCollector::id_text(std::int64_t id) const { return fmt::format("{}-{}", spool_->run(), id); }
 
 void MqttCollector::collect() {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes readings and events to the spool, in its own thread.
+// Writes readings and events to the MQTT spool, in its own thread.
 #pragma once
 
 #include <condition_variable>
@@ -20,16 +20,17 @@ class MqttCollector {
  public:
   /// Starts the collector thread. All arguments must outlive this object.
   MqttCollector(const MqttSettings& settings, Spool& spool, const Fleet& fleet, ServerEvents& server_events);
-  /// Spools the remaining readings and events.
+  /// Writes the remaining readings and events to the spool.
   ~MqttCollector();
 
   void add(const std::vector<ServerEvent>& server_events);
 
   struct Figures {
-    std::string trouble{};                         // why the spool cannot be written; "" without an error
-    std::uint64_t dropped = 0;                     // number of readings lost since the start
-    bool drops = false;                            // whether readings were dropped within the last 30 seconds
-    std::map<std::string, std::uint64_t> taken{};  // by encoder: number of its last reading that is on disk or was sent
+    std::string trouble{};      // why the spool cannot be written; "" without an error
+    std::uint64_t dropped = 0;  // number of readings lost since the start
+    bool drops = false;         // whether readings were dropped within the last 30 seconds
+    // number of the last reading that is in the spool on disk or was sent, by name of the encoder
+    std::map<std::string, std::uint64_t> taken{};
   };
   [[nodiscard]] Figures figures() const;
 
@@ -46,12 +47,12 @@ class MqttCollector {
   const Fleet* fleet_;
   ServerEvents* server_events_;
 
-  // Used by one thread at a time, up to `mutex_`: the collector thread, then the destructor.
+  // The members from here to `mutex_` are used by one thread at a time: the collector thread, then the destructor.
   std::int64_t next_id_;
-  std::map<std::string, std::uint64_t> next_numbers_;  // next number of a reading, by encoder
-  // By encoder: number of its last spooled reading, not yet in `Figures::taken`.
+  std::map<std::string, std::uint64_t> next_numbers_;  // number of the next reading, by name of the encoder
+  // Number of the last spooled reading that is not in `Figures::taken` yet, by name of the encoder.
   std::map<std::string, std::uint64_t> not_on_disk_;
-  Spool::Counts unreported_{};  // dropped messages and readings that no event has reported yet
+  Spool::Counts unreported_{};  // counts of dropped messages and readings that no event has reported yet
   std::string unreported_reason_;
   Time next_report_{};
 
@@ -60,7 +61,7 @@ class MqttCollector {
   std::vector<ServerEvent> waiting_;
   Figures figures_;
   Time last_dropped_{};
-  std::jthread thread_;  // last member, because the thread uses all others
+  std::jthread thread_;  // the last member, so that all members that the thread uses exist before it
 };
 
 }  // namespace absenc::serve

@@ -31,13 +31,14 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr int keepalive_s = 15;
-// Greatest number of messages without acknowledgement; the broker may set a lower limit.
+// Greatest number of messages that the broker has not acknowledged; the broker may set a lower limit.
 constexpr int most_in_flight = 1000;
 constexpr const char* system_certificates = "/etc/ssl/certs";
-// Greatest memory of the process in bytes; an MQTT packet may have 256 MB.
+// Greatest memory of the MQTT client process in bytes; a single MQTT packet may have 256 MB.
 constexpr std::size_t most_memory = 128'000'000;
-constexpr std::size_t most_frame = 256'000'000;  // greatest size in bytes of a frame from the parent
-// Number of bytes waiting for the parent at which reading from the broker pauses.
+// greatest size in bytes of a frame from `absenc serve`, the parent process
+constexpr std::size_t most_frame = 256'000'000;
+// Number of unsent bytes for the parent process at which this process stops reading from the broker.
 constexpr std::size_t outgoing_limit = 100'000;
 constexpr Time sign_of_life_interval = 1s;
 
@@ -56,7 +57,7 @@ class MqttProcess {
 
   void run() {
     while (!over_ || !outgoing_.empty()) {
-      if (!wait_and_exchange()) return;  // without its parent the process has no task
+      if (!wait_and_exchange()) return;  // this process ends with its parent
       if (!over_) run_library();
       if (os::now() < next_sign_of_life_) continue;
       next_sign_of_life_ = os::now() + sign_of_life_interval;
@@ -65,7 +66,7 @@ class MqttProcess {
   }
 
  private:
-  // Returns false when the parent has ended.
+  // Waits for the parent and the broker, and exchanges data with both. Returns false when the parent has ended.
   bool wait_and_exchange() {
     const int broker = client_ == nullptr || over_ ? -1 : ::mosquitto_socket(client_);
     const bool reads = outgoing_.size() < outgoing_limit;
@@ -87,7 +88,8 @@ class MqttProcess {
         break;
       case Wire::connect: {
         const std::string host = frame.text();
-        // mosquitto_connect tries each address of a name and blocks; mosquitto_connect_async tries one.
+        // mosquitto_connect tries each IP address of a host name, and blocks; mosquitto_connect_async tries only one
+        // address.
         const auto connect = frame.number() != 0 ? &::mosquitto_connect : &::mosquitto_connect_async;
         if (client_ != nullptr) note(connect(client_, host.c_str(), broker_.port, keepalive_s));
         break;
@@ -169,19 +171,19 @@ class MqttProcess {
       return lose(fmt::format("{}: {}", topic, ::mosquitto_strerror(error)));
     }
     if (qos != 0) numbers_[given] = number;
-    // The broker may have sent a reason or acknowledgements before it closed the connection.
+    // The broker may have sent a reason or acknowledgements before it closed the connection, so these are read.
     if (connection_failed) broker_events_ |= POLLHUP;
   }
 
-  // Does the work of mosquitto_loop, which would wait for the broker only and not for the parent.
+  // Does the work of mosquitto_loop, which would wait for the broker only and not for the parent process.
   void run_library() {
     if (client_ == nullptr || !connects_) return;
     if (::mosquitto_socket(client_) < 0) return lose("the connection was lost");
-    // After the end of a connection, mosquitto_loop_read reports the reason.
+    // mosquitto_loop_read is called even if the connection has ended, because it reports the reason.
     const bool is_over = (broker_events_ & (POLLERR | POLLHUP | POLLNVAL)) != 0;
     const bool reads = is_over || (broker_events_ & POLLIN) != 0;
     const bool writes = (broker_events_ & POLLOUT) != 0;
-    errno = 0;  // the library reads errno after calls that do not set it
+    errno = 0;  // libmosquitto reads errno after calls that do not set it
     int error = MOSQ_ERR_SUCCESS;
     // A TLS handshake begins with a read, even when the library wants to write.
     const bool begins = broker_.tls && !connected_ && writes;
@@ -192,7 +194,7 @@ class MqttProcess {
     note(error);
   }
 
-  // Reason codes below 128 are those of MQTT 3.1.1, which have their own texts.
+  // Reason codes of the broker below 128 are those of MQTT 3.1.1, which have their own texts.
   void connect_answered(int reason) {
     if (reason == 0) {
       connected_ = true;
@@ -244,7 +246,7 @@ class MqttProcess {
   Broker broker_{};
   MqttVersion version_ = MqttVersion::v5;
   mosquitto* client_ = nullptr;
-  // Number that the parent has given a message, by the number that the library has given it.
+  // Numbers that the parent process has given messages; the keys are the numbers that libmosquitto has given them.
   std::unordered_map<int, std::uint32_t> numbers_{};
   short broker_events_ = 0;
   Time next_sign_of_life_{};
@@ -260,7 +262,7 @@ int run_mqtt_process() {
     MqttProcess(os::become_child("absenc-mqtt", most_memory)).run();
     return 0;
   } catch (const std::exception&) {
-    return 1;  // the parent detects the end of this process
+    return 1;  // the parent process detects that this process has ended
   }
 }
 

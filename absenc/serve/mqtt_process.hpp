@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The process that talks to the broker for `absenc serve`: this program, started again with an internal verb.
 //
-// libmosquitto 2.0.11 ends its process at some packets, by assertions in its parser of properties. A second program
-// file could have another version while the package is being upgraded.
+// A separate process is needed because libmosquitto 2.0.11 aborts at some packets, by assertions in its parser of
+// properties. The process runs the same program file, because a second file could have another version while the
+// package is being upgraded.
 #pragma once
 
 #include <string_view>

@@ -31,12 +31,13 @@ void MqttRefusals::sent(const std::string& topic) {
 
 bool MqttRefusals::refuse(const std::string& topic, const std::string& why, Time now) {
   suspect_is_out_ = false;
-  suspects_.erase(topic);  // the topic is no suspect any more: the broker has refused it
+  suspects_.erase(topic);  // a topic that the broker has refused is no suspect any more
   const auto [place, is_new] = refused_.try_emplace(topic);
   Refused& refused = place->second;
   const bool is_another = refused.why != why;
   refused.why = why;
-  if (!is_new && !refused.is_tried) return is_another;  // this message was sent before the first refusal of its topic
+  // the message was sent before the first refusal of its topic, so the pause does not double
+  if (!is_new && !refused.is_tried) return is_another;
   refused.ends_connection = why == connection_ends;
   refused.pause = is_new ? first_refusal_pause : std::min(2 * refused.pause, longest_refusal_pause);
   refused.retry = now + refused.pause;

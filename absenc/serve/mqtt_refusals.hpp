@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Topics that the broker refuses. Each is tried again after a pause that doubles up to a minute.
+// Topics that the broker refuses. A message of such a topic is sent as a trial after a pause, which doubles up to a
+// minute.
 //
-// Some brokers close the connection instead of refusing a message. Topics that may be the cause are suspects; these are
-// sent one at a time.
+// Some brokers close the connection instead of refusing a message. Topics of messages that may have caused this are
+// suspects: their messages are sent one at a time.
 #pragma once
 
 #include <cstddef>
@@ -20,9 +21,11 @@ class MqttRefusals {
   enum class Verdict : std::uint8_t {
     send,
     wait,  // the message waits until all messages sent so far are acknowledged
-    skip,  // the message is skipped: its topic is refused, and the pause or a trial message is not over
+    // the message is skipped: its topic is refused, and the pause is not over or a trial message is not acknowledged
+    skip,
   };
-  /// Returns whether a message of `topic` may be sent now. `on_their_way`: number of unacknowledged messages.
+  /// Returns whether a message of `topic` may be sent now. `on_their_way`: number of messages sent and not
+  /// acknowledged.
   [[nodiscard]] Verdict verdict(const std::string& topic, std::size_t on_their_way, Time now) const;
   void sent(const std::string& topic);
 
@@ -32,8 +35,9 @@ class MqttRefusals {
   bool take(const std::string& topic);
 
   void begin_connection();
-  /// Records the end of a connection, `soon` after its start or not. `on_their_way`: topics of unacknowledged messages.
-  /// Returns a topic whose refusal, or the reason for it, is new; otherwise "".
+  /// Records that the connection to the broker has ended. `on_their_way`: topics of the messages that were not
+  /// acknowledged. `soon`: whether the connection ended soon after its start. Returns a topic that is refused from
+  /// now on or for a new reason; "" if there is none.
   std::string end_connection(const std::set<std::string>& on_their_way, bool soon, Time now);
 
   /// Returns whether the pause of a refused topic has ended; true only once for each pause.

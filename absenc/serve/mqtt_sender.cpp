@@ -22,17 +22,19 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr std::size_t most_messages_out = 500;  // greatest number of spooled messages without acknowledgement
+// greatest number of spooled messages that are sent and not acknowledged
+constexpr std::size_t most_messages_out = 500;
 constexpr Time one_wait = 20ms;
 constexpr Time state_interval = 200ms;
-constexpr Time many_state_interval = 1s;  // usual time between two checks of the states, with more than `many` encoders
+// usual time between two checks of the encoders' states, if there are more than `many` encoders
+constexpr Time many_state_interval = 1s;
 constexpr std::size_t many = 50;
 constexpr Time value_interval = 1s;  // time between two publications of values for Home Assistant
 constexpr Time first_pause = 500ms;  // first pause between attempts to connect; it doubles up to `longest_pause`
 constexpr Time longest_pause = 5s;
 constexpr Time time_to_connect = 10s;
 constexpr Time time_to_finish = 1s;
-// A connection that lasted this long may reset the pause.
+// A connection that lasted this long is stable: the pause between attempts to connect may be short again.
 constexpr Time stable_time = 10s;
 // Shortest time between two events that report a connection, unless the later connection is stable.
 constexpr Time connection_report_interval = 60s;
@@ -42,7 +44,7 @@ constexpr Time connection_report_interval = 60s;
 MqttSender::MqttSender(const MqttSettings& settings, Spool& spool, const Fleet& fleet, ServerEvents& server_events)
     : settings_(&settings), spool_(&spool), fleet_(&fleet), server_events_(&server_events) {
   for (const auto& [name, next] : spool.next_numbers()) served_.insert(name);
-  static_cast<void>(MqttClient(settings.broker, identity(), version_));  // checks the files that the settings name
+  static_cast<void>(MqttClient(settings.broker, identity(), version_));
   thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
 }
 
@@ -69,7 +71,7 @@ void MqttSender::work(const std::stop_token& stop) {
       run_connection(stop);
     } catch (const Failure& failure) {
       set_lost(failure.what());
-    } catch (const os::Failure& failure) {  // for example, the name of the broker cannot be resolved
+    } catch (const os::Failure& failure) {  // for example, the host name of the broker cannot be resolved
       set_lost(failure.what());
     }
     if (version_ != tried) continue;
@@ -166,10 +168,11 @@ void MqttSender::step(MqttClient& client) {
   report_connected();
   send_messages(client);
   const bool lost = client.work(one_wait) == MqttClient::State::lost;
-  settle(client);  // also handles acknowledgements that arrived before the connection was lost
+  settle(client);  // acknowledgements that arrived before the connection was lost are handled, too
   if (!lost) return;
   note_death(client);
-  if (!client.died()) note_lost_connection();  // if a packet ended the client process, no topic is the cause
+  // a topic is suspected only if the client process lives: if it died, a packet was the cause
+  if (!client.died()) note_lost_connection();
   throw Failure(client.trouble());
 }
 
@@ -243,7 +246,8 @@ void MqttSender::send_values(MqttClient& client) {
   }
 }
 
-// Returns whether the message is sent, or was before.
+// Publishes a retained message unless its condition is unchanged. Returns whether the broker has the message or gets
+// it now.
 bool MqttSender::send_retained(MqttClient& client, const Retained& retained) {
   const auto known = retained_.find(retained.topic);
   if (known != retained_.end() && known->second == retained.condition) return true;
@@ -269,12 +273,13 @@ void MqttSender::send_messages(MqttClient& client) {
   }
 }
 
-// A refused message stays in the spool.
+// A message that the broker refuses stays in the spool.
 void MqttSender::settle(MqttClient& client) {
   std::vector<std::int64_t> arrived;
   for (const MqttClient::Acknowledgement& one : client.take_acknowledgements()) {
     const auto found = outstanding_.find(one.number);
-    if (found == outstanding_.end()) continue;  // messages with QoS 0 are not in `outstanding_`
+    // the acknowledgement is for a message with QoS 0, which `outstanding_` does not contain
+    if (found == outstanding_.end()) continue;
     const Outstanding sent = found->second;
     outstanding_.erase(found);
     messages_out_.erase(sent.message);
@@ -294,7 +299,8 @@ void MqttSender::settle(MqttClient& client) {
 
 void MqttSender::settle_refused(const Outstanding& sent, const std::string& why) {
   const bool is_new = refusals_.refuse(sent.topic, why, os::now());
-  if (sent.message == 0) retained_.erase(sent.topic);  // the state is sent again when the pause is over
+  // the retained state is sent again when the pause of its topic is over
+  if (sent.message == 0) retained_.erase(sent.topic);
   {
     const std::lock_guard lock(mutex_);
     figures_.trouble = refusals_.text();
@@ -304,7 +310,8 @@ void MqttSender::settle_refused(const Outstanding& sent, const std::string& why)
 
 void MqttSender::settle_taken(const Outstanding& sent) {
   if (!refusals_.take(sent.topic)) return;
-  last_checked_id_ = 0;  // the search starts again from the first id, because other messages of this topic were skipped
+  // other messages of this topic were skipped, so the search for messages to send begins at the first id again
+  last_checked_id_ = 0;
   {
     const std::lock_guard lock(mutex_);
     figures_.trouble = refusals_.text();

@@ -69,27 +69,31 @@ class MqttSender {
   const Fleet* fleet_;
   ServerEvents* server_events_;
 
-  // Used by one thread at a time, up to `mutex_`: the constructor, then the sender thread.
+  // The members from here to `mutex_` are used by one thread at a time: the constructor, then the sender thread.
   MqttVersion version_ = MqttVersion::v5;
-  std::unordered_map<int, Outstanding> outstanding_;  // QoS 1 messages without acknowledgement, by number
-  std::set<std::int64_t> messages_out_;               // ids of the spooled messages in `outstanding_`
-  std::int64_t last_checked_id_ = 0;  // messages up to this id were sent or skipped; 0: the search begins anew
+  // messages with QoS 1 that are sent and not acknowledged, by number
+  std::unordered_map<int, Outstanding> outstanding_;
+  std::set<std::int64_t> messages_out_;  // ids of the spooled messages in `outstanding_`
+  // all spooled messages up to this id were sent or skipped; 0: the search for messages to send begins at the first
+  // one
+  std::int64_t last_checked_id_ = 0;
   MqttRefusals refusals_;
   std::set<std::string> served_;                 // names of encoders that may have retained messages at the broker
-  std::map<std::string, std::string> retained_;  // by topic: condition of the retained message that was sent last
+  std::map<std::string, std::string> retained_;  // condition of the retained message that was sent last, by topic
   Time next_states_{};
   Time next_values_{};
-  bool has_acknowledged_ = false;  // whether the broker has acknowledged a spooled message on this connection
+  // whether the broker has acknowledged a spooled message since the connection was made
+  bool has_acknowledged_ = false;
   Time connected_at_{};
-  bool connection_reported_ = false;  // whether an event has reported this connection
+  bool connection_reported_ = false;  // whether an event has reported the current connection
   Time next_connection_report_{};
-  // Reasons of lost connections that were reported since the last reported connection.
+  // Reasons of lost connections that events have reported since the last event about a new connection.
   std::set<std::string> reported_losses_;
 
   mutable std::mutex mutex_;  // mutex that guards all members below except `thread_`
   std::condition_variable_any changed_;
   Figures figures_;
-  std::jthread thread_;  // last member, because the thread uses all others
+  std::jthread thread_;  // the last member, so that all members that the thread uses exist before it
 };
 
 }  // namespace absenc::serve

@@ -15,9 +15,9 @@ namespace absenc::serve {
 /// The kind of a frame, with the fields that follow it.
 enum class Wire : std::uint8_t {
   // Frames to the MQTT client process:
-  begin,    // fields: those of Broker, those of MqttIdentity, MQTT version
-  connect,  // fields: host, whether to try all addresses of the host
-  publish,  // fields: number, topic, payload, QoS, retain
+  begin,    // fields: those of the struct Broker, those of MqttIdentity, then the MQTT version
+  connect,  // fields: host name or address, whether to try all IP addresses of the host
+  publish,  // fields: number of the message, topic, payload, QoS, retain
   leave,    // no fields; the process disconnects from the broker and ends
   // Frames from the MQTT client process:
   ready,         // no fields; the settings of `begin` can be used
@@ -28,7 +28,7 @@ enum class Wire : std::uint8_t {
   alive,         // no fields; sign of life, every second
 };
 
-/// A frame that is built field by field.
+/// A frame to be sent, which is built field by field.
 class WireFrame {
  public:
   explicit WireFrame(Wire kind) : kind_(kind) {}

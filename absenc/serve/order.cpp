@@ -39,7 +39,8 @@ OrderResult run_command(Encoder& encoder, const Order& order) {
   return success(command, change.now, change.was_so ? "it had this value already" : change.note, change.state);
 }
 
-// Optional requests for settings or registers: `done` succeeds if one of them is answered.
+// Requests that an encoder may leave unanswered, for settings or registers: the order succeeds if one of them is
+// answered.
 class OptionalReads {
  public:
   OptionalReads(Encoder& encoder, const Between& between) : encoder_(&encoder), between_(&between) {}
@@ -62,9 +63,9 @@ class OptionalReads {
     return std::nullopt;
   }
 
-  /// Returns the reason of the last request that failed.
+  /// Returns why the last failed request has failed.
   [[nodiscard]] const std::string& reason() const { return last_; }
-  /// Returns whether the options of the encoder permitted the last request.
+  /// Returns whether the last request was sent: the options of the encoder may not permit it.
   [[nodiscard]] bool was_sent() const { return was_sent_; }
   [[nodiscard]] OrderResult done(Json json) const {
     if (answered_) return {true, "read", std::move(json), ChangeState::none};
@@ -74,7 +75,7 @@ class OptionalReads {
  private:
   Encoder* encoder_;
   const Between* between_;
-  bool has_sent_ = false;  // whether a request was tried before
+  bool has_sent_ = false;
   bool was_sent_ = false;
   bool answered_ = false;
   std::string first_;
@@ -93,7 +94,7 @@ std::string range_of(const Unit& unit, const Command& getter) {
   return fmt::format("{}", fmt::join(texts, ", "));
 }
 
-// Returns a value as JSON for people; null for an invalid value.
+// Returns a value as JSON text for people; null for an invalid value.
 Json value_for_people(const Column& column, const Value& value) {
   if (std::holds_alternative<Invalid>(value)) return {};
   if (std::holds_alternative<Unknown>(value)) return "unknown";
@@ -110,7 +111,8 @@ Json row_for_people(const Column& column, const Value& value) {
       .set("meaning", column.meaning);
 }
 
-// Reads settings and identification. `wanted` is the command that reads one of them; null: all.
+// Reads settings and identification of the encoder. `wanted`: the only command to run; null: all commands that read
+// one of them.
 OrderResult read_settings(Encoder& encoder, const Command* wanted, const Between& between) {
   Json identity = Json::object();
   Json settings = Json::object();
@@ -137,7 +139,7 @@ OrderResult read_settings(Encoder& encoder, const Command* wanted, const Between
   return reads.done(json.set("rows", rows).set("failed", failed));
 }
 
-// The last field of the reply is the value of the register.
+// The value of the register is the last field of the reply.
 OrderResult read_registers(Encoder& encoder, const Between& between) {
   const Command& command = *find_command(encoder.unit(), Verb::memory_read);
   Json registers = Json::array();

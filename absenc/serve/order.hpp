@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Orders for an encoder: a command, or to read its settings or memory, or an examination.
+// Orders for an encoder: to run a command, to read its settings or memory, or to examine it.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +25,7 @@ struct OrderResult {
 struct Order {
   enum class Kind : std::uint8_t {
     command,
-    settings,     // reads settings and identification, or only what `command` reads
+    settings,     // reads settings and identification; if `command` is set, only the value that this command reads
     memory,       // reads the memory bytes at `addresses`; for encoders with registers, all readable registers
     examination,  // runs the examination of `absenc doctor`
   };
@@ -35,7 +35,7 @@ struct Order {
   std::vector<std::int64_t> arguments{};
   client::MemoryImage addresses{};
   std::string who{};
-  // called once if Watch::give accepts the order: when the order has ended, or is given up
+  // called once if Watch::give accepts the order: when the order has ended or was given up
   std::function<void(const OrderResult&)> done{};
 
   /// Returns the name of the order for messages: "zero", "doctor".
@@ -43,14 +43,16 @@ struct Order {
   [[nodiscard]] bool changes_encoder() const { return kind == Kind::command && command->changes_encoder; }
 };
 
-/// Returns an order that reads settings and identification, or only `setting`. Throws UsageError.
+/// Returns an order that reads settings and identification; if `setting` is not "", only this setting. Throws
+/// UsageError.
 [[nodiscard]] Order settings_order(const Unit& unit, std::string_view setting);
-/// Returns an order that reads registers, or the memory page `page` (below 0: what a dump contains). Throws UsageError.
+/// Returns an order that reads registers, or the memory page `page`; a page below 0 means the addresses that a dump
+/// contains. Throws UsageError.
 [[nodiscard]] Order memory_order(const Unit& unit, std::int64_t page);
 [[nodiscard]] Order examination_order();
 
-/// Carries out any order but an examination. `between` may be called between two requests. Throws the exceptions of the
-/// encoder, its port and `between`.
+/// Carries out an order of any kind except an examination. `between`, which may do other work on the line, may be
+/// called between two requests. Throws the exceptions of the encoder, its port and `between`.
 [[nodiscard]] OrderResult carry_out(client::Encoder& encoder, const Order& order, const std::function<void()>& between);
 
 /// Returns the fields of a reply for people, without Role::exchange, as a list of {"field","value","meaning"}.

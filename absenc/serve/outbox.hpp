@@ -12,7 +12,7 @@
 
 namespace absenc::serve {
 
-/// One good reading for other systems. Members without a valid value are empty.
+/// A good reading that is sent to other systems. Members without a valid value are empty.
 struct OutgoingReading {
   std::int64_t at_us = 0;         // calendar time at which the encoder latched the position
   std::optional<double> place{};  // position that continues past the end of a turn; degrees, for linear encoders mm
@@ -24,14 +24,15 @@ struct OutgoingReading {
   std::optional<std::int64_t> turns{};
 };
 
-/// A bounded queue of readings, which drops the oldest. Callers put readings only while `wanted`.
+/// A bounded queue of readings; when it is full, it drops the oldest reading. Readings may be put only while
+/// `wanted`.
 class Outbox {
  public:
   static constexpr std::size_t most = 2048;
 
   struct Taken {
     std::vector<OutgoingReading> readings{};  // the taken readings, oldest first
-    std::uint64_t dropped = 0;                // number of older readings that were dropped since the last `take`
+    std::uint64_t dropped = 0;                // number of readings that were dropped since the last `take`
   };
 
   [[nodiscard]] bool wanted() const { return wanted_; }

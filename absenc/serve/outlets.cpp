@@ -27,7 +27,7 @@ constexpr std::array<std::string_view, 10> mqtt_names{"broker",   "login_file", 
                                                       "batch_ms", "home_assistant"};
 constexpr std::array<std::string_view, 1> udp_names{"to"};
 
-/// The settings of one section of the file, overridden by options.
+/// The settings of one section of absenc.toml; command-line options override them.
 class SectionValues {
  public:
   SectionValues(std::string_view section, std::span<const std::string_view> known,
@@ -128,7 +128,7 @@ Broker broker_of(const SectionValues& values) {
   return broker;
 }
 
-// Two servers with the same prefix would overwrite each other's state.
+// Two servers that use the same topic prefix would overwrite each other's state.
 std::string usual_prefix() {
   std::string text = os::host_name();
   if (text.empty()) text = "server";

@@ -14,10 +14,10 @@ namespace absenc::serve {
 
 struct MqttSettings {
   Broker broker{};
-  std::string prefix{};          // beginning of the topics, except those of discovery
+  std::string prefix{};          // beginning of all MQTT topics, except those of discovery
   std::string spool{};           // path of the folder of the spool
   std::int64_t spool_bytes = 0;  // greatest size of the spool in bytes
-  Time batch{};                  // an encoder's readings within this time share messages of up to 250
+  Time batch{};  // time for which the readings of an encoder are collected into one message, which holds up to 250
   std::string home_assistant{};  // prefix of the discovery topics; "": no discovery
 
   bool operator==(const MqttSettings&) const = default;
@@ -35,7 +35,8 @@ struct Outlets {
   std::optional<UdpSettings> udp{};
 };
 
-/// A command-line option that overrides a setting: "mqtt", "broker", "mqtts://hall.example".
+/// A command-line option that overrides a setting of absenc.toml, for example "mqtt", "broker",
+/// "mqtts://hall.example".
 struct OutletOption {
   std::string_view section;
   std::string_view setting;

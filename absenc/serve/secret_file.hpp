@@ -16,7 +16,7 @@ struct Secret {
 /// Throws Failure, also if the file's group may write it, or others may access it.
 [[nodiscard]] std::vector<Secret> read_secrets(const std::string& title, const std::string& path, std::size_t least);
 
-/// Returns the first user name and password in a file. Throws Failure.
+/// Returns the first user name and its password in a file. Throws Failure.
 [[nodiscard]] Secret read_secret(const std::string& path);
 
 }  // namespace absenc::serve

@@ -15,12 +15,13 @@ std::string Sending::change_to(const Outlets& outlets) {
       const std::lock_guard lock(mutex_);
       old = std::exchange(mqtt_, nullptr);
     }
-    old.reset();  // the old object ends first: the new one may use the same spool, which is locked
+    // the old Mqtt object ends before the new one starts, because the new one may use the same spool, which is locked
+    old.reset();
     current_.mqtt.reset();
     std::shared_ptr<Mqtt> next;
     if (outlets.mqtt) next = std::make_shared<Mqtt>(*outlets.mqtt, *fleet_, *server_events_);
     current_.mqtt = outlets.mqtt;
-    // If MQTT only gets new settings, the queued readings wait for the new Mqtt object.
+    // If MQTT only gets new settings, the readings in the queues stay for the new Mqtt object.
     if (!outlets.mqtt) stop_outgoing(Watch::Outlet::mqtt);
     changed += fmt::format("; MQTT: {}", outlets.mqtt ? outlets.mqtt->broker.text() : "none");
     const std::lock_guard lock(mutex_);

@@ -17,8 +17,8 @@ class Sending {
   /// Both arguments must outlive this object. Nothing is sent before `change_to`.
   Sending(const Fleet& fleet, ServerEvents& server_events) : fleet_(&fleet), server_events_(&server_events) {}
 
-  /// Applies new settings of MQTT and UDP and returns the changes in words, each with a leading semicolon. An outlet
-  /// that cannot be started is then off, and Failure or os::Failure is thrown. To be called from one thread only.
+  /// Applies new settings of MQTT and UDP and returns the changes in words, each with a leading semicolon. If MQTT or
+  /// UDP cannot be started, it is off and Failure or os::Failure is thrown. To be called from one thread only.
   std::string change_to(const Outlets& outlets);
 
   void add(const std::vector<ServerEvent>& server_events);

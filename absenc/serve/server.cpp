@@ -25,7 +25,7 @@ using namespace std::chrono_literals;
 
 constexpr Time between_points = 33ms;
 constexpr Time between_states = 200ms;
-// Time between two states in the event stream, with more than `large` encoders.
+// Time between two events `state` in the event stream, if there are more than `large` encoders.
 constexpr Time between_large_states = 1s;
 constexpr std::size_t large = 50;
 
@@ -59,13 +59,14 @@ struct Server::Parts {
   ~Parts() {
     publisher.request_stop();
     publisher.join();
-    http.reset();  // HTTP ends before the parts that its requests use
-    fleet.end();   // before distribute_events is called, so that the events of the last commands are distributed
+    http.reset();  // the HTTP server ends before the parts that its requests use
+    fleet.end();   // before the events are distributed, so that those of the last commands are included
     distribute_events();
     sending.change_to({});
   }
 
-  // Publishes the paths of the ports, so that a program that finds one busy can name this server.
+  // Publishes the paths of the ports that this server reads, so that a program that finds a port busy can name this
+  // server.
   void publish_ports() {
     std::vector<std::string> ports;
     for (const std::shared_ptr<Watch>& watch : fleet.all()) {
@@ -132,7 +133,7 @@ struct Server::Parts {
   Worker worker;
   std::optional<Api> api;
   std::optional<HttpServer> http;
-  std::set<std::string> traced;  // used by the publisher thread only
+  std::set<std::string> traced;  // names of the encoders whose points are sent; used by the publisher thread only
   std::mutex mutex;
   std::condition_variable_any changed;
   std::jthread publisher;
@@ -148,7 +149,8 @@ std::string Server::history_trouble() const {
 std::size_t Server::encoders() const { return parts_->fleet.all().size(); }
 
 std::string Server::reload() {
-  const Outlets outlets = read_outlets(outlets_);  // the settings are read before any change, because reading may throw
+  // the file is read before anything is changed, because reading it may throw
+  const Outlets outlets = read_outlets(outlets_);
   try {
     parts_->access.reload();
   } catch (const client::Failure& failure) {

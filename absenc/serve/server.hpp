@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `absenc serve` without its command line.
+// The server of `absenc serve`, without the command line.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 namespace absenc::serve {
 
 struct Choices {
-  // Addresses of encoders as for `absenc read`; empty: all encoders of absenc.toml.
+  // Names or addresses of encoders, as in the command `absenc read`; empty: all encoders of absenc.toml.
   std::vector<std::string> encoders{};
   double rate = 50;  // readings per second of encoders without rate_hz in absenc.toml; 0: as fast as possible
   int realtime = 0;  // real-time priority of encoders without realtime in absenc.toml, 1 to 99; 0: none
@@ -39,7 +39,7 @@ class Server {
   /// Returns the URL of the web page: "http://127.0.0.1:8420/".
   [[nodiscard]] const std::string& url() const;
   [[nodiscard]] std::size_t encoders() const;
-  /// Returns why the history cannot be written; "" if it can, or if the server has no history.
+  /// Returns why the history cannot be written; "" if it can be written, or if the server has no history.
   [[nodiscard]] std::string history_trouble() const;
   /// Reads absenc.toml and the token file again and returns the changes in words. Throws UsageError, Failure,
   /// os::Failure or os::Interrupted. To be called from one thread only.

@@ -53,13 +53,14 @@ class ServerEvents {
     ++dropped_;
   }
 
-  /// Returns the number of events added since the start.
+  /// Returns the number of events that were added since the start of the server.
   [[nodiscard]] std::uint64_t added() const {
     const std::lock_guard lock(mutex_);
     return added_;
   }
 
-  /// Takes the queued events, oldest first. `added`: number of events added since the start.
+  /// Takes the queued events, oldest first. `added`: receives the number of events that were added since the start of
+  /// the server.
   [[nodiscard]] std::vector<ServerEvent> take(std::uint64_t& added) {
     const std::lock_guard lock(mutex_);
     added = added_;

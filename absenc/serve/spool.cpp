@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Approximate greatest size of a write in bytes; a nearly full disk may still accept a small one.
+// Approximate greatest size in bytes of a write to the spool; a nearly full disk may still accept a small write.
 constexpr std::size_t write_size = 65536;
 
 std::int64_t memory_bytes(std::int64_t most) { return std::clamp<std::int64_t>(most / 16, 64'000, 4'000'000); }
@@ -97,11 +97,12 @@ void Spool::write_waiting() {
   notes_.push_back(fmt::format("the spool {} can be written again", path_));
 }
 
-// Returns false when nothing waits.
+// Writes some of the messages that wait in memory. Returns false when nothing waits.
 bool Spool::write_some() {
   if (memory_.empty() && unwritten_numbers_.empty()) return false;
   std::string bytes;
-  // The reading numbers come first: a truncated write then uses no number twice.
+  // The numbers of the next readings are written before the messages: if the write is cut short, no number is used
+  // twice.
   if (!unwritten_numbers_.empty()) bytes = spool_record({facts_.source, facts_.next_id, unwritten_numbers_});
   std::vector<std::size_t> offsets;
   const std::size_t start = newest_->log().size();
@@ -160,7 +161,7 @@ std::vector<Message> Spool::after(std::int64_t id, std::size_t most) {
       collect_from(part, id, most, found);
     } catch (const os::Failure&) {
       std::error_code error;
-      // The file still exists, so the error may be temporary.
+      // If the file still exists, the error may be temporary, so its messages stay.
       if (fs::exists(path_of(part.number), error)) break;
       drop_part(i--, fmt::format("{} was removed", path_of(part.number)));
     }
@@ -195,7 +196,7 @@ void Spool::remove(const std::vector<std::int64_t>& ids) {
   const std::lock_guard lock(mutex_);
   for (const std::int64_t id : ids) {
     const auto place = places_.find(id);
-    if (place == places_.end()) continue;  // the message was dropped after `after` returned it
+    if (place == places_.end()) continue;  // the message was dropped after it had been returned for sending
     remove_one(id, place->second);
     places_.erase(id);
   }
@@ -228,7 +229,7 @@ void Spool::forget(const std::string& encoder) {
   facts_.next_numbers.erase(encoder);
   unwritten_numbers_.erase(encoder);
   if (newest_ == nullptr) return;
-  // If this fails, the number stays in the newest file, which does no harm.
+  // A failed write does no harm: the number then stays in the newest file of the spool.
   [[maybe_unused]] const int ignored = newest_->log().append(spool_record_without(encoder));
   parts_.back().bytes = newest_->log().size();
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Stores messages on disk until a broker has acknowledged them.
+// Stores MQTT messages on disk until the broker has acknowledged them.
 //
-// The spool is a folder of files (spool_file.hpp). Acknowledged messages are marked in place, so sending needs no free
-// space on the disk. While the disk cannot be written, new messages wait in memory, up to a limit.
+// The spool is a folder of files (spool_file.hpp). Acknowledged messages are marked in place, so sending needs no
+// free space on the disk. While the disk cannot be written, new messages wait in memory, up to a limit.
 #pragma once
 
 #include <cstddef>
@@ -67,7 +67,7 @@ class Spool {
 
   struct Dropped {
     Counts counts{};
-    std::string why{};  // reason of the last drop
+    std::string why{};  // why messages were dropped the last time
   };
   /// Returns how many messages were dropped since the last call, and why.
   [[nodiscard]] Dropped take_dropped();
@@ -81,7 +81,7 @@ class Spool {
     Counts waiting{};
     std::int64_t waiting_bytes = 0;
     std::size_t bytes = 0;
-    bool damaged = false;  // whether a part of the file cannot be read; then the file is renamed instead of deleted
+    bool damaged = false;  // whether a part of the file cannot be read; such a file is renamed instead of deleted
   };
   struct Place {            // place and size of a stored message that `after` has returned
     std::int64_t part = 0;  // number of the file with the message; 0: the message is in memory
@@ -116,7 +116,7 @@ class Spool {
   std::int64_t most_bytes_;
   std::string run_;
 
-  std::mutex mutex_;  // mutex that guards all members up to `shown_mutex_`
+  std::mutex mutex_;  // mutex that guards the members from here to `shown_mutex_`
   SpoolFacts facts_;
   std::map<std::string, std::uint64_t> unwritten_numbers_;
   std::optional<os::OwnedFolder> folder_;
@@ -124,7 +124,7 @@ class Spool {
   std::unique_ptr<SpoolFile> newest_;  // file of the last part, to which messages are appended; null if there is none
   std::int64_t next_part_ = 1;
   std::size_t part_limit_ = 0;
-  std::unique_ptr<SpoolFile> older_;  // file that was read last, other than `newest_`
+  std::unique_ptr<SpoolFile> older_;  // the file other than `newest_` from which messages were read last; kept open
   std::int64_t older_number_ = 0;
   struct {
     std::int64_t part = 0, id = 0;

@@ -19,7 +19,7 @@ constexpr std::size_t largest_body = 100'000'000;
 constexpr char kind_message = 'm', kind_facts = 'f', kind_forget = 'x';
 constexpr char is_waiting = 'w', has_arrived = 'a';
 
-// FNV-1a over kind and body.
+// Returns the checksum of a record: FNV-1a over its kind and body.
 std::uint32_t checksum(char kind, std::string_view body) {
   std::uint32_t hash = 2166136261U;
   const auto take = [&](char one) { hash = (hash ^ static_cast<unsigned char>(one)) * 16777619U; };
@@ -101,7 +101,7 @@ std::optional<SpoolFile::StoredMessage> SpoolFile::next(std::size_t& offset, Spo
       if (facts != nullptr && head[kind_at] == kind_forget) facts->next_numbers.erase(fields.text());
       offset = at + head_bytes + size;
     }
-  } catch (const client::Failure&) {  // the body of the record is invalid
+  } catch (const client::Failure&) {  // the body of a record is invalid: no message
     return {};
   }
 }

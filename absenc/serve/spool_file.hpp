@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// One file of the spool: a sequence of records.
+// One file of the spool: a sequence of records. The fields of a record with their sizes in bytes, the numbers in the
+// byte order of this computer:
 //
-//   checksum (4) | size of the body (4) | kind (1) | arrived (1) | body       numbers in this computer's byte order
+//   checksum (4) | size of the body (4) | kind (1) | arrived (1) | body
 #pragma once
 
 #include <cstddef>
@@ -22,7 +23,7 @@ struct Message {
   std::uint64_t readings = 0;  // number of readings in the message
 };
 
-/// Returns about how many bytes a message needs in the spool.
+/// Returns the approximate number of bytes that a message needs in the spool.
 [[nodiscard]] inline std::int64_t spool_bytes(const Message& message) {
   return static_cast<std::int64_t>(message.topic.size() + message.payload.size()) + 32;
 }
@@ -54,8 +55,8 @@ class SpoolFile {
     std::size_t offset = 0;  // offset of the record of the message in the file
     bool arrived = false;
   };
-  /// Returns the next message at or after `offset` and moves `offset` behind it; nothing at the end of the file or at a
-  /// damaged record. `facts`, unless null, collects the facts on the way. Throws os::Failure.
+  /// Returns the next message at or after `offset` and moves `offset` behind it; nothing at the end of the file or at
+  /// a damaged record. `facts`, unless null, collects the facts of the records that are passed. Throws os::Failure.
   [[nodiscard]] std::optional<StoredMessage> next(std::size_t& offset, SpoolFacts* facts) const;
   /// Marks the message at `offset` as acknowledged. Returns 0 or the errno of the write.
   [[nodiscard]] int mark_arrived(std::size_t offset) const;

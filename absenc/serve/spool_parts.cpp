@@ -16,7 +16,8 @@ namespace {
 
 constexpr std::string_view part_suffix = ".part";
 
-// The greatest size of a file depends on the free space, because only deleting a whole file frees space.
+// Returns the greatest size of a file of the spool in bytes. It is small on a nearly full disk, because only deleting
+// a whole file frees space.
 std::size_t part_bytes(std::int64_t most, const std::string& folder) {
   std::error_code error;
   const std::uintmax_t free = fs::space(folder, error).available;
@@ -26,7 +27,7 @@ std::size_t part_bytes(std::int64_t most, const std::string& folder) {
 
 }  // namespace
 
-// A plain file at the path is renamed: it may be a spool of an older absenc, or no spool.
+// A regular file at the path of the spool folder is renamed: it may be a spool of an older absenc, or no spool.
 void Spool::open_folder() {
   std::error_code error;
   if (fs::exists(path_, error) && !fs::is_directory(path_, error)) set_aside(path_);
@@ -76,7 +77,7 @@ void Spool::load_part(std::int64_t number) {
   }
 }
 
-// The folder or the newest file may have been removed or moved.
+// Opens the spool again if its folder or its newest file was removed or moved.
 void Spool::check_folder() {
   if (folder_ && folder_->is_there() && (newest_ == nullptr || newest_->log().is_there())) return;
   if (folder_) {
@@ -106,7 +107,7 @@ void Spool::rescue_newest() {
     while (std::optional<SpoolFile::StoredMessage> one = newest_->next(offset, nullptr)) {
       if (!one->arrived && !unmarked_.contains(one->message.id)) rescued.push_back(std::move(one->message));
     }
-  } catch (const os::Failure&) {  // disk error: the remaining messages of this file are lost
+  } catch (const os::Failure&) {  // after a disk error, the remaining messages of this file are lost
   }
   Counts lost = parts_.back().waiting;
   for (const Message& one : rescued) lost -= {1, one.readings};
@@ -147,7 +148,7 @@ void Spool::drop_part(std::size_t index, const std::string& why) {
   fs::remove(path_of(part.number), ignored);
 }
 
-// The unreadable messages are reported as dropped.
+// The messages of the file that cannot be read are reported as dropped.
 void Spool::recount(Part& part) {
   Counts readable;
   std::int64_t bytes = 0;
@@ -167,7 +168,7 @@ void Spool::recount(Part& part) {
   drop(lost, fmt::format("{} cannot be read from byte {} of {} on", path_of(part.number), offset, part.bytes));
 }
 
-// The last file stays, because it has the reading numbers.
+// Deletes files without waiting messages. The last file stays, because it has the numbers of the next readings.
 void Spool::tidy() {
   if (newest_ != nullptr && !condition_.trouble.empty() && parts_.back().waiting.messages == 0) {
     if (newest_->log().shrink_to(spool_record(facts_))) {
@@ -202,7 +203,7 @@ Spool::Part* Spool::find_part(std::int64_t number) {
 
 std::string Spool::path_of(std::int64_t number) const { return fmt::format("{}/{:010}{}", path_, number, part_suffix); }
 
-// Renames the file at `path` within its folder, because this needs no free space.
+// Renames the file at `path` within its folder, which needs no free space.
 void Spool::set_aside(const std::string& path) {
   std::error_code error;
   std::string to = path + ".bad";

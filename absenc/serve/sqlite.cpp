@@ -8,7 +8,7 @@ namespace absenc::serve {
 
 namespace {
 
-constexpr int lock_timeout_ms = 2000;  // how long to wait for a lock of another program
+constexpr int lock_timeout_ms = 2000;  // time to wait for a lock that another program holds
 
 }  // namespace
 

@@ -30,9 +30,9 @@ class Sqlite {
   Sqlite& operator=(const Sqlite&) = delete;
 
   void run(const std::string& sql);
-  /// Returns the number that a query with a single result yields; 0 if the query yields no row.
+  /// Returns the number that is the single result of a query; 0 if the query yields no row.
   [[nodiscard]] std::int64_t number(const std::string& sql);
-  /// Returns whether a transaction is open. SQLite may end it after an error.
+  /// Returns whether a transaction is open. SQLite itself may end a transaction after an error.
   [[nodiscard]] bool in_transaction() const;
   /// Makes closing leave the write-ahead log unchanged.
   void keep_log_on_close();
@@ -62,7 +62,7 @@ class Statement {
   bool next();
   /// Runs the statement to its end, ignoring its rows.
   void run();
-  /// Prepares the statement to run again, even after an error.
+  /// Resets the statement so that it can run again, even after an error.
   void reset();
 
   [[nodiscard]] bool is_null(int column) const;

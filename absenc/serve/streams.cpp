@@ -20,7 +20,7 @@ Stream::Text event_text(std::string_view event, const client::Json& data) {
 
 std::shared_ptr<Stream> Streams::open(const std::string& trace, const std::string& peer) {
   auto stream = std::make_shared<Stream>("text/event-stream");
-  // This text makes the EventSource of a browser reconnect one second after it lost the stream.
+  // With this text, the EventSource of a browser connects again one second after it has lost the stream.
   stream->push(std::make_shared<const std::string>("retry: 1000\n\n"));
   const std::lock_guard lock(mutex_);
   if (!make_room(peer)) return nullptr;
@@ -39,7 +39,8 @@ bool Streams::make_room(const std::string& peer) {
   return abort_slowest(peer, os::now() - stall_time);
 }
 
-// Closes the slowest stream of `peer` that asked for no data since `taken_before`, if any.
+// Closes the stream of the IP address `peer` that has waited longest for its client to take data, if it has waited
+// since before the time `taken_before`. Returns whether a stream was closed.
 bool Streams::abort_slowest(const std::string& peer, Time taken_before) {
   auto slowest = open_.end();
   for (auto one = open_.begin(); one != open_.end(); ++one) {

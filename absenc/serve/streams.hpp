@@ -19,7 +19,7 @@ class Streams {
  public:
   static constexpr std::size_t most = 300;
   static constexpr std::size_t most_of_address = 200;
-  // A stream whose connection asked for no data for this time may be closed for a new one.
+  // An event stream whose client has taken no data for this time may be closed to make room for a new one.
   static constexpr Time stall_time = std::chrono::seconds(5);
 
   /// Opens an event stream; null if there are too many. May close another stream for it. `trace`: the encoder whose
@@ -49,7 +49,7 @@ class Streams {
 
   mutable std::mutex mutex_;
   std::vector<Open> open_;
-  std::uint64_t dropped_before_ = 0;  // number of messages lost by streams that are closed
+  std::uint64_t dropped_before_ = 0;  // number of events that streams had lost before they were closed
 };
 
 }  // namespace absenc::serve

@@ -11,7 +11,7 @@ namespace {
 constexpr std::size_t most_points = 4096;
 constexpr std::int64_t recent_ms = 20'000;
 constexpr std::int64_t between_recent_ms = 10;
-constexpr std::size_t most_seconds = 120;  // greatest number of seconds that wait for the history
+constexpr std::size_t most_seconds = 120;  // greatest number of seconds that wait to be written into the history
 constexpr std::size_t minute_s = 60;
 
 }  // namespace
@@ -60,7 +60,7 @@ void TimeSeries::end_second() {
 
 void TimeSeries::add_point(const Point& point) {
   const std::int64_t at_ms = point.at_ms;
-  // After the calendar clock was set back, a point seems earlier than the one before.
+  // After the calendar clock was set back, a new point has an earlier time than the point before it.
   const bool is_next =
       recent_.empty() || at_ms - recent_.back().at_ms >= between_recent_ms || at_ms < recent_.back().at_ms;
   if (is_next) {

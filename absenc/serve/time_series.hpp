@@ -35,8 +35,8 @@ struct Second {
   std::uint64_t readings = 0;
   std::uint64_t errors = 0;
   Spread place{};
-  Spread speed{};  // measured speeds of the second, without their uncertainties
-  // Last valid position of the second.
+  Spread speed{};  // measured speeds in this second, without their uncertainties
+  // Last valid position in this second; empty if there is none.
   std::optional<double> last_place{};
 };
 
@@ -52,7 +52,7 @@ class TimeSeries {
   [[nodiscard]] std::vector<Point> take_points();
   /// Returns the points of the last 20 seconds with readings, at least 10 ms apart, oldest first.
   [[nodiscard]] std::vector<Point> recent_points() const { return {recent_.begin(), recent_.end()}; }
-  /// Takes the completed seconds, at most the newest 120. A second before `now_s` is complete.
+  /// Takes the completed seconds, at most the newest 120. A second is complete if it is before the second `now_s`.
   [[nodiscard]] std::vector<Second> take_seconds(std::int64_t now_s);
   /// Returns the last completed seconds with readings, at most 60, oldest first.
   [[nodiscard]] std::vector<Second> last_minute() const { return {last_minute_.begin(), last_minute_.end()}; }
@@ -63,7 +63,8 @@ class TimeSeries {
   void end_second();
   void add_point(const Point& point);
 
-  Second second_{};  // current second; its `at_s` is 0 if no second has begun since the last one ended
+  // the second that is being counted; its `at_s` is 0 if no second has begun since the last one ended
+  Second second_{};
   std::deque<Second> seconds_;
   std::deque<Second> last_minute_;
   bool traced_ = false;
@@ -73,7 +74,8 @@ class TimeSeries {
     std::int64_t at_s = 0;
     std::uint64_t count = 0;
   };
-  std::array<Errors, 60> errors_{};  // errors of the last 60 seconds; index: second within the minute
+  // numbers of errors in the last 60 seconds; the index is the second within the minute
+  std::array<Errors, 60> errors_{};
 };
 
 }  // namespace absenc::serve

@@ -9,7 +9,7 @@ namespace {
 constexpr std::int64_t begin_s = 1'000'000;
 constexpr std::int64_t begin_ms = 1000 * begin_s;
 
-// The history takes each second as soon as it has ended.
+// The history takes each second with `take_seconds` as soon as the second has ended.
 TEST(TimeSeries, LastMinuteIncludesSecondsTakenByHistory) {
   TimeSeries series;
   for (std::int64_t i = 0; i < 100; ++i) {
@@ -45,7 +45,7 @@ TEST(TimeSeries, CountsErrorsOfLastMinute) {
   EXPECT_EQ(series.errors_last_minute(begin_s + 89), 60u);
   EXPECT_EQ(series.errors_last_minute(begin_s + 99), 50u);
   EXPECT_EQ(series.errors_last_minute(begin_s + 200), 0u);
-  EXPECT_TRUE(series.last_minute().empty());  // no second had a reading
+  EXPECT_TRUE(series.last_minute().empty());  // no second of the test had a reading
 }
 
 TEST(TimeSeries, StoresPointsOnlyWhileTraced) {
@@ -71,7 +71,7 @@ TEST(TimeSeries, RecentPointsCoverTwentySecondsAndRestartWhenClockIsSetBack) {
   EXPECT_EQ(recent.back().at_ms - recent.front().at_ms, 20'000);
   series.count_reading(begin_ms - 5000, 0, {});
   ASSERT_EQ(series.recent_points().size(), 1u);
-  series.count_reading(begin_ms - 4000, {}, {});  // a reading whose position is invalid
+  series.count_reading(begin_ms - 4000, {}, {});  // the position of this reading is invalid
   EXPECT_EQ(series.recent_points().size(), 1u);
 }
 

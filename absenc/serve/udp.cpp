@@ -11,7 +11,7 @@ namespace {
 
 constexpr auto between_sendings = std::chrono::milliseconds(20);
 
-// PlotJuggler takes the time from "timestamp".
+// PlotJuggler takes the time of a point from the field "timestamp".
 Json datagram(const std::string& encoder, const OutgoingReading& reading) {
   Json values = Json::object();
   if (reading.place) values.set("position", *reading.place);

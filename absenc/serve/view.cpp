@@ -31,7 +31,8 @@ void set_acknowledged(Json& json, const std::vector<RaisedAlarm>& raised, const 
   json.set("acknowledged", acknowledged);
 }
 
-// Returns the raised alarms; null if they are unknown. `known`: acknowledgements, or null.
+// Returns the raised alarms as JSON; null if the reading does not report alarms. `known`: acknowledgements of alarms,
+// or null.
 Json alarms_json(const Unit& unit, const Reading& reading, const std::vector<RaisedAlarm>* known = nullptr) {
   Json all = Json::array();
   const std::vector<Flags> channels = alarms_of(unit, reading);
@@ -48,7 +49,7 @@ Json alarms_json(const Unit& unit, const Reading& reading, const std::vector<Rai
   return all;
 }
 
-// Returns the names of the status flags that are set; null if these are unknown.
+// Returns the names of the status flags that are set, as JSON; null if the reading does not report them.
 Json status_json(const Unit& unit, const Reading& reading) {
   Json all = Json::array();
   const std::vector<Flags> channels = status_of(unit, reading);
@@ -86,7 +87,7 @@ Json arguments_json(const Command& command) {
   });
 }
 
-// Returns the name of a verb that the page distinguishes; "" for the others.
+// Returns the name of a kind of command that the page treats in a special way; "" for other kinds.
 std::string_view name_of(Verb verb) {
   switch (verb) {
     case Verb::clear_alarms:
@@ -107,7 +108,8 @@ std::string_view name_of(Verb verb) {
 Json commands_json(const Unit& unit) {
   Json all = Json::array();
   for (const Command& command : unit.commands) {
-    if (command.verb == Verb::scan) continue;  // a scan addresses a line, not an encoder
+    // the command `scan` searches a line for encoders, so no encoder offers it
+    if (command.verb == Verb::scan) continue;
     all.append(Json::object()
                    .set("name", command.name)
                    .set("meaning", command.meaning)
@@ -127,7 +129,8 @@ Json errors_json(const host::Counters& counters) {
   return json;
 }
 
-// The buckets are not cumulative; the last one has no upper limit.
+// A bucket of the latencies counts only replies above the limit of the bucket before it; the last bucket has no upper
+// limit.
 Json latency_json(const LatencyFigures& latency) {
   Json buckets = Json::array();
   std::uint64_t below = 0;
@@ -173,7 +176,7 @@ void set_scale(Json& json, const Watch& watch, const Snapshot& snapshot) {
   json.set("has_turns", known.multiturn_bits != 0);
 }
 
-// The last reading must not be shown as the current position.
+// While the encoder is not live, its last reading must not be shown as the current position.
 Json last_reading_json(const Sample& last) {
   const std::int64_t age_ms = std::chrono::duration_cast<std::chrono::milliseconds>(os::now() - last.at).count();
   Json json = Json::object().set("at_ms", calendar_ms() - age_ms);

@@ -14,16 +14,17 @@ namespace absenc::serve {
 
 [[nodiscard]] inline double seconds_of(Time time) { return std::chrono::duration<double>(time).count(); }
 
-/// Returns the overview of an encoder. Its position, speed and alarms are null if it is not live.
+/// Returns the JSON by which the overview page shows an encoder. Position, speed and alarms are null if the encoder
+/// is not live.
 [[nodiscard]] client::Json overview(const Watch& watch, const Snapshot& snapshot);
 
-/// Returns the state, alarms and status of an encoder, without its position.
+/// Returns the state, alarms and status of an encoder as JSON, without its position.
 [[nodiscard]] client::Json condition_json(const Watch& watch, const Snapshot& snapshot);
 
 /// Returns whether the encoder of `watch` is linear: its positions are in mm instead of degrees.
 [[nodiscard]] bool is_linear(const Watch& watch);
 
-/// Returns the overview of an encoder, with counters, latencies, a recent reply and commands.
+/// Returns the JSON of `overview` together with counters, latencies, the fields of a recent reply, and the commands.
 [[nodiscard]] client::Json details(const Watch& watch);
 
 /// Returns plot points as {"encoder":name,"points":[[at_ms,position,speed,speed_uncertainty],...]}.

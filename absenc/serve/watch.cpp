@@ -28,7 +28,7 @@ constexpr Time summary_interval = 1s;
 constexpr Time failure_report_interval = 1s;  // minimum time between two events about failed readings
 constexpr Time retry_pause = 5s;              // pause before the next attempt to read an encoder in state `ended`
 
-// Converts a time of os::now, which is the steady clock.
+// Converts a time of os::now to a time point of the steady clock, which is the same clock.
 std::chrono::steady_clock::time_point to_time_point(Time time) {
   return std::chrono::steady_clock::time_point(std::chrono::duration_cast<std::chrono::steady_clock::duration>(time));
 }
@@ -182,9 +182,9 @@ void Watch::work(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     try {
       read_on(stop);
-    } catch (const os::Interrupted&) {  // the program ends: os::interrupted() stops the other threads
+    } catch (const os::Interrupted&) {  // the program ends; os::interrupted() also stops the other threads
       return;
-    } catch (const os::Ended&) {  // the end of the reading thread was requested while the line was busy
+    } catch (const os::Ended&) {  // the reading thread was requested to end during a wait
       return;
     } catch (const std::exception& error) {
       set_state(State::ended, error.what());
@@ -282,7 +282,7 @@ void Watch::summarize(const Encoder& live, const Sample& sample) {
   const Time now = os::now();
   const std::lock_guard lock(mutex_);
   const std::uint64_t before = current_.counters.bad();
-  // The error counters start at 0 when the encoder was opened again.
+  // The counters of errors start at 0 again when the encoder was opened again.
   const std::uint64_t errors = bad < before ? bad : bad - before;
   const std::int64_t at_ms = calendar_ms();
   series_.count_errors(at_ms, errors);
@@ -328,7 +328,7 @@ void Watch::queue_outgoing(const Sample& sample) {
   }
 }
 
-// An alarm stays raised until it is reported clear.
+// An alarm counts as raised until a reading reports it as clear.
 void Watch::report_alarms(const Reading& reading) {
   const std::uint32_t alarms = reading.alarms | (alarms_ & ~reading.alarms_reported);
   if (alarms == alarms_) return;
@@ -392,7 +392,7 @@ void Watch::carry_out(Encoder& live, const Order& order, const std::function<voi
     if (!is_examination && !live.connected()) live.connect();
     has_begun = true;
     done = is_examination ? examine(live, stop) : serve::carry_out(live, order, between);
-  } catch (const os::Failure& failure) {  // the port has failed; the next reading will find it lost
+  } catch (const os::Failure& failure) {  // the port has failed; the next reading will find that the port is lost
     note(failure);
     done.text = fmt::format("{} {}: {}", name, has_begun ? "was interrupted" : "was not done", failure.what());
   } catch (const os::Interrupted& interrupted) {

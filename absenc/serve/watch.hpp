@@ -24,11 +24,11 @@
 namespace absenc::serve {
 
 enum class State : std::uint8_t {
-  opening,   // nothing was read yet; the port may be missing
+  opening,   // the encoder was not read yet; its port may be missing
   live,      // the last reading is recent
   silent,    // no reading was received for a while
-  failing,   // the last attempt to read failed
-  lost,      // the port was lost
+  failing,   // the last attempt to read the encoder failed
+  lost,      // the port of the encoder was lost
   ended,     // the encoder cannot be read: `message` reports why; the thread tries again every few seconds
   examined,  // an examination uses the port: `message` reports its current step
 };
@@ -50,7 +50,7 @@ struct LatencyFigures {
   Time median{};
   Time percentile_99{};
   Time longest{};
-  // cumulative histogram for `latency_limits`, as of Latencies::within
+  // number of replies within each limit of `latency_limits` (cumulative, as in Latencies::within)
   std::array<std::uint64_t, latency_limits.size()> within{};
   std::uint64_t count = 0;
   Time sum{};
@@ -70,13 +70,13 @@ struct Snapshot {
   State state = State::opening;
   Time age{};  // age of the last reading; before the first reading, time since the start
   bool has_reading = false;
-  std::optional<double> place{};  // last valid position, as in `Point`
+  std::optional<double> place{};  // last valid position, continued as in `Point`; degrees or mm
   client::Sample last{};          // last reading; current only in state `live`
   std::string message{};          // reason why the encoder is not live; "" if it is, or if none is known
   host::Counters counters{};
   std::uint64_t readings = 0;
   std::uint64_t losses = 0;
-  std::uint64_t restarts = 0;  // number of restarts of the continued position
+  std::uint64_t restarts = 0;  // number of times the continued position was started again
   std::uint64_t errors_last_minute = 0;
   std::vector<RaisedAlarm> raised{};
   double rate = 0;           // rate of readings, per second
@@ -92,28 +92,28 @@ struct Details {
 
 class Watch {
  public:
-  /// Starts a thread that reads the encoder `rate` times per second; 0: as fast as possible. `offset`: time before the
-  /// first reading. `server_events` must outlive this object.
+  /// Starts a thread that reads the encoder `rate` times per second; `rate` 0: as fast as possible. `offset`: time
+  /// before the first reading. `server_events` must outlive this object.
   Watch(std::string name, const client::EncoderAddress& address, double rate, Time offset, ServerEvents& server_events);
   ~Watch();
   Watch(const Watch&) = delete;
   Watch& operator=(const Watch&) = delete;
 
-  /// Requests the reading thread to end, and does not wait for it.
+  /// Requests that the reading thread ends, and does not wait for it.
   void request_stop() { thread_.request_stop(); }
   /// Waits until the reading thread has ended. The destructor calls `request_stop` and `wait`.
   void wait();
 
   [[nodiscard]] Snapshot snapshot() const;
   [[nodiscard]] Details details() const;
-  /// The functions from `trace` to `last_minute` are those of TimeSeries, but thread-safe.
+  /// Thread-safe versions of the functions of TimeSeries with the same names: `trace` to `last_minute`.
   void trace(bool on);
   [[nodiscard]] std::vector<Point> take_points();
   [[nodiscard]] std::vector<Point> recent_points() const;
   [[nodiscard]] std::vector<Second> take_seconds();
   [[nodiscard]] std::vector<Second> last_minute() const;
 
-  /// System to which readings are sent. Each outlet has its own queue of readings.
+  /// A kind of system to which readings are sent. Each outlet has its own queue of readings.
   enum class Outlet : std::uint8_t { mqtt, udp };
   [[nodiscard]] Outbox::Taken take_outgoing(Outlet outlet);
   /// Stops storing readings for `outlet` and drops the queued ones.
@@ -122,8 +122,8 @@ class Watch {
   /// Gives an order to the reading thread. Returns "" or why the order is refused.
   [[nodiscard]] std::string_view give(Order order);
 
-  /// Acknowledges the raised alarm of this name, in all channels. Returns "" or the reason of a refusal. `who`: user
-  /// named in the event.
+  /// Acknowledges the raised alarm named `alarm`, in all channels. Returns "" or the reason of a refusal. `who`: name
+  /// of the user for the event.
   [[nodiscard]] std::string acknowledge(std::string_view alarm, const std::string& token, const std::string& who);
 
   [[nodiscard]] const std::string& name() const { return name_; }
@@ -166,12 +166,12 @@ class Watch {
 
   // The members from here to `thread_` are used by the reading thread only.
   Time next_summary_{};
-  Time next_failure_report_{};  // time from which the next failure may be reported
+  Time next_failure_report_{};  // time from which the next event about a failed reading may be recorded
   std::uint32_t alarms_ = 0;
   bool restarted_ = false;
   bool command_runs_ = false;  // whether a command runs that must not be interrupted
 
-  std::jthread thread_;  // last member, because the thread uses all others
+  std::jthread thread_;  // the last member, so that all members that the thread uses exist before it
 };
 
 }  // namespace absenc::serve

@@ -18,7 +18,7 @@ class Worker {
 
   Worker() : thread_([this](const std::stop_token& stop) { work(stop); }) {}
 
-  /// Adds a job, which must not throw. Returns false if too many jobs wait, unless `always`.
+  /// Adds a job, which must not throw. With `always` false, refuses the job and returns false if too many jobs wait.
   bool add(std::function<void()> job, bool always = false) {
     const std::lock_guard lock(mutex_);
     if (jobs_.size() >= most && !always) return false;
@@ -45,7 +45,7 @@ class Worker {
   std::mutex mutex_;
   std::condition_variable_any changed_;
   std::deque<std::function<void()>> jobs_;
-  std::jthread thread_;  // last member, because the thread uses all others
+  std::jthread thread_;  // the last member, so that all members that the thread uses exist before it
 };
 
 }  // namespace absenc::serve

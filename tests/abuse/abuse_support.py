@@ -5,7 +5,8 @@ import pathlib
 import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
-ALL = bool(os.environ.get("ABSENC_ABUSE_ALL"))  # whether to run the full test, which run.py --all requests
+# whether to run the long version of the tests, which run.py --all requests
+ALL = bool(os.environ.get("ABSENC_ABUSE_ALL"))
 
 
 def often(short, everything):

@@ -62,7 +62,7 @@ class Failures(MqttCase):
         os.mkdir(folder)
         os.chmod(folder, 0o777)
         broker = self.broker("allow_anonymous true", "persistence true", f"persistence_location {folder}/")
-        # The receiver speaks MQTT 3.1.1, because its MQTT 5 session would end with its connection.
+        # The receiver speaks MQTT 3.1.1: an MQTT 5 session would end when its connection ends.
         receiver = self.receiver(broker, version=paho.MQTTv311, client_id="keeps")
         server = self.sender(broker.url, ONE, "--rate", "200")
         for round_ in range(ROUNDS):

@@ -19,7 +19,7 @@ CONVERSATIONS = often(150, 10_000)
 SERVERS = often(20, 60)  # number of processes `absenc serve`; each pauses for up to 5 s between two conversations
 NOBODYS = 60_000  # a packet number that no message has, because packet numbers count from 1 in each conversation
 KNOWN = [bytes.fromhex(one) for one in ("20050000027f00", "4006000100027f00", "e00487027f00", "30050001615859")]
-# Types of the bad packets that the broker sends; 9 is SUBACK, 15 is AUTH.
+# Types of the bad packets that the fake broker sends; 9 is SUBACK, 15 is AUTH.
 KINDS = (CONNACK, PUBACK, 9, PUBLISH, DISCONNECT, PINGRESP, 15)
 
 
@@ -48,18 +48,18 @@ def bad_packet(random_, kind, number):
         return random_.choice(KNOWN)
     if way == 1:
         return random_.randbytes(random_.randrange(1, 64))
-    if way == 2:  # a packet with random properties
+    if way == 2:  # the bad packet has random properties
         start = {CONNACK: b"\0\0", PUBACK: number.to_bytes(2, "big") + b"\0", PUBLISH: b"\0\1a", 9: b"\0\1"}
         return packet(kind, start.get(kind, b"\0") + properties(random_))
-    if way == 3:  # a truncated packet: the receiver takes the next packet for its rest
+    if way == 3:  # the bad packet is truncated, so that the client takes the next packet for its rest
         whole = packet(kind, good + properties(random_))
         return whole[:random_.randrange(1, len(whole))]
-    if way == 4:  # a packet with a wrong size field: too large, 256 MB, five bytes long, or 0
+    if way == 4:  # the size field of the bad packet is wrong: too large, 256 MB, five bytes long, or 0
         size = random_.choice((b"\x7f", b"\xff\xff\xff\x7f", b"\xff\xff\xff\xff\x7f", b"\0"))
         return bytes((kind << 4,)) + size + good
-    if way == 5:  # a packet with random flags, mostly wrong
+    if way == 5:  # the bad packet has random flags, which are mostly wrong
         return packet(kind, good, random_.randrange(16))
-    if way == 6:  # a packet sent 2 to 1999 times
+    if way == 6:  # the packet is good, but sent 2 to 1999 times
         return packet(kind, good) * random_.randrange(2, 2000)
     mutated = bytearray(packet(kind, good + random_.choice((b"", properties(random_)))))
     for _ in range(random_.randrange(1, 4)):
@@ -72,7 +72,7 @@ def acknowledged(stream):
     found = []
     while True:
         sizes = next((stream[1:end] for end in range(2, 6) if end <= len(stream) and stream[end - 1] < 128), None)
-        if sizes is None:  # a client refuses a packet whose size field has five bytes
+        if sizes is None:  # the size field of the packet has five bytes, so the client refuses it
             return found, stream if len(stream) < 5 else b""
         body_at = 1 + len(sizes)
         end = body_at + sum((byte & 127) << 7 * place for place, byte in enumerate(sizes))
@@ -86,12 +86,12 @@ def acknowledged(stream):
 class Conversation:
     def __init__(self, seed):
         self.random = random.Random(seed)
-        # With 0 good packets, the bad packet replaces the CONNACK or follows it.
+        # Number of good packets before the bad one. If it is 0, the bad packet replaces the CONNACK or follows it.
         self.good_packets = self.random.choice((0, 0, 0, 1, 2, 3, 5, 8))
         self.seen = 0
         self.ends = None
         self.received = set()  # packet numbers of the messages received from the client
-        self.rest = b""  # incomplete packet at the end of the bytes sent to the client
+        self.rest = b""  # last bytes sent to the client that are an incomplete packet
 
     def numbers(self):
         return [*sorted(self.received), NOBODYS]
@@ -116,7 +116,7 @@ class Packets(ServeCase):
             return usual
         if not hasattr(connection, "conversation"):
             connection.conversation = Conversation(SEED + connection.index)
-            connection.socket.settimeout(1)  # a client that sends nothing for 1 s ends the conversation
+            connection.socket.settimeout(1)  # the conversation ends if the client sends nothing for 1 s
         conversation = connection.conversation
         if kind == PUBLISH and (number := published(flags, body_)[1]) is not None:
             conversation.received.add(number)
@@ -146,7 +146,7 @@ class Packets(ServeCase):
             self.assertLess(time.monotonic(), deadline, f"{self.broker.connections} conversations")
             for server in servers:
                 self.assertIsNone(server.process.poll(), f"a server ended; seeds {SEED} to {SEED + self.broker.connections}")
-            time.sleep(0.1)  # polling interval in seconds; the test's result depends on no time
+            time.sleep(0.1)  # polling interval in seconds; the result of the test does not depend on it
         self.good = True
         conversations = self.broker.connections
         deaths = sum(server.json("/api/mqtt")["client_deaths"] for server in servers)
@@ -170,11 +170,12 @@ class Packets(ServeCase):
         messages = []
         last = 0
         while last < goal:
-            # After refusals of a topic, a client waits for up to a minute before it retries.
+            # After the broker has refused a topic, a client may wait for up to a minute before it tries the topic
+            # again.
             late = time.monotonic() + 90 + PATIENCE
             while not (new := self.broker.after(topic, len(messages))):
                 self.assertLess(time.monotonic(), late, f"reading {goal} comes after {last}: {server.json('/api/mqtt')}")
-                time.sleep(0.05)  # polling interval in seconds
+                time.sleep(0.05)  # polling interval in seconds; the result of the test does not depend on it
             messages += new
             last = max([last, *numbers(new, ONE)])
         return messages

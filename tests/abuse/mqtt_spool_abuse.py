@@ -36,7 +36,8 @@ def harm(random_, path):
     elif way == 5:
         return path.unlink()
     else:
-        data[at:] = bytes(len(data) - at)  # zeros, as a file system leaves them after a power failure
+        # the end of the file is replaced by zeros, as a file system may leave it after a power failure
+        data[at:] = bytes(len(data) - at)
     with open(path, "r+b") as file:
         file.write(data)
         file.truncate()
@@ -77,7 +78,7 @@ class Spool(MqttCase):
         wait_until(lambda: (numbers(broker.all("/readings"), ONE) or [0])[-1] > first, "what is read comes")
         wait_until(lambda: self.mqtt(server)["waiting"] < 50, "the spool empties")
         found = numbers(broker.all("/readings"), ONE)
-        # After damage the numbers of readings may repeat, but each message has a new id.
+        # If the spool is damaged, numbers of readings may be used twice, but each message has a new id.
         ids = [one["id"] for one in broker.all("/readings")]
         self.assertEqual(len(set(ids)), len(ids), "no id comes twice")
         self.assertGreater(len(found), 0)

@@ -15,8 +15,9 @@ namespace {
 
 /// A command line that stands in backquotes in the text of an advice.
 struct NamedCommand {
-  std::string text;                  // the command line, for example "absenc run ... reset"
-  const Command* command = nullptr;  // the unit's command; null if the line suits every unit or is unknown
+  std::string text;  // the command line, for example "absenc run ... reset"
+  // the unit's command that the command line runs; null if the line suits every unit or is unknown
+  const Command* command = nullptr;
   bool unknown = false;
 };
 
@@ -35,11 +36,11 @@ constexpr auto verb_names = std::to_array<VerbName>({{"alarms", Verb::read},
                                                      {"clear-alarms", Verb::clear_alarms},
                                                      {"memory read", Verb::memory_read},
                                                      {"memory write", Verb::memory_write}});
-/// Beginnings of command lines; the name of a setting or of a command follows them.
+/// Beginnings of command lines, without "absenc"; the name of a setting or of a command follows them.
 constexpr std::string_view get_setting = "config get ... ";
 constexpr std::string_view set_setting = "config set ... ";
 constexpr std::string_view run_command = "run ... ";
-/// Verbs that the advice of any unit may name.
+/// Verbs of the tool that suit every unit, so the advice of each unit may name them.
 constexpr std::array<std::string_view, 3> for_all_units{"list", "identify", "doctor"};
 
 const Command* find_setter(const Unit& unit, std::string_view name) {
@@ -93,11 +94,11 @@ std::string unquoted(std::string_view text) {
 
 // ---- Rules for the wording of every advice
 
-/// Phrases that no advice may have: the advice for an alarm would refer to itself.
+/// Phrases that no advice may contain: as the advice for an alarm, they would refer to themselves.
 constexpr auto circular_phrases =
     std::to_array<std::string_view>({"read the alarms", "look at the alarms", "the other alarms", "see the alarms"});
 
-/// Checks the wording of one advice. `what` names its owner in the findings.
+/// Checks the wording of one advice. `what` names the alarm or error to which it belongs, for the texts of findings.
 void check_words(const Unit& unit, const std::string& what, std::string_view advice, Findings& findings) {
   const auto require = [&](bool holds, std::string_view text) {
     findings.require(holds, [&] { return what + " is advised \"" + std::string(advice) + "\": " + std::string(text); });
@@ -107,7 +108,7 @@ void check_words(const Unit& unit, const std::string& what, std::string_view adv
   }
   const std::string rest = unquoted(advice);
   for (const Command& command : unit.commands) {
-    // a one-word name such as "zero" may be ordinary text
+    // a name of one word, such as "zero", may be ordinary text and needs no backquotes
     const bool is_word = command.name.find('-') == std::string_view::npos;
     require(is_word || rest.find(command.name) == std::string::npos, "it names a command without backquotes");
   }
@@ -145,7 +146,7 @@ class AlarmedEncoder {
     const Command& command = *find_command(unit_, Verb::read);
     return world_.run(command, least_arguments(command));
   }
-  /// Returns whether a reading shows every alarm that was raised in this encoder.
+  /// Returns whether a reading shows every alarm that this test has raised in the encoder.
   [[nodiscard]] bool shows_alarms() {
     const ConversationResult now = read();
     return now.seen.reading && (now.seen.reading->alarms & alarms_) == alarms_;
@@ -157,7 +158,7 @@ class AlarmedEncoder {
   World<Item> world_;
 };
 
-// Returns whether the result of a command has a field that the reading lacks.
+// Returns whether the result of a command has a field that `reading` lacks.
 bool reports_more(const ReportedFields& result, const ReportedFields& reading) {
   return std::any_of(result.fields.begin(), result.fields.end(),
                      [&](const auto& field) { return !reading.fields.contains(field.first); });
@@ -180,7 +181,7 @@ bool follow_advice(const Unit& unit, const Configuration& configuration, std::si
     reported_more =
         reported_more || (ended.good() && !one.command->changes_encoder && reports_more(ended.seen, before));
   }
-  alarmed.world().pass(std::chrono::seconds(1));  // time for the encoder to write its memory
+  alarmed.world().pass(std::chrono::seconds(1));  // gives the encoder time to write its memory
   const bool gone = !alarmed.shows_alarms();
   findings.require(named.empty() || gone || explained || reported_more, [&] {
     return configuration.text + ", alarm " + std::string(flag.name) + ": following \"" + std::string(flag.action) +
@@ -209,7 +210,7 @@ void check_alarms(const Unit& unit, Findings& findings) {
   }
 }
 
-/// Checks that an alarm is reported wherever the advice of a status flag refers to the alarms.
+/// Checks that a reading with a status flag whose advice is to read the alarms reports at least one raised alarm.
 template <class Item>
 void check_status(const Unit& unit, const Configuration& configuration, Findings& findings) {
   if (unit.alarms == nullptr || unit.status == nullptr) return;
@@ -251,7 +252,8 @@ void check_message(const Unit& unit, const std::string& what, const Command& com
   }
 }
 
-/// Calls `use(name, spoil)` for each problem and for none. `spoil(world)` causes the problem.
+/// Calls `use(name, spoil)` without a problem, then for each problem of an encoder. `spoil(world)` causes the
+/// problem.
 template <class Item, class Use>
 void for_each_problem(const Unit& unit, Use use) {
   use(std::string("nothing"), [](World<Item>&) {});
@@ -272,7 +274,7 @@ void for_each_problem(const Unit& unit, Use use) {
   }
 }
 
-// Time limit of one conversation: a host that polls often is slow to simulate.
+// Time limit of one conversation, in simulated time: a host that polls often is slow to simulate.
 constexpr Time time_limit = std::chrono::milliseconds(100);
 
 template <class Item>
@@ -290,7 +292,7 @@ void check_errors(const Unit& unit, const Configuration& configuration, Findings
   });
 }
 
-// Checks the advice that `Unit::explain` gives for the bad replies among the unit's vectors.
+// Checks the advice that `Unit::explain` gives for those test vectors of the unit whose reply is bad.
 void check_explanations(const Unit& unit, Findings& findings) {
   if (unit.explain == nullptr) return;
   for (const Vector& vector : unit.vectors) {

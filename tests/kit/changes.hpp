@@ -10,7 +10,7 @@
 
 namespace absenc::kit {
 
-/// Returns the value of the argument with this role, in `values`; null if there is none.
+/// Returns the element of `values` for the command's argument with the given role; null if the command has none.
 [[nodiscard]] inline std::int64_t* argument(const Command& command, Values& values, Role role) {
   const Argument* const found = find_role(command.arguments, role);
   return found != nullptr ? &values[static_cast<std::size_t>(found - command.arguments.data())] : nullptr;
@@ -30,7 +30,7 @@ namespace absenc::kit {
   return values;
 }
 
-/// Returns random arguments for the command; none for a memory write without a writable byte.
+/// Returns random arguments for the command; nothing for a command that writes memory, if no byte is writable.
 [[nodiscard]] inline std::optional<Values> change_arguments(const Unit& unit, const Command& command,
                                                             sim::Random& random) {
   if (command.verb != Verb::memory_write) return random_arguments(command, random);
@@ -44,7 +44,7 @@ namespace absenc::kit {
   return memory_arguments(command, area, address, static_cast<std::uint8_t>(random.below(256)));
 }
 
-/// Sets the option that the setting changes (`changes_option`), if any, for the host too.
+/// If a setting of the encoder changes an option (`changes_option`), sets this option also for the host.
 template <class Item>
 void apply_to_host(World<Item>& world, const Unit& unit, const Command& setter, Arguments arguments) {
   if (setter.changes_option.empty()) return;
@@ -62,7 +62,7 @@ void apply_to_host(World<Item>& world, const Unit& unit, const Command& setter, 
   world.set_options(options);
 }
 
-/// Runs the command four times at most, because unsolicited frames may interrupt it.
+/// Runs the command until it succeeds, four times at most: unsolicited frames of the encoder may interrupt it.
 template <class Item>
 ConversationResult run_repeated(World<Item>& world, const Command& command, Arguments arguments) {
   ConversationResult result = world.run(command, arguments);
@@ -73,21 +73,21 @@ ConversationResult run_repeated(World<Item>& world, const Command& command, Argu
   return result;
 }
 
-/// Returns the fields that the setting's `config get` command reports, if there is one.
+/// Returns the fields reported by the `config get` command of the setting; no fields if there is no such command.
 template <class Item>
 ReportedFields read_setting(World<Item>& world, const Unit& unit, const Command& setter) {
   const Command* getter = find_command(unit, setter.reads_back);
   return getter == nullptr ? ReportedFields{} : run_repeated(world, *getter, least_arguments(*getter)).seen;
 }
 
-/// Returns whether any field has this value, as a number or as decimal text.
+/// Returns whether any field in `seen` has the value `value`, as a number or as decimal text.
 [[nodiscard]] inline bool shows(const ReportedFields& seen, std::int64_t value) {
   return std::any_of(seen.fields.begin(), seen.fields.end(), [&](const auto& field) {
     return field.second.number == value || field.second.bytes == std::to_string(value);
   });
 }
 
-/// Returns the promise that the successful command broke on a good line, or an empty text.
+/// Returns the promise that a command broke although it succeeded on an undamaged line; "" if it broke none.
 template <class Item>
 std::string broken_promise(World<Item>& world, const Unit& unit, const Command& command, Values values,
                            const ReportedFields& written) {
@@ -132,12 +132,13 @@ std::string broken_promise(World<Item>& world, const Unit& unit, const Command& 
       const ReportedFields now = read_setting(world, unit, command);
       if (!command.reads_back.empty() && now.fields.empty()) return "it cannot be read";
       for (const auto& [name, value] : now.fields) {
-        // A repeated field is one of several frames, and a position depends on the shaft.
+        // Two kinds of fields are not compared: repeated ones, which are from several frames, and the position, which
+        // depends on the shaft.
         if (name.find('#') != std::string::npos || is_of_reading(value.role)) continue;
         const auto found = written.fields.find(name);
         if (found != written.fields.end() && !(found->second == value)) return name + " reads differently";
       }
-      // A text in the setting's field means that the encoder cannot report the setting.
+      // A text instead of a number in the setting's field means that the encoder cannot report the setting.
       const auto setting = now.fields.find(std::string(command.reads_back));
       const bool in_words = setting != now.fields.end() && !setting->second.bytes.empty();
       if (!now.fields.empty() && !values.empty() && !in_words && !shows(now, values[0])) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks the commands with the virtual encoder on a line without faults.
+// Runs the commands that change nothing with the virtual encoder on a line without faults, and checks their results.
 #include <algorithm>
 
 #include "absenc/sim/place.hpp"
@@ -9,18 +9,19 @@
 namespace absenc::kit {
 namespace {
 
-/// Returns whether the command must succeed with each model, unless `is_refused`.
+/// Returns whether the command must succeed with the options of each model, unless the encoder refuses it.
 bool is_plain(const Command& command) {
   return command.verb == Verb::read || command.verb == Verb::read_part || command.verb == Verb::info ||
          command.verb == Verb::temperature || command.verb == Verb::config_get;
 }
 
-// Returns whether `error` is an acceptable refusal of the command.
+// Returns whether `error` means that an encoder may refuse the command, which `read` never allows.
 bool is_refused(const Command& command, Error error) {
   return command.verb != Verb::read && (error == Error::unsupported || error == Error::invalid_argument);
 }
 
-// Unusual options may make a command fail, but never make its result wrong.
+// Runs the unit's commands with one configuration. Options that no model has may make a command fail, but never make
+// its result wrong.
 template <class Item>
 void run_commands(const Unit& unit, const Configuration& configuration, Findings& findings) {
   sim::Random random(7);

@@ -10,7 +10,7 @@
 namespace absenc::kit {
 namespace {
 
-constexpr std::int64_t some_turns = 0x5'6000'0000;  // 5.375 turns in units of 2^-32 turn
+constexpr std::int64_t some_turns = 0x5'6000'0000;  // 5.375 turns, in units of 2^-32 turn
 
 /// A virtual encoder with one condition set, and the host that reads it.
 template <class Item>
@@ -25,7 +25,7 @@ class ConditionedEncoder {
 
   [[nodiscard]] bool made() const { return world_.made(); }
   void move() { world_.move(world_.place() + some_turns); }
-  // Turns the shaft while the encoder is off.
+  // Switches the encoder off, turns the shaft, and switches the encoder on.
   void lose_power() {
     world_.device().power_off(now());
     move();
@@ -52,7 +52,7 @@ std::uint32_t all_alarms(const Unit& unit) {
   return bits;
 }
 
-// Returns whether some command reports different results for two equally treated encoders.
+// Returns whether some command reports different results for two encoders that were treated alike.
 template <class Item>
 bool reports_differ(const Unit& unit, ConditionedEncoder<Item>&& one, ConditionedEncoder<Item>&& other) {
   if (!one.made()) return false;

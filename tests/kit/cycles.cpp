@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks that commands run beside the positions of a drive's cycles, and take no cycle unless they may.
+// Checks that commands run as services beside the position requests of a drive's cycles, and use up no cycle unless
+// they may.
 #include <algorithm>
 #include <optional>
 
@@ -11,21 +12,21 @@
 namespace absenc::kit {
 namespace {
 
-/// Result of a run of cycles with at most one service.
+/// Result of a run of cycles, with at most one command as service.
 struct Ride {
-  bool is_over = false;     // whether the service is over
+  bool is_over = false;     // whether the service has ended
   bool is_refused = false;  // whether the service was refused
-  Time needs{};             // time that the refused request of the service needs
+  Time needs{};             // time that the refused request would need, in nanoseconds
   Error error = Error::none;
   ReportedFields seen{};
   unsigned fresh = 0;
   unsigned repeated = 0;
   unsigned unanswered = 0;  // cycles in which the encoder did not answer
-  unsigned others = 0;      // cycles that are neither fresh, repeated nor unanswered
-  std::string other{};      // kind or error of the first of the `others`
-  unsigned wrong = 0;       // fresh cycles whose position is not the shaft's
+  unsigned others = 0;      // cycles whose position is neither fresh nor repeated, although the encoder answered
+  std::string other{};      // kind or error of the first cycle counted in `others`
+  unsigned wrong = 0;       // fresh cycles with another position than the shaft's
   std::uint32_t violations = 0;
-  std::uint32_t changes = 0;  // changes of the encoder's memory
+  std::uint32_t changes = 0;  // number of changes of the encoder's memory
 };
 
 template <class Item>
@@ -47,10 +48,10 @@ class Rides {
     world.run(read_, {});
     const Time begin = world.line().now();
     const ConversationResult read = world.run(read_, {});
-    // A drive reads with one request a cycle.
+    // A drive needs a `read` of one request; configurations whose `read` sends several are left out.
     if (!read.good() || (read.request_count > 1 && !read.sent.empty())) return;
     position_time_ = world.line().now() - begin;
-    // While an alarm is reported, a reading may take another request.
+    // While an alarm is raised, `read` may send an additional request.
     world.device().raise_alarms(~std::uint32_t{0});
     const Time again = world.line().now();
     world.run(read_, {});
@@ -89,7 +90,8 @@ class Rides {
     const auto what = [&](const char* pace) {
       return configuration_.text + ", " + std::string(command.name) + " " + pace + ": ";
     };
-    // A refused command gets the time that it asks for; a row of requests is refused with any time.
+    // If the request of a command is refused, the period of the cycles is extended by the time that it needs. A row
+    // of requests is refused at any period.
     plan_.period = 2 * position_time_;
     Ride wide = ride(command, arguments, false);
     for (int i = 0; i < 4 && wide.is_refused && wide.needs < std::chrono::hours(1); ++i) {
@@ -128,12 +130,13 @@ class Rides {
   void is_right(const Command& command, const Ride& ride, const std::string& what) {
     findings_.require(ride.wrong == 0,
                       [&] { return what + std::to_string(ride.wrong) + " positions are not the shaft's"; });
-    // A command that changes the encoder may end the positions, for example by other contents of frames.
+    // After a command that changes the encoder, replies may have no valid position, for example if their fields have
+    // changed.
     const bool may_end_positions = command.changes_encoder && command.verb == Verb::run;
     findings_.require(ride.others == 0 || may_end_positions, [&] {
       return what + std::to_string(ride.others) + " cycles have no valid position: " + ride.other;
     });
-    // An encoder that restarts, or is switched off, does not answer.
+    // An encoder that the command restarts or switches off does not answer.
     findings_.require(ride.unanswered == 0 || command.changes_encoder,
                       [&] { return what + std::to_string(ride.unanswered) + " cycles are not answered"; });
     findings_.require(ride.violations == 0, [&] { return what + "the host broke a rule: " + rule_; });
@@ -161,7 +164,8 @@ class Rides {
     return result;
   }
 
-  // Runs cycles until five have ended after the service (without one: five in all), for 200 s at most.
+  // Runs cycles until five have ended after the service; without a service, five cycles. Ends after 200 s in any
+  // case.
   Ride ride(World<Item>& world, host::Service<Item>* service, bool changes) {
     world.move(place);
     world.run(read_, {});
@@ -188,7 +192,7 @@ class Rides {
       if (result.others == 1 && result.other.empty()) {
         result.other = cycle.kind == Kind::invalid ? "invalid" : std::string(text_of(cycle.error).name);
       }
-      // A command that changes the encoder may change the position, for example to zero.
+      // A command that changes the encoder may also change its position, for example to zero.
       const bool is_known = !changes || service == nullptr || service->state() == host::Service<Item>::State::waiting;
       if (cycle.kind == Kind::fresh && is_known && !sim::is_at(cycle.reading, world.place())) ++result.wrong;
       if (++cycles == 2 && service != nullptr) host.add(*service);
@@ -202,7 +206,8 @@ class Rides {
     return result;
   }
 
-  static constexpr std::int64_t place = 0x1234'5678'9ABC;  // 4660 turns and about a third
+  // position of the shaft: 4660 turns and about a third, in units of 2^-32 turn
+  static constexpr std::int64_t place = 0x1234'5678'9ABC;
 
   const Unit& unit_;
   const Configuration& configuration_;
@@ -218,7 +223,7 @@ class Rides {
   unsigned took_cycles = 0;
 };
 
-/// Returns the configurations in which the unit has vectors.
+/// Returns the configurations of the unit's test vectors.
 std::vector<Configuration> configurations_of_vectors(const Unit& unit) {
   std::vector<Configuration> all;
   for (const Vector& vector : unit.vectors) {
@@ -236,7 +241,8 @@ Findings check_cycles(const Unit& unit) {
   unsigned runs = 0;
   unsigned services = 0;
   unsigned took = 0;
-  // The configurations of models; if none of them is read with one request, those of vectors.
+  // The configurations of the models are run first; only if `read` is one request in none of them, those of the test
+  // vectors.
   for (const bool of_models : {true, false}) {
     for (const Configuration& configuration : of_models ? configurations(unit) : configurations_of_vectors(unit)) {
       const bool streams = unit.streams != nullptr && unit.streams(configuration.options);

@@ -19,7 +19,7 @@ bool takes(const Command* command, Role role, std::uint32_t least, std::uint32_t
 void declared_memory(const Unit& unit, Findings& findings) {
   const Command* reads = find_command(unit, Verb::memory_read);
   const Command* writes = find_command(unit, Verb::memory_write);
-  std::uint64_t previous_end = 0;  // end of the previous memory area
+  std::uint64_t previous_end = 0;  // end of the memory area before the current one
   for (const MemoryArea& area : unit.memory) {
     const auto require = [&](bool holds, const char* text) {
       findings.require(
@@ -140,7 +140,7 @@ void request_of(const Unit& unit, const Configuration& configuration, const Comm
     const bool is_expected_error = request.error() == Error::unsupported || request.error() == Error::invalid_argument;
     return findings.require(is_expected_error, [&] { return what() + std::string(text_of(request.error()).name); });
   }
-  if (request->empty()) {  // the request consists of clocks only
+  if (request->empty()) {  // an empty request: only a clocked link sends a request without bytes
     return findings.require(unit.link == LinkKind::clocked, [&] { return what() + "is sent without a byte"; });
   }
   Wire small(request->size() - 1);
@@ -148,10 +148,11 @@ void request_of(const Unit& unit, const Configuration& configuration, const Comm
                    [&] { return what() + "fits into a buffer that is too small"; });
   ReportedFields seen;
   const Error error = unit.decode(configuration.options, frame_of(unit, *request).frame(), {}, seen);
-  if (error == Error::invalid_argument) return;  // no encoder has this combination of options
+  if (error == Error::invalid_argument) return;  // no encoder has these options together
   findings.require(error == Error::none && !seen.fields.empty(),
                    [&] { return what() + "is " + std::string(text_of(error).name); });
-  // Any field with the value counts: another one may have the argument's name.
+  // It is enough if any field of the request has the argument's value: the field with the argument's name may have
+  // another one.
   for (std::size_t i = 0; i < values.size(); ++i) {
     const Argument& one = command.arguments[i];
     if (!seen.fields.contains(std::string(one.name)) || (!one.required && values[i] == one.default_value)) continue;

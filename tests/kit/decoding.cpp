@@ -28,7 +28,8 @@ class Decoding {
     if (seen.reading) reading_shows(seen);
   }
 
-  // Fails for a vector with open bytes, and says what they must be.
+  // Fails for a test vector with open bytes (bytes that its author left out), and reports which values they must
+  // have.
   void complete() {
     std::vector<Pair> good;
     const std::vector<Wire> requests = filled(vector_.request, vector_.open_request, [&](const Wire& request) {
@@ -36,7 +37,7 @@ class Decoding {
       return vector_.open_request.count == 0 ||
              unit_.decode(options_, frame_of(unit_, request).frame(), {}, seen) == Error::none;
     });
-    // A valid request may still be another one than that of the reply.
+    // Each valid request is tried with the reply: a request may be valid, but not the one that this reply answers.
     for (const Wire& request : requests) {
       const std::vector<Wire> replies = filled(vector_.reply, vector_.open_reply, [&](const Wire& reply) {
         ReportedFields seen;
@@ -50,7 +51,8 @@ class Decoding {
     tell_open("reply", vector_.open_reply, good, &Pair::reply);
   }
 
-  // Checks that a request alone does not speak against options that its reply leaves possible.
+  // Checks that the request of a test vector, without its reply, does not exclude options that are possible with the
+  // reply.
   void unanswered() {
     if (unit_.probe == nullptr) return;
     struct Against final : EvidenceSink {
@@ -72,7 +74,7 @@ class Decoding {
             [&] { return "its request alone speaks against its options: " + std::string(why); });
   }
 
-  // Checks that the decoder refuses incomplete and extended requests of bytes.
+  // Checks that the decoder refuses requests with missing or additional bytes.
   void good_request() {
     if (request_.empty() || request_.can || unit_.link == LinkKind::clocked) return;
     const auto unknown = [&](const OwnedFrame& request, std::string_view what) {
@@ -96,7 +98,7 @@ class Decoding {
       ++flipped;
       refused(reply_.flipped(bit), [&] { return "with bit " + std::to_string(bit) + " flipped"; });
     }
-    // In some CAN frames only the identifier has a meaning, so a frame without data may be valid.
+    // A CAN frame without data may be valid: in some frames only the identifier has a meaning.
     const bool means_nothing = reply_.can && flipped == 0;
     for (std::size_t size = reply_.can ? 0 : 1; size < reply_.elements() && !means_nothing; ++size) {
       refused(reply_.cut(size), [&] { return "cut after " + std::to_string(size); });
@@ -117,7 +119,8 @@ class Decoding {
 
   [[nodiscard]] std::size_t open_bits(OpenBytes open) const { return open.count * (carries_bits(unit_.link) ? 1 : 8); }
 
-  // Returns the frame with each value of its open bytes that makes it good; none if there are too many to try.
+  // Returns the frame with each value of its open bytes for which `is_good` is true; nothing if there are too many
+  // values to try.
   template <class IsGood>
   [[nodiscard]] std::vector<Wire> filled(Bytes frame, OpenBytes open, const IsGood& is_good) const {
     const bool is_bits = carries_bits(unit_.link);
@@ -160,7 +163,7 @@ class Decoding {
     findings_.require(holds, [&] { return std::string(vector_.id) + " " + text(); });
   }
 
-  // Decodes the frame, if possible also with the decoder of many frames, which must agree.
+  // Decodes a reply. If the unit has a decoder of many frames, checks that this decoder has the same result.
   Error decode(const OwnedFrame& reply, ReportedFields& seen) {
     const Error error = unit_.decode(options_, request_.frame(), reply.frame(), seen);
     if (decoder_ == nullptr) return error;
@@ -171,7 +174,7 @@ class Decoding {
     return error;
   }
 
-  // Checks that the decoder refuses the frame and reports nothing of it.
+  // Checks that the decoder refuses the reply and reports no field of it.
   template <class Text>
   void refused(const OwnedFrame& reply, Text&& text) {
     ReportedFields seen;
@@ -203,7 +206,8 @@ class Decoding {
     }
   }
 
-  // Checks that the decoder refuses extended and remote frames and, after a request, unknown identifiers.
+  // Checks that the decoder refuses CAN frames of the extended format, remote frames and, after a request, frames
+  // with an unknown identifier.
   void other_frames() {
     for (unsigned bit = 0; bit < 11 && !request_.empty(); ++bit) {
       OwnedFrame other = reply_;
@@ -219,7 +223,7 @@ class Decoding {
     refused(remote, [] { return std::string("as a remote frame"); });
   }
 
-  // Returns whether the good reply of any vector has this identifier.
+  // Returns whether the valid reply of any test vector has the CAN identifier `id`.
   [[nodiscard]] bool is_of_a_vector(std::uint32_t id) const {
     return std::any_of(unit_.vectors.begin(), unit_.vectors.end(), [&](const Vector& one) {
       const OwnedFrame reply = frame_of(unit_, one.reply);

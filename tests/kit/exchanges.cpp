@@ -15,8 +15,9 @@ namespace absenc::kit {
 namespace {
 
 constexpr unsigned places = 8;
-constexpr std::uint64_t exchanges_per_encoder = 4000;  // exchanges before the next virtual encoder is made
-// Greatest number of runs of each changing command with one virtual encoder.
+// number of exchanges with a virtual encoder before a new one replaces it
+constexpr std::uint64_t exchanges_per_encoder = 4000;
+// Greatest number of runs of each command that changes the encoder, with one virtual encoder.
 constexpr unsigned runs_per_change = 2;
 constexpr std::string_view too_short =
     "; if it asks too soon: after a reply HostTimes::pause or silence, before a repetition Manner::pause, after an "
@@ -34,29 +35,30 @@ struct Tally {
   std::uint64_t exchanges = 0;
   std::uint64_t conversations = 0;
   std::uint64_t accepted = 0;
-  std::uint64_t damaged = 0;                // number of faults that changed bytes
+  std::uint64_t damaged = 0;                // number of faults of the line that changed bytes
   std::uint64_t wrong = 0;                  // number of wrong results of commands whose replies have a check
   std::uint64_t rule_violations = 0;        // violations of rules by the host, only with a model's options
   std::uint64_t damaged_request_bytes = 0;  // number of damaged bytes (CAN: frames) in requests
-  std::uint64_t changes = 0;                // conversations with commands that change the encoder, without refused ones
-  std::uint64_t changed = 0;                // number of changes that the host reported as successful
-  // Number of changes that the host reported as successful and the encoder did not make.
+  // number of conversations with commands that change the encoder, without those that were refused
+  std::uint64_t changes = 0;
+  std::uint64_t changed = 0;  // number of changes that the host reported as successful
+  // number of changes that the host reported as successful, although the encoder did not make them
   std::uint64_t failed_changes = 0;
   std::string broken_promise_text{};
   std::string violated_rule{};
-  /// Counters of conversations with one command, and with one configuration unless it is a model's.
+  /// Counters of the conversations with one command; separate for each configuration that is not a model's.
   struct Command {
     std::optional<UndetectedDamage> undetected{};
     std::uint64_t damaged_reply_count = 0;  // number of damaged replies
-    std::uint64_t wrong_positions = 0;      // part of `wrong` with a wrong position
-    std::uint64_t wrong_values = 0;         // part of `wrong` with a right position and another wrong value
-    std::uint64_t cost = 0;                 // most exchanges of one run on a good line; 0: not known yet
-    std::optional<bool> unchecked;          // true if a reply of the command has no check; empty if not yet determined
+    std::uint64_t wrong_positions = 0;      // number of wrong results with a wrong position
+    std::uint64_t wrong_values = 0;         // number of wrong results with a right position and another wrong value
+    std::uint64_t cost = 0;         // greatest number of exchanges of one run on an undamaged line; 0: not known yet
+    std::optional<bool> unchecked;  // whether a reply of the command has no check; empty if not known yet
   };
   std::map<std::string, Command> commands{};
 };
 
-/// Difference between a result and the truth; an empty text means none.
+/// Difference between a result and the true values; an empty text means no difference.
 struct Difference {
   std::string text{};
   bool position = false;
@@ -92,23 +94,26 @@ class Campaign {
   }
 
  private:
-  /// A command with its results on an undamaged line by shaft position; no value: not recorded.
+  /// A command with its results on an undamaged line, by the index of the shaft's position; empty if not recorded.
   struct Query {
     const Command* command;
     Values arguments;
     std::array<std::optional<ReportedFields>, places> truth{};
-    std::uint64_t cost = 0;              // most exchanges of one run of the command on a good line
-    std::vector<std::string> varying{};  // names of fields whose values differ between two runs at the same position
+    std::uint64_t cost = 0;  // greatest number of exchanges of one run of the command on an undamaged line
+    // names of fields whose values differ between two runs at the same position of the shaft
+    std::vector<std::string> varying{};
   };
 
   static sim::FaultRates rates_for(const Unit& unit, const Options& options, const ExchangeTest& test) {
     using sim::FaultKind;
     sim::FaultRates rates = sim::testing::damaged_replies(0.1);
-    // On SPI the host clocks the reply, so its length and time cannot be wrong.
+    // On SPI the host clocks the reply, so faults of its length or time cannot occur.
     if (unit.link == LinkKind::spi) rates = {};
-    rates[FaultKind::corrupt] = unit.link == LinkKind::can ? 0 : 0.1;  // CAN's own checksum detects damaged frames
+    // CAN frames are not damaged, because CAN's own checksum detects that
+    rates[FaultKind::corrupt] = unit.link == LinkKind::can ? 0 : 0.1;
     if (test.requests_too) rates[FaultKind::request_corrupt] = 0.02;
-    // A host cannot determine the age of a frame on CAN or of an unsolicited frame.
+    // Replies are not delayed if the encoder sends unsolicited frames, or on CAN: a host cannot know the age of such
+    // a frame.
     const bool unsolicited = unit.link == LinkKind::can || (unit.streams != nullptr && unit.streams(options));
     if (test.seed % 2 == 1 && !test.requests_too && !unsolicited) rates.delay = unit.timing.turnaround_limit * 3 / 2;
     return rates;
@@ -124,7 +129,8 @@ class Campaign {
     if (!unit_.alarms->flags[bit].name.empty()) world_.device().raise_alarms(1u << bit);
   }
 
-  // Records what repeatable commands report on an undamaged line; leaves out most long ones.
+  // Records the results of commands that can be repeated, on an undamaged line. Commands with more than 20 exchanges
+  // are mostly left out.
   void record_truth() {
     for (std::int64_t& place : places_) place = static_cast<std::int64_t>(random_.next());
     for (const Command& command : unit_.commands) {
@@ -133,7 +139,8 @@ class Campaign {
       if (cost > 20 && !random_.chance(0.1)) continue;
       Query query{&command,
                   command.verb == Verb::memory_read ? least_arguments(command) : random_arguments(command, random_)};
-      // Only `read` is recorded at all positions here: some commands take a hundred exchanges.
+      // `read` is recorded at all positions of the shaft, other commands only at the first: some take a hundred
+      // exchanges.
       if (!record_truth_at(query, 0)) continue;
       cost = query.cost;
       if (command.verb == Verb::read) {
@@ -174,7 +181,7 @@ class Campaign {
   void run_conversation() {
     const bool reads = !reads_.empty() && random_.chance(0.95);
     Query* chosen = &queries_[reads ? reads_[random_.below(reads_.size())] : random_.below(queries_.size())];
-    // The more exchanges above four a command has, the less often it is chosen.
+    // A command with more than four exchanges is chosen less often, the more exchanges it has.
     if (chosen->cost > 4 && !reads_.empty() && !random_.chance(4.0 / static_cast<double>(chosen->cost))) {
       chosen = &queries_[reads_[random_.below(reads_.size())]];
     }
@@ -184,7 +191,7 @@ class Campaign {
     if (!query.truth[place_]) {
       world_.set_rates({});
       world_.pass(std::chrono::seconds(1));
-      // This conversation is ignored: late replies to previous requests may arrive during it.
+      // The result of this run is ignored, because late replies to earlier requests may arrive during it.
       (void)world_.run(*query.command, query.arguments);
       if (!record_truth_at(query, place_)) return;
     }
@@ -201,12 +208,12 @@ class Campaign {
                       [&] { return where(query) + "has a reading before any reply, or with an error"; });
     if (!result.good()) return;
     ++tally_.accepted;
-    // A fault may remove one of several replies to `info`.
+    // The command `info` has several replies; if a fault removes one, its fields are missing from the result.
     const bool may_miss = query.command->verb == Verb::info && result.faults != 0;
     const Difference wrong = difference(query, result, may_miss);
     if (wrong.text.empty()) return;
     if (result.damaged == 0 && rates_[sim::FaultKind::request_corrupt] > 0 && is_true_now(query, result.seen)) return;
-    // A host accepts any bytes as a reply without a check, also the bytes of a previous reply.
+    // If a reply has no check, a host accepts any bytes as the reply, also those of the previous reply.
     const bool unchecked = is_unchecked(query);
     findings_.require(result.damaged != 0 || (unchecked && !faultless_),
                       [&] { return where(query) + wrong.text + ", though no byte was damaged"; });
@@ -216,7 +223,7 @@ class Campaign {
     ++(wrong.position ? command.wrong_positions : command.wrong_values);
   }
 
-  // Returns whether the fields `seen` come on a good line too; if so, discards all recorded truth.
+  // Returns whether the fields `seen` are reported on an undamaged line, too; if so, discards all recorded results.
   bool is_true_now(const Query& query, const ReportedFields& seen) {
     world_.set_rates({});
     const ConversationResult now = world_.run(*query.command, query.arguments);
@@ -233,7 +240,7 @@ class Campaign {
     for (const Command& command : unit_.commands) {
       if (!command.changes_encoder || command.verb == Verb::run) continue;
       for (unsigned i = 0; i < runs_per_change && findings_.count() == 0; ++i) {
-        // Every second run has fewer faults: some changes need a hundred good exchanges.
+        // Every second run has fewer faults on the line: some changes need a hundred exchanges without a fault.
         sim::FaultRates rates = rates_;
         for (double& rate : rates.rates) rate *= i % 2 == 0 ? 1 : 0.03;
         change(command, rates);
@@ -246,7 +253,7 @@ class Campaign {
     if (!values) return;
     world_.set_rates({});
     world_.device().lower_alarms(0xFFFF'FFFF);
-    world_.pass(std::chrono::seconds(2));  // replies that were delayed earlier arrive within these two seconds
+    world_.pass(std::chrono::seconds(2));  // waits until replies that were delayed have arrived
     world_.move(static_cast<std::int64_t>(random_.next()));
     world_.set_rates(rates);
     const ConversationResult result = world_.run(command, *values);
@@ -284,7 +291,8 @@ class Campaign {
     return {};
   }
 
-  // Returns whether `seen` reports fewer alarms than `truth`, and no flag differently.
+  // Returns whether `seen` reports only some of the alarms that `truth` reports, and the same value of each flag that
+  // both report.
   [[nodiscard]] static bool is_part_of(const Reading& seen, const Reading& truth) {
     const std::uint32_t reported = seen.alarms_reported;
     if (reported == truth.alarms_reported || (reported & ~truth.alarms_reported) != 0) return false;
@@ -292,12 +300,12 @@ class Campaign {
            ((seen.status ^ truth.status) & seen.status_reported & truth.status_reported) == 0;
   }
 
-  // Options other than a model's are in the key, because they may select the frame check.
+  // Options that are not a model's are part of the key, because they may select another frame check.
   [[nodiscard]] std::string counter_key(const Query& query) const {
     return std::string(query.command->name) + (configuration_.is_model ? "" : " " + configuration_.text);
   }
 
-  // Counts damaged replies, and measures once per `counter_key` how many the check accepts.
+  // Counts damaged replies. For each `counter_key`, measures once how many damaged replies the check accepts.
   void measure_check(const Query& query, std::uint64_t damaged) {
     Tally::Command& command = tally_.commands[counter_key(query)];
     command.damaged_reply_count += damaged;
@@ -309,7 +317,7 @@ class Campaign {
     }
   }
 
-  // Returns whether the command has a reply of which no bit is covered by a check.
+  // Returns whether the command has a reply without a check, in which no bit is covered.
   bool is_unchecked(const Query& query) {
     std::optional<bool>& unchecked = tally_.commands[counter_key(query)].unchecked;
     if (unchecked) return *unchecked;
@@ -331,7 +339,8 @@ class Campaign {
   void judge_rules(const Query& query, bool had_faults, std::uint32_t before) {
     const std::uint32_t new_violations = world_.device().violation_count() - before;
     faultless_ = faultless_ && !had_faults;
-    // With options that no model has, a host may have to send requests that the rules forbid.
+    // The rules are not counted with options that no model has: the host may then have to send requests that the
+    // rules forbid.
     if (new_violations == 0 || !configuration_.is_model) return;
     tally_.rule_violations += new_violations;
     const std::span<const Violation> rules = world_.device().violations();
@@ -354,13 +363,13 @@ class Campaign {
   sim::FaultRates rates_;
   std::array<std::int64_t, places> places_{};
   unsigned place_ = 0;
-  // False once a conversation had faults.
+  // Whether no conversation with this virtual encoder had a fault so far.
   bool faultless_ = true;
   std::vector<Query> queries_;
   std::vector<std::size_t> reads_;  // indexes in `queries_` of the commands that read the position
 };
 
-/// Returns at most four replies to the command on a line without faults, with their requests.
+/// Returns at most four replies to the command, each with its request, from a line without faults.
 template <class Item>
 std::vector<std::pair<OwnedFrame, OwnedFrame>> Campaign<Item>::frames_of(const Query& query) {
   World<Item> world(unit_, configuration_.options, 1);
@@ -426,7 +435,7 @@ void exchange(const Unit& unit, const ExchangeTest& test, Tally& tally, Findings
       findings.add("too few exchanges per round");
       break;
     }
-    // Even rounds use only the models, which are the first configurations.
+    // In even rounds only configurations of models are run; these are the first ones.
     const Configuration& configuration = setups[round / 2 % (round % 2 == 0 ? models : setups.size())];
     Campaign<Item> campaign(unit, configuration, test, 1000 * test.seed + round, tally, findings);
     if (!campaign.is_possible()) continue;
@@ -449,7 +458,7 @@ Findings check_exchanges(const Unit& unit, const ExchangeTest& test) {
     exchange<std::uint8_t>(unit, test, tally, findings);
   }
   judge_undetected_damage(tally, findings);
-  // A damaged request may itself violate a rule.
+  // Rules are checked only if requests are not damaged: a damaged request may itself break a rule.
   findings.require(tally.rule_violations <= tally.damaged_request_bytes, [&] {
     return "the host broke rules " + std::to_string(tally.rule_violations) + " times, of which " +
            std::to_string(tally.damaged_request_bytes) +

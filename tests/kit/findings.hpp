@@ -25,9 +25,9 @@ class Findings {
 
   [[nodiscard]] const std::vector<std::string>& texts() const { return texts_; }
   [[nodiscard]] std::uint64_t count() const { return count_; }
-  /// Number of calls of `require`, so that a test can detect a check which checked nothing.
+  /// Returns the number of calls of `require`; 0 shows a test that nothing was checked.
   [[nodiscard]] std::uint64_t check_count() const { return check_count_; }
-  /// Measured figures for a test to print, such as the number of exchanges.
+  /// Returns measured figures, such as the number of exchanges, for a test to print.
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
 
  private:

@@ -26,15 +26,15 @@ struct OwnedFrame {
   [[nodiscard]] Frame frame() const { return {.bytes = bytes, .bits = bits, .can = can ? &*can : nullptr}; }
   [[nodiscard]] std::size_t elements() const;
   [[nodiscard]] std::size_t bit_count() const;
-  /// Returns a frame with the first `count` elements of this one.
+  /// Returns the first `count` elements of this frame as a frame.
   [[nodiscard]] OwnedFrame cut(std::size_t count) const;
   /// Returns the frame with one bit inverted, numbered as in `Unit::is_checked`.
   [[nodiscard]] OwnedFrame flipped(std::size_t bit) const;
-  /// Returns the frame with extra bytes before and after its own. Only for links that carry bytes.
+  /// Returns the frame with additional bytes before and after its own. Only for links that carry bytes.
   [[nodiscard]] OwnedFrame between(Bytes before, Bytes after) const;
 };
 
-/// Returns the frame whose bytes a vector states for its request or reply.
+/// Returns the frame that a test vector states as its request or reply in `text`.
 [[nodiscard]] OwnedFrame frame_of(const Unit& unit, Bytes text);
 
 /// Value of one field; real numbers are compared as floats.
@@ -49,7 +49,7 @@ struct Value {
   }
 };
 
-/// Stores every field that a decoder reports, by its name; repetitions get a number.
+/// Stores every field that a decoder reports, by its name. If a name is repeated, a number is added to it.
 struct ReportedFields final : FieldSink {
   void put(const FieldValue& value) override;
   void put_reading(const Reading& one) override {
@@ -77,7 +77,8 @@ struct Configuration {
   Options options;
   bool is_model = false;
 };
-/// Returns models or the defaults, and then variants of the first in one option.
+/// Returns the configurations of the unit's models (of its defaults, if it has no models), then variants of the first
+/// one in which one option has another value.
 [[nodiscard]] std::vector<Configuration> configurations(const Unit& unit);
 
 using Values = std::vector<std::int64_t>;

@@ -9,7 +9,7 @@
 namespace absenc::kit {
 namespace {
 
-/// Result of a conversation whose reply the test supplied.
+/// Result of a conversation to which the test has supplied the reply.
 struct Outcome {
   bool ended = false;
   unsigned tested_requests = 0;
@@ -17,7 +17,7 @@ struct Outcome {
   ReportedFields seen;
 };
 
-/// A conversation that receives the reply of one vector. Its command sends the vector's request.
+/// A conversation with a command that sends the request of a test vector; the test supplies the reply of the vector.
 struct VectorReplay {
   const Unit& unit;
   const Vector& vector;
@@ -65,7 +65,7 @@ struct VectorReplay {
     return unit.decode(options, request.frame(), frame.frame(), seen);
   }
 
-  // Checks that the fields that the conversation and the vector share are equal.
+  // Checks that the fields that both the conversation and the test vector report are equal.
   void require_report(const Outcome& outcome) const {
     const bool reads = command.verb == Verb::read || command.verb == Verb::read_part;
     unsigned shared = 0;
@@ -84,7 +84,7 @@ struct VectorReplay {
     const bool has_reading = decoded(reply, frame) == Error::none && frame.reading.has_value();
     require(!reads || outcome.seen.reading.has_value() == has_reading, [] { return "has another reading"; });
     if (!reads || !has_reading || !outcome.seen.reading) return;
-    // The validity is not compared: it may come from an earlier reply.
+    // The validity of the position is not compared: the conversation may have taken it from an earlier reply.
     require(outcome.seen.reading->singleturn == frame.reading->singleturn &&
                 outcome.seen.reading->multiturn == frame.reading->multiturn,
             [] { return "reads another position"; });
@@ -105,12 +105,12 @@ struct VectorReplay {
   void characters() const {
     const Outcome whole = converse({reply.bytes});
     require(request.empty() || whole.tested_requests > 0, [] { return "is not sent"; });
-    // Other commands may continue after a good reply, or repeat their request.
+    // Only a command with one request is compared: others may send a further request after a good reply.
     if (is_one_question()) {
       require(whole.error == vector.error, [&] { return "ends with " + std::string(text_of(whole.error).name); });
     }
     if (whole.error == Error::none && vector.error == Error::none) require_report(whole);
-    // Extra bytes after a complete reply belong to the next one.
+    // A reply with additional bytes is not sent byte by byte: those bytes would belong to the next reply.
     const FrameEnd end = unit.frame_end(options, Direction::reply, vector.reply);
     if (end.kind != FrameEnd::Kind::complete || end.size >= reply.bytes.size()) {
       const Outcome pieces = converse(bytewise(reply.bytes));
@@ -169,7 +169,8 @@ struct VectorReplay {
       stream_with(reply.between(std::array{byte}, {}), [] { return std::string("with garbage between"); });
     }
   }
-  // Sends seven good frames and `odd`, twice. Returns the number of good results.
+  // Sends seven good frames with `odd` between them, frame by frame and again byte by byte. Returns the number of
+  // good results.
   template <class Text>
   unsigned stream_with(const OwnedFrame& odd, Text&& text) const {
     unsigned good = 0;
@@ -222,7 +223,7 @@ struct VectorReplay {
       });
       ReportedFields seen;
       const Error error = decoded(clocked, seen);
-      // A conversation may check more than the decoder, such as a life counter.
+      // The conversation may refuse a reply that the decoder accepts: it may check more, such as a life counter.
       const bool as_decoded = error == Error::none && outcome.seen.fields == seen.fields;
       require(outcome.error != Error::none || as_decoded, [&] {
         return "makes " + to_text(outcome.seen.fields) + " of " + to_text(clocked) + ", which is " +
@@ -245,7 +246,7 @@ struct VectorReplay {
         return pieces;
       });
     };
-    // A vector with an error is skipped: other nodes may send such frames.
+    // A test vector with an error is skipped: other nodes of the bus may send such frames.
     if (vector.error != Error::none) return;
     const CanFrame other{.id = 0x7A5, .size = 8, .data = {1, 2, 3, 4, 5, 6, 7, 8}};
     std::vector<CanFrame> echo = requests;
@@ -266,7 +267,7 @@ struct VectorReplay {
   }
 };
 
-/// Returns arguments with which the command has this vector's exchange, or no value.
+/// Returns arguments with which the command has the exchange of the test vector; nothing if there are none.
 std::optional<Values> arguments_for(const Unit& unit, const Options& options, const Command& command,
                                     const Vector& vector) {
   ReportedFields request_fields;
@@ -281,14 +282,14 @@ std::optional<Values> arguments_for(const Unit& unit, const Options& options, co
   }
   const Result<Wire> request = encoded(unit, options, command, values);
   if (request && std::ranges::equal(*request, vector.request)) return values;
-  // A command that only waits for unsolicited frames has no request.
+  // A command that sends no request suits the vector if it waits for unsolicited frames.
   const bool unsolicited = !request && request.error() == Error::unsupported && vector.request.empty() &&
                            command.verb == Verb::read && unit.streams != nullptr && unit.streams(options);
   if (unsolicited) return values;
   return std::nullopt;
 }
 
-// Returns whether the vector's reply decodes without an error to a reading.
+// Returns whether the reply of the test vector decodes without an error to a reading.
 bool has_reading(const Unit& unit, const Options& options, const Vector& vector) {
   ReportedFields seen;
   return unit.decode(options, frame_of(unit, vector.request).frame(), frame_of(unit, vector.reply).frame(), seen) ==
@@ -318,7 +319,7 @@ void feed_vector(const Unit& unit, const Vector& vector, const Options& options,
   }
 }
 
-/// A conversation of `read`, as far as it waits for the reply to its request, if it does.
+/// A conversation of `read`, run until it waits for the reply to its first request, or does not wait.
 template <class Item>
 class Asked {
  public:
@@ -342,14 +343,15 @@ class Asked {
     if (step.kind == Kind::wait) wait_ = step;
   }
 
-  /// Returns how long the host waits for a reply, or no value if it does not wait.
+  /// Returns how long the host waits for a reply; nothing if it does not wait.
   [[nodiscard]] std::optional<Time> patience() const {
     if (!wait_) return std::nullopt;
     return wait_->answer != Time{} ? wait_->answer : wait_->gap;
   }
 
-  /// Returns the time from the end of a reply of one byte, which is cut short, to the next request, or to the end of
-  /// the conversation, after which another one may ask. No value if the host does not wait for a reply.
+  /// Returns the time from the end of a reply that is cut short after its first byte to the next request, or to the
+  /// end of the conversation, after which another conversation may send a request. Returns nothing if the host does
+  /// not wait for a reply.
   [[nodiscard]] std::optional<Time> rest_after_cut_reply() requires(!std::is_same_v<Item, CanFrame>) {
     constexpr std::array<std::uint8_t, 1> begin{};
     if (!wait_) return std::nullopt;
@@ -382,7 +384,7 @@ std::optional<Time> wait_for_reply(const Unit& unit, const Options& options) {
   return Asked<Item>(unit, options).patience();
 }
 
-// Compares `turnaround_limit`, which captures use, with the longest timeout of the host.
+// Checks that `turnaround_limit`, the timeout that captures use, agrees with the longest timeout of the host.
 void compare_limits(const Unit& unit, Findings& findings) {
   std::optional<Time> longest;
   for (const Configuration& configuration : configurations(unit)) {
@@ -397,7 +399,8 @@ void compare_limits(const Unit& unit, Findings& findings) {
   });
 }
 
-// Checks that captures do not join a reply that was cut short with the host's next request.
+// Checks that a capture does not join a reply that was cut short with the next request of the host: the host pauses
+// for at least `frame_pause`.
 void compare_rests(const Unit& unit, Findings& findings) {
   if (unit.timing.frame_pause == Time{}) return;
   for (const Configuration& configuration : configurations(unit)) {

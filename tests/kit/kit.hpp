@@ -9,13 +9,13 @@
 
 namespace absenc::kit {
 
-/// Checks the decoding of the unit's vectors, whole and damaged.
+/// Checks that the unit decodes the replies of its test vectors, and refuses damaged ones.
 [[nodiscard]] Findings check_decoding(const Unit& unit);
 
-/// Checks that the bits at the positions that the unit states for a field have its value.
+/// Checks the bit positions that the unit states for its fields: the bits there must have the field's value.
 [[nodiscard]] Findings check_places(const Unit& unit);
 
-/// Feeds the replies of vectors, whole and damaged, to commands that send their requests.
+/// Runs commands that send the request of a test vector, and supplies the reply of the vector, whole and damaged.
 [[nodiscard]] Findings check_hosts(const Unit& unit);
 
 /// Checks how commands end if no encoder answers.

@@ -15,7 +15,7 @@ bool bit_of(const OwnedFrame& frame, std::size_t bit) {
   return (bytes[bit / 8] & (carries_bits(frame.link) ? 0x80u >> bit % 8 : 1u << bit % 8)) != 0;
 }
 
-/// Returns the value of at most 64 bits at these positions, and sets `width` to their number.
+/// Returns the value of the bits in `ranges`, at most 64, and sets `width` to their number.
 std::uint64_t bits_at(const OwnedFrame& frame, const BitRanges& ranges, unsigned& width) {
   std::uint64_t value = 0;
   width = 0;
@@ -28,12 +28,12 @@ std::uint64_t bits_at(const OwnedFrame& frame, const BitRanges& ranges, unsigned
   return value;
 }
 
-/// Checks the stated bit positions of each field of one frame.
+/// Checks the bit positions that a unit states for the fields of its frames, one frame after the other.
 class Places final : public FieldSink {
  public:
   Places(const Unit& unit, Findings& findings) : unit_(unit), findings_(findings) {}
 
-  /// Checks the bit positions of the frame's fields. Returns whether the frame is valid.
+  /// Checks the bit positions of the fields of a reply. Returns whether the reply is valid.
   bool check_frame(const Options& options, const OwnedFrame& request, const OwnedFrame& reply) {
     if (unit_.check(options, request.frame(), reply.frame()) != Error::none) return false;
     options_ = &options;
@@ -67,7 +67,7 @@ class Places final : public FieldSink {
     placed_.insert(info.role);
   }
 
-  /// Checks that at least one frame had stated bit positions for its position field.
+  /// Checks that the unit stated the bit positions of the position field for at least one of the frames.
   void require_position() {
     findings_.require(placed_.contains(Role::position), [] { return "no frame has bit positions of the position"; });
   }
@@ -81,7 +81,7 @@ class Places final : public FieldSink {
   std::set<Role> placed_;
 };
 
-// Checks the replies of the vectors, whole and with one bit flipped, if they are valid.
+// Checks the replies of the test vectors, whole and with one bit flipped, if they are valid.
 void check_vectors(const Unit& unit, Places& places) {
   for (const Vector& vector : unit.vectors) {
     const std::optional<Options> options = options_of(unit, vector.options);

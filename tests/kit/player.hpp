@@ -19,7 +19,8 @@ template <class Item>
 class Player {
  public:
   using Pieces = std::vector<std::vector<Item>>;
-  /// Function that returns the pieces of the reply under test; `clocks` is 0 if unknown.
+  /// A function that returns the reply to the request under test, in pieces. `clocks`: number of clocks of the host;
+  /// 0 if unknown.
   using Reply = std::function<Pieces(std::size_t clocks)>;
 
   /// Creates a player without a virtual encoder: only the request under test gets a reply.
@@ -29,7 +30,7 @@ class Player {
     if (device_ != nullptr) device_->power_on(now_, Device<Item>::PowerOn::skip);
   }
 
-  /// Runs the conversation. Returns whether it ended within `most_steps`.
+  /// Runs the conversation. Returns whether it ended within `most_steps` steps.
   template <class OnEmit>
   bool run(Conversation<Item>& conversation, const std::vector<Item>& request, const Reply& reply, OnEmit&& on_emit,
            unsigned most_steps = 2000) {
@@ -62,9 +63,9 @@ class Player {
     }
     return false;
   }
-  /// Number of times that the host sent the request under test.
+  /// Returns the number of times that the host has sent the request under test.
   [[nodiscard]] unsigned tested_requests() const { return tested_requests_; }
-  /// Number of requests of any kind that the host sent.
+  /// Returns the number of requests of any kind that the host has sent.
   [[nodiscard]] unsigned request_count() const { return request_count_; }
 
  private:

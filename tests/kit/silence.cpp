@@ -17,7 +17,8 @@ void meet_silence(const Unit& unit, const Configuration& configuration, const Co
   constexpr unsigned every_address = 100'000;  // limit of simulator steps, enough for a scan of every address
   const bool ended = player.run(
       *conversation, {}, [](std::size_t) { return typename Player<Item>::Pieces{}; }, [] {}, every_address);
-  // A command without a request is unsupported here, or only waits for unsolicited frames.
+  // A command that sends no request is unsupported with these options, or waits for unsolicited frames: it need not
+  // fail.
   if (ended && player.request_count() == 0) return;
   const auto where = [&] {
     return std::string(command.name) + " of \"" + configuration.text + "\" without an encoder: ";
@@ -34,7 +35,8 @@ void meet_silence(const Unit& unit, const Configuration& configuration, const Co
 
 Findings check_silence(const Unit& unit) {
   Findings findings;
-  // On clocked and SPI links the host always reads some level, even without an encoder.
+  // Links without silence are left out: on a clocked or SPI link the host always reads some level, even without an
+  // encoder.
   const bool can_be_silent = !host_clocks(unit.link);
   if (!can_be_silent) return findings;
   for (const Configuration& configuration : configurations(unit)) {

@@ -8,7 +8,7 @@
 namespace absenc::kit {
 namespace {
 
-/// Flags of one channel of a reading: `bits` has the set ones, `reported` those in the reply.
+/// Flags of one channel of a reading: `bits` are the set ones, `reported` those that the reply contains.
 struct Flags {
   const FieldInfo* field;
   std::uint32_t bits;
@@ -39,7 +39,7 @@ std::vector<Flags> status_of(const Unit& unit, const Reading& reading) {
   return channels_of(unit.status, unit.second_status, reading.status, reading.status_reported);
 }
 
-/// A command's live reading, and the fields of its last reply, decoded as from a capture.
+/// The reading of a command that is run on a line, and the fields of its last reply, decoded as from a capture.
 struct LiveAndCaptured {
   std::optional<Reading> live;
   ReportedFields captured;
@@ -131,7 +131,7 @@ class States {
     if (!is_raised) require(!is_shown, "it is reported raised and is not");
   }
 
-  // Returns the flags of `field` that stand for optional alarms that `reading` does not report.
+  // Returns the flags of `field` that depend on optional alarms which `reading` does not report.
   [[nodiscard]] std::uint32_t absent(const FieldInfo& field, const Reading& reading) const {
     std::uint32_t alarms = 0;
     for (std::size_t i = 0; i < unit_.alarms->flags.size(); ++i) {
@@ -145,7 +145,7 @@ class States {
     return mask;
   }
 
-  // Checks that the reading and the fields of a reply have the same flags, except `absent` ones.
+  // Checks that the reading has the same flags as the fields of the reply, except those that `absent` returns.
   void check_carried_flags(const ReportedFields& seen) {
     if (!seen.reading) return;
     const auto agrees = [&](const Flags& state) {
@@ -169,7 +169,7 @@ class States {
             "a part reports valid turns, the whole invalid ones");
   }
 
-  // Checks a captured reading that is completed with the alarms of an earlier one.
+  // Checks the reading of a captured reply to which the unit has added the alarms of an earlier reply.
   void check_completed(const LiveAndCaptured& before, const LiveAndCaptured& now, std::size_t bit, bool is_raised) {
     if (unit_.remembered == nullptr || !before.captured.reading || !now.captured.reading) return;
     const Reading reading = unit_.remembered(*before.captured.reading, *now.captured.reading);

@@ -38,7 +38,7 @@ void change(const Unit& unit, const Configuration& configuration, const Command&
     apply_to_host(world, unit, command, values);
     const std::string broken = broken_promise(world, unit, command, values, result.seen);
     findings.require(broken.empty(), [&] { return what() + broken; });
-    // Some encoders forbid to write a value that is set already.
+    // The rules of some encoders forbid to write a value that the setting already has; such a violation is ignored.
     const std::string now = to_text(read_setting(world, unit, command).fields);
     findings.require(world.device().violation_count() == 0 || (command.verb == Verb::config_set && now == before),
                      [&] { return what() + std::string(world.device().violations()[0].rule); });
@@ -48,7 +48,7 @@ void change(const Unit& unit, const Configuration& configuration, const Command&
   }
   findings.require(good > 0 || refused,
                    [&] { return configuration.text + ", " + std::string(command.name) + ": never ends well"; });
-  // If at least two different values were set, at least two must have been read back.
+  // If at least two different values were written, at least two different values must have been read back.
   findings.require(set.size() < 2 || read.size() > 1,
                    [&] { return std::string(command.name) + ": the same value is read whatever is set"; });
 }
@@ -108,7 +108,8 @@ void try_registers(const Unit& unit, const Configuration& configuration, Finding
 
 constexpr std::byte untouched{0xA5};
 
-/// Storage followed by bytes with a known value: a changed one reveals a write beyond it.
+/// Storage of a given size, followed by bytes with a known value: if one of these changes, the unit has written
+/// beyond its storage.
 struct Fenced {
   Fenced(std::size_t size_given, std::size_t behind) : bytes(size_given + behind + 64, untouched), size(size_given) {}
   [[nodiscard]] std::span<std::byte> given() { return std::span(bytes).first(size); }
@@ -135,7 +136,7 @@ void store(const Unit& unit, const Configuration& configuration, const Command& 
                      [&] { return std::string(command.name) + ": needs more than host_storage"; });
     return;
   }
-  std::size_t none = 0;  // largest storage size, of those tried, that the unit refused
+  std::size_t none = 0;  // the largest storage size that the unit has refused, of those tried
   std::size_t needed = unit.host_storage;
   findings.require(!made(0), [&] { return std::string(command.name) + ": needs no storage"; });
   while (needed - none > 1) {
@@ -150,7 +151,7 @@ void store(const Unit& unit, const Configuration& configuration, const Command& 
     return std::pair(result.error, result.seen.fields);
   };
   const auto roomy = end(unit.host_storage);
-  // A later part of a procedure may need more storage than its start.
+  // In the smallest storage a procedure may start and later fail, because its later part needs more storage.
   const auto tight = needed == unit.host_storage ? roomy : end(needed);
   findings.require(tight == roomy || tight.first == Error::buffer_too_small,
                    [&] { return std::string(command.name) + ": ends differently in the smallest storage"; });

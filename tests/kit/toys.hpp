@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A complete toy unit with one selectable mistake.
+// A complete toy unit with a selectable mistake, which the kit must find.
 #pragma once
 
 #include <array>
@@ -12,22 +12,22 @@ namespace absenc::kit::toy {
 
 enum class Mistake : std::uint8_t {
   none,
-  weak_check,           // no mistake: the parity bits accept a quarter of wrong words
-  accepts_two_bytes,    // the host takes the first two bytes for the reply
-  ignores_checksum,     // the host ignores the checksum
-  accepts_excess,       // the host accepts bytes that begin with a good reply and leaves the rest for the next command
-  reports_nothing,      // the host reports no field
-  has_no_request,       // `encode` fails
-  unread_vectors,       // no command sends the request of the vectors
-  stale_reply,          // the virtual encoder returns the position of the previous request
-  wrong_position,       // the virtual encoder's position is one count too high
-  needs_more_storage,   // `host_storage` is smaller than the host needs
-  overflows_storage,    // the host is constructed even if the storage is too small
-  ignores_last_byte,    // `decode` ignores the last byte
-  differs_among_many,   // the decoder of many frames refuses a good frame
-  wrong_bit_positions,  // the stated bit positions cover only a part of the position
-  ignores_condition,    // the virtual encoder ignores its condition
-  never_ends,           // the host waits for ever if no byte arrives
+  weak_check,         // the toy has no mistake, but weak parity bits, which accept a quarter of the wrong words
+  accepts_two_bytes,  // the host takes the first two bytes it receives for the reply
+  ignores_checksum,   // the host ignores the checksum
+  accepts_excess,     // the host accepts bytes that begin with a good reply, and leaves the excess for the next command
+  reports_nothing,    // the host reports no field
+  has_no_request,     // `encode` fails
+  unread_vectors,     // no command sends the request of the vectors
+  stale_reply,        // the virtual encoder returns the position of the previous request
+  wrong_position,     // the virtual encoder's position is one count too high
+  needs_more_storage,       // `host_storage` is smaller than the host needs
+  overflows_storage,        // the host is constructed even if the storage is too small
+  ignores_last_byte,        // `decode` ignores the last byte
+  differs_among_many,       // the decoder of many frames refuses a good frame
+  wrong_bit_positions,      // the stated bit positions of the position field cover only a part of its bits
+  ignores_condition,        // the virtual encoder ignores its condition
+  never_ends,               // the host waits for ever if no byte arrives
   accepts_all_arguments,    // `encode` accepts any arguments
   late_capture_timeout,     // captures wait longer for a reply than any host does
   zeroes_invalid_position,  // every position is invalid, and the zero command sets the zero nevertheless
@@ -186,7 +186,7 @@ struct Toy {
    private:
     const Shaft& shaft_;
     unsigned sent_position_ = 0;
-    unsigned offset_ = 0;  // value of the condition, in counts, which is added to the position
+    unsigned offset_ = 0;  // value of the toy's condition, in counts; the toy adds it to the position
     unsigned previous_position_ = 0;
     Time reply_at_{};
     bool reply_due_ = false;
@@ -279,7 +279,7 @@ inline constexpr Unit unit = [] {
   return made;
 }();
 
-/// The descriptor, without functions, of an encoder that lacks the role `forgotten`.
+/// A descriptor without functions; the role `forgotten` is missing from what it declares.
 template <Role forgotten>
 struct Declared {
   static constexpr Role unless_forgotten(Role role) { return role == forgotten ? Role::other : role; }

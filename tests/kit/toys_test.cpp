@@ -33,7 +33,7 @@ void expect_no_finding() {
 
 TEST(KitToys, ReportsNothingForCorrectUnit) { expect_no_finding<Mistake::none>(); }
 
-// The kit must tolerate as many accepted wrong replies as chance explains.
+// A unit with a weak frame check has no finding if it accepts no more wrong replies than chance explains.
 TEST(KitToys, AllowsWeakFrameCheck) {
   expect_no_finding<Mistake::weak_check>();
   EXPECT_THAT(check_exchanges(toy::unit<Mistake::weak_check>, few).notes(),
@@ -90,7 +90,8 @@ TEST(KitToys, FindsTooSmallStorage) {
               Contains(HasSubstr("constructed beyond its storage")));
 }
 
-/// Decodes a request of five bits of data and a checksum above them, and a reply of the same data.
+/// Decodes a toy protocol. A request is five bits of data with a checksum of three bits above them; a reply repeats
+/// the data.
 Error decode_five_bits(const Options&, Frame request, Frame reply, FieldSink& sink) {
   static constexpr FieldInfo data{"data", FieldInfo::Kind::number, "", "what is asked"};
   const unsigned value = request.bytes[0] & 31u;
@@ -110,7 +111,7 @@ std::vector<std::string> open_bytes_of(Bytes reply, std::int64_t value) {
   return check_decoding(unit).texts();
 }
 
-// Five of the eight open bits are data, so 32 values make a valid request.
+// Five of the eight open bits are data and three the checksum, so 32 requests are valid.
 TEST(KitToys, CompletesRequestByWhatVectorStates) {
   constexpr std::array<std::uint8_t, 1> reply{9};
   EXPECT_THAT(open_bytes_of({}, 9), ElementsAre("open request is not complete: paste \"49\""));
@@ -183,9 +184,10 @@ TEST(KitToys, FindsAcceptedSurplusArguments) {
   EXPECT_THAT(texts, Contains("position 0: has a conversation"));
 }
 
-// Three models have one configuration, and the option makes a second one. Every other round is for models.
+// The toy has three models with the same configuration, and a second configuration with another option. Every other
+// round is for models only.
 TEST(KitToys, PrefersConfigurationsOfModels) {
-  static std::map<std::int64_t, unsigned> made;  // number of virtual encoders by the value of the option
+  static std::map<std::int64_t, unsigned> made;  // number of virtual encoders made with each value of the option
   constexpr std::array<OptionValue, 1> values{{{0, 2}}};
   constexpr std::array<Option, 1> options{
       {{.name = "kind", .meaning = "", .default_value = 2, .minimum = 1, .maximum = 2}}};

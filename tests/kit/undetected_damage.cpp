@@ -8,7 +8,7 @@
 namespace absenc::kit {
 namespace {
 
-/// A device that sends the same reply to every request, for a line with faults.
+/// A device that sends the same reply to every request; a faulty line damages the reply.
 template <class Item>
 class FixedReplyDevice final : public Machine<Item> {
  public:
@@ -30,7 +30,7 @@ class FixedReplyDevice final : public Machine<Item> {
   bool reply_due_ = false;
 };
 
-/// Says whether a decoded position is wrong, or only another field.
+/// Whether the position that was decoded from a damaged reply is wrong, and whether other fields are.
 struct WrongValues {
   bool position = false;
   bool others = false;

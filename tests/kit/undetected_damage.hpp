@@ -17,7 +17,8 @@ struct DamageCount {
 
   [[nodiscard]] double chance() const { return static_cast<double>(wrong) / static_cast<double>(damaged); }
 
-  /// Returns how many of `trials` further damaged replies may be wrong at the same probability.
+  /// Returns how many of `trials` further damaged replies may be decoded to a wrong value, if the probability is the
+  /// measured one.
   [[nodiscard]] std::uint64_t allowed(std::uint64_t trials) const {
     const double ratio = static_cast<double>(trials) / static_cast<double>(damaged);
     const double deviation = std::sqrt(static_cast<double>(wrong) * ratio * (1 + ratio));
@@ -25,12 +26,13 @@ struct DamageCount {
   }
 };
 
-/// Rates of undetected damage: of the position, and of other fields alone.
+/// Counts of undetected damage: of replies with a wrong position, and of replies in which only other fields are
+/// wrong.
 struct UndetectedDamage {
   DamageCount position{};
   DamageCount others{};
 
-  /// Keeps the higher of each rate and that of `other`.
+  /// Replaces each count by that of `other` if the rate of `other` is higher.
   void add(const UndetectedDamage& other) {
     if (other.position.chance() >= position.chance()) position = other.position;
     if (other.others.chance() >= others.chance()) others = other.others;

@@ -23,12 +23,12 @@ struct SettableShaft final : Shaft {
   std::int64_t position = 0;
 };
 
-/// Result of one conversation.
+/// Result of one conversation between host and virtual encoder.
 struct ConversationResult {
-  bool made = false;   // true if the unit supports the command
-  bool ended = false;  // true if the conversation ended before the time limit
+  bool made = false;   // whether the unit supports the command with these options
+  bool ended = false;  // whether the conversation ended before its time limit
   Error error = Error::none;
-  // True if the conversation had a reading before any byte arrived, or together with an error.
+  // Whether the conversation reported a reading before any byte was received, or together with an error.
   bool premature_reading = false;
   std::string detail{};
   std::string advice{};
@@ -36,7 +36,7 @@ struct ConversationResult {
   std::uint64_t damaged{};        // number of faults that changed bytes during the conversation
   std::uint64_t faults{};         // number of faults of any kind during the conversation
   std::uint64_t request_count{};  // number of requests that the encoder answered during the conversation
-  Wire sent{};                    // bytes sent by the host in its last exchange; empty on CAN
+  Wire sent{};                    // bytes that the host has sent in its last exchange; empty on CAN
   Wire received{};
 
   [[nodiscard]] bool good() const { return made && ended && error == Error::none; }
@@ -70,7 +70,8 @@ class World {
   [[nodiscard]] const Options& options() const { return options_; }
   void set_rates(const sim::FaultRates& rates) { faulty_->set_rates(rates); }
   void pass(Time time) { line_->run_until(line_->now() + time); }
-  /// Sets the position of the shaft. Waits where frames on their way may have the old one.
+  /// Sets the position of the shaft. If the encoder sends unsolicited frames, waits until those with the old position
+  /// have arrived.
   void move(std::int64_t position) {
     shaft_.position = position;
     const bool unsolicited = is_can || (unit_.streams != nullptr && unit_.streams(options_));
@@ -86,7 +87,7 @@ class World {
     line_->run(node_, line_->now());
   }
 
-  /// Runs one conversation to its end, or to the first result of a stream, for at most `limit`.
+  /// Runs one conversation until it ends, or a stream has its first result, but at most for the time `limit`.
   ConversationResult run(const Command& command, Arguments arguments, Time limit = std::chrono::seconds(100)) {
     return run_in(host_storage_, command, arguments, limit);
   }
@@ -164,7 +165,7 @@ class World {
 
   static constexpr std::size_t none = ~std::size_t{0};
 
-  /// A machine at the host's end that only configures the host's port.
+  /// A machine at the host's end of the line that only sets the baud rate of the host's port.
   class SetRate final : public Machine<Item> {
    public:
     explicit SetRate(const LineSettings& line) : line_(line) {}
@@ -178,7 +179,8 @@ class World {
     LineSettings line_;
     bool done_ = false;
   };
-  /// Occupies the host's end of the line between conversations, whose storage is reused.
+  /// A machine that does nothing: it takes the host's end of the line between two conversations, because the storage
+  /// of a conversation is used again.
   struct Idle final : Machine<Item> {
     void feed(const Event<Item>&) override {}
     Step<Item> next(Time) override { return {.kind = Step<Item>::Kind::done}; }
@@ -186,7 +188,7 @@ class World {
   };
 
   [[nodiscard]] LineSettings settings() const { return line_settings(unit_, options_).with_some_rate(); }
-  // Returns whether the reply guard covers the command, by the rule of `host::Session`.
+  // Returns whether the host uses a reply guard for the command, by the same rule as `host::Session`.
   [[nodiscard]] bool guarded(const Command& command) const {
     if (is_can) return command.verb == Verb::read || command.verb == Verb::read_part;
     return !host_clocks(unit_.link);
@@ -195,7 +197,7 @@ class World {
     if (node_ == none) {
       node_ = line_->attach(sim::NodeRole::host, idle_, [this] { return !on_emit_ || on_emit_(); });
     }
-    // On SPI the chip must stay deselected for a time between two conversations.
+    // On SPI the chip must stay deselected for a minimum time between two conversations.
     if (unit_.link == LinkKind::spi) pass(std::chrono::microseconds(20));
     line_->replace(node_, machine);
   }

@@ -15,7 +15,7 @@ std::optional<Reading> read_position(World<Item>& world, const Unit& unit) {
   return world.run(read, least_arguments(read)).seen.reading;
 }
 
-/// Tries the zero command where `spoil` makes the position invalid. `mend` reverses `spoil`.
+/// Checks that the zero command is refused after `spoil` has made the position invalid. `mend` makes it valid again.
 template <class Item, class Spoil, class Mend>
 void try_zero(const Unit& unit, const Configuration& configuration, const std::string& what, Spoil spoil, Mend mend,
               Findings& findings) {

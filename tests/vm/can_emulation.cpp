@@ -16,7 +16,7 @@ int main(int count, char** arguments) {
   std::printf("%s %llu\n", emulation.address().c_str(), static_cast<unsigned long long>(encoder.read().singleturn));
   std::fflush(stdout);
   while (std::getchar() != EOF) {
-    emulation.power_off();  // the power of the encoder can be switched also while the interface is down
+    emulation.power_off();  // switches the power of the encoder, which is possible also while the interface is down
     emulation.power_on();
     std::puts("switched");
     std::fflush(stdout);

@@ -178,7 +178,7 @@ class Verbs(VirtualBus):
         emulator = self.emulator("--singleturn", "5000", "--option", "cyclic=50")
         zero = self.run_json("zero", ENCODER, "--yes")["fields"]
         self.assertEqual((zero["before"], zero["after"], zero["written"], zero["answered"]), (5000, 0, True, True))
-        # The node sends cyclic frames again, as before the command.
+        # The node sends cyclic frames again, as it did before the command `zero`.
         self.assertEqual(self.singleturn(f"{ENCODER}&listen=true"), 0)
         self.assert_no_rule_broken(emulator)
 
@@ -227,7 +227,7 @@ class Verbs(VirtualBus):
         self.assert_failed(absenc("read", HASTY), "timeout", "scan", f"to {BUS}")
         rate = self.run_json("config", "set", f"{ENCODER}&node=0x42", "bitrate", "500000", "--yes")
         self.assertEqual((rate["new"]["bit_rate"], rate["new"]["written"]), (500000, True))
-        # A virtual bus has no bit rate, so nodes with different rates receive each other's frames.
+        # A virtual bus has no bit rate, so nodes with different settings of the rate receive each other's frames.
         self.assertEqual(self.singleturn(f"{ENCODER}&node=0x42&bitrate=500000"), 16384 - 1000)
         self.assert_no_rule_broken(emulator)
 
@@ -312,7 +312,7 @@ class CanUtils(VirtualBus):
         self.assertIsNone(cangen.poll(), "cangen has ended")
         self.assertGreater(load, 50)
         self.assertEqual([line["singleturn"] for line in json_lines(result.stdout)], 200 * [9799])
-        # The first reading needs two requests, each other one needs one.
+        # The first reading needs two position requests, each further reading one.
         self.assertRegex(emulator.end()[2], r"^absenc: 20[0-2] requests answered")
 
     @staticmethod
@@ -350,7 +350,7 @@ class OtherFrames(VirtualBus):
 class ErrorFrames(VirtualBus):
     BUS_OFF = "20000040#0000000000000000"
     NO_ACKNOWLEDGE = frame(socket.CAN_ERR_FLAG | 0x20, bytes(8))
-    # A warning of the controller about many errors: no frame was lost.
+    # Error frame with a warning of the CAN controller that errors are frequent; it does not mean a lost frame.
     WARNING = frame(socket.CAN_ERR_FLAG | 0x04, bytes([0, 8, 0, 0, 0, 0, 97, 0]))
 
     def test_destroyed_frames(self):

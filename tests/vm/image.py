@@ -15,9 +15,9 @@ import zlib
 TESTS = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 CACHE = os.path.join(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "absenc")
 
-# The kernel is Debian's, because a container cannot add modules to the running kernel.
+# The kernel for the virtual machine is Debian's: a container cannot add modules to the kernel on which it runs.
 
-# Kernel modules for the tests, with those that the kernel itself loads on demand.
+# Kernel modules for the tests, including those that the kernel itself loads on demand.
 MODULES = ["can", "can-raw", "vcan", "slcan", "fuse", "cuse", "dummy_hcd", "cdc-acm", "usb_f_acm", "usb_f_serial",
            "usb_f_obex", "g_serial"]
 # Programs of this computer that are copied into the initramfs.

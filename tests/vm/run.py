@@ -13,9 +13,11 @@ import time
 import image
 
 ABSENC = os.path.abspath(os.environ.get("ABSENC", "build/release/bin/absenc"))
-PATIENCE = 600  # time limit of a run of the machine, in seconds; a run of all tests takes far less
+PATIENCE = 600  # time limit of one run of the virtual machine, in seconds; a run of all tests takes far less
 SKIPPED = 77
-BUSY = "no_timer_check"  # kernel option without which a busy computer delays the timer so much that the kernel panics
+# kernel option against a panic: a busy computer delays the timer of the virtual machine too much for the kernel's
+# check
+BUSY = "no_timer_check"
 
 
 def boot(kernel, initramfs, folder):
@@ -26,7 +28,7 @@ def boot(kernel, initramfs, folder):
         "none",
         "-kernel", kernel, "-initrd", initramfs, "-append", f"console=ttyS0 quiet panic=-1 {BUSY}",
         "-serial", "stdio",
-        # ttyS1 and ttyS2 are the two ends of one line.
+        # The serial ports ttyS1 and ttyS2 of the virtual machine are the two ends of one line.
         "-chardev", f"socket,id=one,path={line},server=on,wait=off", "-chardev", f"socket,id=two,path={line}",
         "-serial", "chardev:one", "-serial", "chardev:two",
     ]  # fmt: skip
@@ -40,7 +42,7 @@ def boot(kernel, initramfs, folder):
             output, _ = machine.communicate()
             trouble = f"the machine did not end within {PATIENCE} s"
         finally:
-            machine.kill()  # has no effect if the virtual machine has ended
+            machine.kill()  # ends the virtual machine if it still runs
     return output.decode(errors="replace").replace("\r", ""), trouble
 
 

@@ -81,7 +81,7 @@ class Spi:
 
     def message(self, *transfers):
         packed = bytearray(b"".join(transfer.packed for transfer in transfers))
-        # fcntl copies at most 1024 bytes by itself, and a longer SPI message needs a mutable buffer.
+        # The message is passed as a mutable buffer, because fcntl copies at most 1024 bytes of an immutable one.
         return fcntl.ioctl(self.descriptor, request(False, 0, len(packed)), packed, True)
 
     def exchange(self, out, **settings):
@@ -344,7 +344,7 @@ class Lifecycle(SpidevCase):
 
             def slow():
                 try:
-                    spi.exchange(bytes(1000), speed=100)  # a transfer that takes 80 s
+                    spi.exchange(bytes(1000), speed=100)  # at 100 Hz this transfer takes 80 s
                 except OSError as error:
                     errors.append(error.errno)
 
@@ -496,7 +496,7 @@ class SpidevInterface(SpidevCase):
         self.assertEqual(self.spi.get(RD_SPEED, "I"), 250_000)
         os.close(self.spi.descriptor)
         self.spi.descriptor = os.open("/dev/spidev9.0", os.O_RDWR)
-        # The speed is the default again, because for a moment no descriptor was open.
+        # The speed is the default again: when the only descriptor was closed, the driver reset it.
         self.assertEqual(self.spi.get(RD_SPEED, "I"), 1_000_000)
         self.assertEqual(self.spi.get(RD_MODE, "B"), 1)
 

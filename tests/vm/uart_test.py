@@ -17,8 +17,8 @@ from command_support import Emulator, EncoderCase, absenc, end, json_lines
 from tap_support import Relay, TapCase, joined
 
 PORT, OTHER = "/dev/ttyS1", "/dev/ttyS2"
-REGISTERS = 0x2F8  # I/O address of the registers of the UART that has the port PORT
-CLOCK = 115200  # the UART's baud rate with a divisor of 1
+REGISTERS = 0x2F8  # I/O address of the registers of the UART behind PORT
+CLOCK = 115200  # baud rate of the UART with a divisor of 1
 NOBODY = 65534
 PARITY = termios.PARENB | termios.PARODD
 
@@ -26,7 +26,7 @@ PARITY = termios.PARENB | termios.PARODD
 TCGETS2, BOTHER, BAUD_MASK = 0x802C542A, 0o010000, 0o010017
 TIOCGSERIAL, TIOCSSERIAL, ASYNC_LOW_LATENCY = 0x541E, 0x541F, 1 << 13
 SERIAL_STRUCT = struct.Struct("iiIiiiiiHcciPHIL")
-FLAGS = 4  # index of the flags in struct serial_struct
+FLAGS = 4  # index of `flags` among the members of struct serial_struct
 
 
 def settings(path):
@@ -71,7 +71,8 @@ def divisor():
 class EncoderAtOneRate(threading.Thread):
     """A fake encoder that replies correctly only while PORT has the encoder's baud rate."""
 
-    # Reply to 1A: 17 bits of position and 16 bits of turns, both 0, without an alarm.
+    # Reply of a T-format encoder to the request 1A: 17 bits of position and 16 bits of turns, both 0, without an
+    # alarm.
     REPLY = bytes.fromhex("1a 00000000 11 000000 00 0b")
 
     def __init__(self, rate):

@@ -32,7 +32,8 @@ class UsbSerial(EncoderCase):
     def setUp(self):
         super().setUp()
         self.addCleanup(plug)
-        # A late hang-up of the gadget's end could otherwise hit the next user of the port.
+        # The cable is unplugged and plugged in once, because a late hang-up of an earlier test could otherwise hit
+        # this one.
         with self.without_cable():
             pass
 

@@ -176,7 +176,7 @@ void SpidevNode::process_one() {
   fuse_buf buffer{};
   const int size = fuse_session_receive_buf(session_.get(), &buffer);
   const std::unique_ptr<void, decltype(&std::free)> memory(buffer.mem, std::free);
-  // Nothing to read, for example because the program that made the request has ended.
+  // The kernel has no request, for example because the program that made the request has ended.
   if (size == -EINTR || size == -EAGAIN) return;
   if (size > 0) fuse_session_process_buf(session_.get(), &buffer);
   if (size <= 0 || fuse_session_exited(session_.get()) != 0) {

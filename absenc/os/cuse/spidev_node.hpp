@@ -15,8 +15,8 @@ namespace absenc::os {
 
 class SpidevNode {
  public:
-  /// Creates /dev/`name`, which is removed with the object. `spidev` must outlive it. Throws Failure, and as `wait_for`
-  /// does.
+  /// Creates /dev/`name`, which the destructor removes. `spidev` must outlive the node. Throws Failure, and as
+  /// `wait_for` does.
   SpidevNode(const std::string& name, Spidev& spidev);
   SpidevNode(const SpidevNode&) = delete;
   SpidevNode& operator=(const SpidevNode&) = delete;
@@ -24,7 +24,7 @@ class SpidevNode {
 
   [[nodiscard]] const std::string& path() const { return path_; }
 
-  /// Answers requests of programs until `end`. Throws Failure, and as `wait_for` does.
+  /// Answers requests of programs until the time `end`. Throws Failure, and as `wait_for` does.
   void serve(Time end = never);
 
  private:
@@ -46,7 +46,7 @@ class SpidevNode {
   Spidev* spidev_;
   std::string path_;
   bool made_ = false;
-  std::optional<Pending> pending_;  // request of a program that `answer` answers at `reply.at`
+  std::optional<Pending> pending_;
   std::unique_ptr<fuse_session, CloseSession> session_;
 };
 

@@ -29,7 +29,7 @@ function lose(why, refused = false) {
   view.lose(refused ? why : undefined);
 }
 
-// The token button is shown because the server may require a token for reading.
+// Shows why the server does not answer, and the token button, because the server may require a token for reading.
 function explain(why, refused) {
   lose(why, refused);
   tokenButton.hidden = false;
@@ -44,7 +44,8 @@ function take(event, data) {
     historyTrouble.hidden = trouble === "";
     setText(historyTrouble, trouble === "" ? "" : `The history is not being written: ${trouble}. Rows lost so far: ${data.history.lost}.`);
     view.show(data);
-    if (view.isServed === false) {  // the server has read absenc.toml again, which no longer has this encoder
+    // the server has read absenc.toml again, and the shown encoder is no longer in the file
+    if (view.isServed === false) {
       connection.hidden = false;
       setText(connection, `${shown} is no longer served: it was removed from absenc.toml. Nothing on this page is live.`);
     }
@@ -64,7 +65,7 @@ function decoded(text) {
   }
 }
 
-/** Returns the values of the fragment: encoder, tab, range, unit. */
+/** Returns the values in the fragment of the page's address: encoder, tab, range, unit. */
 function place() {
   const values = new URLSearchParams();
   for (const part of location.hash.slice(1).split("&")) {
@@ -91,7 +92,7 @@ async function greet() {
   try {
     tokenButton.hidden = !(await tokenInfo()).tokens;
   } catch {
-    // the error is ignored: the event stream reports an unreachable server
+    // an error is ignored here, because the event stream reports an unreachable server
   }
 }
 

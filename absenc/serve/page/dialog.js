@@ -10,9 +10,9 @@ const body = document.getElementById("dialog-body");
 const wrong = document.getElementById("dialog-wrong");
 const yes = document.getElementById("dialog-yes");
 const no = document.getElementById("dialog-no");
-const WRITING_MS = 300;  // delay in milliseconds after a key press before the encoder is polled
+const WRITING_MS = 300;  // time without a key press, in milliseconds, after which the encoder is asked for the value
 
-/** `agree` returns "" or an error text. Resolves to whether the user agreed. */
+/** Asks the user. `agree` runs on consent and returns "" or an error text. Resolves to whether the user agreed. */
 function ask(words, button, nodes, agree) {
   title.textContent = words;
   body.replaceChildren(...nodes);
@@ -55,7 +55,7 @@ export async function askToken() {
   await ask("Token", "Use it", [tokenLabel(input)], () => tryToken(input.value.trim()));
 }
 
-/** Resolves to whether the user agreed. */
+/** Asks the user to acknowledge an alarm. Resolves to whether the user agreed. */
 export async function askAcknowledge(name, alarm) {
   const {name: who} = await tokenInfo();
   const token = tokenField();
@@ -64,7 +64,10 @@ export async function askAcknowledge(name, alarm) {
   return ask(`Acknowledge ${plain(alarm)}: ${name}`, "Acknowledge", nodes, async () => (who === null ? tryToken(token.value.trim()) : ""));
 }
 
-/** Resolves to the arguments, or null without consent. `now` and `then` return the value before and after. */
+/**
+ * Asks the user for the arguments of a command. Resolves to the arguments; null if the user does not agree. `now` and
+ * `then` return the value before and after the command.
+ */
 export async function askCommand(name, command, now, then) {
   const {name: who} = await tokenInfo();
   const fields = command.arguments.map((argument) => element("input", {
@@ -86,7 +89,7 @@ export async function askCommand(name, command, now, then) {
     } catch (error) {
       text = `not known: ${error.message}`;
     }
-    if (question !== asked) return;  // the answer belongs to an earlier question, which a newer one has replaced
+    if (question !== asked) return;  // the answer belongs to an earlier question, which a newer question has replaced
     before.replaceChildren(text);
     before.closest("dl > div")?.toggleAttribute("hidden", text === "");
   };

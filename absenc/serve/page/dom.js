@@ -63,7 +63,8 @@ export const rich = (text) => text.split("`").map((part, i) => (i % 2 === 1 ? el
 export function dial() {
   const needle = drawing("line", {class: "needle", y1: 0, y2: -36});
   const ticks = Array.from({length: 12}, (_, i) => drawing("line", {class: "tick", y1: -46, y2: -40, transform: `rotate(${30 * i})`}));
-  const node = drawing("svg", {viewBox: "-50 -50 100 100", class: "dial off", "aria-hidden": "true"},  // hidden from screen readers: they get the number beside the dial
+  // the dial is hidden from screen readers: they get the number beside it
+  const node = drawing("svg", {viewBox: "-50 -50 100 100", class: "dial off", "aria-hidden": "true"},
                        drawing("circle", {r: 46}), ...ticks, needle, drawing("circle", {class: "hub", r: 5}));
   let shown;
   return {
@@ -98,7 +99,8 @@ export function scale() {
 }
 
 const SPARK_S = 60;
-const SPARK_LOST_S = 15;  // greatest width of the area of a small plot that marks the time without readings, in seconds
+// greatest width, in seconds, of the area of a small plot that marks the time without readings
+const SPARK_LOST_S = 15;
 
 /** Creates the small plot of the last minute. */
 export function spark() {
@@ -107,7 +109,7 @@ export function spark() {
   const node = drawing("svg", {viewBox: "0 0 600 100", preserveAspectRatio: "none", class: "spark", "aria-hidden": "true"}, gap, line);
   return {
     node,
-    /** `points`: [seconds, value]; `least`: smallest range of the y axis. */
+    /** Draws `points`, a list of [seconds, value]. `least`: smallest range of the y axis. */
     draw(points, now, least, live) {
       const last = points.at(-1)?.[0] ?? now;
       const end = live ? now : Math.min(now, last + SPARK_LOST_S);

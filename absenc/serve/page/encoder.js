@@ -9,10 +9,11 @@ import {download, pathOf, request, tokenInfo} from "./server.js";
 import {SHAPES, belowFigure, clock, condition, duration, fieldName, fieldText, figure, forPeople, eventKind, lastText, microseconds, numberText, plain, sentence, valueText, faultLines} from "./words.js";
 
 const LIVE_MS = 20000;      // length of the live plot in milliseconds: the server stores the points of this time
-const LOST_SHARE = .15;     // greatest time without readings in a lost encoder's live plot, as a share of LIVE_MS
+// greatest part of a lost encoder's live plot that shows the time without readings, as a share of LIVE_MS
+const LOST_SHARE = .15;
 const MOST_POINTS = 2500;
 const REFRESH_MS = 1000;
-const WRITTEN_MS = 1500;    // after this time a new event is in the history, in milliseconds
+const WRITTEN_MS = 1500;    // time in milliseconds after which a new event is in the history
 const PAST_MS = 10000;
 const MOST_EVENTS = 100;
 const RANGES = {live: ["Live", 0], "10m": ["10 min", 600], "1h": ["1 h", 3600], "24h": ["24 h", 86400], "7d": ["7 days", 604800], all: ["All", 31 * 86400]};
@@ -35,7 +36,7 @@ function latencyRows(buckets) {
     .map(({at_most: limit, count}) => [limit === null ? "longer" : `to ${limitText(limit)}`, count]);
 }
 
-// Returns why no reply has a latency.
+// Returns the text for an encoder whose replies have no latency.
 const noLatency = (encoder) => (encoder.readings === 0 ? "no reply yet" : "sent without requests");
 
 export class EncoderPage {
@@ -44,7 +45,8 @@ export class EncoderPage {
     this.trace = name;
     this.points = [];     // points of the live plot as [at_ms, position, speed, uncertainty of the speed]
     this.events = [];
-    this.loss = 0;        // number of losses: refresh() ignores a response to a request from before one
+    // number of times the encoder was lost: refresh() ignores the response to a request from before a loss
+    this.loss = 0;
     this.hasHistory = true;
     this.values = new Map(values);
     this.build(main, bar);
@@ -68,7 +70,7 @@ export class EncoderPage {
     this.below = element("p", {class: "below"});
     this.ranges = element("div");
     this.units = element("div");
-    this.scale.node.hidden = true;  // the scale is hidden until the encoder is known to be linear, with its length
+    this.scale.node.hidden = true;  // the scale is shown only for a linear encoder, after its length is known
     this.plot = element("div", {class: "plot", hidden: true, role: "img", "aria-label": "trace"});
     this.noTrace = element("p", {class: "faint"});
     this.wrong = element("div");
@@ -190,7 +192,7 @@ export class EncoderPage {
       this.points.unshift(...body.points.filter(([at]) => at < first));
       this.changed = true;
     } catch {
-      // the error is ignored: the event stream reports an unreachable server
+      // an error is ignored here, because the event stream reports an unreachable server
     }
   }
 
@@ -297,7 +299,8 @@ export class EncoderPage {
       if (point[0] - (this.points.at(-1)?.[0] ?? 0) >= LEAST_MS) this.points.push(point);
     }
     while (this.points.length > MOST_POINTS) this.points.shift();
-    if (this.range === "live") this.changed = true;  // loadPast() and refresh() redraw plots of the history
+    // live points do not change a plot of the history, which loadPast() and refresh() redraw
+    if (this.range === "live") this.changed = true;
   }
 
   /** Returns the plot's rows, from the points or the history, in the selected unit. */
@@ -359,7 +362,7 @@ export class EncoderPage {
     try {
       answer = await request(pathOf(this.name));
     } catch {
-      return;  // the error is ignored: the event stream reports an unreachable server
+      return;  // an error is ignored here, because the event stream reports an unreachable server
     }
     if (this.closed || this.loss !== loss || answer.status !== 200) return;
     const encoder = answer.body;
@@ -510,7 +513,7 @@ export class EncoderPage {
       }
       this.changed = true;
     } catch {
-      // the error is ignored: the event stream reports an unreachable server
+      // an error is ignored here, because the event stream reports an unreachable server
     } finally {
       this.loading = false;
     }

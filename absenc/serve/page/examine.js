@@ -5,7 +5,7 @@ import {pathOf, request} from "./server.js";
 import {fieldName, plain, sentence, valueText, forPeople} from "./words.js";
 
 const inLine = () => (matchMedia("(max-width: 40rem)").matches ? 8 : 16);
-const GONE = new Set(["opening", "lost", "ended"]);  // states after which the port may return with another encoder
+const GONE = new Set(["opening", "lost", "ended"]);  // encoder states after which another encoder may be on the port
 const THERE = new Set(["live", "examined"]);
 
 const hex = (number, digits) => number.toString(16).toUpperCase().padStart(digits, "0");
@@ -62,7 +62,7 @@ class ReadPanel {
     setText(this.status, words);
   }
 
-  /** Removes a result that may have become invalid. */
+  /** Removes the shown result, which may have become invalid. */
   clearResult(why) {
     this.clearedText = `the result is no longer shown: ${why}`;
     if (this.result.childElementCount === 0) return;

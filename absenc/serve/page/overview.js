@@ -15,7 +15,8 @@ const MOST_WORDS = 2;
 /** Creates the large figure with its unit, for a card or the page of an encoder. */
 export function figureNode() {
   const digits = element("span", {class: "digits"});
-  const widest = element("span", {class: "widest", "aria-hidden": "true"});  // invisible text that reserves the width of the widest value so far
+  // invisible text that keeps the figure as wide as its widest value so far
+  const widest = element("span", {class: "widest", "aria-hidden": "true"});
   const unit = element("span", {class: "unit"});
   const node = element("p", {class: "figure"}, element("span", {class: "number"}, widest, digits), unit);
   let sizes;
@@ -37,7 +38,7 @@ export function figureNode() {
   };
 }
 
-/** Returns 1 for position, 2 for speed. */
+/** Returns the quantity of the small plot as a column of its points: 1 for position, 2 for speed. */
 export function sparkColumn(points, linear) {
   if (linear) return 1;
   const places = points.map((row) => row[1]).filter((place) => place !== null);
@@ -132,7 +133,8 @@ class Card {
 
   drawTrace(now, live) {
     const column = sparkColumn(this.points, this.encoder.linear);
-    // Continues a rotary position across steps of more than half a turn, as from 360 to 0 degrees.
+    // Continues a rotary position over the end of a turn: steps of more than half a turn, as from 360 to 0 degrees,
+    // become short.
     let turns = 0;
     const unwrapped = this.points.map((row, i) => {
       const step = i > 0 ? row[1] - this.points[i - 1][1] : 0;
@@ -162,7 +164,7 @@ export class Overview {
       element("p", {}, element("code", {}, "absenc serve \"sim:tformat?motion=rpm=60\" sim:esl")));
     this.noMatch = element("p", {class: "none", hidden: true}, "No encoder matches. ", element("button", {type: "button", onclick: () => this.clearFilter()}, "Show all"));
     main.replaceChildren(this.none, this.noMatch, this.list);
-    // The buttons are created once, so that none loses the focus.
+    // The filter buttons are created once, so that a button does not lose the focus.
     this.groups = new Map(GROUPS.map((group) => {
       const [shape, words, more] = [element("span", {"aria-hidden": "true"}), element("span"), element("span", {class: "where-wide"})];
       return [group, {shape, words, more, node: element("button", {type: "button", class: "pill", hidden: true, "data-group": group, onclick: () => this.choose(group)}, shape, words, more)}];
@@ -185,7 +187,7 @@ export class Overview {
       const {status, body} = await request("api/minute");
       if (status === 200) this.minutes = new Map(body.encoders.map((encoder) => [encoder.encoder, encoder.seconds]));
     } catch {
-      // the error is ignored: the event stream reports an unreachable server
+      // an error is ignored here, because the event stream reports an unreachable server
     }
     for (const card of this.cards.values()) this.seedCard(card);
   }
@@ -197,7 +199,7 @@ export class Overview {
     card.seed(seconds);
   }
 
-  /** With many encoders, not every state is drawn. */
+  /** Draws a state of the server. If there are many encoders, not every state is drawn. */
   show(state) {
     const wait = state.encoders.length > MANY && this.cards.size > 0 ? this.drawn + DRAW_MS * state.encoders.length - performance.now() : 0;
     clearTimeout(this.later);

@@ -4,7 +4,7 @@
 import {eventKind, plain, clock} from "./words.js";
 
 const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-// `pixels`: size for a font of 16 pixels.
+// Scales `pixels`, a size for a font of 16 pixels, to the font size of the page.
 const scaled = (pixels) => pixels * parseFloat(getComputedStyle(document.documentElement).fontSize) / 16;
 const NONE = [NaN, NaN, NaN];
 
@@ -36,7 +36,7 @@ function gridLines(quantity) {
       for (let at = 90 * Math.ceil(low / 90); at <= high; at += 90 * Math.max(1, Math.ceil((high - low) / 900))) lines.push({v: at, label: `${at}°`});
       return high - low < 400 ? lines : lines.filter((line) => line.v - low > .05 * (high - low));
     }
-    // A label at the lower end would overlap the labels of the time axis.
+    // No label stands at the lower end of the value axis, where it would overlap the labels of the time axis.
     const lines = Dygraph.numericTicks(low, high, pixels, options, graph, values).filter((line) => line.v - low > .05 * (high - low));
     if (lines.length < 2) return lines;
     const decimals = Math.min(9, Math.max(0, Math.ceil(-Math.log10(Math.abs(lines[1].v - lines[0].v)) - 1e-9)));
@@ -49,7 +49,7 @@ export const isMarked = (event) => MARKED.includes(event.kind);
 export const markText = (event) => (event.kind === "alarm" ? plain(event.text.split(":")[0]) : eventKind(event.kind)[1]);
 
 function drawMarks(canvas, area, graph, marks) {
-  const free = [area.x, area.x, area.x];  // right end of the labels in each of three lines
+  const free = [area.x, area.x, area.x];  // x coordinate at which each of three rows of labels is free again
   for (const event of marks) {
     const x = Math.round(graph.toDomXCoord(event.at_ms)) + .5;
     if (x < area.x || x > area.x + area.w) continue;
@@ -115,7 +115,8 @@ export class Trace {
     let low = Infinity;
     let high = -Infinity;
     let before = null;
-    // Positions are drawn within one turn if the rows are dense enough for that.
+    // Positions are drawn within one turn if the shaft turns less than half a turn within each row and from row to
+    // row.
     const fits = within && rows.every((row, i) => row[2] === null ||
       (row[3] - row[1] < turn / 2 && (i === 0 || rows[i - 1][2] === null || this.quantity.wraps || Math.abs(row[2] - rows[i - 1][2]) < turn / 2)));
     for (const [at, ...values] of rows) {

@@ -14,7 +14,7 @@ const headers = () => (token === "" ? {} : {Authorization: `Bearer ${token}`});
 /** Returns the API path of an encoder, or of one of its parts. */
 export const pathOf = (name, part = "") => `api/encoders/${encodeURIComponent(name)}${part && `/${part}`}`;
 
-/** Returns {status, body} with the parsed JSON body. */
+/** Sends a request to the server. Returns {status, body} with the HTTP status and the parsed JSON body. */
 export async function request(path, values = {}, method = "GET") {
   const query = new URLSearchParams();
   for (const [name, value] of Object.entries(values)) {

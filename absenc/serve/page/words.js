@@ -3,7 +3,7 @@
 
 export const NOTHING = "—";
 const MINUS = "−";
-const THIN = " ";  // narrow no-break space
+const THIN = " ";  // the narrow no-break space, which separates groups of digits
 
 /** Formats a number with groups of three digits: "−1 204.55". */
 export function numberText(value, decimals = 0) {
@@ -68,7 +68,7 @@ export function lastText(last) {
   return last.position_mm !== null ? `${numberText(last.position_mm, 4)} mm` : "";
 }
 
-/** `isSmall`: for a small card. */
+/** Returns the texts below the large figure of an encoder. `isSmall`: whether they are for a small card. */
 export function belowFigure(encoder, now, isSmall = false) {
   if (encoder.state !== "live") {
     if (encoder.last_reading === null) return ["no reading yet"];
@@ -114,7 +114,7 @@ export function condition(encoder) {
   return encoder.alarms === null ? {group: "live", kind: "plain", word: "live"} : {group: "good", kind: "good", word: "good"};
 }
 
-/** Texts of the bar for the number of encoders in a group. */
+/** Texts for the number of encoders in a group, shown in the bar of the page. */
 export const GROUP_WORDS = {
   unknown: (count) => `${count} not known`, lost: (count) => `${count} lost`, alarm: (count) => (count === 1 ? "1 alarm" : `${count} with alarms`), errors: (count) => `${count} with errors`,
   waiting: (count) => `${count} waiting`, live: (count) => `${count} live`, good: (count) => `${count} good`,
@@ -123,7 +123,7 @@ export const GROUP_WORDS = {
 /** Additions to the texts of GROUP_WORDS, on wide screens only. */
 export const MORE_WORDS = {live: ", alarms not reported"};
 
-/** Returns lines [kind, bold text, text]. */
+/** Returns the faults of an encoder as lines [kind, bold text, text]. */
 export function faultLines(encoder) {
   const list = [];
   for (const alarm of encoder.alarms ?? []) {
