@@ -16,7 +16,7 @@ namespace absenc::client {
 enum class Verdict : std::uint8_t {
   kept,      ///< the tested behaviour was observed, and the clause was satisfied
   broken,    ///< a violation of the clause was observed
-  untested,  ///< nothing was observed that decides
+  untested,  ///< the observations do not decide whether the clause is satisfied
 };
 
 /// Result of the test of one clause, a requirement of a document.

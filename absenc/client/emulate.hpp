@@ -34,9 +34,10 @@ struct RuleCount {
 struct RequestCounts {
   /// Number of good requests; those for other encoders on the line may count, too.
   std::uint64_t good = 0;
-  /// Number of byte runs, CAN frames and characters that are no good request; starts again at the first good one.
+  /// Number of byte runs, CAN frames and characters with a line error that are no good request. The count starts again
+  /// at the first good request.
   std::uint64_t bad = 0;
-  /// Value of `bad` at the first good request; 0 until there is one.
+  /// Number of bad requests before the first good request; 0 until there is a good one.
   std::uint64_t before = 0;
   std::string first_bad = {};  ///< Text of the first item counted in `bad`; "" for a damaged character or none.
 };

@@ -25,15 +25,16 @@ struct FoundCheck {
   std::string_view name;  ///< Kind of check: "crc", "sum", "negative_sum" or "xor".
   /// Parameters of a CRC; for the other kinds `init` is the constant of the sum or xor.
   CrcParameters parameters{};
-  bool low_first = false;  ///< Whether the low byte of a check of more than 8 bits comes first.
+  bool low_first = false;  ///< Whether a check of more than 8 bits is sent with its low byte first.
   bool padded = false;     ///< Whether the check also covers a byte 00 appended to the data.
-  /// Whether every init fits with an xorout of its own, and no usual pair of them does.
+  /// Whether the frames fit every initial value `init`, each with another `xorout`, and none of these pairs is a usual
+  /// one.
   bool init_open = false;
   /// Possible positions of the first byte or bit that the check covers.
   std::vector<std::size_t> first{};
   std::size_t check_size = 0;  ///< Size of the check, in positions.
   std::size_t trailing = 0;    ///< Number of positions after the check, up to the end of the frame.
-  double chance = 1;           ///< Expected number of such checks if the frames were random, at most 1.
+  double chance = 1;  ///< Expected number of checks that would explain as many frames with random content, at most 1.
   /// Number of further frames, with other data, that would leave no doubt about the check.
   unsigned frames_to_settle = 0;
 };

@@ -15,7 +15,7 @@ namespace absenc::client {
 /// A failed command or reading in words. Every text may be empty.
 struct Trouble {
   Error error = Error::none;  ///< Kind of the error.
-  std::string message{};      ///< What happened, and what the received bytes are taken for, as a sentence.
+  std::string message{};      ///< Sentence that says what happened and, if possible, what the received bytes are.
   std::string exchange{};     ///< Request and reply, as text for people.
   std::string advice{};       ///< What the user can try; "": no advice.
   std::string sent{};         ///< Bytes or frames that were sent, as text.
