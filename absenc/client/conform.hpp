@@ -38,7 +38,8 @@ struct Conformance {
 
   /// Returns the number of clauses with this verdict.
   [[nodiscard]] std::size_t count(Verdict verdict) const;
-  /// Returns `broken` if a clause is broken or `left` is not empty, else `kept` if one is kept, else `untested`.
+  /// Returns `broken` if a clause is broken or the test left a value changed, else `kept` if a clause is kept, else
+  /// `untested`.
   [[nodiscard]] Verdict verdict() const;
   /// Returns the results in the Test Anything Protocol, version 13.
   [[nodiscard]] std::string tap() const;

@@ -17,7 +17,7 @@ namespace absenc::client {
 
 /// Kinds of findings, in the order in which an examination lists them.
 enum class FindingKind : std::uint8_t {
-  // Faults of the port
+  // Findings about faults of the port
   port_missing,
   port_forbidden,
   port_in_use,
@@ -28,11 +28,11 @@ enum class FindingKind : std::uint8_t {
   port_failed,
   latency_timer,
   direction_unswitched,
-  // Faults of the bus
+  // Findings about faults of the bus
   can_bus_off,
   can_not_acknowledged,
   can_errors,
-  // Faults of the line and of what is connected to it
+  // Findings about faults of the line and of what is connected to it
   never_silent,
   line_inverted,
   wrong_baud,
@@ -46,7 +46,7 @@ enum class FindingKind : std::uint8_t {
   modem_answers,
   no_answer,
   baud_pattern,
-  // Faults of frames, beginning with what an adapter or its driver does to bytes
+  // Findings about faults of frames, beginning with what an adapter or its driver does to bytes
   byte_before,
   byte_after,
   flow_control,
@@ -70,16 +70,16 @@ enum class FindingKind : std::uint8_t {
   requests_damaged,
   refused,
   counter_stands,
-  // Faults of times
+  // Findings about faults of times
   reply_late,
   sometimes_late,
   reply_slow,
-  // States that the encoder reports
+  // Findings about states that the encoder reports
   starting,
   alarm,
   status,
   position_invalid,
-  // Faults of the position
+  // Findings about faults of the position
   position_noise,
   position_jumps,
   position_frozen,

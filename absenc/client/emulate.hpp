@@ -88,7 +88,7 @@ class Emulation {
   [[nodiscard]] std::uint32_t violations() const;
   /// Returns the first rule that the host broke, in words; empty: none.
   [[nodiscard]] std::string first_violation() const;
-  /// Returns, for each rule that was checked, how often it was checked and broken.
+  /// Returns, for each rule that was checked, how often it was checked and how often the host broke it.
   [[nodiscard]] std::vector<RuleCount> rule_counts() const;
   /// Returns how many good and bad requests the virtual encoder received.
   [[nodiscard]] RequestCounts request_counts() const;

@@ -39,7 +39,7 @@ enum class PositionState : std::uint8_t {
 
 /// Result of one attempt to read or to open the port. Instants are those of os::now.
 struct Sample {
-  /// The kind of a sample.
+  /// Kind of a sample: a reading, a failure, or an event of the port.
   enum class Kind : std::uint8_t {
     reading,
     failed,  ///< the attempt failed because of the encoder or the line

@@ -35,7 +35,7 @@ using MemoryImage = std::map<MemoryAddress, std::uint32_t>;
 /// Bytes or words at consecutive addresses of one page.
 struct MemoryRun {
   MemoryAddress first;               ///< Page and address of the first byte or word.
-  std::vector<std::uint32_t> words;  ///< The bytes or words, from `first` on.
+  std::vector<std::uint32_t> words;  ///< The bytes or words, the first of them at the address `first`.
 };
 
 /// Returns the number of bytes at each address of the unit's memory: 1, 2 or 4.

@@ -32,7 +32,7 @@ struct Trouble {
 struct BadExchangeText {
   Error error = Error::none;  ///< Kind of the error.
   Time at{};                  ///< Time of the exchange, by the same clock as the times of readings.
-  std::string sent{};         ///< First bytes or frames that were sent, as text.
+  std::string sent{};         ///< The first bytes or frames of the exchange that were sent, as text.
   std::string received{};     ///< First bytes or frames that were received, as text; "": none were received.
 };
 

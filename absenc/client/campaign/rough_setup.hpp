@@ -102,7 +102,7 @@ struct RoughBench {
     using namespace std::chrono_literals;
     if (rates.device[sim::FaultKind::request_corrupt] <= 0) return false;
     set_faults(false);
-    line.rest(line.now() + (unsolicited ? 11s : 20s));  // after this wait no late reply is outstanding
+    line.rest(line.now() + (unsolicited ? 11s : 20s));  // after a wait of this length no late reply is outstanding
     line.drop();
     const Conversation<Item>* now = session.run(read);
     const bool changed = now->error() != Error::none || (now->reading() != nullptr && !is_right(*now->reading()));

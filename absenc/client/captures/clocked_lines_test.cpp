@@ -193,7 +193,7 @@ TEST_F(ClockedLines, AControlBitMayComeLateInTheTimeout) {
     for (const std::int64_t timeout : {3 * period / 2, std::int64_t{20'000}, std::int64_t{40'000}}) {
       for (const std::int64_t falls : {5 * timeout / 10, 6 * timeout / 10}) {
         for (const bool releases : {false, true}) {
-          // skips a time so short that the falling edge would count as one more clock
+          // skips a falling edge of the bit CDM so early that it would count as one more clock
           if (falls < 6 * period / 10) continue;
           SCOPED_TRACE(std::to_string(khz) + " kHz, timeout " + std::to_string(timeout) + " ns, CDM behind " +
                        std::to_string(falls) + " ns, " + (releases ? "released" : "held"));

@@ -61,7 +61,7 @@ class PositionTrace {
   [[nodiscard]] std::string_view unit() const;
 
   std::array<Extent, columns> columns_{};
-  unsigned shift_ = 0;  // each column covers 2^shift_ ticks
+  unsigned shift_ = 0;  // each column of the plot covers 2^shift_ ticks
   std::uint64_t first_ = 0;
   std::uint64_t last_ = 0;
   std::uint64_t count_ = 0;

@@ -45,7 +45,7 @@ TEST(PositionTrace, TurnsBelowZeroAreBelowThoseAbove) {
   EXPECT_NE(line_of(plot, 9).find("-4.000 turns |*"), std::string::npos) << plot;
 }
 
-// Checks that a plot covers its whole capture of more than 10^12 ticks.
+// Checks that a plot shows the whole capture if the capture has more than 10^12 ticks.
 TEST(PositionTrace, ARampFillsTheDiagonal) {
   PositionTrace trace;
   for (std::uint64_t i = 0; i < 4096; ++i) trace.add(1000 + i * 1'000'000'000, position(i));

@@ -262,7 +262,7 @@ CaptureOutcome CaptureRun::run_bytes(capture::AnnotationSink& sink, const std::f
   if (settings.channel_count == 2) settings.channels = {Carries::requests, Carries::replies};
   settings.gap = reader_->layout().arrival_gap;
   settings.by_arrival = settings.gap != 0;
-  // A log by arrival times may begin inside a frame; other captures of bytes hardly do.
+  // A capture that has only arrival times may begin inside a frame; other captures of bytes hardly do.
   settings.begins_silent = !settings.by_arrival;
   CaptureOutcome outcome;
   std::unique_ptr<capture::Annotator> annotator;

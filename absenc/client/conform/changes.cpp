@@ -25,7 +25,7 @@ namespace {
 constexpr Time settling = std::chrono::milliseconds(50);
 constexpr unsigned tries = 3;        // number of attempts to restore one value
 constexpr std::uint32_t beside = 4;  // number of bytes before the written byte that must stay unchanged
-// positions are equal if at most this fraction of a turn, 1/512, is between them
+// two positions count as equal if they differ by at most this fraction of a turn, 1/512
 constexpr unsigned position_tolerance = 512;
 
 /// Thrown when a command fails or a value is missing or wrong, so that the clause is broken.

@@ -70,7 +70,7 @@ class Disobedient final : public Machine<Item> {
   unsigned obeyed_times = 0;            // number of times that the encoder obeys `ignored_request` before it ignores it
   // number of the first ignored request, counted from 1; 0 together with `ignored_until` 0: none
   unsigned ignored_from = 0;
-  unsigned ignored_until = 0;  // number of the first request after the ignored ones
+  unsigned ignored_until = 0;  // number of the first request that the encoder does not ignore any more
   // number of the request whose reply has a wrong bit; 0: none
   unsigned damaged_at = 0;
   unsigned change = 0;  // number of the memory change that `spoil` corrupts, from 1; 0: none

@@ -235,7 +235,7 @@ TEST(Conformance, TapBailsOutIfNoClauseWasJudged) {
       std::string::npos);
 }
 
-// The document's name stands before the paragraph, so it must not contain the paragraph too.
+// A report prints the name of the document before the paragraph, so the name must not contain the paragraph, too.
 TEST(Clauses, DocumentNameContainsNoParagraph) {
   for (const Unit* unit : all_units()) {
     const auto look = [&](std::string_view id, std::string_view paragraph) {

@@ -47,7 +47,7 @@ struct Flaws {
 
 struct Stopped {};
 
-/// A port that can stop its host.
+/// A port that throws Stopped when its host wants to send more requests than `requests_left`, and can skip waits.
 template <class Item>
 class HastyPort final : public Port<Item> {
  public:

@@ -34,7 +34,8 @@ constexpr Time trial_limit = std::chrono::milliseconds(500);
 constexpr int trial_characters = 200;
 // An encoder that was powered on just before the first request replies after this time. tformat needs 1.5 s.
 constexpr Time longest_start = std::chrono::seconds(2);
-constexpr Time models_limit = std::chrono::seconds(3);  // time limit of first readings with other models and options
+// time limit of the first readings that are tried with other models and options
+constexpr Time models_limit = std::chrono::seconds(3);
 constexpr Time addresses_limit = std::chrono::seconds(4);
 constexpr Time identify_limit = std::chrono::seconds(16);
 
@@ -52,7 +53,7 @@ bool streams(const EncoderAddress& address) {
   return address.unit->streams != nullptr && address.unit->streams(address.options);
 }
 
-// Stores the addresses at which a scan receives damaged replies, or those of two encoders.
+// Stores the addresses at which a scan receives damaged replies, or the replies of two encoders.
 struct Clashes final : FieldSink {
   void put(const FieldValue& value) override {
     if (value.info->role == Role::encoder) address = value.number;

@@ -67,7 +67,7 @@ class Examiner {
   }
 
   /// Takes readings as `read` does and adds them to `seen`. On a line of characters it also adds the failed requests
-  /// that a reading repeated, and what a stream shows beside its good frames.
+  /// that a reading repeated, and evidence of damaged, missing or doubled frames in a stream.
   void observe(const Command& command, std::size_t count, Time limit, Observations& seen) {
     if constexpr (std::is_same_v<Item, CanFrame>) {
       read(command, count, limit, seen.readings);

@@ -117,7 +117,7 @@ class Mender {
   }
 
  private:
-  static constexpr std::size_t most_tries = 5000;  // limit of the decodings of one reply
+  static constexpr std::size_t most_tries = 5000;  // greatest number of decodings of one reply with changed bytes
 
   // Each decoding decrements `tries`; the search for a good reply ends at 0.
   [[nodiscard]] bool insert(ByteList& bytes, const ByteList& values, std::size_t from, std::size_t count,

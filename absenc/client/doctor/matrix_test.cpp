@@ -202,7 +202,7 @@ std::vector<std::string> readable_modes(const Unit& unit) {
       const EncoderAddress address = address_of(unit, mode, "");
       const Read one = reading_of(address);
       if (one.error == Error::none && known.insert(one.wire).second) modes.push_back(mode);
-    } catch (const std::exception&) {  // these options exclude each other
+    } catch (const std::exception&) {  // skips options that exclude each other
     }
   }
   return modes;

@@ -25,7 +25,7 @@ struct Trial {
   std::string setting{};       // the other setting, "baud=9600"
   std::size_t good = 0;
   std::size_t tried = 0;
-  // number of good readings with the user's setting, taken in turns with those of `setting`
+  // number of good readings with the user's setting, which were taken in turns with the readings with `setting`
   std::size_t good_as_said = 0;
   std::size_t tried_as_said = 0;
   std::string command{};  // address that reads the encoder, if `identify` found it; "": it did not

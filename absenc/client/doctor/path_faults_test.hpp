@@ -115,7 +115,7 @@ inline std::vector<PathFault> faults_of_bytes() {
                       if (one.seen.changed != 0) outcome = one;
                       return outcome;
                     }});
-  // Without its 00 bytes, a frame may look like a cut one.
+  // Without its 00 bytes, a frame may look as if its end were cut off.
   faults.push_back(of_bytes("nul_lost", {0x00},
                             [](const ByteList&, const ByteList& reply) { return without(reply, {0x00}); },
                             {"bytes_missing"}));

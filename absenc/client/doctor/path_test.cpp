@@ -81,7 +81,7 @@ std::string name_of_test(const ::testing::TestParamInfo<const Unit*>& one) {
 
 INSTANTIATE_TEST_SUITE_P(Units, DoctorWays, ::testing::ValuesIn(character_units()), name_of_test);
 
-// A setting is compared with the user's by 10 readings each. At 2400 baud 5 of them take 0.7 s.
+// Doctor compares a setting with the user's by 10 readings with each. At 2400 baud, 5 of these readings take 0.7 s.
 TEST(Doctor, SlowLineHasTimeForEachReadingOfComparison) {
   Pair pair = pair_of(*find_unit("raa38-modbus"), "", "baud=2400", {"address=1"});
   pair.far.delay = 35ms;

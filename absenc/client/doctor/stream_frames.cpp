@@ -15,7 +15,8 @@ namespace {
 using namespace std::chrono_literals;
 using ByteList = std::vector<std::uint8_t>;
 
-constexpr std::size_t enough = 8;  // least number of pieces, distances or doubled frames for a statement about them
+// least number of pieces, distances or doubled frames of a stream from which conclusions are drawn
+constexpr std::size_t enough = 8;
 
 /// Bytes without a pause between them, and the time at which the first of them arrived.
 struct PausedBytes {
@@ -75,7 +76,7 @@ std::vector<Time> distances_of(const std::vector<Time>& arrivals) {
   return distances;
 }
 
-// Returns the usual distance of frames; 0 if there are too few distances, or they are irregular.
+// Returns the usual time between two frames of a stream; 0 if there are too few frames, or the times are irregular.
 Time period_of(std::vector<Time> distances) {
   if (distances.size() < enough) return {};
   std::ranges::sort(distances);

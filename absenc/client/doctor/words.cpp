@@ -300,7 +300,7 @@ static_assert(is_in_order() && table.size() == static_cast<std::size_t>(FindingK
 
 const Words& words_of(FindingKind finding_kind) { return table[static_cast<std::size_t>(finding_kind)]; }
 
-// Returns the text with its {0}, {1} ... replaced by these values.
+// Returns the text in which {0}, {1} ... are replaced by these values.
 std::string filled(std::string_view text, const std::vector<std::string>& values) {
   fmt::dynamic_format_arg_store<fmt::format_context> arguments;
   for (const std::string& value : values) arguments.push_back(value);

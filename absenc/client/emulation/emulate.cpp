@@ -160,8 +160,9 @@ struct Emulation::Running {
   std::shared_ptr<os::EmulatorPort> port;
   std::unique_ptr<os::SocketCan> can;  // the opened CAN interface, until the encoder's thread takes it
 
-  std::mutex wishes;  // lets only one thread at a time pass a function to the encoder's thread
-  std::mutex mutex;   // guards `wish` and `stopped`; `thrown` is set before `stopped`
+  std::mutex wishes;  // allows only one thread at a time to pass a function to the encoder's thread
+  // the mutex guards `wish` and `stopped`; `thrown` needs no guard, because it is set before `stopped`
+  std::mutex mutex;
   std::condition_variable changed;
   std::function<void(Time)> wish;
   bool stopped = false;

@@ -392,7 +392,7 @@ std::string Trouble::text() const {
   return with_change(lines, change);
 }
 
-// The user's line settings remain, except for the rate if the options change it.
+// The line settings that the user has set remain, except for the rate if the options change it.
 void Connection::set_options(const Options& options) {
   const std::uint32_t rate = line_settings(unit(), options).rate;
   if (rate != line_settings(unit(), uri_.options).rate) uri_.line.rate = rate;

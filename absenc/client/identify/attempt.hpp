@@ -56,7 +56,7 @@ enum class TryEnd : std::uint8_t {
   harmful,  // the next request might change an encoder, or the next pulse of the wire `clear` would set its zero
 };
 
-/// Result of asking an encoder for its identity, and whether it agrees with the assumed options.
+/// Result of reading an encoder's identity, and whether the identity agrees with the assumed options.
 struct Introduction {
   Answer identity{};
   bool agrees = false;          // whether the encoder reported an identity that does not contradict the options

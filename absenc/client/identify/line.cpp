@@ -63,7 +63,8 @@ std::vector<Sender> senders(const Unit& unit, std::span<const CanFrame> frames) 
   return all;
 }
 
-/// A search for encoders: usual settings of each fitting unit, other rates, then, if in doubt, silent units again.
+/// A search for encoders: tries the usual settings of each fitting unit, then other rates and, if no encoder is found
+/// beyond doubt, silent units again.
 class Search {
  public:
   explicit Search(const LineSearch& search) : search_(search), deadline_(search.now() + search.limit) {}

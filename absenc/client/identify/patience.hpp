@@ -15,8 +15,8 @@ template <class Item>
 class Patience {
  public:
   struct Limits {
-    Time quiet{};                 // limit of the time in which no item at all is received
-    Time nonsense{};              // limit of the time in which items but no good reply are received
+    Time quiet{};     // longest time in which no item at all is received, before the conversation ends
+    Time nonsense{};  // longest time in which items but no good reply are received, before the conversation ends
     bool is_one_request = false;  // whether a single request to which nothing is received ends the conversation
     Time latency{};               // latency of the port, which is added to the timeouts of the conversation's steps
   };

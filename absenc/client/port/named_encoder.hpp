@@ -23,7 +23,7 @@ struct NamedEncoder {
   double rate_hz = 0;        // readings per second for `serve`; 0: not in the file
 };
 
-/// The encoders of an absenc.toml that was checked, and is read only once for all encoders.
+/// The encoders of absenc.toml. The file is read and checked only once for all of them.
 class NamedEncoders {
  public:
   /// Takes the content of absenc.toml and checks its names. Throws UsageError.

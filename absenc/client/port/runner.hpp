@@ -277,7 +277,7 @@ class Runner {
   [[nodiscard]] std::uint64_t overfull() const { return overfull_; }
   /// Returns the greatest number of further items that followed a good reply.
   [[nodiscard]] std::size_t most_behind() const { return most_behind_; }
-  /// Returns all items of the last exchange in which a good reply was followed by further items.
+  /// Returns all items of the last exchange whose good reply was followed by further items.
   [[nodiscard]] std::span<const Item> overfull_example() const { return overfull_example_; }
 
   /// Copies the last exchange into `one`, the result of the last command.

@@ -146,7 +146,7 @@ class Hdf5Record final : public RecordFile {
   std::uint64_t serving_ = 0;
   std::uint64_t served_ = 0;
   bool ending_ = false;
-  bool is_last_ = false;  // whether the rows that are being written are the last of the file
+  bool is_last_ = false;  // whether the rows that are being written are the last rows of the file
   std::exception_ptr failure_;
   std::jthread thread_;  // last member, because the thread uses all other members
 };

@@ -113,7 +113,7 @@ TEST(Hdf5Table, EveryBeginningOfACommitIsAWholeFile) {
   EXPECT_GT(states, 200u);
 }
 
-// If the disk is full at any write, the rows committed before must remain.
+// If the disk is full at any write, the rows that were committed before this write must remain.
 TEST(Hdf5Table, AWriteThatFailsLosesOnlyItsCommit) {
   for (int failing = 0;; ++failing) {
     ASSERT_LT(failing, 1000);
@@ -142,7 +142,7 @@ TEST(Hdf5Table, AWriteThatFailsLosesOnlyItsCommit) {
     EXPECT_GE(rows, 900) << failing;
     if (failed) continue;
     EXPECT_EQ(rows, 5900) << failing;
-    return;  // all writes succeeded, so every write has been tested as the failing one
+    return;  // all writes succeeded, so each of them has been tested as the one that fails
   }
 }
 

@@ -63,8 +63,8 @@ struct Recording::Parts {
   std::unique_ptr<RecordFile> file_;
   unsigned part_ = 0;
   Time part_start_{};
-  std::uint64_t finished_bytes_ = 0;  // size of all files before `file_`, in bytes
-  RecordCounts finished_;             // counts of all files before `file_`
+  std::uint64_t finished_bytes_ = 0;  // size of the finished files of the recording, in bytes
+  RecordCounts finished_;             // counts of the rows in the finished files of the recording
   std::uint64_t offered_ = 0;         // number of readings, including those that `RecordingSettings::every` leaves out
   std::uint64_t taken_ = 0;           // number of readings that were written
   std::uint64_t gap_ = 0;             // number of missed readings for which no row was written yet

@@ -25,7 +25,7 @@ class RequestRates final : public capture::AnnotationSink {
     capture::Tick begin = 0;   // tick of the first request
     capture::Tick last = 0;    // tick of the last request
 
-    /// Returns the mean number of such requests per second; 0 if the times do not tell it.
+    /// Returns the mean number of such requests per second; 0 if their times do not show it.
     [[nodiscard]] double per_second() const {
       return count > 1 && last > begin
                  ? static_cast<double>(count - 1) * static_cast<double>(arrival_ticks_per_second) /
