@@ -25,41 +25,49 @@ struct LineFault {
 
 /// Settings of a campaign.
 struct CampaignChoices {
-  std::string model{};                 ///< Name of a model; empty: the first that fits `options`.
+  std::string model{};                 ///< Name of a model of the unit; empty: the first model that fits `options`.
   std::vector<std::string> options{};  ///< Options of the unit, as "address=3".
   /// Faults with their rates from 0 to 1, as "bit=0.001"; empty: the default rates of all faults.
   std::vector<std::string> faults{};
-  std::uint64_t exchanges = 100'000;  ///< Number of exchanges, at least 1; the last reading may exceed it.
-  std::uint64_t seed = 1;             ///< Seed of faults and shaft positions; the same seed gives the same counts.
-  /// Speed of the shaft in revolutions per minute, or mm/s for linear encoders; positions are then confirmed. Without a
-  /// value the shaft moves to another place before every reading.
+  /// Number of exchanges to run, at least 1; a few more if the last reading needs them.
+  std::uint64_t exchanges = 100'000;
+  std::uint64_t seed = 1;  ///< Seed of faults and shaft positions; the same seed gives the same counts.
+  /// Speed of the shaft in revolutions per minute, or mm/s for linear encoders; the host then confirms each position by
+  /// a second reading. Without a value, the shaft moves to another place before every reading, and positions are not
+  /// confirmed.
   std::optional<double> rpm{};
-  /// Speed limit that the host assumes with `rpm`, in rev/min or mm/s; 0: a default.
+  /// Highest shaft speed, in rev/min or mm/s, that the host assumes when it confirms positions; used only with `rpm`.
+  /// 0: the default.
   std::uint32_t maximum_rpm = 0;
 };
 
-/// Computed strength of the frame check against independent bit errors. The rates are shares of all replies.
+/// Computed strength of the frame check (the checksum) against independent bit errors. Each share refers to all
+/// replies.
 struct CheckWorth {
-  unsigned check_bits = 0;     ///< Width of the check in bits; 0: none.
+  unsigned check_bits = 0;     ///< Width of the checksum in bits; 0: frames have no checksum.
   std::size_t frame_bits = 0;  ///< Length of a reply, in bits.
-  unsigned distance = 0;       ///< Hamming distance of the code: fewer wrong covered bits are all detected; 0: over 8.
-  double words = 0;            ///< Number of undetected error patterns of `distance` bits.
-  double unseen = 0;           ///< Share of all replies with damage only in covered bits and yet a correct checksum.
-  double taken = 0;            ///< Share of all replies that are damaged, yet accepted with a wrong position.
-  double taken_deviation = 0;  ///< Standard deviation of `taken`, which is estimated from random samples.
+  /// Hamming distance of the checksum: every error of fewer wrong bits, all of them covered by it, is detected; 0:
+  /// above 8.
+  unsigned distance = 0;
+  double words = 0;   ///< Number of patterns of exactly `distance` wrong bits that the checksum does not detect.
+  double unseen = 0;  ///< Share of all replies with damage only in covered bits and yet a correct checksum.
+  double taken = 0;   ///< Share of all replies that are damaged, yet accepted with a wrong position.
+  /// Standard deviation of `taken`, the share of accepted damaged replies, which is estimated from random samples.
+  double taken_deviation = 0;
 };
 
 /// Shares of confirmed and of wrong positions, in a campaign with a turning shaft.
 struct Guarded {
   Share confirmed{};  ///< Share of readings whose position a second reading confirmed.
-  /// Share of confirmed readings with a position that the shaft did not have near that time; excludes changed encoders.
+  /// Share of confirmed readings with a position that the shaft did not have near that time. Readings of an encoder
+  /// that a fault has changed are left out.
   Share wrong{};
   Share alone{};  ///< Share of wrong positions, confirmed or not, among the readings that passed every frame check.
   double let_through = 0;  ///< Computed number of wrong positions that pass both frame checks and confirmation.
 };
 
-/// Result of a campaign: numbers of exchanges and shares of errors. With `rpm`, `recovered`, `wrong` and `older` are
-/// not counted.
+/// Result of a campaign: numbers of exchanges and shares of errors. In a campaign with a turning shaft (`rpm`),
+/// `recovered`, `wrong` and `older` are not counted.
 struct CampaignResult {
   std::string protocol{};       ///< Identifier of the unit.
   std::string model{};          ///< Name of the encoder's model; "": none.
@@ -69,15 +77,18 @@ struct CampaignResult {
   Share failed{};               ///< Share of exchanges that ended with an error.
   Share given_up{};             ///< Share of readings that ended with an error after all attempts.
   Share recovered{};            ///< Share of readings that succeeded after a failed attempt.
-  Share wrong{};                ///< Share of exchanges with a wrong position; includes `older`, excludes `changed`.
-  /// Share of exchanges (with `rpm`: of readings) after which the encoder proved to be changed.
+  /// Share of exchanges with a wrong position. Includes earlier positions (`older`), but no exchange after which the
+  /// encoder proved to be changed (`changed`).
+  Share wrong{};
+  /// Share of exchanges (with `rpm`: of readings) after which a damaged request proved to have changed the encoder.
   Share changed{};
   /// Share of exchanges with an earlier position, from a frame that was sent before the request.
   Share older{};
   std::optional<Guarded> guarded{};  ///< Shares of confirmed and wrong positions; without a value unless `rpm` was set.
   /// Computed strength of the frame check; without a value if it cannot be computed, as on CAN.
   std::optional<CheckWorth> worth{};
-  double seconds = 0;  ///< Processor time of the process during the exchanges, in seconds; excludes computing `worth`.
+  /// Processor time of the process during the exchanges, in seconds, without the time to compute `worth`.
+  double seconds = 0;
 };
 
 /// Runs a campaign on one core. Throws UsageError.

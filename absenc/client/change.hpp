@@ -35,12 +35,12 @@ struct Change {
   [[nodiscard]] std::string text() const;
 };
 
-/// Returns `what` and, except for the state `none`, a line with the sentence of the change.
+/// Returns the text `what`; unless the state of the change is `none`, a line with the sentence of the change is added.
 [[nodiscard]] std::string with_change(std::string_view what, const Change& change);
 
 /// Base class of exceptions that carry the state of a change.
 struct Changing {
-  /// Makes the part of an exception that carries the state of a change, `what_became`.
+  /// Stores `what_became`, the change and its state when the exception is thrown.
   explicit Changing(Change what_became) : change(std::move(what_became)) {}
   virtual ~Changing() = default;
   Change change;  ///< The change and its state when the exception was thrown.

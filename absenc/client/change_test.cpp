@@ -44,7 +44,7 @@ class BreakingPort final : public Port<Item> {
     if (left_ == 0) throw os::Failure(os::Failure::Kind::lost, "the port went away");
     --left_;
   }
-  Link link_;  // the link, which owns the port
+  Link link_;  // owner of `port_`, which it keeps alive
   Port<Item>& port_;
   std::size_t left_;
 };
@@ -77,7 +77,7 @@ Stored stored(VirtualDevice& device) {
   return one.bytes != nullptr ? of(one.bytes->memory()) : of(one.frames->memory());
 }
 
-/// Runs a command on a virtual encoder; the port fails after `steps` steps, without them never.
+/// Runs a command on a virtual encoder. The port fails after `steps` steps; without a value it never fails.
 Ended run(const std::string& address, const Command& command, const Values& values,
           std::optional<std::size_t> steps = {}) {
   VirtualDevice* device = nullptr;
@@ -107,7 +107,7 @@ Ended run(const std::string& address, const Command& command, const Values& valu
   return ended;
 }
 
-/// Returns arguments with which the change is confirmed on a good line; nothing: none found.
+/// Returns arguments with which the encoder confirms the change on a line without faults; nothing: none were found.
 std::optional<Values> working_values(const Unit& unit, const Command& command) {
   std::vector<Values> candidates;
   for (const std::int64_t wanted : {INT64_MAX, std::int64_t{2}, std::int64_t{3}, std::int64_t{90}, INT64_MIN}) {
@@ -168,7 +168,7 @@ void require_truth(const Ended& ended, const Ended& good, const std::string& wha
   }
 }
 
-// Returns the smallest number of steps at the port, at least 33, with which nothing is thrown.
+// Returns the smallest number of steps, at least 33, for which the port must work so that the command throws nothing.
 std::size_t steps_of(const std::string& address, const Command& command, const Values& values) {
   std::size_t most = 64;
   while (run(address, command, values, most).thrown) most *= 2;
@@ -234,7 +234,8 @@ TEST_P(EveryUnit, ReportedChangeMatchesMemoryAfterPortLoss) {
     const Ended good = run(address, command, values);
     Counts of_command{};
     const std::size_t all = steps_of(address, command, values);
-    // The change occurs in the last steps, so each of these is tried, and some of the others.
+    // A command changes the encoder in its last steps, so the port fails at each of these in turn, and at some earlier
+    // ones.
     const std::size_t each = test_cases(60);
     const std::size_t last = all > each ? all - each : 0;
     for (std::size_t steps = 0; steps < all; steps = steps < last ? std::min(steps + 1 + all / 12, last) : steps + 1) {

@@ -16,7 +16,7 @@ namespace absenc::client {
 enum class Verdict : std::uint8_t {
   kept,      ///< the tested behaviour was observed, and the clause was satisfied
   broken,    ///< a violation of the clause was observed
-  untested,  ///< nothing was observed that decides
+  untested,  ///< the observations do not decide whether the clause is satisfied
 };
 
 /// Result of the test of one clause, a requirement of a document.
@@ -38,7 +38,8 @@ struct Conformance {
 
   /// Returns the number of clauses with this verdict.
   [[nodiscard]] std::size_t count(Verdict verdict) const;
-  /// Returns `broken` if a clause is broken or `left` is not empty, else `kept` if one is kept, else `untested`.
+  /// Returns `broken` if a clause is broken or the test left a value changed, else `kept` if a clause is kept, else
+  /// `untested`.
   [[nodiscard]] Verdict verdict() const;
   /// Returns the results in the Test Anything Protocol, version 13.
   [[nodiscard]] std::string tap() const;

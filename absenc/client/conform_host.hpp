@@ -15,7 +15,8 @@ namespace absenc::client {
 /// Length of a conformance test of a host, and its callbacks.
 struct ConformHostChoices {
   std::size_t answers = 100;  ///< Number of replies, half before the first and half after the last fault; at least 2.
-  Time patience = std::chrono::seconds(10);       ///< Longest silence of the host after it first sent something.
+  /// Silence of the host after which the test ends; it is measured once the host has sent something.
+  Time patience = std::chrono::seconds(10);
   std::function<void(const Emulation&)> ready{};  ///< Called with the running emulation when the host can connect.
   /// Polled during the test; true ends it. Empty: never.
   std::function<bool()> over{};

@@ -25,7 +25,7 @@ struct DecodeChoices {
   double baud = 0;                       ///< Baud rate of the line, in bits per second; 0: the unit's, or detected.
   /// Parity of the line; without a value: the unit's, or detected.
   std::optional<Parity> parity{};
-  std::string model{};                 ///< Name of a model; empty: the first that fits `options`.
+  std::string model{};                 ///< Name of a model of the unit; empty: the first model that fits `options`.
   std::vector<std::string> options{};  ///< Options of the unit, as "name=value".
 };
 

@@ -17,7 +17,7 @@ namespace absenc::client {
 
 /// Kinds of findings, in the order in which an examination lists them.
 enum class FindingKind : std::uint8_t {
-  // Faults of the port
+  // Findings about faults of the port
   port_missing,
   port_forbidden,
   port_in_use,
@@ -28,11 +28,11 @@ enum class FindingKind : std::uint8_t {
   port_failed,
   latency_timer,
   direction_unswitched,
-  // Faults of the bus
+  // Findings about faults of the bus
   can_bus_off,
   can_not_acknowledged,
   can_errors,
-  // Faults of the line and of what is connected to it
+  // Findings about faults of the line and of what is connected to it
   never_silent,
   line_inverted,
   wrong_baud,
@@ -46,7 +46,7 @@ enum class FindingKind : std::uint8_t {
   modem_answers,
   no_answer,
   baud_pattern,
-  // Faults of frames, beginning with what an adapter or its driver does to bytes
+  // Findings about faults of frames, beginning with what an adapter or its driver does to bytes
   byte_before,
   byte_after,
   flow_control,
@@ -70,16 +70,16 @@ enum class FindingKind : std::uint8_t {
   requests_damaged,
   refused,
   counter_stands,
-  // Faults of times
+  // Findings about faults of times
   reply_late,
   sometimes_late,
   reply_slow,
-  // States that the encoder reports
+  // Findings about states that the encoder reports
   starting,
   alarm,
   status,
   position_invalid,
-  // Faults of the position
+  // Findings about faults of the position
   position_noise,
   position_jumps,
   position_frozen,
@@ -109,19 +109,20 @@ struct Finding {
 
 /// How many readings report alarms and validity.
 struct Reported {
-  std::size_t alarms = 0;  ///< Number of readings that report of every alarm whether it is raised.
+  std::size_t alarms = 0;  ///< Number of readings that report, for every alarm, whether it is raised.
   std::size_t valid = 0;   ///< Number of readings that report a valid position.
   std::string missing{};   ///< Names of alarms whose state no reading reports, as "over_speed, over_heat".
 };
 
 /// Times, rates and settings that were measured during the diagnosis.
 struct Measured {
-  Time time{};           ///< Time from the begin of the first reading to that of the last.
-  double failures = 1;   ///< Upper limit of the share of failed readings, 0 to 1, at 95 % confidence (Wilson).
-  Time quickest{};       ///< Shortest time from the end of a request to the end of its good reply; 0: not known.
-  Time slowest{};        ///< Longest time from the end of a request to the end of its good reply; 0: not known.
-  Time computer_late{};  ///< Greatest delay of this computer itself; 0: not measured.
-  double rate = 0;       ///< Number of good readings per second; 0: none, or not known.
+  Time time{};          ///< Time from the beginning of the first reading to the beginning of the last one.
+  double failures = 1;  ///< Upper limit of the share of failed readings, 0 to 1, at 95 % confidence (Wilson).
+  Time quickest{};      ///< Shortest time from the end of a request to the end of its good reply; 0: not known.
+  Time slowest{};       ///< Longest time from the end of a request to the end of its good reply; 0: not known.
+  /// Greatest delay with which this computer itself reacted during the readings; 0: not measured.
+  Time computer_late{};
+  double rate = 0;  ///< Number of good readings per second; 0: none, or not known.
   /// Echo of the adapter in words, as "no echo", or the user's setting, as "echo=off"; may be "".
   std::string echo{};
   /// Latency of the connection; without a value: not known.
@@ -148,9 +149,10 @@ struct Examination {
 
 /// Limits of the diagnosis, and its callbacks.
 struct DoctorChoices {
-  std::size_t readings = 100'000;        ///< Greatest number of readings of a series with the given settings.
-  Time limit = std::chrono::seconds(3);  ///< Time limit of such a series while the shaft is as it is.
-  Time turning{};                        ///< Time of further readings while the user turns the shaft by hand; 0: none.
+  std::size_t readings = 100'000;  ///< Greatest number of readings of a series with the given settings.
+  /// Time limit of a series of readings during which the user leaves the shaft alone.
+  Time limit = std::chrono::seconds(3);
+  Time turning{};  ///< Time of further readings while the user turns the shaft by hand; 0: none.
   std::function<void(const std::string& what)> progress{};  ///< Called with the step that begins, as a phrase.
   /// Polled during the diagnosis; true ends it. Empty: never.
   std::function<bool()> over{};

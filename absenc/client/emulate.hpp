@@ -34,9 +34,10 @@ struct RuleCount {
 struct RequestCounts {
   /// Number of good requests; those for other encoders on the line may count, too.
   std::uint64_t good = 0;
-  /// Number of byte runs, CAN frames and characters that are no good request; starts again at the first good one.
+  /// Number of byte runs, CAN frames and characters with a line error that are no good request. The count starts again
+  /// at the first good request.
   std::uint64_t bad = 0;
-  /// Value of `bad` at the first good request; 0 until there is one.
+  /// Number of bad requests before the first good request; 0 until there is a good one.
   std::uint64_t before = 0;
   std::string first_bad = {};  ///< Text of the first item counted in `bad`; "" for a damaged character or none.
 };
@@ -87,7 +88,7 @@ class Emulation {
   [[nodiscard]] std::uint32_t violations() const;
   /// Returns the first rule that the host broke, in words; empty: none.
   [[nodiscard]] std::string first_violation() const;
-  /// Returns, for each rule that was checked, how often it was checked and broken.
+  /// Returns, for each rule that was checked, how often it was checked and how often the host broke it.
   [[nodiscard]] std::vector<RuleCount> rule_counts() const;
   /// Returns how many good and bad requests the virtual encoder received.
   [[nodiscard]] RequestCounts request_counts() const;

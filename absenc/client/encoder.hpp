@@ -39,7 +39,7 @@ enum class PositionState : std::uint8_t {
 
 /// Result of one attempt to read or to open the port. Instants are those of os::now.
 struct Sample {
-  /// The kind of a sample.
+  /// Kind of a sample: a reading, a failure, or an event of the port.
   enum class Kind : std::uint8_t {
     reading,
     failed,  ///< the attempt failed because of the encoder or the line
@@ -49,8 +49,9 @@ struct Sample {
   };
 
   Kind kind = Kind::absent;  ///< Whether this sample holds a reading, a failure or an event.
-  Time at{};                 ///< `latched` of the reading, or the time of the failure or of the event.
-  Reading reading{};         ///< The reading; default-constructed if `kind` is not `reading`.
+  /// Time at which the encoder latched the position (`latched` of the reading), or time of the failure or of the event.
+  Time at{};
+  Reading reading{};  ///< The reading; default-constructed if `kind` is not `reading`.
   /// Whether the position agrees with the one that was read before it (host::FirstReading).
   bool confirmed = false;
   /// Whether the encoder was ready and its position valid, but not `confirmed`.

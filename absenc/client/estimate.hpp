@@ -9,7 +9,7 @@ namespace absenc::client {
 
 /// A measured value with its uncertainty.
 struct Estimate {
-  double value = 0;        ///< Estimate of the true value.
+  double value = 0;        ///< Estimate of the true value of what was measured.
   double uncertainty = 0;  ///< Greatest distance of the true value from `value`.
 };
 

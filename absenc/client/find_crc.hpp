@@ -25,15 +25,17 @@ struct FoundCheck {
   std::string_view name;  ///< Kind of check: "crc", "sum", "negative_sum" or "xor".
   /// Parameters of a CRC; for the other kinds `init` is the constant of the sum or xor.
   CrcParameters parameters{};
-  bool low_first = false;  ///< Whether the low byte of a check of more than 8 bits comes first.
+  bool low_first = false;  ///< Whether a check of more than 8 bits is sent with its low byte first.
   bool padded = false;     ///< Whether the check also covers a byte 00 appended to the data.
-  /// Whether every init fits with an xorout of its own, and no usual pair of them does.
+  /// Whether the frames fit every initial value `init`, each with another `xorout`, and none of these pairs is a usual
+  /// one.
   bool init_open = false;
-  /// Possible positions of the first byte or bit that the check covers.
+  /// Positions, in the frame, of the bytes or bits that may be the first that the check covers.
   std::vector<std::size_t> first{};
-  std::size_t check_size = 0;  ///< Size of the check, in positions.
-  std::size_t trailing = 0;    ///< Number of positions after the check, up to the end of the frame.
-  double chance = 1;           ///< Expected number of such checks if the frames were random, at most 1.
+  std::size_t check_size = 0;  ///< Size of the check, in bytes or, for frames of bits, in bits.
+  /// Number of bytes or, for frames of bits, bits after the check, up to the end of the frame.
+  std::size_t trailing = 0;
+  double chance = 1;  ///< Expected number of checks that would explain as many frames with random content, at most 1.
   /// Number of further frames, with other data, that would leave no doubt about the check.
   unsigned frames_to_settle = 0;
 };
@@ -41,8 +43,8 @@ struct FoundCheck {
 /// Result of a search for the checksum of frames.
 struct CheckFindings {
   std::vector<FoundCheck> checks{};  ///< Checks that explain the frames, the least likely coincidence first.
-  std::size_t shortest = 0;          ///< Length of the shortest frame, in positions.
-  std::size_t longest = 0;           ///< Length of the longest frame, in positions.
+  std::size_t shortest = 0;          ///< Length of the shortest frame, in bytes or, for frames of bits, in bits.
+  std::size_t longest = 0;           ///< Length of the longest frame, in bytes or, for frames of bits, in bits.
   /// Whether the frames contain too little information to list all checks that explain them.
   bool is_open = false;
   /// Number, from 1, of a frame without which a check explains all others beyond doubt; 0: none was found.

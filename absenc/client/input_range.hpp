@@ -13,7 +13,7 @@ class InputIterator {
   struct End {};
   /// Type of the values that the iterator points to.
   using value_type = typename Range::value_type;
-  /// Type that an iterator must declare; no function returns a distance.
+  /// Type that every iterator must declare; no function of this iterator returns a distance.
   using difference_type = std::ptrdiff_t;
 
   /// Makes an iterator that points to the current value of `range`, which must outlive it.

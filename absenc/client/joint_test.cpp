@@ -81,7 +81,7 @@ TEST(Joint, FollowsTheShaftOverSeveralTurnsInBothDirections) {
   const std::string more = "&pole_pairs=5&offset_deg=-40.5&gear=";
   expect_angles("sim:tformat?multiturn=100&motion=rpm=300" + more + "50", 1, -40.5, 50, 5);
   expect_angles("sim:tformat?multiturn=100&motion=rpm=-300&direction=-1" + more + "50/3", -1, -40.5, 50.0 / 3, 5);
-  // the encoder's counter of turns passes 0
+  // the shaft turns so far that the encoder's counter of turns passes 0
   expect_angles("sim:tformat?multiturn=1&motion=rpm=-300" + more + "0.5", 1, -40.5, 0.5, 5);
 }
 

@@ -35,7 +35,7 @@ using MemoryImage = std::map<MemoryAddress, std::uint32_t>;
 /// Bytes or words at consecutive addresses of one page.
 struct MemoryRun {
   MemoryAddress first;               ///< Page and address of the first byte or word.
-  std::vector<std::uint32_t> words;  ///< The bytes or words, from `first` on.
+  std::vector<std::uint32_t> words;  ///< The bytes or words, the first of them at the address `first`.
 };
 
 /// Returns the number of bytes at each address of the unit's memory: 1, 2 or 4.
@@ -66,7 +66,7 @@ struct MemoryRun {
 enum class MemoryAccess : std::uint8_t {
   read,
   write,
-  force,  ///< write, also to write-protected bytes
+  force,  ///< write access, also to write-protected bytes
 };
 
 /// Returns the reason why this access to the address is impossible; "" if it is possible.
@@ -92,7 +92,8 @@ class Memory {
   /// Returns the unit of the encoder.
   [[nodiscard]] const Unit& unit() const;
 
-  /// Reads the position, if the unit can, and throws if that fails, as it may with a wrong model.
+  /// Reads the position, if the unit has a command for it, and throws if that fails, because a wrong model is a likely
+  /// reason.
   void check_model();
 
   /// Returns the bytes or words at the addresses of `image`, whose values are ignored.

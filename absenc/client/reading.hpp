@@ -36,7 +36,8 @@ struct Flags {
 /// Returns the alarms of all channels joined; nothing if the unit has no alarms.
 [[nodiscard]] std::optional<Flags> joined_alarms(const Unit& unit, const Reading& reading);
 
-/// Returns the reading; may mark its position as unknown if it is not `confirmed`.
+/// Returns the reading. If it is not `confirmed`, but its encoder is ready and its position valid, marks the position,
+/// and valid turns, as unknown.
 [[nodiscard]] Reading checked(Reading reading, bool confirmed);
 
 }  // namespace absenc::client

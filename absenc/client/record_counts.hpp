@@ -11,7 +11,7 @@ struct RecordCounts {
   std::uint64_t readings = 0;  ///< Number of good readings.
   std::uint64_t failures = 0;  ///< Number of failed attempts to read.
   std::uint64_t gaps = 0;      ///< Number of gaps, in which readings were due and not taken.
-  std::uint64_t missed = 0;    ///< Number of readings that were due and not taken, in all gaps.
+  std::uint64_t missed = 0;    ///< Number of readings that were due and not taken, in all gaps together.
 
   /// Adds the counts of `other` and returns the sum.
   RecordCounts& operator+=(const RecordCounts& other) {

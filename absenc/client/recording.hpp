@@ -20,7 +20,8 @@ struct RecordingSettings {
   std::string path;
   std::string encoder;   ///< Name of the encoder, as the header of the file shows it.
   double rate_hz = 100;  ///< Intended number of readings per second; 0: as many as possible.
-  /// Writes every Nth reading, and each one with other alarms than the one before; 1: all.
+  /// Writes every Nth reading, and each reading whose alarms differ from those of the reading before; 1: writes all
+  /// readings.
   std::uint64_t every = 1;
   std::uint64_t count = 0;         ///< Number of written readings after which the recording ends; 0: no limit.
   std::optional<Time> duration{};  ///< Time after which the recording ends; without a value: no limit.

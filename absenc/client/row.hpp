@@ -26,7 +26,7 @@ struct Column {
     bool is_detail = false;  ///< Whether tables with one line for each row leave the value out.
     /// Whether the number is shown in hexadecimal; tables of values show it in decimal nevertheless.
     bool in_hex = false;
-    /// Whether the value repeats the request or shows bytes of the reply.
+    /// Whether the value only repeats the request, or shows bytes of the reply.
     bool is_exchange = false;
   };
 
@@ -62,12 +62,12 @@ using Value = std::variant<std::monostate, std::int64_t, std::uint64_t, double, 
   return value.index() != 0 && !std::holds_alternative<Invalid>(value) && !std::holds_alternative<Unknown>(value);
 }
 
-/// Returns the flags as a value; `Unknown` if none is raised and a required one was not reported.
+/// Returns the raised flags as a value; `Unknown` if none is raised and a flag that is not optional was not reported.
 [[nodiscard]] Value value_of(const Flags& flags);
 /// Returns whether the validity is `valid`; no value if it is absent, `Unknown` if it is unknown.
 [[nodiscard]] Value value_of(Validity validity);
 
-/// Returns the value as text, as "12.5", "yes" or "1A 00"; "" without a value or a raised flag.
+/// Returns the value as text, as "12.5", "yes" or "1A 00"; "" if there is no value, or if no flag is raised.
 [[nodiscard]] std::string to_text(const Value& value);
 /// Returns the value of a column as text with its unit: "80 degC".
 [[nodiscard]] std::string to_text(const Column& column, const Value& value);

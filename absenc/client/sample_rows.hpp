@@ -45,9 +45,9 @@ class SampleRows {
   std::vector<Column> columns_;
   // Index of each column in a row; 0 for a column that the rows do not have.
   std::size_t protocol_, reading_at_, confirmed_, ok_;
-  std::size_t motion_ = 0;  // index of the first motion column; 0: no such columns
+  std::size_t motion_ = 0;  // index of the first column of the motion in a row; 0: rows have no such columns
   std::size_t missed_ = 0;
-  std::size_t angles_ = 0;  // index of the first joint-angle column; 0: no such columns
+  std::size_t angles_ = 0;  // index of the first column of joint angles in a row; 0: rows have no such columns
   std::size_t event_, message_, sent_, received_;
   Row row_;
 };

@@ -19,7 +19,7 @@ struct Setting {
   const Command* setter;  ///< Command that writes the setting; null: the setting can only be read.
   const Command* getter;  ///< Command that reads the setting; null: the setting can only be written.
 
-  /// Returns the name of the command that reads the setting, or else of the one that writes it.
+  /// Returns the name of the command that reads the setting or, if there is none, of the command that writes it.
   [[nodiscard]] std::string_view name() const { return getter != nullptr ? getter->name : setter->name; }
 };
 

@@ -8,10 +8,10 @@ namespace absenc::client {
 
 namespace {
 
-// `side`: -1 for the lower end of the interval, 1 for the upper.
+// Returns one end of Wilson's confidence interval: the lower end for a `side` of -1, the upper end for 1.
 double wilson(const Share& share, double side) {
   if (share.of == 0) return side > 0 ? 1 : 0;
-  if (share.count == 0 && side < 0) return 0;  // exactly 0, without rounding errors
+  if (share.count == 0 && side < 0) return 0;  // returns exactly 0: the formula would give rounding errors
   constexpr double z = 1.96;
   const auto n = static_cast<double>(share.of);
   const double p = share.rate();

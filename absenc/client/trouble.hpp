@@ -15,7 +15,7 @@ namespace absenc::client {
 /// A failed command or reading in words. Every text may be empty.
 struct Trouble {
   Error error = Error::none;  ///< Kind of the error.
-  std::string message{};      ///< What happened, and what the received bytes are taken for, as a sentence.
+  std::string message{};      ///< Sentence that says what happened and, if possible, what the received bytes are.
   std::string exchange{};     ///< Request and reply, as text for people.
   std::string advice{};       ///< What the user can try; "": no advice.
   std::string sent{};         ///< Bytes or frames that were sent, as text.
@@ -32,7 +32,7 @@ struct Trouble {
 struct BadExchangeText {
   Error error = Error::none;  ///< Kind of the error.
   Time at{};                  ///< Time of the exchange, by the same clock as the times of readings.
-  std::string sent{};         ///< First bytes or frames that were sent, as text.
+  std::string sent{};         ///< The first bytes or frames of the exchange that were sent, as text.
   std::string received{};     ///< First bytes or frames that were received, as text; "": none were received.
 };
 

@@ -115,10 +115,10 @@ class Campaign {
   // Moves the shaft to a random position of 64 bits, so that an older position is recognised.
   void move() {
     shaft_.position = static_cast<std::int64_t>(bench_.random.next());
-    constexpr Time longest = 30s;  // longer than any fault delays a reply
+    constexpr Time longest = 30s;  // older positions are forgotten: no fault delays a reply for so long
     if (places_.size() > 1 && places_[1].since + longest < line_.now()) places_.pop_front();
     places_.push_back({line_.now(), shaft_.position});
-    // Frames with the old position must pass first; on SPI chip select must be released for a time.
+    // Waits until frames with the old position have passed; on SPI, chip select must be released for some time.
     if (bench_.unsolicited) {
       line_.rest(line_.now() + 5ms);
       line_.drop();
@@ -172,7 +172,7 @@ class Campaign {
 
 std::optional<CheckWorth> worth_of(const Unit& unit, const Options& options, double bit_errors) {
   if (unit.link == LinkKind::can) return {};
-  // A shifted frame passes the check only at some positions, so many replies are needed.
+  // A frame that is shifted by some bits passes the checksum only at some shaft positions, so many replies are needed.
   constexpr unsigned frames = 20'000;
   constexpr unsigned samples = 500'000;
   const std::vector<GoodReply> replies = Campaign<std::uint8_t>(unit, options, {}, 7).good_replies(frames);

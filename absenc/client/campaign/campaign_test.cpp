@@ -53,7 +53,8 @@ INSTANTIATE_TEST_SUITE_P(Units, Computed,
                                            Named{"amt21", "bit=0.1", 2, 2}, Named{"ssi", "bit=0.01", 0, 1},
                                            Named{"biss", "bit=0.005", 6, 3}, Named{"biss", "bit=0.02", 6, 3}));
 
-// The exclusive OR misses two wrong bits in a column and detects every error of three bits.
+// An XOR checksum misses two wrong bits at the same bit number of two bytes (a column), and detects every error of
+// three bits.
 TEST(CheckCodeTest, ExclusiveOrHasTheWeightsOfItsColumns) {
   const Unit& unit = *find_unit("tformat");
   Options options;
@@ -64,7 +65,7 @@ TEST(CheckCodeTest, ExclusiveOrHasTheWeightsOfItsColumns) {
   EXPECT_EQ(code->bits(), 88u);
   const std::vector<double> words = code->weights(4);
   EXPECT_EQ(words, (std::vector<double>{1, 0, 8 * 55, 0, 8 * 330 + 28 * 55 * 55}));
-  // An error is missed if each column contains an even number of wrong bits.
+  // An XOR checksum misses an error if each of the 8 bit numbers (columns) has an even number of wrong bits.
   const double even = (1 + std::pow(1 - 2 * 0.02, 11)) / 2;
   EXPECT_NEAR(code->unseen(0.02), std::pow(even, 8) - std::pow(0.98, 88), 1e-12);
 }

@@ -12,7 +12,8 @@ namespace absenc::client {
 
 namespace {
 
-constexpr unsigned most_check_bits = 16;  // greatest width of a check: its dual code has 2^bits words
+// greatest width of a checksum, in bits: all 2^width words of its dual code are computed
+constexpr unsigned most_check_bits = 16;
 
 struct ReadingSink final : FieldSink {
   void put(const FieldValue&) override {}
@@ -75,7 +76,8 @@ std::optional<CheckCode> CheckCode::learn(const Unit& unit, const Options& optio
   return code;
 }
 
-// Searches check bits from the end, where most checks are; other independent bits would do too.
+// Searches the check bits from the end of the frame, where most checksums are. Other linearly independent bits would do
+// too.
 bool CheckCode::find_check(AlteredReply& asked) {
   bool complete = false;
   bool before = false;
@@ -99,13 +101,14 @@ bool CheckCode::find_check(AlteredReply& asked) {
   return true;
 }
 
-// Returns the check bits that compensate an error of `bit`; nothing if none do.
+// Returns the check bits that must be flipped together with the bit number `bit` to make the reply good again; nothing
+// if there are none.
 std::optional<std::uint32_t> CheckCode::syndrome_of(AlteredReply& asked, std::size_t bit) const {
   asked.restore();
   asked.flip(bit);
   std::uint32_t pattern = 0;
   if (asked.passes()) return pattern;
-  // In the order of the Gray code one bit changes at a time.
+  // In Gray code order, consecutive patterns of check bits differ in one bit, so each step flips only one.
   for (std::uint32_t i = 1; i < std::uint32_t{1} << check_.size(); ++i) {
     const auto changed = static_cast<unsigned>(std::countr_zero(i));
     asked.flip(check_[changed]);
@@ -115,7 +118,7 @@ std::optional<std::uint32_t> CheckCode::syndrome_of(AlteredReply& asked, std::si
   return {};
 }
 
-// Returns whether 1000 random errors of random replies agree with the syndromes.
+// Returns whether the decoder judges 1000 random errors of random replies as the syndromes predict.
 bool CheckCode::is_linear(const Unit& unit, const Options& options, std::span<const GoodReply> replies) const {
   sim::Random random(1);
   for (unsigned i = 0; i < 1000; ++i) {
@@ -156,7 +159,7 @@ std::vector<double> CheckCode::weights(unsigned most) const {
   std::vector<double> words(most + 1);
   for (std::size_t weight = 0; weight < dual.size(); ++weight) {
     if (dual[weight] == 0) continue;
-    // Computes the Krawtchouk polynomials of this weight, each from the two polynomials before it.
+    // Computes the Krawtchouk polynomials at this weight of dual code words, each from the two polynomials before it.
     double before = 0;
     double now = 1;
     for (unsigned k = 0; k <= most; ++k) {
@@ -186,7 +189,8 @@ bool CheckCode::is_check(std::size_t bit) const {
   return std::has_single_bit(syndrome) && check_[static_cast<unsigned>(std::countr_zero(syndrome))] == bit;
 }
 
-// Importance sampling: an error that the checksum detects is not worth drawing.
+// Estimates by importance sampling: draws only errors that the checksum does not detect, because no other can be
+// accepted.
 Estimated CheckCode::taken(const Unit& unit, const Options& options, std::span<const GoodReply> replies,
                            double bit_errors, unsigned samples) const {
   sim::Random random(2);

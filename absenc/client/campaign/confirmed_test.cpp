@@ -76,7 +76,7 @@ TEST_P(Confirmed, IsWrongLessOftenWithALowerLimit) {
 
 INSTANTIATE_TEST_SUITE_P(Models, Confirmed, ::testing::ValuesIn(encoders()), name_of);
 
-// The words have no check: only the distance to the word before shows damage.
+// The words of SSI have no checksum: only a position that is too far from the one before shows damage.
 TEST(ConfirmedWords, WithoutACheckOnlyTheLimitTells) {
   CampaignChoices choices{.faults = {"corrupt=0.1"}, .exchanges = 20'000};
   choices.rpm = 0;

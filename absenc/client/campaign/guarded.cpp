@@ -36,9 +36,11 @@ class MeasuredShaft final : public Shaft {
     return {.position = position, .speed_millirpm = seconds > 0 ? static_cast<std::int32_t>(60'000 * speed_) : 0};
   }
 
-  /// Returns whether the shaft had the position near the reading's latch time, as far as stored.
+  /// Returns whether a stored measurement of the shaft, within 2 ms of the reading's latch time, has the reading's
+  /// position.
   [[nodiscard]] bool was_at(const Reading& reading) const { return find(reading) != nullptr; }
-  /// Returns the position of the shaft that belongs to the reading, also to a wrong one.
+  /// Returns the position that the shaft had when the reading was taken, also if the position of the reading is another
+  /// one.
   [[nodiscard]] std::int64_t place_of(const Reading& reading) const {
     const ShaftSample* found = find(reading);
     for (std::size_t i = 0; found == nullptr && i < count(); ++i) {
@@ -59,7 +61,7 @@ class MeasuredShaft final : public Shaft {
   }
   [[nodiscard]] std::size_t count() const { return std::min(count_, samples_.size()); }
   [[nodiscard]] const ShaftSample* find(const Reading& reading) const {
-    // uncertainty of the time of measurement: an encoder may measure more often than it is polled
+    // tolerance of the time of a measurement: an encoder may measure more often than it is polled
     constexpr Time vague = 2ms;
     for (std::size_t i = 0; i < count(); ++i) {
       const bool then = last(i).at >= reading.latched - vague && last(i).at <= reading.latched + vague;
@@ -74,7 +76,7 @@ class MeasuredShaft final : public Shaft {
   mutable std::size_t count_ = 0;
 };
 
-/// Computes how many wrong positions are confirmed.
+/// Computes how many wrong positions the host confirms by mistake.
 class LetThrough {
  public:
   LetThrough(const Resolution& resolution, const host::SpeedLimit& limit, unsigned bits)
@@ -83,14 +85,16 @@ class LetThrough {
   void add_position() { ++positions_; }
   /// Adds a wrong position, by its distance in counts from the true position.
   void add_wrong(std::int64_t away) { away_.push_back(away); }
-  /// Adds a comparison: the shaft moved `moved` counts, in the comparison before `before` counts.
+  /// Adds a comparison of two consecutive readings: the shaft moved `moved` counts between them, and `before` counts in
+  /// the comparison before.
   void add_comparison(Time between, std::int64_t moved, std::int64_t before) {
     comparisons_.push_back({between, moved, before});
   }
 
   [[nodiscard]] Share wrong() const { return {away_.size(), positions_}; }
 
-  /// Returns the expected number of confirmed wrong positions, if these are wrong independently.
+  /// Returns the expected number of wrong positions that are confirmed, if readings are wrong independently of each
+  /// other.
   [[nodiscard]] double expected() const {
     if (away_.empty()) return 0;
     constexpr unsigned draws = 16;
@@ -119,7 +123,7 @@ class LetThrough {
     std::int64_t before;
   };
 
-  // Returns whether the host would accept `step` after the step `before`.
+  // Returns whether the host would accept a movement of `step` counts after a movement of `before` counts.
   [[nodiscard]] bool agrees(Time between, std::uint64_t step, std::uint64_t before) const {
     const double most = std::ldexp(15.0 / 32, static_cast<int>(bits_));
     const double reached = 4 + counts_per_second_ * std::chrono::duration<double>(between).count();

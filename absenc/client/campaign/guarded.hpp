@@ -7,8 +7,8 @@
 
 namespace absenc::client {
 
-/// Reads a shaft at `choices.rpm`, which must have a value. Counts in `result`, and returns the shares of confirmed and
-/// wrong positions.
+/// Reads an encoder whose shaft turns at `choices.rpm`, which must have a value. Adds its counts to `result`, and
+/// returns the shares of confirmed and wrong positions.
 [[nodiscard]] Guarded read_guarded(const Unit& unit, const Options& options, const Rates& rates,
                                    const CampaignChoices& choices, CampaignResult& result);
 

@@ -22,7 +22,7 @@ namespace absenc::client {
 struct Rates {
   sim::RoughRates line;
   sim::FaultRates device;
-  bool by_device = false;  // whether any fault of `device` has a rate above 0
+  bool by_device = false;  // whether any fault of the virtual encoder has a rate above 0
 
   void set(std::string_view name, double rate) {
     if (double* const own = of_line(name)) {
@@ -81,7 +81,8 @@ struct RoughBench {
     faulty.set_rates(on ? rates.device : sim::FaultRates{});
   }
 
-  /// Returns the number of requests since `before`, or else of unsolicited frames, at least 1.
+  /// Returns the number of requests since the counts `before` were taken; if there were none, the number of unsolicited
+  /// frames, but at least 1.
   [[nodiscard]] std::uint64_t exchanges_since(const sim::RoughCounts& before) const {
     const std::uint64_t asked = line.counts().requests - before.requests;
     return asked != 0 ? asked : std::max<std::uint64_t>(1, line.counts().replies - before.replies);
@@ -101,7 +102,7 @@ struct RoughBench {
     using namespace std::chrono_literals;
     if (rates.device[sim::FaultKind::request_corrupt] <= 0) return false;
     set_faults(false);
-    line.rest(line.now() + (unsolicited ? 11s : 20s));  // after this wait no late reply is outstanding
+    line.rest(line.now() + (unsolicited ? 11s : 20s));  // after a wait of this length no late reply is outstanding
     line.drop();
     const Conversation<Item>* now = session.run(read);
     const bool changed = now->error() != Error::none || (now->reading() != nullptr && !is_right(*now->reading()));
@@ -110,7 +111,8 @@ struct RoughBench {
     return changed;
   }
 
-  // Lets a random time of at most 10 s pass: a line that delays a reply also delays later ones.
+  // Lets a random time of at most 10 s pass, because without pauses a delayed reply would also delay the replies behind
+  // it.
   void pause() {
     const double decades = (unsolicited ? 4 : 6) * static_cast<double>(random.next() >> 11) * 0x1p-53;
     line.rest(line.now() + Time(static_cast<std::int64_t>(1e4 * std::pow(10.0, decades))));

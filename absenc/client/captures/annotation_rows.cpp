@@ -11,7 +11,7 @@ namespace {
 
 using capture::Annotation;
 
-/// Indexes of the columns before those of the unit's fields, and of the first of these.
+/// Indexes of the columns that every unit has, and of the first column of the unit's own fields.
 enum At : std::size_t { at_begin, at_end, at_kind, at_request, at_reply, at_turnaround, at_position, first_field };
 
 std::vector<Column> columns_of(const Unit& unit, const Options& options, bool has_time) {
@@ -69,7 +69,8 @@ void AnnotationRows::fill(const Annotation& annotation, const Options& options, 
                                                 : degrees(reading.singleturn, reading.singleturn_bits);
 }
 
-// Returns the field's index in the unit's list, by identity or name; the list's length if none.
+// Returns the index of the field, or of one with the same name, in the unit's list of fields; the list's length if
+// there is none.
 std::size_t AnnotationRows::place_of(const FieldInfo& info) const {
   const std::span<const FieldInfo> fields = unit_.fields;
   std::size_t place = 0;

@@ -127,7 +127,7 @@ WireChannels find_wires(LinkKind link, std::span<const std::string> channels, st
         if (!found.wires[wire] && is_called(wires[wire], channels[i])) found.wires[wire] = i;
       }
     }
-    // Channels without names of wires may be in the order of the wires.
+    // If no channel has the name of a wire, the channels are assumed to be in the order of the wires.
     const bool any =
         std::any_of(found.wires.begin(), found.wires.end(), [](const auto& one) { return one.has_value(); });
     if (!any && !host_clocks(link) && channels.size() <= wires.size()) {

@@ -19,7 +19,9 @@ namespace absenc::client {
 /// The channel of each wire, in the order of `wires_of`; nothing if the wire has none.
 struct WireChannels {
   std::vector<std::optional<unsigned>> wires;
-  bool assumed = false;  // full duplex: whether a --channel value names no wire, or channels were assigned in order
+  // whether the channels of a full-duplex line were assigned without names of wires, so that host and encoder may be
+  // swapped
+  bool assumed = false;
 };
 
 /// Assigns channels to wires by --channel ("D0", "clock=D0"), or without it by names or order. Throws UsageError.

@@ -55,18 +55,21 @@ class Wires {
 
 // ---- BiSS
 
-// Example of TI's table: the host reads register 44 of slave 0; the slave replies 0A.
+// Example from TI's table of BiSS register access: the host reads register 44 of slave 0, which replies 0A.
 constexpr std::string_view read_44 = "0000000000000011000100010011011010000000000000000";
 constexpr std::string_view read_44_answer = "0000000000000001000000000000000101000010100010000";
 
 struct Master {
   std::int64_t period;
   std::int64_t timeout;
-  std::int64_t falls = 0;  // time from the last rising edge to the falling edge that sends CDM 1; 0: half a period
-  // with CDM 1: whether MA rises when the timeout has elapsed; otherwise MA is held low until the next frame
+  // time from the last rising edge to the falling edge by which the host sends the control bit CDM as 1; 0: half a
+  // period
+  std::int64_t falls = 0;
+  // after a control bit CDM of 1: whether the clock MA rises when the timeout has elapsed; otherwise MA stays low until
+  // the next frame
   bool releases = false;
-  int clocks = 0;          // number of clocks beyond the bits of `biss_frame`; -1: one less
-  std::int64_t pause = 0;  // time after the timeout before the next frame; after a release at least `timeout`
+  int clocks = 0;          // number of clocks more than `biss_frame` has bits; -1: one clock fewer
+  std::int64_t pause = 0;  // time from the end of the timeout to the next frame; at least `timeout` if MA was released
 };
 
 constexpr int biss_bits = 32;  // number of bits that `biss_frame` returns
@@ -190,7 +193,7 @@ TEST_F(ClockedLines, AControlBitMayComeLateInTheTimeout) {
     for (const std::int64_t timeout : {3 * period / 2, std::int64_t{20'000}, std::int64_t{40'000}}) {
       for (const std::int64_t falls : {5 * timeout / 10, 6 * timeout / 10}) {
         for (const bool releases : {false, true}) {
-          // skips a time so short that the falling edge would count as one more clock
+          // skips a falling edge of the bit CDM so early that it would count as one more clock
           if (falls < 6 * period / 10) continue;
           SCOPED_TRACE(std::to_string(khz) + " kHz, timeout " + std::to_string(timeout) + " ns, CDM behind " +
                        std::to_string(falls) + " ns, " + (releases ? "released" : "held"));
@@ -207,7 +210,7 @@ TEST_F(ClockedLines, AControlBitMayComeLateInTheTimeout) {
   }
 }
 
-// The clock rests nearly as long in words as between them; only the data line shows the ends.
+// The clock rests nearly as long within words as between them, so only the data line shows where words end.
 TEST_F(ClockedLines, ATimeoutThatIsOverEndsAWordWhoseClockRestsAsLong) {
   constexpr std::int64_t timeout = 12'500;
   const std::string frame = biss_frame(17, false);
@@ -248,7 +251,7 @@ TEST_F(ClockedLines, AControlFrameThatTheFileCutsIsCut) {
 
 constexpr unsigned ssi_bits = 13;
 
-// Draws words with different positions; with more than 14 clocks the same word follows again.
+// Draws words with different positions; if a word has more than 14 clocks, the same word follows again.
 void draw_ssi(Wires& wires, std::int64_t period, std::int64_t monoflop, std::int64_t pause, std::size_t clocks,
               unsigned words) {
   for (unsigned word = 0; word < words; ++word) {
@@ -290,7 +293,7 @@ TEST_F(ClockedLines, SsiOfAnyClockMonoflopAndNumberOfClocks) {
   EXPECT_GT(cells, 300u);
 }
 
-// Both copies belong to one word: the monoflop time elapses only after the second.
+// A word and its repetition belong together, because the monoflop time elapses only after the repetition.
 TEST_F(ClockedLines, AMonoflopThatIsOverEndsAWord) {
   Wires wires;
   for (unsigned word = 0; word < 12; ++word) {

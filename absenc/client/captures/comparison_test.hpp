@@ -43,7 +43,8 @@ class Comparison {
  public:
   Comparison(const Unit& unit, const LineSettings& line, bool faulty, const std::vector<Said>& rows)
       : unit_(unit), rows_(rows), faulty_(faulty) {
-    // A live CAN receiver waits until the bus is idle, so its times may be later by that wait.
+    // A live CAN receiver waits until the bus is idle, so its times may be later than those of the capture by that
+    // wait.
     tolerance_ = unit.link == LinkKind::can ? line.bits(160) : 2 * line.character();
   }
 
@@ -71,13 +72,15 @@ class Comparison {
     if (told) return {};
     const bool any =
         std::any_of(within_.begin(), within_.end(), [](const Said* row) { return row->error != Error::none; });
-    // A host that repeats a request may reject a reply, which may belong to the request before.
+    // A host that has repeated a request may reject a reply that can belong to the earlier request, although the
+    // capture shows the reply as good.
     return (any || faulty_) && live.exchanges != 1 ? "" : "no row has the error";
   }
 
   std::string compare_good(const Said& live) const {
     for (const Said* row : within_) {
-      // A search or wake-up command may send requests to an encoder that does not reply.
+      // A search or wake-up command may send requests to which no encoder replies; the rows of these requests have an
+      // error.
       const bool silent = row->error == Error::timeout || row->error == Error::line_stuck;
       const bool is_silence = silent && live.exchanges > 1;
       if (row->error != Error::none && !is_silence && !faulty_ && !live.is_special) return "a row has an error";
@@ -139,13 +142,15 @@ class Comparison {
       }
     }
     const Reading& known = *live.reading;
-    // A unit-specific command may omit turns that the reply carries: a safe position has none.
+    // A command that only this unit has may leave out turns that its reply carries; for example, a safe position is
+    // reported without turns.
     if (live.is_special && known.multiturn_bits == 0) {
       all.multiturn = known.multiturn;
       all.multiturn_bits = known.multiturn_bits;
       all.multiturn_valid = known.multiturn_valid;
     }
-    // A capture uses alarms from earlier conversations; a host that reads once has none.
+    // Rows of a capture also contain alarms that earlier conversations reported; a host that reads once does not know
+    // these.
     all.alarms &= known.alarms_reported;
     all.alarms_reported &= known.alarms_reported;
     all.status &= known.status_reported;

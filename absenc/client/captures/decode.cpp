@@ -66,7 +66,7 @@ struct Decoded::Parts {
     } catch (...) {
       const std::exception_ptr failure = std::current_exception();
       try {
-        if (filled > 0) hand_over();  // the rows before the failure
+        if (filled > 0) hand_over();  // passes on the rows that were decoded before the failure
       } catch (const Stopped&) {
       }
       const std::lock_guard lock(mutex);
@@ -132,7 +132,7 @@ struct Decoded::Parts {
   Batch taken;
   std::size_t at = 0;
 
-  std::mutex mutex;  // guards the following members except `changed` and `thread`
+  std::mutex mutex;  // the mutex guards the following members except `changed` and `thread`
   std::condition_variable changed;
   std::deque<Batch> ready;
   std::vector<Batch> used;  // batches that the caller has read, to be filled again

@@ -55,7 +55,7 @@ TEST(ClientDecode, RowsHaveTypedColumns) {
 TEST(ClientIdentify, SaysHowToOpenWhatItFound) {
   const Emulation emulation = emulate("tformat?motion=rpm=60");
   Identified all;
-  // A request without a reply takes several latencies, so the shortest is tried first.
+  // The host waits several latencies for each unanswered request, so the shortest latency is tried first.
   for (const char* const latency : {"20", "200", "1000"}) {
     all = identify(emulation.path() + "?latency=" + latency, {.limit = std::chrono::minutes(5)});
     if (!all.found.empty() && all.found[0].sure) break;

@@ -122,7 +122,7 @@ CheckFindings find_crc(std::span<const CheckedFrame> frames) {
 
 namespace {
 
-// Returns `crc` with `xorout` and the initial value that then fits frames of `covered` bits.
+// Returns `crc` with another `xorout`, and with the initial value with which it still fits frames of `covered` bits.
 CrcParameters with_xorout(CrcParameters crc, std::uint32_t xorout, std::size_t covered) {
   std::uint32_t change = crc.xorout ^ xorout;
   for (std::size_t i = 0; i < covered; ++i) {

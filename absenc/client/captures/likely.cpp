@@ -56,7 +56,7 @@ struct GoodReplies final : capture::AnnotationSink {
   std::vector<std::pair<std::vector<std::uint8_t>, std::vector<std::uint8_t>>> frames;
 };
 
-/// For each option, the values that the evidence is about, possible or not.
+/// Collects, for each option, the values for or against which the frames give evidence.
 struct Possible final : EvidenceSink {
   void put(const OptionEvidence& evidence) override { values.insert({evidence.option, evidence.value}); }
   [[nodiscard]] bool is_open(std::size_t option, std::int64_t value) const {
@@ -100,7 +100,8 @@ CaptureRun::Speed CaptureRun::likely_speed(const Lines& lines) const {
   return best;
 }
 
-// A clock may also pause within words: between the bytes of a host that sends eight bits each.
+// Selects the pause that ends a word. A clock may also pause within words, as between the bytes of a host that sends
+// eight bits at a time.
 std::size_t CaptureRun::likely_pause(std::span<const capture::PauseReading> readings,
                                      std::vector<std::string>& notes) const {
   struct Words final : capture::AnnotationSink {
@@ -133,7 +134,8 @@ std::size_t CaptureRun::likely_pause(std::span<const capture::PauseReading> read
     annotator.finish();
     is_proved = is_proved || words.is_proved;
     if (words.bad == 0 && words.good > 1) faultless.push_back(i);
-    // The number of bad frames does not decide: a longer pause merges a silent word into the next.
+    // Compares good frames only: a longer pause may give fewer bad frames just because it joins a silent word to the
+    // next one.
     if (i > 0 && words.good <= most) continue;
     best = i;
     most = words.good;
@@ -141,7 +143,7 @@ std::size_t CaptureRun::likely_pause(std::span<const capture::PauseReading> read
   const auto differs = [&](std::size_t i) { return readings[i].bursts.size() != readings[best].bursts.size(); };
   const auto other = std::find_if(faultless.begin(), faultless.end(), differs);
   if (other == faultless.end() || is_proved) return best;
-  // After a pause without the end of a timeout the encoder would continue the old word.
+  // Prefers a pause after which the encoder was seen to time out: without a timeout it would continue the old word.
   const auto shown =
       std::find_if(faultless.begin(), faultless.end(), [&](std::size_t i) { return readings[i].timed_out; });
   if (shown != faultless.end()) return *shown;

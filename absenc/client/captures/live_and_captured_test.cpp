@@ -71,7 +71,7 @@ std::vector<Said> decode(const Stage& stage, const std::string& path) {
   return std::move(captured.rows);
 }
 
-/// The address of a virtual encoder, and whether it differs only in a detail from another one.
+/// The address of a virtual encoder, and whether it differs from another tested address only in a detail.
 struct Encoder {
   std::string address;
   bool is_detail = false;
@@ -119,10 +119,12 @@ std::vector<Encoder> encoders_of(const Unit& unit) {
 
 constexpr std::uintmax_t long_file = 300'000;  // size in bytes above which a capture is long
 
-/// The commands of one capture: those that change nothing, except scans, or one that changes the encoder.
+/// The commands of one capture: either all commands that change nothing, except scans, or one command that changes the
+/// encoder.
 struct Together {
   std::vector<const Command*> commands;
-  // whether the capture of a changing command is long, so that it is not repeated for details
+  // whether the capture of a command that changes the encoder is long: then it is not repeated for encoders that differ
+  // only in a detail
   bool is_long = false;
 };
 

@@ -42,7 +42,7 @@ class PositionTrace {
   [[nodiscard]] std::uint64_t count() const { return count_; }
   /// Returns a small plot with its scale; "" if no position was valid.
   [[nodiscard]] std::string plot() const;
-  /// Return the tick of the first and of the last valid position that was added.
+  /// Return the tick (the time in the capture) of the first and of the last valid position that was added.
   [[nodiscard]] std::uint64_t first() const { return first_; }
   [[nodiscard]] std::uint64_t last() const { return last_; }
 
@@ -54,19 +54,21 @@ class PositionTrace {
   };
 
   void halve();
-  // Returns the offset by which negative turns sort before positive ones, or 0.
+  // Returns the offset that makes positions with negative turns sort before those with positive turns; 0 if none is
+  // needed.
   [[nodiscard]] std::uint64_t offset() const { return turns_ && signed_ ? std::uint64_t{1} << 63 : 0; }
   [[nodiscard]] double value(std::uint64_t counts) const;
   [[nodiscard]] std::string_view unit() const;
 
   std::array<Extent, columns> columns_{};
-  unsigned shift_ = 0;  // each column covers 2^shift_ ticks
+  unsigned shift_ = 0;  // each column of the plot covers 2^shift_ ticks
   std::uint64_t first_ = 0;
   std::uint64_t last_ = 0;
   std::uint64_t count_ = 0;
   unsigned bits_ = 1;
   bool signed_ = false;
-  bool turns_ = false;  // whether the first valid position had turns, with at most 64 bits in all; see `add`
+  // whether the first valid position had turns, and turns and position together had at most 64 bits
+  bool turns_ = false;
   double unit_um_ = 0;
 };
 

@@ -45,7 +45,7 @@ TEST(PositionTrace, TurnsBelowZeroAreBelowThoseAbove) {
   EXPECT_NE(line_of(plot, 9).find("-4.000 turns |*"), std::string::npos) << plot;
 }
 
-// Checks that a plot covers its whole capture of more than 10^12 ticks.
+// Checks that a plot shows the whole capture if the capture has more than 10^12 ticks.
 TEST(PositionTrace, ARampFillsTheDiagonal) {
   PositionTrace trace;
   for (std::uint64_t i = 0; i < 4096; ++i) trace.add(1000 + i * 1'000'000'000, position(i));
@@ -63,7 +63,7 @@ TEST(PositionTrace, ARampFillsTheDiagonal) {
 TEST(PositionTrace, TurnsGoOn) {
   PositionTrace trace;
   for (std::uint64_t i = 0; i < 200; ++i) trace.add(i, position(i % 2 * 2048, i / 2, true));
-  trace.add(200, position(4095));  // a position without turns must not count
+  trace.add(200, position(4095));  // a position without turns must be left out
   EXPECT_EQ(trace.count(), 200u);
   EXPECT_NE(line_of(trace.plot(), 0).find("99.50 turns"), std::string::npos) << trace.plot();
 }

@@ -19,8 +19,8 @@ struct Probed {
   std::vector<std::string> settled{};      // options that later commands need, as "name=value"; may be empty
 };
 
-/// Judges captured frames in the text form that `absenc decode` reads, "" for a missing one. `requests` are as many as
-/// `replies`, or none. Throws UsageError.
+/// Judges captured frames, given in the text form that `absenc decode` reads; "" stands for a missing frame. `requests`
+/// must be as many as `replies`, or none. Throws UsageError.
 [[nodiscard]] Probed probe(std::string_view protocol, std::string_view model, std::span<const std::string> settings,
                            std::span<const std::string> replies, std::span<const std::string> requests);
 

@@ -22,7 +22,8 @@ inline constexpr std::uint64_t arrival_ticks_per_second = 1'000'000;
 
 struct ReceivedCharacters {
   std::vector<capture::Character> characters{};  // characters with times in arrival ticks
-  capture::Tick gap = 1;  // shortest pause that must come from the line, see Annotator::Settings::gap
+  // shortest pause that is taken for one of the line, not for a delay of this computer (Annotator::Settings::gap)
+  capture::Tick gap = 1;
 };
 
 class ReceivedReader final : public capture::ParsedReader {

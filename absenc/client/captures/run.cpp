@@ -71,7 +71,8 @@ void require_link(const Unit& unit, Content content) {
   if (content == Content::bytes && !uart) refuse(unit, "bytes", "record the levels of its wires, or CAN frames");
 }
 
-// A damage is reported as the problem, whatever else is missing.
+// Returns why nothing was decoded: the first damage of the capture or, without damage, the problem that the decoder
+// reported.
 std::string why_nothing(const CaptureOutcome& outcome, const TickClock& clock) {
   for (const capture::Damage& damage : outcome.damages) {
     if (!damage.note) return to_text(damage, clock);
@@ -79,7 +80,7 @@ std::string why_nothing(const CaptureOutcome& outcome, const TickClock& clock) {
   return outcome.problem;
 }
 
-// Decodes a bus for capture::BlockRun. Frames depend on those before, so `guess` does nothing.
+// Decodes a CAN bus for capture::BlockRun. Each frame depends on the frames before it, so `guess` does nothing.
 struct BusDecoding {
   struct Guess {};
 
@@ -123,7 +124,7 @@ std::unique_ptr<capture::Reader> open_capture(const CaptureChoices& choices) {
   try {
     if (choices.path != "-") return capture::open_capture(choices.path, how);
     auto source = std::make_unique<StdinSource>();
-    // Some binary formats are read from the end of the file, which is not known here.
+    // Refuses binary formats, because some of them are read from their end, and the end of standard input is not known.
     std::array<std::uint8_t, 64> head{};
     const std::size_t size = source->read(0, head);
     if (how.channels != 0 || std::count(head.begin(), head.begin() + static_cast<std::ptrdiff_t>(size), 0) != 0) {
@@ -261,7 +262,7 @@ CaptureOutcome CaptureRun::run_bytes(capture::AnnotationSink& sink, const std::f
   if (settings.channel_count == 2) settings.channels = {Carries::requests, Carries::replies};
   settings.gap = reader_->layout().arrival_gap;
   settings.by_arrival = settings.gap != 0;
-  // A log by arrival times may begin inside a frame; other captures of bytes hardly do.
+  // A capture that has only arrival times may begin inside a frame; other captures of bytes hardly do.
   settings.begins_silent = !settings.by_arrival;
   CaptureOutcome outcome;
   std::unique_ptr<capture::Annotator> annotator;

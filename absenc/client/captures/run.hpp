@@ -35,7 +35,7 @@ struct CaptureOutcome {
   capture::Tick end = 0;             // tick at which the decoded part of the capture ends
   std::vector<double> baud;          // measured baud rate of each asynchronous line; 0: not known
   std::vector<std::string> carries;  // "D0 is the host's", for both channels whose senders were found
-  std::vector<std::string> notes;    // sentences about other results, such as detected properties
+  std::vector<std::string> notes;    // sentences about the capture, such as properties that were detected
   std::vector<capture::Damage> damages;
 };
 

@@ -29,7 +29,7 @@ class SequenceWatch final : public capture::AnnotationSink {
   }
 
  private:
-  // frames after which an equal counter may be right: a counter of 7 bits may have wrapped
+  // number of frames after which an equal counter is no error, because a counter of 7 bits may have wrapped
   static constexpr std::uint64_t most_between = 100;
   static constexpr std::int64_t life_counter_end = 64;
 
@@ -60,7 +60,7 @@ class SequenceWatch final : public capture::AnnotationSink {
   }
 
   capture::AnnotationSink& sink_;
-  // Last counter values, by the encoder's address; those of life counters also by their field.
+  // Last counter values, by the encoder's address; those of life counters also by the field that holds the counter.
   std::map<std::pair<std::int64_t, const FieldInfo*>, LastCounter> last_;
   std::uint64_t count_ = 0;
   std::uint64_t damaged_at_ = 0;

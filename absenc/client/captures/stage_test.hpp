@@ -76,7 +76,7 @@ class Stage {
 
   [[nodiscard]] LineSettings line() const { return address.line.with_some_rate(); }
 
-  /// Runs the commands one after the other; `live` receives the results that a capture can show.
+  /// Runs the commands one after the other, and adds to `live` the results that a capture can also show.
   void run(const std::vector<const Command*>& commands) {
     if (device_.bytes() != nullptr) {
       run_on(*device_.bytes(), commands);
@@ -160,7 +160,7 @@ class Stage {
       said.is_verdict = has_bytes && address.unit->check(address.options, {.bytes = last.sent},
                                                          {.bytes = last.received}) == Error::none;
     }
-    // `not_still` is always a verdict: it compares two good replies.
+    // The error `not_still` compares two good replies, so it is always a verdict over several replies.
     said.is_verdict = said.is_verdict || said.error == Error::not_still;
     // After a change of the rate a capture cannot be decoded, except on clocked lines.
     const bool can_follow = !port.moved || address.unit->link == LinkKind::clocked;

@@ -27,7 +27,8 @@ std::size_t StdinSource::read(std::uint64_t offset, std::span<std::uint8_t> into
   return done;
 }
 
-// Reads until `until` bytes have been read in total; returns false at the end. Throws Failure.
+// Reads until `until` bytes of the input have been read in total; returns false if the input ends before that. Throws
+// Failure.
 bool StdinSource::pull(std::uint64_t until) {
   while (!ended_ && end_ < until) {
     const std::size_t place = static_cast<std::size_t>(end_ % capacity);

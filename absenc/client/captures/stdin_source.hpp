@@ -17,7 +17,8 @@ class StdinSource final : public capture::Source {
 
   /// Returns the greatest number as the size, because the size of standard input is unknown.
   [[nodiscard]] std::uint64_t size() const override { return UINT64_MAX; }
-  /// Waits for the bytes, copies them and returns their number, fewer if some are not available. Throws Failure.
+  /// Waits until the wanted bytes have been read, copies them and returns their number. Returns fewer if the input ends
+  /// before them, or if they are no longer stored. Throws Failure.
   [[nodiscard]] std::size_t read(std::uint64_t offset, std::span<std::uint8_t> into) override;
 
  private:

@@ -38,7 +38,7 @@ class TickClock {
 
 [[nodiscard]] bool has_fields(const capture::Annotation& annotation);
 
-/// Returns a message about the annotation; "" if there is none.
+/// Returns a sentence about the error or remark of the annotation; "" if it has neither.
 [[nodiscard]] std::string message_of(const Unit& unit, const Options& options, const capture::Annotation& annotation);
 
 }  // namespace absenc::client

@@ -15,7 +15,8 @@
 
 namespace absenc::client {
 
-/// Parses the address; selects an option with which the encoder is polled, if there is one.
+/// Parses the address. If the encoder sends unsolicited frames, selects an option with which it is polled, if there is
+/// one.
 inline EncoderAddress polled_address(const std::string& text) {
   const EncoderAddress usual = parse_address(text);
   const Unit& unit = *usual.unit;
@@ -52,7 +53,8 @@ inline std::vector<EncoderAddress> variations_of(const Unit& unit) {
   }
   return all;
 }
-/// Returns the unit's identifier and its first option that is not the default, if any.
+/// Returns a name for the options of the address: the unit's identifier and the first option that differs from its
+/// default, if any.
 inline std::string variation_name(const EncoderAddress& address) {
   const EncoderAddress usual = parse_address(fmt::format("sim:{}", address.unit->id));
   for (std::size_t i = 0; i < address.unit->options.size(); ++i) {

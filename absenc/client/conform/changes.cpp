@@ -21,11 +21,11 @@ namespace absenc::client {
 
 namespace {
 
-// longer than an encoder is busy after a byte write, including its reply
+// wait that is longer than an encoder is busy after the write of a byte, including the time of its reply
 constexpr Time settling = std::chrono::milliseconds(50);
-constexpr unsigned tries = 3;        // attempts to restore one value
+constexpr unsigned tries = 3;        // number of attempts to restore one value
 constexpr std::uint32_t beside = 4;  // number of bytes before the written byte that must stay unchanged
-// positions are equal if at most this fraction of a turn, 1/512, is between them
+// two positions count as equal if they differ by at most this fraction of a turn, 1/512
 constexpr unsigned position_tolerance = 512;
 
 /// Thrown when a command fails or a value is missing or wrong, so that the clause is broken.
@@ -108,7 +108,7 @@ void ChangeTester::test_one(const Clause& clause, ClauseResult& result) {
 // ---- Clauses about the memory
 
 void ChangeTester::test_byte(const Clause& clause, ClauseResult& result) {
-  // saves the clause's setting, because reading the memory changes it
+  // saves the setting that the clause is about, because reading the memory changes it
   if (!clause.setting.empty()) save_setting(clause);
   const std::int64_t written = save_byte(clause.page, clause.address) ^ 0xFF;
   const Saved& byte = saved_.back();
@@ -135,12 +135,12 @@ void ChangeTester::test_bytes_beside(const Clause& clause, ClauseResult& result)
   std::string seen = fmt::format("{} of {} others are as before, when 0x{:02X} was written and 0x{:02X} is read", same,
                                  others.size(), written, now);
   if (same != std::ssize(others)) return conclude(result, false, std::move(seen));
-  // Unchanged neighbours prove nothing if the byte itself was not written.
+  // Unchanged neighbouring bytes prove nothing if the byte itself was not written.
   result.evidence = seen;
   if (now == written) conclude(result, true, std::move(seen));
 }
 
-// Sends single requests: commands would wait until the memory is no longer busy.
+// Sends single requests instead of commands, because a command would wait until the memory is no longer busy.
 void ChangeTester::test_busy(const Clause& clause, ClauseResult& result) {
   const std::int64_t written = save_byte(clause.page, clause.address) ^ 0xFF;
   const Command& reader = *find_command(unit_, Verb::memory_read);
@@ -159,20 +159,20 @@ void ChangeTester::test_busy(const Clause& clause, ClauseResult& result) {
   const std::optional<BusyReply> reply = busy_reply(asked);
   result.evidence = "the byte could not be written: " + seen;
   if (!accepted || accepted->busy || now != written) return;
-  // A memory that is ready is no violation, because the document states no shortest busy time.
+  // A memory that is ready again at once is no violation, because the document states no shortest busy time.
   result.evidence = "it was not busy any more: " + seen;
   if (reply && !reply->busy && reply->value == written) return;
   conclude(result, reply && reply->busy, std::move(seen));
 }
 
-// Saves byte 0 of page 0: reading it in `put_back` selects page 0, as after power-on.
+// Saves byte 0 of page 0: `put_back` reads it at the end of the test, which selects page 0, as after power-on.
 void ChangeTester::test_closed(const Clause& clause, ClauseResult& result) {
   save({.look = [this] { return read_byte(0, 0); }, .write = [](std::int64_t) {}});
   static_cast<void>(read_byte(clause.page, clause.address));
   const SingleExchange sent = line_.send(request_of_ask(unit_, line_.options(), clause.ask));
   const bool as_demanded = reply_error(unit_, line_.options(), clause.as, {sent.request, sent.reply}) == Error::none;
   const std::string seen = exchange_text(unit_.link, sent.request.frame(), sent.reply.frame());
-  // proves that the encoder still replies, and selects the page of the byte
+  // reads the byte, which proves that the encoder still replies, and selects the page of the byte
   static_cast<void>(read_byte(clause.page, clause.address));
   conclude(result, as_demanded, seen);
 }
@@ -217,7 +217,7 @@ void ChangeTester::test_direction(const Clause& clause, ClauseResult& result) {
   const auto set = [this, &setter](std::int64_t value) {
     static_cast<void>(run(setter, complete_arguments(setter, std::array{value})));
   };
-  // It is not known which value gave which direction, so both may be tried.
+  // It is not known which of the setting's two values stands for which direction, so both may be tried.
   save({.look = is_mirrored,
         .write =
             [is_mirrored, set, values = std::array{clause.other, clause.value}](std::int64_t wanted) {
@@ -239,7 +239,7 @@ void ChangeTester::test_direction(const Clause& clause, ClauseResult& result) {
 }
 
 void ChangeTester::test_pace(const Clause& clause, ClauseResult& result) {
-  // long enough for two frames at the lowest rate, one frame per second
+  // time to listen, which is long enough for two frames at the lowest rate, one frame per second
   static constexpr Time heard_for = std::chrono::milliseconds(2200);
   const Command& start = *find_command(unit_, clause.command);
   const Command& stop = *find_command(unit_, clause.stop);
@@ -384,7 +384,7 @@ bool ChangeTester::put_back(const Saved& one) {
       interrupted_ = true;
     } catch (const os::Ended&) {
       interrupted_ = true;
-    } catch (const ClauseBroken&) {  // a command failed, or a value is not as expected: tries again
+    } catch (const ClauseBroken&) {  // the loop tries again: a command failed, or a value is not as expected
     } catch (const std::exception&) {
     }
   }

@@ -67,7 +67,7 @@ struct ChangesLine {
   std::function<const Options&()> options;  // returns the options with which the encoder is reached now
 };
 
-/// Returns whether the reading's position is at most 1/512 turn away from `wanted`, in counts.
+/// Returns whether the reading's position is at most 1/512 turn away from the position `wanted`, which is in counts.
 [[nodiscard]] bool is_near(const Reading& reading, std::uint64_t wanted);
 
 class ChangeTester {
@@ -122,7 +122,7 @@ class ChangeTester {
   bool resets_;
   std::vector<Saved> saved_{};
   std::vector<std::string> restore_commands_{};
-  bool interrupted_ = false;  // an interrupt was delayed because values were being restored
+  bool interrupted_ = false;  // whether an interrupt came while values were being restored, and was delayed until then
 };
 
 }  // namespace absenc::client

@@ -70,7 +70,7 @@ class Disobedient final : public Machine<Item> {
   unsigned obeyed_times = 0;            // number of times that the encoder obeys `ignored_request` before it ignores it
   // number of the first ignored request, counted from 1; 0 together with `ignored_until` 0: none
   unsigned ignored_from = 0;
-  unsigned ignored_until = 0;  // number of the first request after the ignored ones
+  unsigned ignored_until = 0;  // number of the first request that the encoder does not ignore any more
   // number of the request whose reply has a wrong bit; 0: none
   unsigned damaged_at = 0;
   unsigned change = 0;  // number of the memory change that `spoil` corrupts, from 1; 0: none
@@ -92,7 +92,7 @@ class Disobedient final : public Machine<Item> {
   std::vector<Item> reply_;
 };
 
-/// A port that calls `end` at its wait `at`, from 1, and with `lost` then loses the line.
+/// A port that calls `end` in its wait number `at`, counted from 1; if `lost` is set, the line is lost after that.
 template <class Item>
 class EndingPort final : public Port<Item> {
  public:
@@ -125,9 +125,9 @@ struct Bench {
     port = std::make_unique<EndingPort<Item>>(*line);
   }
   [[nodiscard]] ByteList memory() const { return {device->memory().begin(), device->memory().end()}; }
-  /// Returns position and settings as text. The memory is no measure: it may count its writes.
+  /// Returns position and settings as text. The memory is left out, because an encoder may count its writes in it.
   [[nodiscard]] std::string settings() const {
-    // The test may have ended at another rate, or just after a restart of the encoder.
+    // The conformance test may have ended at another rate, or just after a restart of the encoder.
     line->begin({.kind = Step<Item>::Kind::configure, .rate = address.line.with_some_rate().rate});
     const Step<Item> rest{.at = line->now() + std::chrono::seconds(2)};
     while (line->now() < rest.at && line->wait(rest).kind != Event<Item>::Kind::timer) {
@@ -273,7 +273,8 @@ std::vector<Spoil<Item>> spoils_of(const EncoderAddress& address, const Clause& 
     for (unsigned from = 1; clause.demand >= Demand::set && from <= requests; from += step) {
       all.push_back([=](Encoder& one) {
         one.ignored_from = from;
-        one.ignored_until = from + window;  // the window is longer than the host repeats a request
+        // the encoder ignores more requests than a host sends when it repeats one request
+        one.ignored_until = from + window;
       });
     }
   }
@@ -317,9 +318,10 @@ void check_ends(const EncoderAddress& address) {
   ASSERT_EQ(original.verdict(), Verdict::kept) << original.report();
   const unsigned steps = whole.port->steps;
   const std::string settings = whole.settings();
-  // A memory that differs even after a complete test counts its writes.
+  // If the memory differs even after a complete test, the encoder counts its writes in the memory.
   const bool counts = whole.memory() != before;
-  // In tests with many steps, each tested step has only one of the three kinds of end.
+  // A test with many steps is ended at each of them in only one of the three ways: interrupt, short loss of the line,
+  // or cancellation.
   const unsigned kinds = steps < 1000 ? 3 : 1;
   const unsigned stride = 10 / test_cases(10);
   for (unsigned i = 0; i < steps * kinds; i += stride) {

@@ -50,7 +50,8 @@ void flip_and_repair(Mutant<Item>& mutant, const EncoderAddress& address, std::s
   }
 }
 
-/// Adds mutants that change one reply, all from the third on, or all from the eighth on.
+/// Adds three mutants: one changes a single reply, one all replies from the third on, one all replies from the eighth
+/// on.
 template <class Item>
 void add_reply_mutants(ReplyChanges<Item>& all, const std::function<void(Mutant<Item>&)>& change) {
   all.push_back({.change = change});
@@ -237,7 +238,7 @@ ReplyChanges<Item> mutants_of(const EncoderAddress& address, const Clause& claus
     case Demand::in_time:
       add_reply_mutants<Item>(all, [](List&, Step<Item>& step) { step.at += 15ms; });
       add_reply_mutants<Item>(all, [](List&, Step<Item>& step) { step.at += 60ms; });
-      // A host may wait for some characters longer, which are long on a slow line.
+      // A host may wait longer by the duration of some characters, so on a slow line the reply must be later, too.
       add_reply_mutants<Item>(all, [late = 60ms + 8 * address.line.with_some_rate().character()](Mutant<Item>& m) {
         m.change_reply = [late](List&, Step<Item>& step) { step.at += late; };
       });
@@ -251,7 +252,8 @@ ReplyChanges<Item> mutants_of(const EncoderAddress& address, const Clause& claus
     default:
       break;
   }
-  // Changes apply to valid requests to other encoders or without an address; on CAN to all.
+  // The changes of the mutants apply only to valid requests that address another encoder or none; on CAN, to all
+  // requests.
   if (clause.demand == Demand::foreign_silent) {
     for (const ReplyChange<Item>& change : special_request_mutants<Item>(clause)) {
       all.push_back({.change = [change = change.change, &address](Mutant<Item>& m) {

@@ -18,7 +18,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Returns whether the mutant breaks only this clause; those about commands may break together.
+// Returns whether the mutant breaks no clause except `clause`. Clauses about commands (Demand::does) may break
+// together.
 bool breaks_only(const Unit& unit, const Clause& clause, const std::vector<std::string>& broken) {
   return std::all_of(broken.begin(), broken.end(), [&](const std::string& id) {
     const auto other = std::ranges::find(clauses_of(unit), id, &Clause::id);
@@ -78,7 +79,7 @@ void check_kept(const EncoderAddress& address, std::set<std::string>& seen) {
   const Unit& unit = *address.unit;
   try {
     const Conformance good = conform_mutant<Item>(address, {}, {.readings = 3});
-    // A report that equals an earlier one needs no second check.
+    // An encoder whose report equals that of an earlier one needs no second check.
     if (!seen.insert(good.report()).second) return;
     for (const Clause& clause : clauses_of(unit)) {
       if (verdict_of(good, clause.id) != Verdict::kept) continue;
@@ -153,7 +154,7 @@ TEST(Conformance, ReplyToRepeatedRequestIsNoReaction) {
   EXPECT_EQ(result.evidence, "3 of 3 times; to 90 came nothing");
 }
 
-// A late reply answers its request: at 2400 baud its 7 characters take longer than 20 ms.
+// A late reply still counts as the answer to its request at 2400 baud, where its 7 characters take longer than 20 ms.
 TEST(Conformance, LateReplyOnSlowLineIsReceived) {
   const ReplyChange<std::uint8_t> late{.change = [](Mutant<std::uint8_t>& mutant) {
     mutant.always = true;
@@ -234,7 +235,7 @@ TEST(Conformance, TapBailsOutIfNoClauseWasJudged) {
       std::string::npos);
 }
 
-// The document's name stands before the paragraph, so it must not contain the paragraph too.
+// A report prints the name of the document before the paragraph, so the name must not contain the paragraph, too.
 TEST(Clauses, DocumentNameContainsNoParagraph) {
   for (const Unit* unit : all_units()) {
     const auto look = [&](std::string_view id, std::string_view paragraph) {

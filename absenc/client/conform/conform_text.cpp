@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Converts the results to text for people, to TAP, to JUnit XML and to JSON.
+// Converts the results of a conformance test to text for people, to TAP, to JUnit XML and to JSON.
 #include "absenc/client/conform/conform_text.hpp"
 
 #include <fmt/format.h>
@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::string_view nothing_judged = "nothing was seen that could be judged";
 
-// Returns why the result is not good apart from broken clauses; "" if there is no such reason.
+// Returns why a conformance test did not succeed, apart from broken clauses; "" if there is no such reason.
 std::string_view failure_of_all(const Conformance& one) {
   if (!one.left.empty()) return "the encoder is left changed";
   return one.verdict() == Verdict::untested ? nothing_judged : std::string_view();

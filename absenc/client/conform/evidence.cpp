@@ -35,7 +35,7 @@ void resize(ObservedFrame& frame, int by) {
   }
 }
 
-// Returns the request of a command with valid arguments, or empty, as always on clocked links.
+// Returns the request of a command with valid arguments; empty if it cannot be encoded, and always on clocked links.
 ObservedFrame request_of(const Unit& unit, const Options& options, const Command& command) {
   std::array<std::uint8_t, longest_request> bytes{};
   std::vector<std::int64_t> arguments;
@@ -51,7 +51,7 @@ ObservedFrame request_of(const Unit& unit, const Options& options, const Command
   return {.can = parse_wire_text(unit.link, "a request", text).can};
 }
 
-// Returns the requests of all commands to this encoder and, with addresses, to another one.
+// Returns the requests of all commands to this encoder and, if the unit has addresses, to another encoder.
 std::vector<ObservedFrame> other_requests(const Unit& unit, const Options& options) {
   std::vector<ObservedFrame> requests;
   const auto add = [&](const Options& with, const Command& command) {
@@ -135,8 +135,9 @@ std::size_t detected_changes(const Unit& unit, const Options& options, const Obs
     try_one(good.request, changed);
   }
   for (const ObservedFrame& request : other_requests(unit, options)) try_one(request, good.reply);
-  if (unit.link == LinkKind::clocked) return noticed;  // on a clocked link the checksum is no byte at the end
-  // A wrong checksum would hide the change, so every value of the last byte is tried.
+  // On a clocked link, the checksum is not a byte at the end of the frame, so it cannot be corrected below.
+  if (unit.link == LinkKind::clocked) return noticed;
+  // A change of a bit would be hidden by a wrong checksum, so each value of the last byte is tried as the checksum.
   ObservedFrame changed = good.reply;
   for (std::size_t bit = 0; noticed == 0 && changed.bytes.size() > 2 && bit < bits_of(good.reply) - 8; ++bit) {
     flip(changed, bit);

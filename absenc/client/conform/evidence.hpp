@@ -30,11 +30,12 @@ inline void conclude(ClauseResult& result, bool kept, std::string evidence) {
 /// Returns the reason why the clause does not apply with these options; "" if it applies.
 [[nodiscard]] std::string reason_against(const Unit& unit, const Options& options, const Clause& clause);
 
-/// Returns how many changes of a good exchange the decoder reports as one of `errors`.
+/// Returns how many changes of a good exchange make the decoder report one of `errors`.
 [[nodiscard]] std::size_t detected_changes(const Unit& unit, const Options& options,
                                            const capture::ObservedExchange& good, Errors errors);
 
-/// Returns the reply's error, as a reply to `command` or, if that is "", to its own request.
+/// Returns the error of the exchange's reply if it is taken for a reply to `command`, or, if `command` is "", for a
+/// reply to the exchange's own request.
 [[nodiscard]] Error reply_error(const Unit& unit, const Options& options, std::string_view command,
                                 const capture::ObservedExchange& exchange);
 

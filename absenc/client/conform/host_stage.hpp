@@ -28,7 +28,7 @@ void require_host(const Unit& unit, const Options& options);
 /// Serves the host until `choices` end the test, and returns the verdicts on the host.
 [[nodiscard]] Conformance judge_host(const Unit& unit, HostStage& stage, const ConformHostChoices& choices);
 
-/// Returns `counts` with those of the rule about the SPI mode, which only the device can check.
+/// Returns `counts` together with the count of the rule about the SPI mode, which only the SPI device can check.
 [[nodiscard]] inline std::vector<RuleCount> with_mode(std::vector<RuleCount> counts, const os::SpiDevice& device) {
   counts.push_back({.rule = spi_mode_rule, .looked = device.messages(), .broken = device.wrong_modes()});
   return counts;

@@ -18,14 +18,15 @@ std::uint64_t HostTrial::length() const {
   return is_polled ? requests_to_continue : 0;
 }
 
-// Returns the count, since the test began, that ends the present phase.
+// Returns the count, since the test began, of the events for which the present phase waits: suppressed replies,
+// requests, damaged replies or answered requests.
 std::uint64_t HostTrial::counted() const {
   if (phase_ == Phase::silence) return seen_.missing;
   if (phase_ == Phase::refusal) return seen_.requests.good + seen_.requests.bad;
   return phase_ == Phase::damage ? seen_.damaged : seen_.answered;
 }
 
-// Returns whether no fault, present or earlier, affects the host's requests.
+// Returns whether the host's requests are affected neither by a present fault nor by an earlier one.
 bool HostTrial::is_calm() const {
   return phase_ == Phase::good || phase_ == Phase::over ||
          (phase_ == Phase::last && counted() - phase_begin_ >= requests_to_continue);
@@ -95,7 +96,8 @@ void HostTrial::judge_requests(ClauseResult& result) const {
   conclude(result, true, std::move(evidence));
 }
 
-// Concludes `kept` only if the host sends only requests: random bytes may contain some.
+// Concludes `kept` only if the host sent nothing but valid requests, because random bytes may contain valid ones by
+// chance.
 void HostTrial::conclude_if_all_are_requests(ClauseResult& result, bool kept, std::string evidence) const {
   if (!kept || seen_.requests.bad == 0) return conclude(result, kept, std::move(evidence));
   result.evidence = fmt::format("{}, but the host also sent what is no request", evidence);

@@ -53,10 +53,12 @@ class HostTrial {
   const Unit& unit_;
   std::size_t answers_;
   Phase phase_ = Phase::good;
-  std::uint64_t phase_begin_ = 0;  // result of `counted` when the present phase began
-  std::uint64_t refused_ = 0;  // number of requests received while the fault `damaged_request` damages every request
+  // count of the events that decide how long a phase lasts, at the beginning of the present phase
+  std::uint64_t phase_begin_ = 0;
+  // number of requests that arrived while the fault `damaged_request` damaged every request
+  std::uint64_t refused_ = 0;
   TrialCounts seen_{};
-  // rule counts of the times in which no fault affects the host
+  // counts of rule checks, without those from times in which a fault affects the host
   std::vector<RuleCount> calm_{};
 };
 

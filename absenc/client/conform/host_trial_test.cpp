@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks clauses for hosts: our own host keeps them, flaws break them, strangers keep none.
+// Checks the clauses for hosts: our own host keeps them, hosts with a flaw break them, and random senders keep none.
 #include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
@@ -101,7 +101,7 @@ EncoderAddress address_of_unit(const Unit& unit, std::string_view motion) {
 }
 
 bool is_mistake_of(std::span<const std::string> broken, std::string_view clause) {
-  // A host that sends other bytes may also violate the clause "asks".
+  // A host that sends other bytes may also violate the clause "asks" (which requests a host may send).
   return std::find(broken.begin(), broken.end(), clause) != broken.end() &&
          std::all_of(broken.begin(), broken.end(), [&](const std::string& id) { return id == clause || id == "asks"; });
 }
@@ -172,7 +172,8 @@ TEST_P(HostClauses, EachClauseIsBrokenByTwoMutantsAlone) {
   const Unit& unit = *GetParam();
   std::size_t tried = 0;
   std::map<std::string_view, unsigned> found;
-  std::map<std::string_view, std::string> with_others;  // for each clause: all that the last host to break it broke
+  // for each clause: all clauses that the last host to break it has broken
+  std::map<std::string_view, std::string> with_others;
   const auto left = [&] {
     return std::ranges::any_of(host_clauses_of(unit), [&](const HostClause& one) { return found[one.id] < 2; });
   };
@@ -228,7 +229,7 @@ TEST_P(HostClauses, ScriptBreaksItsClause) {
   }
 }
 
-// A rule for which the host gave no occasion must be untested, not kept.
+// If the host did nothing to which a rule applies, the rule must be untested, not kept.
 TEST_P(HostClauses, UnobservedRuleIsUntested) {
   const EncoderAddress address = address_of_unit(*GetParam(), "still");
   const Conformance silent = judged(address, {.is_silent = true});
@@ -272,7 +273,7 @@ void check_stranger_hosts(const EncoderAddress& address) {
   for (const Unit* const other : all_units()) {
     if (other->link == LinkKind::clocked || (other->link == LinkKind::can) != std::is_same_v<Item, CanFrame>) continue;
     const std::vector<Item> request = request_of<Item>(polled_address(fmt::format("sim:{}", other->id)));
-    // Skips empty requests, and requests that both units accept.
+    // Skips empty requests, and requests of the other unit that the tested unit accepts, too.
     if (request.empty() || error_of(address, request) == Error::none) continue;
     expect_none_kept(judged_sending([&] { return request; }), other->id);
   }

@@ -57,7 +57,8 @@ class TapPort final : public Port<Item> {
   Port<Item>& port_;
 };
 
-/// A device that replies with the items of `next`, and streams them where an encoder would.
+/// A device that is no encoder: replies with the items of `next`, and sends them unsolicited if the encoder would do
+/// so.
 template <class Item>
 class Stranger final : public Machine<Item> {
  public:
@@ -167,7 +168,7 @@ ObservedFrame frame_of(const std::vector<Item>& items, std::size_t bits = 0) {
   return frame;
 }
 
-/// Counts the good frames that `tap` stored, except flat ones (`is_flat`); some may count twice.
+/// Counts the good frames that `tap` stored, without frames whose bits are all equal (`is_flat`); some may count twice.
 template <class Item>
 std::size_t good_replies(EncoderAddress address, const Clause& clause, const TapPort<Item>& tap) {
   const Unit& unit = *address.unit;
@@ -194,7 +195,8 @@ std::size_t good_replies(EncoderAddress address, const Clause& clause, const Tap
   return good;
 }
 
-/// Returns whether `tap` stored the request of the clause or, if that is unknown, several kinds.
+/// Returns whether `tap` stored the request of the clause; if that request is not known, whether it stored several
+/// different ones.
 template <class Item>
 bool was_sent(const EncoderAddress& address, const Clause& clause, const TapPort<Item>& tap) {
   const Unit& unit = *address.unit;
@@ -211,7 +213,7 @@ bool was_sent(const EncoderAddress& address, const Clause& clause, const TapPort
       return std::ranges::any_of(tap.exchanges, [&](const auto& one) { return one.request == wanted; });
     }
   }
-  // The clause has no request in bytes, as on CAN: several kinds of requests must do.
+  // The clause has no request in bytes, as on CAN, so two different requests are taken as proof.
   std::set<std::string> different;
   for (const auto& one : tap.exchanges) {
     if (!one.request.empty()) different.insert(to_wire_text(unit.link, frame_of(one.request).frame()));
@@ -304,7 +306,7 @@ void check(const Unit& unit) {
       check_strangers<Item>(address, choices);
       check_damaged_line<Item>(address, choices);
     } catch (const UsageError&) {
-      EXPECT_FALSE(usual);  // only with options other than the defaults may reading be impossible
+      EXPECT_FALSE(usual);  // reading must be possible with the default options; other options may exclude it
     }
   }
   std::printf("%s: %zu variations\n", std::string(unit.id).c_str(), variations);

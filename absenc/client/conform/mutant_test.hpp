@@ -53,11 +53,11 @@ class Mutant final : public Machine<Item> {
       Step<Item> step = device_.next(now);
       if (step.kind != Step<Item>::Kind::transfer) return step;
       reply_items.assign(step.out.begin(), step.out.end());
-      if (!driven && last_request_.empty()) ++requests;  // counts an unsolicited frame of the device as a request
+      if (!driven && last_request_.empty()) ++requests;  // an unsolicited frame of the device counts as a request
       if (change_reply && mutates()) {
         change_reply(reply_items, step);
         if (reply_items.empty() && driven) continue;
-        // Reports the suppressed reply to the device as sent.
+        // Reports to the device that its reply was sent, although the mutant suppressed it.
         if (reply_items.empty()) {
           device_.feed({.kind = Kind::sent, .at = now});
           continue;
@@ -72,8 +72,9 @@ class Mutant final : public Machine<Item> {
 
   std::function<void(std::vector<Item>&)> change_request{};
   std::function<void(std::vector<Item>&, Step<Item>&)> change_reply{};
-  bool on_damage = false;  // whether a damaged special request reaches the encoder as the first request, `good`
-  // whether `is_special` selects the replies that are changed, instead of `mutated`
+  // whether the encoder receives `good`, the first request, in place of a damaged special request
+  bool on_damage = false;
+  // whether the changed replies are selected by `is_special` instead of by their number, `mutated`
   bool changes_special = false;
   bool always = false;  // whether the replies to all requests from number `mutated` on are changed
   // number of the first request, from 1, whose reply is changed
@@ -81,15 +82,16 @@ class Mutant final : public Machine<Item> {
   bool driven = false;
   unsigned requests = 0;
   std::vector<Item> reply_items;
-  std::vector<Item> good;  // the first request that was received, a good one
-  // index in `specials_` of the only special request; -1: any
+  std::vector<Item> good;  // the first request that was received, which is a good one
+  // index in `specials_` of the only request that counts as special; -1: all of them do
   int special = -1;
-  // further condition that a special request must fulfil; empty: none
+  // further condition for a request to count as special; empty: none
   std::function<bool(const std::vector<Item>&)> is_meant{};
-  bool is_special = false;  // whether the last request differs from `good` and is one of those selected
+  // whether the last request is special: different from `good`, and selected by `special` and `is_meant`
+  bool is_special = false;
 
  private:
-  // A damaged request has no items.
+  // Decides whether the request is special. A damaged request is given as one without items.
   void note_special(const std::vector<Item>& request) {
     is_special = false;
     if (!request.empty() && request == good) return;

@@ -27,7 +27,7 @@ std::size_t distinct_counters(const Readings& readings) {
   return values.size();
 }
 
-// Counts mixtures of two good replies that have one of `errors`.
+// Counts how many mixtures of two good replies the decoder rejects with one of `errors`.
 std::size_t detected_mixtures(const Unit& unit, const Options& options, const Readings& readings, Errors errors) {
   const Attempted* const one = readings.first_good();
   std::size_t noticed = 0;
@@ -123,7 +123,7 @@ void judge_frames(const Unit& unit, const Options& options, const Readings& read
                         ? "no good reply came"
                         : "all bits were alike, as on a line that nobody drives: turn the shaft a little";
   if (good == nullptr) return;
-  // an error of a counter needs two replies to show
+  // an error of a counter shows only in two consecutive replies
   const bool about_counters = errors == any_of(Error::sequence_mismatch);
   const std::size_t noticed = about_counters ? 0 : detected_changes(unit, options, good->exchange, errors);
   if (noticed != 0) {

@@ -91,10 +91,11 @@ class Tester {
   }
 
  private:
-  // Thrown instead of sending a request after an edited one: a host would repeat it, and judge the second reply.
+  // Thrown instead of sending a further request after an edited one: a host would repeat the request, and judge the
+  // second reply.
   struct NextRequest {};
 
-  // Terms of `listening_`.
+  // The time of listening for a reply is 20 ms and the duration of 16 characters.
   static constexpr Time least_listening = std::chrono::milliseconds(20);
   static constexpr int reply_characters = 16;
   static constexpr unsigned times = 3;  // number of times that a test sends its command or request
@@ -146,7 +147,7 @@ class Tester {
     runner_.keep_exchange(one);
     return one;
   }
-  // Runs a reading once; `NextRequest` ends it after its first exchange.
+  // Runs a reading once. NextRequest ends the reading after its first exchange.
   Attempted read_once() {
     try {
       return runner_.once(read_);
@@ -165,7 +166,7 @@ class Tester {
       const std::uint64_t requests = runner_.port().requests - before;
       const std::uint64_t unanswered = std::min(requests, one.unanswered + (was_answered(one) ? 0 : 1));
       readings.requests += requests;
-      // Before a late reply, earlier replies are taken to be late too.
+      // If the last reply was late, the replies to the requests before it are assumed to be late, not missing.
       readings.answered += was_answered(one) && one.is_late() ? requests : requests - unanswered;
       readings.good += one.error == Error::none ? std::max<std::uint64_t>(requests, 1) : 0;
       readings.discarded += one.discarded;
@@ -179,7 +180,7 @@ class Tester {
   }
   // On SPI and clocked links the host clocks the bits, so no reply can be late.
   [[nodiscard]] bool is_polled() const { return !host_clocks(unit_.link); }
-  // Returns whether a reading succeeds, without which a missing reply proves nothing.
+  // Returns whether the encoder can be read; if it cannot, a missing reply proves nothing.
   [[nodiscard]] bool answers() {
     for (unsigned i = 0; i < times; ++i) {
       if (once(options_).error == Error::none) return true;
@@ -187,7 +188,7 @@ class Tester {
     return false;
   }
 
-  /// Sends an edited request in place of the first one of a reading, and no further request.
+  /// Sends an edited request instead of the first request of a reading, and no further request.
   std::optional<Attempted> send_instead(const std::function<void(std::vector<Item>&)>& edit, std::uint32_t permille = 0,
                                         std::optional<Time> listen_for = {}) {
     const std::uint64_t before = runner_.port().requests;
@@ -228,7 +229,7 @@ class Tester {
       return request;
     }
   }
-  /// Counts frames like the readings' replies for `time`; 0 on other links than CAN.
+  /// Counts, for `time`, CAN frames that are like the replies to the readings; returns 0 on other links than CAN.
   UnsolicitedFrames count_unsolicited(Time time) {
     UnsolicitedFrames heard;
     const Attempted* const good = readings_.first_good();
@@ -278,7 +279,7 @@ class Tester {
 
   // ---- Requests that no host sends
 
-  // A single other address may be a neighbour's.
+  // Tries several other addresses, because at a single one a neighbour on the line may reply.
   void test_foreign(ClauseResult& result) {
     constexpr std::size_t most_addresses = 8;
     const auto role = std::find_if(unit_.options.begin(), unit_.options.end(),
@@ -330,7 +331,8 @@ class Tester {
     return unit_.check(options_, frame, {}) == Error::none &&
            encoder_of(unit_, options_, frame).value_or(value) == value;
   }
-  // On CAN a node may send other frames at any time.
+  // Returns whether the encoder did not reply. On CAN, other frames are ignored, because a node may send them at any
+  // time.
   [[nodiscard]] static bool is_silent(const Attempted& one) {
     if constexpr (is_can) return one.error == Error::timeout;
     return !one.answered;
@@ -364,7 +366,7 @@ class Tester {
       if (!one) return;
       last = exchange_text(unit_.link, one->exchange.request.frame(), one->exchange.reply.frame());
       const Compliance seen = reaction_of(clause, *one);
-      // The port may return to its usual rate too late for the reply.
+      // A reply may be missed because the port returns to its usual rate too late to receive it.
       const bool missed = slow && (is_silent(*one) || seen == Compliance::unclear);
       result.evidence = last + ": a port that changes its rate may be too late to hear the reply";
       if (missed) return;

@@ -29,10 +29,13 @@ namespace absenc::client {
 /// Defects of a host; by default the host has none.
 struct Flaws {
   bool is_silent = false;
-  unsigned stops_at_silence = 0;  // requests without a reply after which, at the latest, the host stops; 0: never
-  unsigned stops_at_damage = 0;   // damaged replies after which, at the latest, the host stops; 0: never
-  unsigned stops_at_refusal = 0;  // damaged requests after which, at the latest, the host stops; 0: never
-  Time skipped_wait{};            // longest wait in its memory reads that the host skips; 0: none
+  // number of requests without a reply after which the host stops at the latest; 0: it never stops
+  unsigned stops_at_silence = 0;
+  // number of damaged replies after which the host stops at the latest; 0: it never stops
+  unsigned stops_at_damage = 0;
+  // number of damaged requests after which the host stops at the latest; 0: it never stops
+  unsigned stops_at_refusal = 0;
+  Time skipped_wait{};  // longest wait that the host leaves out when it reads the memory; 0: it leaves none out
   std::vector<HostStep> sends{};
   // Defects of an SPI controller:
   Time too_early_by{};     // time by which each transfer begins too early
@@ -44,7 +47,7 @@ struct Flaws {
 
 struct Stopped {};
 
-/// A port that can stop its host.
+/// A port that throws Stopped when its host wants to send more requests than `requests_left`, and can skip waits.
 template <class Item>
 class HastyPort final : public Port<Item> {
  public:
@@ -161,7 +164,7 @@ class Host {
     return trial.judge();
   }
 
-  /// Returns the verdict; `all` adds every command that changes no option.
+  /// Returns the verdict on a host that reads; with `all` it also runs every command that changes no option.
   Conformance judged(bool all = false) {
     constexpr unsigned most_rounds = 40;
     HostTrial trial(unit_, 20);

@@ -48,13 +48,13 @@ bool has_good_part(const Case& one, const Attempted& attempt) {
     return end.kind == FrameEnd::Kind::complete && end.size == bytes.size() && decodes(one, request, {.bytes = bytes});
   };
   const Bytes raw = attempt.raw;
-  if (is_frame(raw)) return false;  // the whole reply is a single frame, without other bytes
+  if (is_frame(raw)) return false;  // a reply that is a single frame has no other bytes
   const Bytes sent = request.bytes;
   if (!sent.empty() && raw.size() > sent.size() && std::equal(sent.begin(), sent.end(), raw.begin()) &&
       is_frame(raw.subspan(sent.size()))) {
     return true;
   }
-  // Needs two good frames, or one with at least two thirds of all bytes.
+  // Searches two good frames that make up the reply, or one good frame with at least two thirds of all bytes.
   for (std::size_t size = 2; size < raw.size(); ++size) {
     const bool is_long = size * 3 >= raw.size() * 2;
     if (is_long ? is_frame(raw.first(size)) || is_frame(raw.last(size))

@@ -44,7 +44,7 @@ template <class Is>
 
 /// Returns settings, as "model=23-bit", that change the options `now` into `wanted`.
 [[nodiscard]] std::vector<std::string> settings_to_set(const Unit& unit, const Options& wanted, const Options& now);
-/// Says how many readings were good: "no good reply", "3 of 24 replies good".
+/// Returns a phrase that says how many readings were good: "no good reply", "3 of 24 replies good".
 [[nodiscard]] std::string good_as_said(std::size_t good, std::size_t tried);
 /// Returns options as the settings that give them, "model=23-bit", or "the usual settings".
 [[nodiscard]] std::string said_settings(const Unit& unit, const Options& options);

@@ -376,7 +376,7 @@ TEST(Doctor, AThousandHealthyEncodersGiveNoFinding) {
   }
 }
 
-/// A flicker by one count is no noise; neither is an even or an accelerated motion.
+/// A flicker of the position by one count is no noise; neither is an even or an accelerated motion.
 TEST(Doctor, AFlickeringLastBitIsNoNoise) {
   EXPECT_THAT(ids(judged(positions([](std::size_t i) { return i % 2; }))), IsEmpty());
   EXPECT_THAT(ids(judged(positions([](std::size_t i) { return i * 13; }))), IsEmpty());

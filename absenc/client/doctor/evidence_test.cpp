@@ -140,7 +140,7 @@ TEST(Doctor, AComputerThatStoodStillExplainsSilence) {
   EXPECT_THAT(ids(judged(seen)), Contains("sometimes_silent"));
 }
 
-/// A late computer may cut a reply, but it does not change bytes.
+/// A computer that reads late may cut a reply, but it does not change bytes.
 TEST(Doctor, AComputerThatStoodStillExplainsACutReply) {
   Observations seen = positions([](std::size_t) { return 5; });
   for (Attempted& one : seen.readings) one.exchange.reply.bytes = good_reply();

@@ -28,12 +28,14 @@ namespace {
 constexpr std::size_t first_readings = 2;
 constexpr std::size_t trial_readings = 5;  // number of readings with each setting per turn of the comparison
 constexpr unsigned trial_turns = 2;
-// Time limit for the readings with each setting per turn, and the number of characters whose duration is added to it.
+// Time limit for the readings with each setting in one turn of the comparison: this time, and the duration of 200
+// characters.
 constexpr Time trial_limit = std::chrono::milliseconds(500);
 constexpr int trial_characters = 200;
 // An encoder that was powered on just before the first request replies after this time. tformat needs 1.5 s.
 constexpr Time longest_start = std::chrono::seconds(2);
-constexpr Time models_limit = std::chrono::seconds(3);  // time limit of first readings with other models and options
+// time limit of the first readings that are tried with other models and options
+constexpr Time models_limit = std::chrono::seconds(3);
 constexpr Time addresses_limit = std::chrono::seconds(4);
 constexpr Time identify_limit = std::chrono::seconds(16);
 
@@ -51,7 +53,7 @@ bool streams(const EncoderAddress& address) {
   return address.unit->streams != nullptr && address.unit->streams(address.options);
 }
 
-// Stores the addresses at which a scan receives damaged replies, or those of two encoders.
+// Stores the addresses at which a scan receives damaged replies, or the replies of two encoders.
 struct Clashes final : FieldSink {
   void put(const FieldValue& value) override {
     if (value.info->role == Role::encoder) address = value.number;
@@ -242,7 +244,7 @@ class Doctor {
     if (count_good(attempts) == first_readings) read_again<std::uint8_t>();
   }
 
-  // Takes readings once more, after the failed ones, because the encoder replies now.
+  // Takes a new series of readings with the user's settings, because the encoder replies now.
   template <class Item>
   void read_again() {
     tell("reading");

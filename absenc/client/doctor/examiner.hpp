@@ -67,7 +67,7 @@ class Examiner {
   }
 
   /// Takes readings as `read` does and adds them to `seen`. On a line of characters it also adds the failed requests
-  /// that a reading repeated, and what a stream shows beside its good frames.
+  /// that a reading repeated, and evidence of damaged, missing or doubled frames in a stream.
   void observe(const Command& command, std::size_t count, Time limit, Observations& seen) {
     if constexpr (std::is_same_v<Item, CanFrame>) {
       read(command, count, limit, seen.readings);
@@ -79,14 +79,14 @@ class Examiner {
       const auto attempt = [&] {
         failed.clear();
         Attempted one = attempt_reading(command);
-        // The last request is part of the reading itself.
+        // The reading itself contains its last request, so this request is no repeated one.
         if (!failed.empty() && failed.back().began == runner_.last().sent_at) failed.pop_back();
         std::ranges::move(failed, std::back_inserter(seen.repeated));
         if (streams_) stream.append(runner_.last());
         return one;
       };
       runner_.repeat(series(count, limit), attempt, seen.readings);
-      // An encoder that sends a frame for each pulse is polled, too.
+      // A stream has no requests: an encoder that sends a frame for each pulse of the host is polled.
       if (streams_ && before == 0 && runner_.port().requests == 0) conclude_stream(unit_, options_, stream, seen);
     }
   }

@@ -62,8 +62,8 @@ TEST_P(HealthyEncoder, IsNeverCalledIll) {
     std::optional<EncoderAddress> usual;
     try {
       usual = parse_address(fmt::format("sim:{}{}{}", unit.id, mode.empty() ? "" : "?", mode));
-      if (examined(*usual, 1).good == 0) continue;  // the virtual encoder cannot be read with these options
-    } catch (const std::exception&) {               // these options exclude each other
+      if (examined(*usual, 1).good == 0) continue;  // skips options with which the virtual encoder cannot be read
+    } catch (const std::exception&) {               // skips options that exclude each other
       continue;
     }
     ++modes;
@@ -71,7 +71,7 @@ TEST_P(HealthyEncoder, IsNeverCalledIll) {
     const unsigned bits = std::min(unit.resolution(usual->options).singleturn_bits, 62u);
     unsigned ill = 0;
     for (unsigned i = 0; i < examinations && ill < 3; ++i) {
-      // The shaft has room to turn backwards from this many turns.
+      // The shaft begins at turn 100, so that it can turn backwards without passing 0.
       const bool has_turns = unit.resolution(usual->options).multiturn_bits >= 8;
       const std::string turns = has_turns ? "&multiturn=100" : "";
       const std::string state = fmt::format("singleturn={}{}&motion={}", random.below(std::uint64_t{1} << bits), turns,

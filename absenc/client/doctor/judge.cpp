@@ -18,7 +18,7 @@ namespace absenc::client {
 
 namespace {
 
-// delay beyond the allowed time above which a reply is slow
+// delay after the allowed time from which on a reply is called slow
 constexpr Time slow = std::chrono::milliseconds(8);
 
 FindingKind kind_of(const Refusal& refusal) {
@@ -44,7 +44,7 @@ FindingKind kind_of(const Refusal& refusal) {
   return FindingKind::port_failed;
 }
 
-// Returns the advice to make a port free, by the program that uses it.
+// Returns advice on how to free a port, depending on the program that has opened it.
 std::string_view action_for(os::Failure::Holder holder) {
   using Holder = os::Failure::Holder;
   switch (holder) {
@@ -88,7 +88,7 @@ std::string inversion(const Case& one) {
   std::size_t zeros = 0;
   for (const Attempted& attempt : seen.readings) {
     const auto& reply = attempt.exchange.reply.bytes;
-    // A cut frame of a few zeros is no evidence: it may be the beginning of a good frame.
+    // A cut frame of a few zeros is no evidence of an inverted line: it may be the beginning of a good frame.
     constexpr std::size_t many = 8;
     if (!reply.empty() && all_are(reply, 0) && (reply.size() >= many || !is_cut(one, attempt))) ++zeros;
   }
@@ -119,7 +119,7 @@ void judge_lateness(const Case& one, std::vector<Finding>& findings) {
   const std::size_t tried = seen.readings.size();
   // On CAN, a frame after an unanswered request may be unsolicited.
   if (seen.late == 0 || one.unit.link == LinkKind::can) return;
-  // A few late replies may be due to this computer.
+  // A few late replies may be due to a delay of this computer.
   const bool nothing_else = one.good == 0 && count(seen.readings, was_heard) * 10 < tried;
   const bool often = seen.late * 10 >= tried || nothing_else;
   if (!often && (seen.late < 2 || may_be_the_computer(seen, seen.late))) return;
@@ -127,7 +127,8 @@ void judge_lateness(const Case& one, std::vector<Finding>& findings) {
   for (const Attempted& attempt : seen.readings) limit = std::max(limit, attempt.limit);
   const bool is_ours = seen.computer_late > Time{} && seen.lateness - limit <= seen.computer_late;
   const bool is_one_of_few = seen.late < 2 && !nothing_else;
-  if ((!often || is_one_of_few) && is_ours) return;  // late by no more than this computer's own delay
+  // Reports nothing if the replies were late by no more than the delay of this computer.
+  if ((!often || is_one_of_few) && is_ours) return;
   const auto allowance = std::chrono::ceil<std::chrono::milliseconds>(seen.lateness * 3 / 2).count();
   findings.push_back(finding(often ? FindingKind::reply_late : FindingKind::sometimes_late,
                              {fmt::format("{}", std::min<std::size_t>(seen.late, tried)), fmt::format("{}", tried),
@@ -288,7 +289,7 @@ Examination judge(const Unit& unit, const Options& options, const Observations& 
   const Case one{unit, options, seen, result.good};
   judge_port(one, result.findings);
   judge_line(one, result.findings);
-  // A fault of the port or of the line explains bad frames.
+  // A fault of the port or of the line already explains bad frames.
   const bool explained = std::any_of(result.findings.begin(), result.findings.end(), [](const Finding& found) {
     return found.severity == Severity::fault && found.finding_kind != FindingKind::can_errors;
   });

@@ -23,7 +23,7 @@ struct Burst {
   std::size_t count = 0;
 };
 
-// Returns the series of failures that are too long for independent failures.
+// Returns the series of consecutive failures that are too long to be a coincidence of independent failures.
 std::vector<Burst> bursts_of(const std::vector<Attempted>& readings, std::size_t failed) {
   // greatest probability that independent failures form such a series among all these readings
   constexpr double chance = 1e-3;
@@ -41,10 +41,10 @@ std::vector<Burst> bursts_of(const std::vector<Attempted>& readings, std::size_t
     if (burst.count >= least) bursts.push_back(burst);
     burst = {};
   }
-  return bursts;  // without the last series of failures, which may continue
+  return bursts;  // the last series of failures is left out, because it may continue after the last reading
 }
 
-// Returns for example " of about 300 ms, one every 1 s".
+// Returns the usual length and distance of bursts in words, as " of about 300 ms, one every 1 s".
 std::string rhythm(const std::vector<Burst>& bursts) {
   std::vector<Time> lengths;
   std::vector<Time> periods;

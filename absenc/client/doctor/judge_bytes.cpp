@@ -34,7 +34,7 @@ class Mender {
   // longest reply for which all combinations of 8th bits are tried, in bytes
   static constexpr std::size_t most_bytes = 12;
 
-  /// Takes a damaged reply; with `random` the changes are random, to measure chance.
+  /// Takes a damaged reply. With `random`, the object makes random changes, to measure how often chance mends a reply.
   Mender(const Case& one, const Attempted& attempt, sim::Random* random)
       : one_(one), request_(attempt.exchange.request.frame()), raw_(attempt.raw), random_(random) {}
 
@@ -48,7 +48,8 @@ class Mender {
     return sent.size() == size && raw_.size() >= size && std::equal(sent.begin(), sent.end(), raw_.begin());
   }
 
-  /// Returns whether leaving out these bytes, or as many random ones, mends the reply.
+  /// Returns whether the reply becomes good without the bytes at `places` or, with `random`, without as many random
+  /// ones.
   [[nodiscard]] bool without(const std::vector<std::size_t>& places) const {
     if (places.empty() || places.size() >= raw_.size()) return false;
     std::vector<bool> removed(raw_.size(), false);
@@ -71,14 +72,15 @@ class Mender {
     return is_good(rest);
   }
 
-  /// Returns whether up to `most` inserted bytes of `values` mend the reply; tries 5000 times at most.
+  /// Returns whether the reply becomes good if up to `most` bytes with one of these `values` are inserted; decodes at
+  /// most 5000 changed replies.
   [[nodiscard]] bool with(Bytes values, std::size_t most, std::size_t& put) const {
     ByteList used(values.begin(), values.end());
     if (random_ != nullptr) {
       for (std::uint8_t& value : used) value = static_cast<std::uint8_t>(0x20 + random_->below(0xE0));
     }
     std::size_t tries = most_tries;
-    // Begins with the number of bytes that the frame lacks.
+    // Inserts first as many bytes as the frame lacks according to its beginning.
     const FrameEnd end = one_.unit.frame_end(one_.options, Direction::reply, raw_);
     const bool is_cut = end.kind == FrameEnd::Kind::incomplete && end.size > raw_.size();
     for (put = is_cut ? std::min(end.size - raw_.size(), most) : 1; put <= most && tries > 0; ++put) {
@@ -88,14 +90,15 @@ class Mender {
     return false;
   }
 
-  /// Returns whether lost 8th bits may be the damage of the reply.
+  /// Returns whether the reply may be damaged because the 8th bits of its bytes were lost.
   [[nodiscard]] bool with_eighth_bits(std::size_t& set) const {
     ByteList bytes = raw_;
     if (random_ != nullptr && bytes.size() > 2) {
       for (int i = 0; i < 2; ++i)
         bytes[random_->below(bytes.size())] ^= static_cast<std::uint8_t>(1u << random_->below(7));
     }
-    if (bytes.size() > most_bytes) {  // a longer reply is only checked for completeness
+    // A longer reply has too many combinations of 8th bits, so only its length is checked.
+    if (bytes.size() > most_bytes) {
       const FrameEnd end = one_.unit.frame_end(one_.options, Direction::reply, bytes);
       set = bytes.size();
       return end.kind == FrameEnd::Kind::complete && end.size == bytes.size();
@@ -114,9 +117,9 @@ class Mender {
   }
 
  private:
-  static constexpr std::size_t most_tries = 5000;  // limit of the decodings of one reply
+  static constexpr std::size_t most_tries = 5000;  // greatest number of decodings of one reply with changed bytes
 
-  // Each decoding decrements `tries`; at 0 the search ends.
+  // Each decoding decrements `tries`; the search for a good reply ends at 0.
   [[nodiscard]] bool insert(ByteList& bytes, const ByteList& values, std::size_t from, std::size_t count,
                             std::size_t& tries) const {
     if (count == 0) {
@@ -126,7 +129,7 @@ class Mender {
     }
     for (std::size_t place = from; place <= bytes.size(); ++place) {
       for (const std::uint8_t value : values) {
-        // Inserting before or after the same value gives the same bytes.
+        // Inserting a value before or after an equal byte gives the same bytes, so only one of the two is tried.
         if (place < bytes.size() && bytes[place] == value) continue;
         bytes.insert(bytes.begin() + static_cast<std::ptrdiff_t>(place), value);
         const bool good = insert(bytes, values, place + 1, count - 1, tries);
@@ -161,7 +164,8 @@ struct Suspicion {
 
 bool fits_any(const ByteList&) { return true; }
 
-// The whole request before a reply is its echo.
+// Returns whether the reply becomes good without its first bytes; false if these are the whole request, which is an
+// echo.
 template <std::size_t size>
 bool undo_bytes_before(const Mender& mender, std::size_t& count) {
   count = size;
@@ -228,10 +232,10 @@ bool fits_seven_bits(const ByteList& raw) {
 }
 bool undo_seven_bits(const Mender& mender, std::size_t& count) { return mender.with_eighth_bits(count); }
 
-constexpr std::size_t cheap = 24;  // number of replies to try
-constexpr std::size_t dear = 10;   // number of replies to try if each is decoded thousands of times
+constexpr std::size_t cheap = 24;  // greatest number of replies for which undoing a change is tried
+constexpr std::size_t dear = 10;   // greatest number of replies if undoing a change decodes each thousands of times
 
-// The first change that is found is reported; costly searches come last.
+// The first change that explains the replies is reported, so changes whose search takes long come last.
 constexpr auto suspicions = std::to_array<Suspicion>({
     {FindingKind::telnet_doubled, fits_telnet, undo_telnet, cheap},
     {FindingKind::newline_translated, fits_newline, undo_newline, cheap},
@@ -257,7 +261,8 @@ std::size_t variety(const All& all) {
   return sum;
 }
 
-// Compares with random changes, because chance mends some replies, too.
+// Returns the finding if undoing the change mends far more replies than random changes do, because chance mends some,
+// too.
 std::optional<Finding> suspected(const Case& one, const All& all, const Suspicion& suspicion) {
   constexpr std::size_t enough = 4;
   const bool of_nearly_all = all.size() * 10 >= one.seen.readings.size() * 8;
@@ -286,7 +291,7 @@ std::optional<Finding> suspected(const Case& one, const All& all, const Suspicio
       example = attempt;
     }
     by_chance += suspicion.undo(Mender(one, *attempt, &random), ignored) ? 1 : 0;
-    // A change that explains none of the first four replies is taken for the wrong one.
+    // If undoing the change mends none of the first four replies, the change is taken for the wrong one.
     if (tried >= enough && mended == 0) return {};
   }
   tried = std::min(tried, suspicion.most_tried);
@@ -299,7 +304,7 @@ std::optional<Finding> suspected(const Case& one, const All& all, const Suspicio
                   to_hex(Bytes(example->raw).first(std::min<std::size_t>(example->raw.size(), 24)))});
 }
 
-// With an XOR checksum, a reply without its 8th bits can be good.
+// Finds good replies that lost the 8th bits of their bytes: with an XOR checksum, a reply can be good without them.
 std::optional<Finding> seven_bits_of_good(const Case& one) {
   constexpr std::size_t enough = 40;
   constexpr std::size_t least_wraps = 2;

@@ -44,7 +44,7 @@ Finding counted(FindingKind finding_kind, const Case& one, const All& those) {
                   to_hex(Bytes(those.front()->raw).first(std::min<std::size_t>(those.front()->raw.size(), 16)))});
 }
 
-// Returns whether `is` returns true for at least 8 of 10 attempts; the others may be noise.
+// Returns whether `is` returns true for at least 8 of 10 attempts; the remaining attempts may be noise.
 template <class Is>
 bool most(const All& all, const Is& is) {
   const auto those = std::count_if(all.begin(), all.end(), [&](const Attempted* one) { return is(*one); });
@@ -131,7 +131,7 @@ bool is_contradiction(const Attempted& attempt) {
          attempt.error == Error::unexpected_reply;
 }
 
-// `all` has at least one contradiction.
+// At least one attempt of `all` must be a contradiction.
 Finding contradiction(const Case& one, const All& all) {
   std::size_t count = 0;
   const Attempted* last = nullptr;
@@ -207,7 +207,7 @@ std::optional<Damage> compare(const ByteList& reply, const ByteList& good) {
   return damage;
 }
 
-// Returns the reply that nearly all good ones equal; may be empty.
+// Returns the reply that nearly all good replies are equal to; empty if there is none.
 ByteList usual_reply(const std::vector<Attempted>& readings) {
   std::map<ByteList, std::size_t> counts;
   std::size_t good = 0;
@@ -222,7 +222,7 @@ ByteList usual_reply(const std::vector<Attempted>& readings) {
   return is_usual ? usual->first : ByteList{};
 }
 
-// Counts damaged frames of a stream that no reading reports.
+// Counts the damaged frames of a stream that were discarded without making a reading fail.
 std::size_t unreported(const std::vector<Attempted>& readings) {
   std::size_t count = 0;
   for (const Attempted& one : readings) {
@@ -241,14 +241,15 @@ All heard(const std::vector<Attempted>& attempts) {
 
 bool is_silent(const Attempted& one) { return one.error != Error::none && !one.heard; }
 
-// Returns whether the reply is shorter than each good one: this computer may have read its rest late.
+// Returns whether the reply is shorter than each good reply: this computer may have read the end of it too late.
 bool is_cut(const Observations& seen, const Attempted& attempt) {
   return std::ranges::none_of(seen.readings, [&](const Attempted& one) {
     return one.error == Error::none && one.exchange.reply.bytes.size() <= attempt.exchange.reply.bytes.size();
   });
 }
 
-// Returns none if as many requests stay unanswered: a late reply may collide with the next request.
+// Returns the damaged replies to requests that were then repeated; none if as many of these requests got no reply at
+// all, because then late replies may have collided with the next requests.
 All damaged_requests(const Case& one) {
   All all = damaged(one.seen.repeated);
   std::erase_if(all, [&](const Attempted* attempt) { return is_refusal(*attempt) || has_good_part(one, *attempt); });
@@ -263,7 +264,8 @@ Finding some_damage(const Case& one, const All& all) {
                                   errors_of(all)};
   const ByteList usual = usual_reply(one.seen.readings);
   if (usual.empty()) return finding(FindingKind::sometimes_damaged, values);
-  constexpr std::size_t few = 3;  // greatest number of bits that a short disturbance, as long as one bit, changes
+  // greatest number of wrong bits that count as a short disturbance, one that lasts about as long as a bit
+  constexpr std::size_t few = 3;
   std::size_t single = 0;
   std::size_t compared = 0;
   Damage sum{.first = usual.size()};
@@ -303,7 +305,9 @@ void judge_bad_frames(const Case& one, std::vector<Finding>& findings) {
       return;
     }
   }
-  if (all.size() * 10 < one.seen.readings.size()) return;  // silence is the main fault, which another judge reports
+  // Reports no damage if fewer than one in ten replies are damaged: then the main fault is silence, which another judge
+  // reports.
+  if (all.size() * 10 < one.seen.readings.size()) return;
   findings.push_back(
       finding(FindingKind::always_damaged, {fmt::format("{}", all.size()), errors_of(all), shown(*all.front())}));
 }
@@ -351,7 +355,7 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
     return;
   }
   if (most(all, [](const Attempted& attempt) { return attempt.error == Error::out_of_range; })) {
-    // The checksums are right: another format may fit all replies, the good ones, too.
+    // The checksums are right, so with another format all replies may be good, including those that are good now.
     if (std::optional<Finding> other = other_settings(one, heard(one.seen.readings))) {
       findings.push_back(std::move(*other));
       return;
@@ -380,7 +384,7 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
                                 refused.back()->detail.empty() ? std::string(text_of(refused.back()->error).description)
                                                                : refused.back()->detail}));
   }
-  // Among other damage, a contradiction may be damage that the checksum missed.
+  // A contradiction is reported only if there is no other damage, because it may be damage that the checksum missed.
   if (!all.empty() && std::ranges::all_of(all, [](const Attempted* attempt) { return is_contradiction(*attempt); })) {
     findings.push_back(contradiction(one, all));
     all.clear();
@@ -397,7 +401,7 @@ void judge_mixed_frames(const Case& one, std::vector<Finding>& findings) {
                                {fmt::format("{}", one.seen.overfull), fmt::format("{}", one.seen.readings.size()),
                                 to_hex(example.first(std::min(example.size(), most_shown)))}));
   } else if (std::optional<Finding> extra = extra_bytes(one, all)) {
-    // A late reply stands before the reply to the next request.
+    // A late reply arrives before the reply to the next request, and both together look like a reply with extra bytes.
     const bool are_late =
         std::ranges::all_of(all, [&](const Attempted* one_of) { return holds_two(one, *one_of, {}); });
     const bool is_explained = are_late && (silent >= all.size() || may_be_the_computer(one.seen, all.size()));

@@ -24,7 +24,7 @@ namespace absenc::client {
 
 namespace {
 
-// Returns for example "address=3"; empty if the unit has no addresses.
+// Returns the setting of the encoder's address, as "address=3"; empty if the unit has no addresses.
 std::vector<std::string> address_settings(const Unit& unit, const Options& options) {
   const Option* option = find_role(unit.options, Role::encoder);
   if (option == nullptr) return {};
@@ -50,7 +50,8 @@ bool speaks_text(const Unit& unit) {
   return all != 0 && text * 10 >= all * 9;
 }
 
-// Returns up to 32 bytes of a line.
+// Returns the line of text at the index `at` in quotes, with up to 32 characters, and '.' for those that are not
+// printable.
 std::string quoted(Bytes bytes, std::size_t at) {
   constexpr std::size_t most = 32;
   std::string text = "\"";
@@ -65,7 +66,7 @@ std::string quoted(Bytes bytes, std::size_t at) {
 CheckFindings checks_of(const std::vector<CheckedFrame>& frames) {
   try {
     return find_crc(frames);
-  } catch (const UsageError&) {  // for example, there are too few frames
+  } catch (const UsageError&) {  // `find_crc` throws this if, for example, there are too few frames
     return {};
   }
 }
@@ -120,7 +121,8 @@ std::optional<Finding> text_of_others(const Case& one, Bytes bytes) {
     const std::size_t at = text.find(word);
     if (at != std::string::npos) return finding(FindingKind::modem_answers, {quoted(bytes, at)});
   }
-  // least number of different characters in a text: a frame that repeats may contain letters, too
+  // least number of different characters that a text has: a repeated frame of another protocol may contain a few
+  // letters, too
   constexpr std::size_t enough_kinds = 6;
   const bool has_lines = text.find_first_of("\r\n") != std::string::npos;
   if (bytes.size() < enough || !has_lines || std::set(text.begin(), text.end()).size() < enough_kinds) return {};
@@ -130,13 +132,14 @@ std::optional<Finding> text_of_others(const Case& one, Bytes bytes) {
   return finding(FindingKind::modem_answers, {quoted(bytes, static_cast<std::size_t>(begin - bytes.begin()))});
 }
 
-// Searches like `identify`, but only this unit at the encoder's address.
+// Searches options that explain the replies, as `identify` does, but only those of this unit with the encoder's
+// address.
 std::optional<Finding> other_settings(const Case& one, const All& all) {
-  constexpr std::size_t enough = 4;  // least number of frames; fewer are weak evidence
+  constexpr std::size_t enough = 4;  // least number of replies; fewer are too weak evidence
   if (all.size() < enough) return {};
   std::vector<capture::ObservedExchange> exchanges;
   for (const Attempted* attempt : all) exchanges.push_back(attempt->exchange);
-  // Spread over all frames, because the first ones of a slow shaft may fit fewer bits.
+  // Takes at most 32 replies, spread over all: if the shaft is slow, the first ones may also fit a lower resolution.
   constexpr std::size_t most_tried = 32;
   const std::size_t count = std::min(exchanges.size(), most_tried);
   for (std::size_t i = 0; i < count; ++i) exchanges[i] = exchanges[i * exchanges.size() / count];

@@ -20,7 +20,7 @@ constexpr double quiet_share = 1e-4;  // fraction of a turn by which a position 
 constexpr std::int64_t quiet_counts = 4;
 constexpr std::uint32_t hand_rpm = 600;
 
-/// The positions of the readings in which they are valid, and the movement between them.
+/// The valid positions of all readings, and the movement between them.
 struct Walk {
   unsigned bits = 0;
   double unit_um = 0;
@@ -30,9 +30,9 @@ struct Walk {
   std::int64_t lowest = 0;  // lowest position relative to the first, in counts, continued past the end of the counter
   std::int64_t highest = 0;
   std::int64_t end = 0;
-  std::set<std::int64_t> turns{};  // the valid numbers of turns of these readings
+  std::set<std::int64_t> turns{};  // the numbers of turns that readings report as valid
   std::size_t zero_crossings = 0;
-  Time time{};  // time from the first to the last of these readings
+  Time time{};  // time from the first to the last reading with a valid position
 
   [[nodiscard]] std::int64_t span() const { return highest - lowest; }
 };
@@ -68,7 +68,7 @@ std::int64_t quiet(const Walk& walk) {
   return std::max(quiet_counts, static_cast<std::int64_t>(std::ldexp(quiet_share, static_cast<int>(walk.bits))));
 }
 
-// Noise changes direction all the time, unlike a shaft that turns or swings.
+// Finds noise of the position: noise changes direction all the time, unlike a shaft that turns or swings.
 void judge_noise(const Walk& walk, std::vector<Finding>& findings) {
   constexpr std::size_t enough = 40;
   std::size_t turns = 0;
@@ -81,7 +81,7 @@ void judge_noise(const Walk& walk, std::vector<Finding>& findings) {
     ++moved;
   }
   if (walk.steps.size() < enough || walk.span() <= quiet(walk) || moved * 4 < walk.steps.size()) return;
-  // A wide movement is no noise, and neither is a slow swing.
+  // A wide movement is no noise; neither is a slow swing, which seldom changes direction.
   const bool wide = walk.unit_um > 0 ? walk.span() > 1000 : walk.span() > (std::int64_t{1} << walk.bits) / 32;
   if (turns * 3 < moved || wide) return;
   const std::string size = walk.unit_um > 0
@@ -130,7 +130,8 @@ void judge_turning(const Walk& walk, std::vector<Finding>& findings) {
   }
 }
 
-// With even steps a sound bit may never change.
+// Finds bits of the position that never change. Needs steps of different sizes: with equal steps even a sound bit may
+// never change.
 void judge_bits(const Walk& walk, std::vector<Finding>& findings) {
   constexpr std::size_t enough = 64;
   constexpr std::size_t uneven = 8;

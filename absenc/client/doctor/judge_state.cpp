@@ -24,9 +24,9 @@ struct RaisedFlag {
   const FlagInfo* flag = nullptr;
   bool is_alarm = false;
   std::set<std::string_view> channels{};  // names of the fields, one for each channel, that report the flag
-  const Reading* last = nullptr;          // the last reading that has the flag raised
+  const Reading* last = nullptr;          // the last of the readings that report the flag as raised
   std::size_t readings = 0;
-  // number of these readings whose position or turns are invalid; 0 if that may be damage
+  // number of the readings with this flag raised whose position or turns are invalid; 0 if that may be damage
   std::size_t invalid = 0;
 };
 
@@ -110,9 +110,10 @@ void judge_state(const Case& one, std::vector<Finding>& findings) {
     count_flags(status_of(one.unit, *reading), false, *reading, alarms, flags);
   }
   std::stable_sort(flags.begin(), flags.end(), [](const RaisedFlag& before, const RaisedFlag& after) {
-    return (before.invalid > 0) > (after.invalid > 0);  // flags with an invalid position or turns come first
+    // flags that come with an invalid position or invalid turns are reported first
+    return (before.invalid > 0) > (after.invalid > 0);
   });
-  // Flags of so few readings may be damage that the checksum missed.
+  // A flag that far fewer readings report than failed may be damage that the checksum missed.
   const std::size_t failed = one.seen.readings.size() - one.good;
   const auto is_damage = [failed](std::size_t count) { return count * 10 < failed; };
   std::erase_if(flags, [&](const RaisedFlag& rare) { return is_damage(rare.readings); });
@@ -138,7 +139,7 @@ void judge_state(const Case& one, std::vector<Finding>& findings) {
 
 namespace {
 
-// Returns the natural logarithm of the number of ways to choose `some` of `all`.
+// Returns the natural logarithm of the binomial coefficient "`all` over `some`".
 double log_choose(std::size_t all, std::size_t some) {
   return std::lgamma(static_cast<double>(all + 1)) - std::lgamma(static_cast<double>(some + 1)) -
          std::lgamma(static_cast<double>(all - some + 1));
@@ -147,16 +148,18 @@ double log_choose(std::size_t all, std::size_t some) {
 }  // namespace
 
 std::optional<Finding> judge_start(const Case& one) {
-  constexpr double chance = 1e-3;  // greatest probability that failures at random times all come first
+  // the encoder is called starting if failures at random times would all come first with at most this probability
+  constexpr double chance = 1e-3;
   const std::vector<Attempted>& readings = one.seen.readings;
   const auto first =
       std::ranges::find_if(readings, [](const Attempted& attempt) { return attempt.error == Error::none; });
   const auto failed = static_cast<std::size_t>(first - readings.begin());
   if (failed < 2 || failed + one.good != readings.size()) return {};
   const auto silent = std::count_if(readings.begin(), first, [](const Attempted& attempt) { return !attempt.heard; });
-  // The encoder may begin to reply in the middle of a request.
+  // Some of the first replies may be damaged, because the encoder may begin to reply in the middle of a request; most
+  // must be missing.
   if (static_cast<std::size_t>(silent) * 2 < failed) return {};
-  // A computer that stood still for as long may have delayed the first replies.
+  // If this computer stood still for as long as the failures lasted, it may itself have delayed the first replies.
   if (first->began - readings.front().began <= one.seen.computer_late) return {};
   if (-log_choose(readings.size(), failed) > std::log(chance)) return {};
   return finding(FindingKind::starting,

@@ -17,7 +17,7 @@ struct Case {
   std::size_t good = 0;
 };
 
-/// Returns whether this busy computer may be the cause of `some` late or missing replies.
+/// Returns whether `some` late or missing replies may be due to this computer, because it was busy.
 [[nodiscard]] inline bool may_be_the_computer(const Observations& seen, std::size_t some) {
   constexpr Time busy = std::chrono::milliseconds(1);
   constexpr Time very_late = std::chrono::milliseconds(50);

@@ -16,7 +16,7 @@ namespace absenc::client {
 
 using namespace std::chrono_literals;
 
-/// A line in virtual time on which `answer` makes the replies.
+/// A line in virtual time on which the function `answer` makes the replies.
 template <class Item>
 class ScriptedPort final : public Port<Item> {
  public:

@@ -28,7 +28,7 @@ using Ids = std::set<std::string_view>;
 
 constexpr std::size_t readings = 200;
 
-/// With zeros only, the rest of a truncated frame could be a good frame.
+/// A position whose bytes are not all zero: with zeros only, the rest of a truncated frame could be a good frame.
 constexpr std::string_view at_no_zero = "singleturn=1383&";
 
 struct Watched {
@@ -126,7 +126,7 @@ Read reading_of(const EncoderAddress& address) {
   return link.bytes != nullptr ? reading_on(address, *link.bytes) : reading_on(address, *link.frames);
 }
 
-/// Returns the raised alarms, and the raised status flags with an advice, as bits.
+/// Returns, as bits, the raised alarms, and those raised status flags that have an advice for the user.
 std::uint64_t defects_of(const Unit& unit, const Reading& reading) {
   std::uint64_t bits = reading.alarms;
   unsigned at = 0;
@@ -149,7 +149,8 @@ const Ids& causes_of(const Unit& unit, sim::FaultKind kind) {
   static const Ids damage{"damaged_bits",   "damaged_bursts", "sometimes_damaged", "always_damaged", "bytes_missing",
                           "position_jumps", "position_noise", "stuck_bits",        "can_errors"};
   static const std::map<sim::FaultKind, Ids> others{
-      // sometimes_silent: a late reply may come after the host has ended to listen for it.
+      // The finding sometimes_silent is possible because a late reply may come after the host has stopped listening for
+      // it.
       {delay, {"reply_late", "sometimes_late", "sometimes_silent"}},
       {echo, {"wrong_echo", "two_answer", "extra_bytes"}},
       // Random bytes on a bus may look like two encoders that send at the same time.
@@ -158,7 +159,7 @@ const Ids& causes_of(const Unit& unit, sim::FaultKind kind) {
         "always_damaged", "position_jumps", "position_noise", "stuck_bits"}},
       {silence, {"no_answer", "sometimes_silent", "miso_stuck"}},
       {repeat, {"two_answer", "extra_bytes"}},
-      // A damaged request may look like another one, whose reply does not fit.
+      // A damaged request may look like another valid request, and its reply then does not fit.
       {request_corrupt,
        {"requests_damaged", "sometimes_silent", "no_answer", "refused", "damaged_bits", "damaged_bursts",
         "sometimes_damaged", "always_damaged", "bytes_missing", "contradictory", "position_jumps"}},
@@ -201,7 +202,7 @@ std::vector<std::string> readable_modes(const Unit& unit) {
       const EncoderAddress address = address_of(unit, mode, "");
       const Read one = reading_of(address);
       if (one.error == Error::none && known.insert(one.wire).second) modes.push_back(mode);
-    } catch (const std::exception&) {  // these options exclude each other
+    } catch (const std::exception&) {  // skips options that exclude each other
     }
   }
   return modes;
@@ -247,7 +248,7 @@ TEST_P(Matrix, WhatTheEncoderReportsIsNeverGood) {
       try {
         address = address_of(unit(), mode, state);
         static_cast<void>(device_of(*address));
-      } catch (const std::exception&) {  // these options exclude this state
+      } catch (const std::exception&) {  // with these options the encoder cannot have this state
         continue;
       }
       const auto [error, reading, wire] = reading_of(*address);
@@ -343,7 +344,7 @@ std::string state_table() {
       std::optional<Examination> examination;
       try {
         examination = examined(address_of(*unit, "", state)).examination;
-      } catch (const std::exception&) {  // these options exclude this state
+      } catch (const std::exception&) {  // with these options the encoder cannot have this state
         continue;
       }
       const Finding* first = examination->first();
@@ -361,7 +362,7 @@ std::vector<std::string> lines_of(const std::string& text) {
   return lines;
 }
 
-/// Returns the first cell of a row, which names the protocol, with the bar before it.
+/// Returns the first cell of a row of a Markdown table, which names the protocol, with the bar before it.
 std::string protocol_of(const std::string& row) { return row.substr(0, row.find('|', 1)); }
 
 /// Replaces the table between the marks `<!-- name -->` and `<!-- end -->`.

@@ -12,12 +12,13 @@
 
 namespace absenc::client {
 
-/// Returns settings as "model=23-bit"; "" is the default mode.
+/// Returns the modes of a unit as settings, such as "model=23-bit"; "" is the default mode.
 [[nodiscard]] inline std::vector<std::string> modes_of(const Unit& unit) {
   std::vector<std::string> modes{""};
   for (const Model& model : unit.models) modes.push_back(fmt::format("model={}", model.name));
   for (const Option& option : unit.options) {
-    if (option.role == Role::rate) continue;  // in simulations host and encoder have the same rate
+    // the rate is no mode here, because simulated hosts and encoders always have the same rate
+    if (option.role == Role::rate) continue;
     for (const std::string_view choice : option.choices) modes.push_back(fmt::format("{}={}", option.name, choice));
   }
   return modes;

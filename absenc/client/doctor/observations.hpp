@@ -20,12 +20,12 @@ namespace absenc::client {
 
 /// A setting that was tried instead of the user's.
 struct Trial {
-  FindingKind finding_kind{};  // the finding if the other setting helps
+  FindingKind finding_kind{};  // kind of the finding that is reported if the other setting helps
   std::string said{};          // the user's setting, "baud=115200"
   std::string setting{};       // the other setting, "baud=9600"
   std::size_t good = 0;
   std::size_t tried = 0;
-  // number of good readings with the user's setting, taken in turns with those of `setting`
+  // number of good readings with the user's setting, which were taken in turns with the readings with `setting`
   std::size_t good_as_said = 0;
   std::size_t tried_as_said = 0;
   std::string command{};  // address that reads the encoder, if `identify` found it; "": it did not
@@ -48,9 +48,10 @@ struct Observations {
   std::optional<Refusal> refusal{};
   std::vector<std::uint8_t> unsolicited{};  // bytes received before the first request, about the first 4096
   Time listened{};
-  bool never_silent = false;  // whether bytes came in 4 or all of 5 periods of listening
+  // whether bytes were received in at least 4 of the 5 periods of listening before the first request
+  bool never_silent = false;
   std::vector<Attempted> readings{};
-  // Failed requests that readings repeated.
+  // Failed requests that the host repeated within a reading.
   std::vector<Attempted> repeated{};
   std::vector<Attempted> damaged_frames{};  // damaged frames of a stream, cut at the pauses between frames
   std::size_t doubled = 0;                  // number of frames of a stream that arrived twice; 0 also if these are few
@@ -78,7 +79,7 @@ struct Observations {
       std::ranges::count_if(attempts, [](const Attempted& one) { return one.error == Error::none; }));
 }
 
-/// Returns whether at most one in 20 attempts is good, perhaps by chance.
+/// Returns whether at most one in 20 attempts is good; so few good replies may be due to chance.
 [[nodiscard]] inline bool hardly_any_good(const std::vector<Attempted>& attempts) {
   return count_good(attempts) * 20 < attempts.size() + 1;
 }

@@ -63,7 +63,7 @@ inline Observations turned_by_hand(const std::function<std::uint64_t(std::size_t
 
 constexpr std::uint64_t hand_counts = 1201;  // counts per millisecond of a shaft at 550 rpm (17 bits)
 
-/// Examines a line on which requests get no reply while `dead(now)` is true.
+/// Examines a line on which an encoder replies to no request while `dead(now)` is true.
 inline Examination examine_contact(Time time, const std::function<bool(Time)>& dead) {
   const Surroundings surroundings{[&](const EncoderAddress&) {
                                     auto port = std::make_shared<ScriptedPort<std::uint8_t>>();

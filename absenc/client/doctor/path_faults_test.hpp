@@ -78,7 +78,8 @@ inline PathFault of_bytes(const std::string& name, const std::vector<std::uint64
               for (std::size_t i = 0; i < probed; ++i) static_cast<void>(read_once(asked, opener));
               if (opener.changed() * 2 < probed) continue;
               const Outcome one{examined(pair.asked, pair.far), causes};
-              // The shaft may have left the values: a slow line takes many seconds.
+              // The shaft may have left the positions that the fault changes, because readings on a slow line take many
+              // seconds.
               if (one.seen.changed * 2 < one.seen.examination.tried) continue;
               outcome = one;
               break;
@@ -114,7 +115,7 @@ inline std::vector<PathFault> faults_of_bytes() {
                       if (one.seen.changed != 0) outcome = one;
                       return outcome;
                     }});
-  // Without its 00 bytes, a frame may look like a cut one.
+  // Without its 00 bytes, a frame may look as if its end were cut off.
   faults.push_back(of_bytes("nul_lost", {0x00},
                             [](const ByteList&, const ByteList& reply) { return without(reply, {0x00}); },
                             {"bytes_missing"}));
@@ -137,7 +138,7 @@ inline PathFault of_encoder_fault(const std::string& name, const std::string& fa
               pair.far.encoder.device.delay = limit * 5 / 4;
             }
             Outcome one{examined(pair.asked, pair.far, {.readings = 400, .limit = 60s}), causes};
-            // A unit whose conversation repeats failed requests may be spared.
+            // A unit that repeats failed requests within a reading may show nothing of the fault.
             const bool is_spared =
                 one.seen.first() == "good" && one.seen.examination.good == one.seen.examination.tried;
             if (!is_spared) outcome = one;
@@ -148,7 +149,7 @@ inline PathFault of_encoder_fault(const std::string& name, const std::string& fa
 inline PathFault of_talker(const std::string& name, const std::string& text, Time period, bool answers, Ids causes) {
   return {name, [=](const Unit& unit, const std::string& mode, const std::string& rate) {
             Pair pair = pair_of(unit, mode, rate);
-            // With a weak checksum the text may look like a reply.
+            // With a weak checksum, the other device's text may look like a reply.
             if (has_weak_check(pair)) return std::optional<Outcome>();
 
             pair.far.other = [=] {
@@ -165,7 +166,7 @@ inline std::vector<PathFault> faults_of_line() {
   faults.push_back(of_encoder_fault("lost 10 %", "fault=silence=0.1", {"sometimes_silent"}));
   faults.push_back(of_encoder_fault("corrupt 2 %", "fault=corrupt=0.02", damage));
   faults.push_back(of_encoder_fault("always late", "fault=delay=1", {"reply_late"}));
-  // sometimes_silent: a late reply may come after the host has ended to listen for it.
+  // The finding sometimes_silent is possible because a late reply may come after the host has stopped listening for it.
   faults.push_back(
       of_encoder_fault("randomly late", "fault=delay=0.2", {"reply_late", "sometimes_late", "sometimes_silent"}));
   faults.push_back({"line low", [](const Unit& unit, const std::string& mode, const std::string& rate) {
@@ -252,7 +253,7 @@ inline std::vector<PathFault> faults_of_state() {
                       Pair pair = pair_of(unit, mode, rate, {"singleturn=1383"});
                       pair.far.goes_on = true;
                       Opener opener(pair_of(unit, mode, rate).far);
-                      // The start is long enough for several timeouts of readings that repeat each request.
+                      // The encoder is silent at first, for several timeouts of a reading that repeats each request.
                       const Time start = std::max(Time(900ms), 20 * read_once(parse_address(pair.asked), opener).limit);
                       pair.far.is_cut = [start](Time now) { return now < start; };
                       return std::optional(Outcome{examined(pair.asked, pair.far), {"starting"}});

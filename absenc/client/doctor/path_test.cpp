@@ -51,7 +51,7 @@ TEST_P(DoctorWays, OtherModelIsNamedInBothDirections) {
       Pair pair = pair_of(unit, said, mode, {});
       pair.far = pair_of(unit, there, mode, {"motion=rpm=20"}).far;
       const Seen seen = examined(pair.asked, pair.far);
-      // If both models have the same frames, all readings are good and there is nothing to name.
+      // If both models have the same frames, all readings are good, so doctor has nothing to report.
       const bool is_same = seen.examination.good == seen.examination.tried;
       if (is_same) continue;
       EXPECT_EQ(seen.first(), "wrong_settings") << sentences(seen.examination);
@@ -59,7 +59,8 @@ TEST_P(DoctorWays, OtherModelIsNamedInBothDirections) {
   }
 }
 
-/// If the first reading fails, the finding for it must be doctor's first one or one of `open`.
+/// If the first reading fails, the finding in its error message must be doctor's first finding or one of the unspecific
+/// ones in `open`.
 TEST_P(DoctorWays, ReadSaysTheSameOrLeavesItOpen) {
   static const Ids open{"no_answer", "always_damaged", "extra_bytes", "bytes_missing", "sometimes_damaged"};
   const Unit& unit = *GetParam();
@@ -80,7 +81,7 @@ std::string name_of_test(const ::testing::TestParamInfo<const Unit*>& one) {
 
 INSTANTIATE_TEST_SUITE_P(Units, DoctorWays, ::testing::ValuesIn(character_units()), name_of_test);
 
-// A setting is compared with the user's by 10 readings each. At 2400 baud 5 of them take 0.7 s.
+// Doctor compares a setting with the user's by 10 readings with each. At 2400 baud, 5 of these readings take 0.7 s.
 TEST(Doctor, SlowLineHasTimeForEachReadingOfComparison) {
   Pair pair = pair_of(*find_unit("raa38-modbus"), "", "baud=2400", {"address=1"});
   pair.far.delay = 35ms;

@@ -24,7 +24,7 @@ namespace absenc::client::path_faults {
 using namespace std::chrono_literals;
 using ByteList = std::vector<std::uint8_t>;
 
-/// A function that returns the changed bytes of the reply to a request.
+/// A function that returns the reply to a request with the changes that an adapter makes to its bytes.
 using Change = std::function<ByteList(const ByteList& request, ByteList reply)>;
 
 /// A machine that changes, delays or drops replies of a device.
@@ -285,7 +285,8 @@ struct Pair {
   Far far;
 };
 
-/// Returns the user's address and the far end; only the encoder has the settings `state`.
+/// Returns the user's address and what is at the other end of the line. Only the encoder, not the address, has the
+/// settings `state`.
 inline Pair pair_of(const Unit& unit, const std::string& mode, const std::string& rate,
                     const std::vector<std::string>& state = {}) {
   std::vector<std::string> settings{mode, of_encoder(unit, rate)};

@@ -15,7 +15,8 @@ namespace {
 using namespace std::chrono_literals;
 using ByteList = std::vector<std::uint8_t>;
 
-constexpr std::size_t enough = 8;  // least number of pieces, distances or doubled frames for a statement about them
+// least number of pieces, distances or doubled frames of a stream from which conclusions are drawn
+constexpr std::size_t enough = 8;
 
 /// Bytes without a pause between them, and the time at which the first of them arrived.
 struct PausedBytes {
@@ -51,7 +52,8 @@ double evenness(const std::vector<PausedBytes>& pieces) {
   return static_cast<double>(usual->second) / static_cast<double>(pieces.size());
 }
 
-// Chooses the middle one of several pauses that divide a stream equally well: it is the safest.
+// Divides a stream at pauses of the length that gives the most even pieces. If several lengths do equally well, takes
+// the middle one, which is the safest.
 std::vector<PausedBytes> most_even_pieces(const StreamBytes& stream) {
   constexpr Time shortest = 100us;
   constexpr Time longest = 200ms;
@@ -74,7 +76,7 @@ std::vector<Time> distances_of(const std::vector<Time>& arrivals) {
   return distances;
 }
 
-// Returns the usual distance of frames; 0 if there are too few distances, or they are irregular.
+// Returns the usual time between two frames of a stream; 0 if there are too few frames, or the times are irregular.
 Time period_of(std::vector<Time> distances) {
   if (distances.size() < enough) return {};
   std::ranges::sort(distances);
@@ -112,13 +114,13 @@ void insert_missing_frames(std::vector<Attempted>& readings, const std::vector<T
   const std::vector<Time> distances = distances_of(arrivals);
   const Time period = period_of(distances);
   if (period == Time{}) return;
-  // missing[i]: the number of frames that did not come between readings i - 1 and i.
+  // missing[i] is the number of frames that did not arrive between the readings i - 1 and i.
   std::vector<std::size_t> missing(readings.size(), 0);
   for (std::size_t i = 1; i < readings.size(); ++i) {
     const double periods = static_cast<double>(distances[i - 1].count()) / static_cast<double>(period.count());
     const auto due = static_cast<std::size_t>(std::lround(periods));
     const std::size_t come = 1 + readings[i].discarded;
-    // Two damaged frames may have been discarded as one.
+    // Counts no missing frames where some were discarded as damaged: two damaged frames may have been discarded as one.
     if (due > come && readings[i].discarded == 0) missing[i] = due - come;
     // A late frame may have been counted as missing; the frames after it then seem early.
     std::size_t early = come > due ? come - due : 0;
@@ -128,10 +130,10 @@ void insert_missing_frames(std::vector<Attempted>& readings, const std::vector<T
       early -= late;
     }
   }
-  // A gap just before the end may be a late frame.
+  // A gap just before the end of the stream counts as no missing frame, because a late frame may still follow.
   for (std::size_t i = readings.size() - std::min<std::size_t>(readings.size(), 2); i < readings.size(); ++i)
     missing[i] = 0;
-  // One missing frame may be a change of delay.
+  // A single missing frame is ignored, because the delay of the arrivals may have changed.
   if (std::accumulate(missing.begin(), missing.end(), std::size_t{0}) < 2) return;
   std::vector<Attempted> all;
   for (std::size_t i = 0; i < readings.size(); ++i) {
@@ -166,7 +168,7 @@ void conclude_stream(const Unit& unit, const Options& options, const StreamBytes
     seen.doubled = count_doubled(seen.readings, stream.arrivals);
     insert_missing_frames(seen.readings, stream.arrivals);
   } else if (!frames.empty()) {
-    // The frames themselves are examined, because hardly any reading is good.
+    // Hardly any reading is good, so the frames of the stream take the place of the readings.
     seen.readings = std::move(frames);
   } else if (!stream.bytes.empty()) {
     constexpr std::size_t most_shown = 256;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Evidence of a stream beside its good frames.
+// Finds evidence in a stream of unsolicited frames: damaged, missing and doubled frames.
 #pragma once
 
 #include <cstdint>
@@ -18,17 +18,18 @@ struct StreamBytes {
   };
   std::vector<std::uint8_t> bytes{};
   std::vector<Mark> marks{};
-  std::vector<Time> arrivals{};  // arrival of each reading's last byte; without bytes: time of the reading before, or 0
+  // arrival of the last byte of each reading; for a reading without bytes the time of the reading before it, or 0
+  std::vector<Time> arrivals{};
 
-  /// Appends the bytes and times of a reading; no bytes beyond 1 MiB in all.
+  /// Appends the bytes and times of a reading; ignores bytes beyond 1 MiB in total.
   void append(const LineExchange<std::uint8_t>& line);
 };
 
-/// Returns pieces of the stream between pauses.
+/// Returns the pieces of the stream between its pauses, each as a reading.
 [[nodiscard]] std::vector<Attempted> frames_between_pauses(const Unit& unit, const Options& options,
                                                            const StreamBytes& stream);
 
-/// Inserts failed readings for frames that seem to be missing.
+/// Inserts a failed reading for each frame that seems to be missing between the readings of a stream.
 void insert_missing_frames(std::vector<Attempted>& readings, const std::vector<Time>& arrivals);
 
 /// Counts good frames that arrived twice in a row; 0 unless there are many and the frames change.

@@ -130,7 +130,7 @@ TEST(StreamFrames, FramesThatDidNotComeAreFailedReadingsAtTheirTime) {
 
 TEST(StreamFrames, LateFramesAreNotMissing) {
   std::vector<Time> arrivals = regular_arrivals(30);
-  arrivals[10] = arrivals[11] = arrivals[12] = arrivals[13];  // three frames arrive with the fourth
+  arrivals[10] = arrivals[11] = arrivals[12] = arrivals[13];  // three frames arrive late, together with the fourth
   EXPECT_EQ(missing_of(good_readings(30), arrivals), 0u);
 }
 

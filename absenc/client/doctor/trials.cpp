@@ -102,7 +102,7 @@ void add_spi(const EncoderAddress& address, std::vector<Other>& others) {
 
 // ---- Trials of other models and addresses
 
-/// Decides which options may be tried: their request must not change an encoder of another protocol.
+/// Decides which options may be tried: the request to read with them must not change an encoder of another protocol.
 class Safety {
  public:
   explicit Safety(const EncoderAddress& address)
@@ -111,7 +111,7 @@ class Safety {
     harmful_ = harmful_to_others(unit_, address.line.rate, search_of(address));
     said_ = is_harmful(address.options);
   }
-  /// Returns whether the request of these options may be sent; always if the user's own one is harmful.
+  /// Returns whether a request with these options may be sent; always true if the user's own options are harmful, too.
   [[nodiscard]] bool allows(const Options& options) const { return said_ || !is_harmful(options); }
 
  private:
@@ -150,7 +150,7 @@ bool is_possible(const Unit& unit, const Options& options) {
 
 LineSearch search_of(const EncoderAddress& address) {
   LineSearch search;
-  // On a line of 8-bit characters, a request in longer characters would arrive as another request.
+  // On a line of 8-bit characters, a request in longer characters would arrive as a different request.
   search.most_data_bits = address.unit->line.data_bits > 8 ? search.most_data_bits : 8;
   search.place =
       address.port_kind == PortKind::tcp ? fmt::format("tcp:{}:{}", address.host, address.port) : address.path;
@@ -185,7 +185,8 @@ std::vector<Other> other_models(const EncoderAddress& address) {
   const Safety safety(address);
   const std::string said = said_settings(unit, address.options);
   const auto add = [&](Options options) {
-    if (encoder != nullptr) {  // sets the user's address: another model is tried, but of the same encoder on the line
+    // Keeps the address of the encoder: another model is tried, but of the same encoder on the line.
+    if (encoder != nullptr) {
       const auto index = static_cast<std::size_t>(encoder - unit.options.data());
       options.values[index] = address.options[index];
     }

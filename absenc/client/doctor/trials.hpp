@@ -15,7 +15,7 @@ namespace absenc::client {
 
 /// A setting to try instead of the user's, with the address that results.
 struct Other {
-  FindingKind finding_kind{};  // the finding if the setting helps
+  FindingKind finding_kind{};  // the finding that is reported if the setting helps
   std::string said{};          // the user's setting, "baud=115200"
   std::string setting{};       // the setting to try, "baud=9600"
   EncoderAddress address{};

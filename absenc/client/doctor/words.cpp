@@ -27,7 +27,7 @@ using enum Severity;
 
 // In the texts of `table`, {0}, {1} ... are replaced by the values that the judge passes to `finding`.
 constexpr auto table = std::to_array<Words>({
-    // In findings about a port or bus, "{0}" alone is the error of the system with its advice.
+    // In findings about a port or bus, a text of "{0}" alone is the operating system's error message with its advice.
     {FindingKind::port_missing, "port_missing", fault, "{0}",
      "the adapter is not plugged in, or the name is another one",
      "plug it in, or correct the name; `ls /dev/serial/by-id` shows adapters by their own names"},
@@ -194,7 +194,8 @@ constexpr auto table = std::to_array<Words>({
 
     {FindingKind::starting, "starting", warning, "{0}",
      "it was switched on just now, or its supply is too weak to come up", "wait, then look again; measure the supply"},
-    // {1} of alarm and status comes from the encoder's document, and {2} if the document states an action.
+    // In the findings `alarm` and `status`, {1} is the meaning from the encoder's document, and {2} the action, if the
+    // document states one.
     {FindingKind::alarm, "alarm", warning, "the encoder reports {0}", "{1}", "{2}"},
     {FindingKind::status, "status", warning, "the status of the encoder has {0}", "{1}", "{2}"},
     {FindingKind::position_invalid, "position_invalid", fault,
@@ -220,7 +221,7 @@ constexpr auto table = std::to_array<Words>({
      "the resolution is another one, or codes are missing", "check the resolution of the model; replace the encoder"},
 });
 
-/// Texts for one kind of port; "" replaces nothing.
+/// Texts that replace those of `table` for one kind of port; "": keeps the text of `table`.
 struct Elsewhere {
   FindingKind finding_kind;
   PortKind place;
@@ -299,7 +300,7 @@ static_assert(is_in_order() && table.size() == static_cast<std::size_t>(FindingK
 
 const Words& words_of(FindingKind finding_kind) { return table[static_cast<std::size_t>(finding_kind)]; }
 
-// Returns the text with its {0}, {1} ... replaced by these values.
+// Returns the text in which {0}, {1} ... are replaced by these values.
 std::string filled(std::string_view text, const std::vector<std::string>& values) {
   fmt::dynamic_format_arg_store<fmt::format_context> arguments;
   for (const std::string& value : values) arguments.push_back(value);

@@ -10,7 +10,7 @@
 
 namespace absenc::client {
 
-/// Longest time by which the encoder may send before the time of its reply.
+/// Longest time by which a virtual encoder may send its reply too early.
 inline constexpr Time send_slack = std::chrono::microseconds(500);
 
 /// A machine that calls `look` in the thread of the encoder.
@@ -22,7 +22,9 @@ class Attended final : public Machine<Item> {
 
   void feed(const Event<Item>& event) override {
     if (event.kind == Event<Item>::Kind::timer) {
-      if (event.at < timer_) return;  // the timer was due only to call `look`, not for the encoder
+      // A timer event before the time of the encoder's timer only serves to call `look`, so the encoder does not get
+      // it.
+      if (event.at < timer_) return;
       timer_ = never;
     }
     machine_.feed(event);
@@ -33,7 +35,7 @@ class Attended final : public Machine<Item> {
     if (now >= look_at_) look_at_ = look_(now) ? now + between_looks : never;
     Step<Item> step = machine_.next(now);
     if (step.kind != Step<Item>::Kind::wait) return step;
-    // A time that has passed starts no timer, unless it is that of the present timer.
+    // A wait for a time that has passed starts no timer, unless the encoder repeats the wait for its present timer.
     timer_ = step.at > now || step.at == timer_ ? step.at : never;
     step.at = std::min(look_at_, timer_);
     return step;
@@ -42,7 +44,7 @@ class Attended final : public Machine<Item> {
  private:
   Machine<Item>& machine_;
   std::function<bool(Time)> look_;
-  Time timer_ = never;  // time of the timer for which the encoder waits
+  Time timer_ = never;  // time for which the encoder waits with a timer
   Time look_at_{};
 };
 

@@ -28,7 +28,7 @@ namespace absenc::client {
 
 namespace {
 
-// period in which `look` is called while the encoder waits for a lost CAN interface
+// period of the calls of `look` (which serves other threads) while the encoder waits for a lost CAN interface
 constexpr Time between_tries_to_look = std::chrono::milliseconds(20);
 
 EncoderAddress virtual_address(std::string_view text) {
@@ -122,7 +122,7 @@ struct Emulation::Running {
     serve_forever(attended, open, wait, [](PortEvent, std::string_view) {});
   }
 
-  // Throws Cancelled once `stopped` is set.
+  // Executes a function that another thread has passed, if any. Throws Cancelled once `stopped` is set.
   bool look(Time now) {
     const std::lock_guard lock(mutex);
     if (stopped) throw Cancelled{};
@@ -133,7 +133,7 @@ struct Emulation::Running {
     return true;
   }
 
-  /// Runs `work` in the encoder's thread and waits for its end. Throws what ended that thread.
+  /// Runs `work` in the encoder's thread and waits for its end. Throws the exception that ended that thread, if any.
   void carry_out(const std::function<void(Time)>& work) {
     const std::lock_guard turn(wishes);
     std::unique_lock lock(mutex);
@@ -160,8 +160,9 @@ struct Emulation::Running {
   std::shared_ptr<os::EmulatorPort> port;
   std::unique_ptr<os::SocketCan> can;  // the opened CAN interface, until the encoder's thread takes it
 
-  std::mutex wishes;  // lets only one thread at a time pass a function to the encoder's thread
-  std::mutex mutex;   // guards `wish` and `stopped`; `thrown` is set before `stopped`
+  std::mutex wishes;  // allows only one thread at a time to pass a function to the encoder's thread
+  // the mutex guards `wish` and `stopped`; `thrown` needs no guard, because it is set before `stopped`
+  std::mutex mutex;
   std::condition_variable changed;
   std::function<void(Time)> wish;
   bool stopped = false;

@@ -72,7 +72,7 @@ class RequestWatch final : public Machine<Item> {
     }
   }
 
-  // Counts an SPI transfer, whose beginning must be a request.
+  // Counts an SPI transfer as good if it begins with a valid request, else as bad.
   void look_at_transfer(Bytes bytes) {
     const FrameEnd end = unit_.frame_end(options_, Direction::request, bytes);
     const bool good = end.kind == FrameEnd::Kind::complete && error_of({.bytes = bytes.first(end.size)}) == Error::none;
@@ -84,7 +84,7 @@ class RequestWatch final : public Machine<Item> {
   void look_at_bytes(Bytes bytes, Time at, Time late) {
     const Time pause = at - character_ * static_cast<std::int64_t>(bytes.size()) - heard_at_;
     heard_at_ = at;
-    // If this event may be that late, the host may have waited for the reply before.
+    // If the bytes may be reported so late that the reply fits into the delay, the host may have waited for the reply.
     const bool may_have_waited = late > unit_.timing.turnaround + most_in_reply * character_;
     if (pause > 2 * character_ || may_have_waited) skipping_ = waits_ = false;
     if (sending_ && unit_.link == LinkKind::half_duplex) skipping_ = true;
@@ -126,7 +126,8 @@ class RequestWatch final : public Machine<Item> {
 
   [[nodiscard]] Error error_of(const Frame& request) const { return unit_.check(options_, request, {}); }
 
-  // Opening a port may produce a few bad requests before the first good one.
+  // Counts a good request. At the first one, earlier bad requests are counted separately: opening a port may produce a
+  // few.
   void note_good() {
     if (++counts_.good > 1) return;
     counts_.before += counts_.bad;
@@ -143,8 +144,8 @@ class RequestWatch final : public Machine<Item> {
   Time character_;
   bool sending_ = false;
   Time heard_at_{};
-  bool waits_ = false;  // whether the reply is outstanding, so that the host must wait
-  // whether bytes are ignored
+  bool waits_ = false;  // whether the encoder has not replied yet, so that the host must wait
+  // whether received bytes are ignored until the next pause
   bool skipping_ = false;
   std::vector<std::uint8_t> pending_{};
   RequestCounts counts_{};

@@ -32,7 +32,7 @@ using namespace std::chrono_literals;
 constexpr Time first_request = 20us;              // time from power-on to the first request
 constexpr std::uint64_t fastest = 1'000'000'000;  // highest sample rate: the drawing has a resolution of 1 ns
 
-// Idle time that decoders need at the beginning and at the end.
+// Returns the idle time that decoders need before the first and after the last character.
 Time idle_around(const LineSettings& line) { return std::max(first_request, 5 * line.character()); }
 
 enum class FileFormat : std::uint8_t { vcd, sigrok, saleae };

@@ -20,7 +20,7 @@ class ChangeRecord {
   /// Reads, if necessary, the value that the command will overwrite.
   ChangeRecord(Connection& connection, const Command& command, Arguments arguments, std::optional<std::int64_t> known);
 
-  /// Returns "" or why the change could not be written.
+  /// Adds the change to the journal; returns "" or why it could not be written.
   [[nodiscard]] std::string keep(const EncoderAddress& way, const Change& change);
 
  private:
@@ -35,8 +35,9 @@ class ChangeRecord {
   Connection& connection_;
   const Command& command_;
   std::vector<std::int64_t> arguments_;
-  std::optional<Answer> old_{};              // old value of a setting, as all fields of the reply
-  std::optional<std::int64_t> old_value_{};  // old value, in the form that the command can write
+  std::optional<Answer> old_{};  // value of the setting before the change, as all fields of the reply
+  // value before the change, as an argument with which the command restores it
+  std::optional<std::int64_t> old_value_{};
 };
 
 }  // namespace absenc::client

@@ -25,7 +25,7 @@ Frame to_frame(std::span<const CanFrame> frames, std::size_t = 0) {
   return {.can = frames.empty() ? nullptr : &frames.front()};
 }
 
-// Returns how the encoder is reached after the command, in words; "" if as before.
+// Returns a sentence about the options with which the encoder is reached after the command; "" if they are unchanged.
 std::string new_way(const EncoderAddress& before, const Command& command, Arguments arguments) {
   if (command.changes_option.empty()) return {};
   const Options behind = options_behind(*before.unit, before.options, command, arguments.front());
@@ -58,7 +58,7 @@ std::string advice_to_look(const EncoderAddress& before, const Command& command,
 class LifeCounters final : public FieldSink {
  public:
   void clear() { before_.clear(); }
-  /// Begins the comparison of the next reading, whose fields `put` then receives.
+  /// Begins the comparison of the next reading; `put` then receives the fields of that reading.
   void begin() { stand_ = false; }
   void put(const FieldValue& field) override {
     if (field.info->role != Role::life_counter) return;
@@ -66,7 +66,7 @@ class LifeCounters final : public FieldSink {
     stand_ = stand_ || (!is_first && known->second == field.number);
     known->second = field.number;
   }
-  /// Returns whether a life counter equals that of the reading before.
+  /// Returns whether a life counter has the same value as in the reading before.
   [[nodiscard]] bool stand() const { return stand_; }
 
  private:
@@ -111,7 +111,7 @@ class ConnectionOn final : public Connection {
     const Command* command = uri().reads != nullptr ? uri().reads : find_command(unit(), Verb::read);
     if (command == nullptr) throw UsageError(fmt::format("{} has no command that reads the position", unit().id));
     Outcome ended = read_once(*command, take);
-    // Another host may have read so many frames that the counter wrapped to the same value.
+    // Reads again, because another host may have read so many frames that the counter wrapped to the same value.
     if (life_counters_.stand()) ended = read_once(*command, take);
     if (!life_counters_.stand()) return ended;
     session_.refuse_last(Error::sequence_mismatch);
@@ -255,7 +255,7 @@ class ConnectionOn final : public Connection {
     return ended;
   }
 
-  // Returns the state of a change after its command. `before` is the address before the change.
+  // Returns the state of a change after its command has ended. `before` is the encoder's address before the change.
   Change change_after(const EncoderAddress& before, const Command& command, Arguments arguments, bool good) const {
     const ChangeSent sent = port_.requests != requests_before_ ? session_.change_sent() : ChangeSent::no;
     if (sent == ChangeSent::no) return {ChangeState::not_sent};
@@ -264,7 +264,7 @@ class ConnectionOn final : public Connection {
     return {ChangeState::unknown, advice_to_look(before, command, arguments)};
   }
 
-  // Conversations must not change settings of a line that other encoders share.
+  // Tells the unit that other encoders share the line, so that conversations do not change settings of the line.
   void tell_of_company() {
     Options options = uri().options;
     tell_shared(unit(), options);
@@ -280,7 +280,7 @@ class ConnectionOn final : public Connection {
             port_.take_aborted(),  conversation->reading(), {}};
   }
 
-  // A late reply has other causes than a missing one.
+  // Adds to the message that replies came late, because a late reply has other causes than a missing one.
   void tell_lateness(Trouble& trouble) const {
     const Time lateness = session_.lateness();
     if (trouble.error != Error::timeout || lateness == Time{}) return;
@@ -304,7 +304,7 @@ class ConnectionOn final : public Connection {
     return fmt::format("{}: {}", found.id, found.cause);
   }
 
-  // Describes a failure of a conversation that had not sent anything yet.
+  // Describes a failure of a conversation that failed before it sent a request.
   [[nodiscard]] Trouble unasked_trouble(const Outcome& outcome) const {
     const std::span<const Item> damaged = last_->exchange().received;
     const std::span<const Item> received = damaged.empty() ? std::span<const Item>(line_.received) : damaged;
@@ -345,7 +345,7 @@ class ConnectionOn final : public Connection {
     return fmt::format("{}; received {}{}", sent, trouble.received, later);
   }
 
-  // Returns the bits that the last clocks received, as text.
+  // Returns the bits that the host received with its last clocks, as text.
   [[nodiscard]] std::string clocked_text() const {
     return to_wire_text(unit().link, to_frame(std::span<const Item>(line_.received), line_.clocks));
   }
@@ -367,7 +367,7 @@ class ConnectionOn final : public Connection {
   static constexpr unsigned attempts = 3;
 
   bool is_journaled_;
-  bool is_exact_;  // whether times on the line are exact: the line is simulated
+  bool is_exact_;  // whether the times of events on the line are exact, because the line is simulated
   OpenLink open_;
   std::shared_ptr<SharedLink> link_;
   Runner<Item> runner_;
@@ -380,7 +380,7 @@ class ConnectionOn final : public Connection {
   ArrivalSpread arrivals_;
   host::LatchTime latch_time_{};  // bounds of the time at which the encoder latched the last position
   Change change_{};
-  std::uint64_t requests_before_ = 0;  // number of requests that preceded the last conversation of `run`
+  std::uint64_t requests_before_ = 0;  // number of requests that were sent before the last command began
 };
 
 }  // namespace
@@ -392,7 +392,7 @@ std::string Trouble::text() const {
   return with_change(lines, change);
 }
 
-// The user's line settings remain, except for the rate if the options change it.
+// The line settings that the user has set remain, except for the rate if the options change it.
 void Connection::set_options(const Options& options) {
   const std::uint32_t rate = line_settings(unit(), options).rate;
   if (rate != line_settings(unit(), uri_.options).rate) uri_.line.rate = rate;

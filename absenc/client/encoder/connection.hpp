@@ -46,21 +46,21 @@ class Connection {
 
   /// Reads the position. Throws UsageError and the exceptions of the port.
   virtual Outcome read(host::Take take = host::Take::newest) = 0;
-  /// Runs a command; calls `on_emit` at intermediate results, which `report` then passes on.
+  /// Runs a command. Calls `on_emit` at each intermediate result; `report` then passes that result on.
   virtual Outcome run(const Command& command, Arguments arguments, const std::function<void()>& on_emit = {}) = 0;
   /// Stores the value that the next changing command overwrites, for the journal.
   void know_before(std::int64_t value) { known_before_ = value; }
   /// Returns the state of the last changing command, also if the command threw an exception.
   [[nodiscard]] virtual const Change& change() const = 0;
-  /// Passes the fields of the last outcome, and its reading, to `sink`.
+  /// Passes the fields and the reading of the last command's outcome to `sink`.
   virtual void report(FieldSink& sink) const = 0;
-  /// Passes settings that a failed command left changed to `sink`.
+  /// Passes the settings of the encoder that a failed command has left changed to `sink`.
   virtual void report_left(FieldSink& sink) const = 0;
-  /// Returns a description of the failure `outcome`, which must be the last outcome.
+  /// Returns a description of a failed command. `outcome` must be the outcome of the last command.
   [[nodiscard]] virtual Trouble trouble(const Outcome& outcome) const = 0;
   /// Returns bounds of the time at which the last position was latched, by the port's clock.
   [[nodiscard]] virtual host::LatchTime latch_time() const = 0;
-  /// Returns whether the last position agrees with the one before.
+  /// Returns whether the last position agrees with the position that was read before it.
   [[nodiscard]] virtual bool confirmed() const = 0;
   [[nodiscard]] virtual const host::Counters& counters() const = 0;
   [[nodiscard]] virtual const host::Latencies& latencies() const = 0;
@@ -70,7 +70,7 @@ class Connection {
   [[nodiscard]] virtual std::uint64_t items() const = 0;
   /// Returns the open link, for other conversations while this connection runs none.
   [[nodiscard]] virtual Link lend() const = 0;
-  /// Returns the present time of the clock of the readings.
+  /// Returns the present time of the port's clock, by which the times of readings are given.
   [[nodiscard]] virtual Time now() = 0;
 
   /// Sets a function that is polled during waits; true ends them with os::Ended. Empty: none.

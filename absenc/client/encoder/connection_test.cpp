@@ -22,7 +22,7 @@ class Seen final : public FieldSink {
   bool any = false;
 };
 
-/// A machine that can repeat frames of an encoder.
+/// A machine that stands between host and encoder and can repeat old frames of the encoder.
 class Recorder final : public Machine<std::uint8_t> {
  public:
   explicit Recorder(Machine<std::uint8_t>& encoder) : encoder_(&encoder) {}
@@ -60,7 +60,7 @@ struct Counting {
         })) {
     encoder.power_on(Time{});
     connection->connect();
-    // Frames 0 and 1 are those of the first reading.
+    // The recorder numbers frames from 0: the first reading has frames 0 and 1.
     first = connection->read();
     connection->report(seen);
   }
@@ -102,7 +102,7 @@ TEST_P(LifeCounters, OneThatStandsStillIsAnError) {
 TEST_P(LifeCounters, OneThatHasComeRoundIsReadAgain) {
   Counting line(*GetParam());
   for (int i = 0; i < 2; ++i) EXPECT_EQ(line.connection->read().error, Error::none);
-  // the second reading looks as if the counter had wrapped, and is repeated
+  // the second reading repeats the life counter, as if it had wrapped, so the encoder is read again
   line.recorder.play({0, 1, 0, 1, 2, 3, 0, 1});
   for (int i = 0; i < 3; ++i) EXPECT_EQ(line.connection->read().error, Error::none);
   EXPECT_EQ(line.recorder.left(), 0u);

@@ -86,7 +86,7 @@ TEST(ClientEncoder, AnAnswerOutlivesItsEncoder) {
   Answer answer;
   {
     Answer first = open("sim:ssi?word=a_long_name=value:4 position:13").run("position");
-    answer = first;  // the copy must stay valid after the original was overwritten
+    answer = first;  // the copy must stay valid after the original, `first`, is destroyed
   }
   EXPECT_EQ(answer["a_long_name"], Value(std::uint64_t{0}));
   EXPECT_EQ(answer.columns[0].name, "a_long_name");
@@ -129,7 +129,8 @@ TEST(ClientEncoder, GoesOnAtTheRateThatItWasSetTo) {
   }
 }
 
-// The encoder is readable if, and only if, it has the rate of its connection.
+// However a change of the rate was broken off, the encoder can be read if, and only if, it has the rate of its
+// connection.
 TEST(ClientEncoder, IsReadAtItsRateWhenAChangeOfItsRateWasBrokenOff) {
   unsigned whole = 0;
   unsigned there = 0;
@@ -183,7 +184,7 @@ TEST(ClientEncoder, DisconnectedEncoderOpensItsPortForTheNextReading) {
   encoder.disconnect();
   const Sample sample = encoder.next();
   EXPECT_EQ(sample.kind, Sample::Kind::back);
-  EXPECT_EQ(sample.message, "the port is open");  // a port that `disconnect` closed was not lost
+  EXPECT_EQ(sample.message, "the port is open");  // a port that was closed by `disconnect` does not count as lost
   EXPECT_EQ(encoder.losses(), 0u);
 }
 
@@ -194,7 +195,7 @@ TEST(ClientEncoder, EndsAtItsDeadline) {
   encoder = open("sim:tformat?singleturn=7");
   EXPECT_EQ(encoder.read(os::now() + std::chrono::minutes(10)).singleturn, 7u);
   EXPECT_EQ(encoder.read().singleturn, 7u);
-  unsigned samples = 0;  // number of samples; the second one would be due after 1000 s
+  unsigned samples = 0;  // number of samples that were taken; the second one would be due after 1000 s
   const Time end = os::now() + std::chrono::milliseconds(50);
   for (const Sample& sample : encoder.samples({.rate_hz = 1e-3, .deadline = end})) {
     EXPECT_EQ(sample.position_state(), PositionState::good);

@@ -11,21 +11,23 @@
 
 namespace absenc::client {
 
-/// Returns the bounds for a requested reading; `character` is the duration of a character, or 0.
+/// Returns bounds of the latch time of a reading that was requested. `character` is the duration of a character; 0: not
+/// known.
 template <class Item>
 [[nodiscard]] host::LatchTime asked_latch_time(const LineExchange<Item>& exchange, Time latched, Time character) {
-  // The encoder latches before the end of the request if the host clocks or triggered it.
+  // The encoder latches before the request ends if the host clocks the bits or triggers the encoder by a pulse.
   const Time earliest = std::min(exchange.sent_at, latched) - exchange.sent_late;
-  // The last character may be reported before its stop bit ends, and clocks differ.
+  // Subtracts 15/16 of the duration of all characters but one: the last one may be reported before its stop bit ends,
+  // and clocks differ.
   const auto characters = static_cast<std::int64_t>(std::max<std::size_t>(exchange.reply().size(), 1)) - 1;
   const Time reply = characters * character * 15 / 16;
   return {earliest, std::max(earliest, exchange.received_at - reply)};
 }
 
-/// Estimates bounds for unsolicited readings from the spread of their arrivals.
+/// Estimates bounds of the latch times of unsolicited readings from the spread of their arrival times.
 class ArrivalSpread {
  public:
-  /// Adds the arrival of the next reading. No byte had arrived until `nothing_until`.
+  /// Adds the arrival of the next reading. No byte of it had arrived until `nothing_until`.
   void add(Time arrived, Time nothing_until) {
     const Time pause = arrived - std::max(arrived_, nothing_until);
     if (arrived_ == Time{}) usual_ = pause;
@@ -50,7 +52,7 @@ class ArrivalSpread {
   Time arrived_{};
   Time usual_{};  // average pause between two readings
   Time second_ends_{};
-  Time now_{};  // sum by which pauses exceeded 5/4 of the usual pause in the present second
+  Time now_{};  // sum of the times by which pauses in the present second were longer than 5/4 of the usual pause
   Time before_{};
 };
 

@@ -68,7 +68,7 @@ class BusyPort final : public Port<Item> {
   }
 
  private:
-  // Most delays are short: seven of eight are at most 1/50 of the longest.
+  // Returns a random delay of the computer. Most are short: seven of eight are at most 1/50 of the longest possible.
   Time lateness() {
     const Time most = random_() % 8 == 0 ? most_ : most_ / 50;
     return Time(std::uniform_int_distribution<Time::rep>(0, most.count())(random_));
@@ -106,7 +106,7 @@ std::vector<Case> cases() {
   return all;
 }
 
-// A revolution of a linear encoder is its whole range.
+// Returns the speed of the shaft. One revolution moves a linear encoder over its whole range, so it is slower there.
 double revolutions_a_second(const Case& one) {
   const EncoderAddress address = parse_address(one.address);
   return address.unit->resolution(address.options).unit_um > 0 ? 0.05 : 0.5;
@@ -244,7 +244,7 @@ TEST_P(LatchTimes, MakeTheMeanSpeedOfAShaftThatSwings) {
     Busy busy(
         GetParam(), [=](double seconds) { return swing * std::sin(2 * M_PI * seconds); }, most, 1);
     if (busy.is_unsolicited()) GTEST_SKIP() << "it sends by itself: only its arrival is known";
-    std::map<Time, Time> truths;  // true instant of each reading, by the earliest time of its bounds
+    std::map<Time, Time> truths;  // the true latch time of each reading, by the lower of its two bounds
     std::size_t compared = 0;
     busy.read(600, 3ms, [&](const Reading& reading, const host::LatchTime& at) {
       const std::optional<Time> instant = true_instant(busy.shaft(), reading, at);

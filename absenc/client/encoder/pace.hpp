@@ -13,11 +13,12 @@ namespace absenc::client {
 
 class Pace {
  public:
-  /// Takes the rate in Hz (0: as fast as possible) and the offset of the first time from now.
+  /// Takes the rate in Hz (0: as fast as possible) and the time from now to the first due time.
   explicit Pace(double rate, Time offset = {})
       : period_(rate > 0 ? static_cast<std::int64_t>(1e9 / rate) : 0), next_(os::now() + offset) {}
 
-  /// Returns the next time, from the second one on; without a rate, a time in the past.
+  /// Returns the next due time; the first call returns the second due time of the series. Without a rate it returns a
+  /// time in the past.
   Time next() {
     if (period_ == Time{}) return {};
     next_ += period_;
@@ -26,7 +27,7 @@ class Pace {
     return next_;
   }
 
-  /// Sleeps until the next time, or until `end` if that is earlier; does nothing without a rate.
+  /// Sleeps until the next due time, or until `end` if that is earlier; returns at once without a rate.
   template <class SleepUntil>
   void wait(Time end, SleepUntil sleep_until) {
     if (period_ == Time{}) return;
@@ -43,7 +44,8 @@ class Pace {
 
   void wait() { wait(never, os::sleep_until); }
 
-  /// Skips times that have passed; one less than a period late is kept, unless `end` is reached.
+  /// Skips due times that have passed and counts them as missed. Keeps one that passed less than a period ago, unless
+  /// `end` has been reached.
   void leave_out(Time end) {
     const Time now = os::now();
     if (period_ == Time{} || now < next_) return;
@@ -60,7 +62,7 @@ class Pace {
 
   [[nodiscard]] std::uint64_t take_missed() { return std::exchange(missed_, 0); }
 
-  /// Begins a new series; the next call of `next` or `wait` is for the time after `start`.
+  /// Begins a new series of due times at `start`; the next call of `next` or `wait` is for the due time after `start`.
   void start_at(Time start) { next_ = start; }
 
   [[nodiscard]] Time period() const { return period_; }

@@ -12,7 +12,7 @@ TEST(Pace, WhatWasDueBeforeTheEndIsMissedWhereverItCame) {
   const Time start = os::now() - 10s;
   Pace pace(10);
   pace.start_at(start);
-  pace.leave_out(start + 550ms);  // times were due at 0, 100 ... 500 ms
+  pace.leave_out(start + 550ms);  // at 550 ms, times were due at 0, 100, 200, 300, 400 and 500 ms
   EXPECT_EQ(pace.take_missed(), 6u);
   pace.leave_out(start + 550ms);
   EXPECT_EQ(pace.take_missed(), 0u) << "once";

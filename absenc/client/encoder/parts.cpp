@@ -39,7 +39,7 @@ double speed_of(const Reading& reading, double counts_per_second) {
   return std::ldexp(60 * counts_per_second, -static_cast<int>(reading.singleturn_bits));
 }
 
-// The quickest of five attempts is the most exact.
+// Returns the offset from the connection's clock to os::now. The quickest of five measurements is the most exact.
 Time ahead_of(Connection& connection) {
   Time quickest = never;
   Time ahead{};
@@ -163,7 +163,7 @@ Sample Encoder::Parts::sample_of(Reading reading) {
   return sample;
 }
 
-// The sample's position must be valid.
+// Returns the angles of joint and motor for a sample whose position is valid.
 JointAngles Encoder::Parts::angles_of(const Sample& sample) const {
   const Joint& one = connection->uri().joint;
   const Reading& reading = sample.reading;

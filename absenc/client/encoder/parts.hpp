@@ -39,7 +39,7 @@ struct Encoder::Parts {
   std::atomic<bool> cancelled = false;
   std::function<bool()> over{};
   std::unique_ptr<Connection> connection;
-  Time period;  // intended time between readings; 0: as short as the line allows
+  Time period;  // intended time between two readings; 0: as short as the line allows
   host::Rate rate;
   Time offset{};  // offset from the clock of the port to os::now
   std::uint64_t readings = 0;
@@ -59,7 +59,7 @@ struct Encoder::Parts {
   Time unwrapped_at_{};  // lower bound of the time at which the last valid position was latched
 };
 
-/// Makes an encoder; `period` is the intended time between readings, 0: none.
+/// Makes an encoder. `period` is the intended time between two readings; 0: no period is intended.
 [[nodiscard]] Encoder make_encoder(const EncoderAddress& address, Time period, OpenLink open = {});
 
 /// Returns a connection that stays the same if the encoder is moved.

@@ -39,7 +39,8 @@ std::size_t place_of(const Answer& answer, std::string_view name) {
                                   answer.columns.begin());
 }
 
-// Runs the setter. If the port is lost, the exception may state which values the encoder may have.
+// Runs the command that writes the setting. If the port is lost, adds to the exception which values the encoder may
+// have.
 void write(Connection& encoder, const Command& setter, Arguments arguments, SettingSink& told) {
   try {
     run_into(encoder, setter, arguments, told);
@@ -59,7 +60,7 @@ void write(Connection& encoder, const Command& setter, Arguments arguments, Sett
   }
 }
 
-// Throws Failure if the setting reads differently from what was written.
+// Throws Failure if the value of the setting that was read back differs from the written value.
 void require_same(const Answer& now, const Answer& written, std::string_view name) {
   for (std::size_t i = 0; i < written.columns.size(); ++i) {
     const std::size_t place = place_of(now, written.columns[i].name);
@@ -71,7 +72,7 @@ void require_same(const Answer& now, const Answer& written, std::string_view nam
   }
 }
 
-// Returns how the encoder is reached from now on, in words; "" if as before.
+// Returns a sentence about the option with which the encoder is reached from now on; "" if it is unchanged.
 std::string note_of(const Unit& unit, const Options& before, const Command& setter, std::int64_t value) {
   if (options_behind(unit, before, setter, value).values == before.values) return {};
   return fmt::format("from now on it is reached with {}={}", setter.changes_option, value);

@@ -24,7 +24,7 @@ using namespace std::chrono_literals;
 using capture::Hypothesis;
 using capture::ObservedExchange;
 
-/// How long an attempt asks an encoder that does not answer.
+/// How long an attempt tries to get a reply from an encoder that does not answer.
 struct Effort {
   Time scan{};              // time without a reply after which a scan ends
   bool asks_again = false;  // whether silent encoders are asked again: by further requests, and after a silent scan
@@ -34,12 +34,12 @@ inline constexpr Effort thorough{.scan = 5s, .asks_again = true};
 
 inline constexpr unsigned reads = 6;              // intended number of answered readings of each encoder that replies
 inline constexpr Time listening = 100ms;          // time of listening before the first request at a setting of the line
-inline constexpr std::size_t stream_size = 2048;  // number of unsolicited bytes or frames that are enough
-inline constexpr unsigned most_unanswered = 3;    // number of readings without a reply after which no more are taken
-inline constexpr Time settled = 5ms;              // silence after which no earlier reply is expected
-inline constexpr Time longest_settling = 200ms;   // limit of the wait for silence, on a line that is never silent
-inline constexpr Time late_window = 100ms;        // time after an unanswered request in which its reply may arrive late
-inline constexpr Time most_allowance = 400ms;     // greatest extension of the timeout if replies are late
+inline constexpr std::size_t stream_size = 2048;  // number of unsolicited bytes or frames after which listening ends
+inline constexpr unsigned most_unanswered = 3;  // number of unanswered readings after which an encoder is read no more
+inline constexpr Time settled = 5ms;  // duration of silence after which no reply to an earlier request is expected
+inline constexpr Time longest_settling = 200ms;  // limit of the wait for silence, on a line that is never silent
+inline constexpr Time late_window = 100ms;       // time after an unanswered request in which its reply may arrive late
+inline constexpr Time most_allowance = 400ms;    // greatest extension of the timeout if replies are late
 
 /// Collects the addresses of encoders that a scan finds, without those that two encoders share.
 struct ScannedAddresses final : FieldSink {
@@ -53,10 +53,10 @@ struct ScannedAddresses final : FieldSink {
 /// Reason why a conversation was aborted.
 enum class TryEnd : std::uint8_t {
   silent,   // no valid reply arrived within the limits of `Patience`
-  harmful,  // the next request, or pulse of the wire `clear`, might change an encoder
+  harmful,  // the next request might change an encoder, or the next pulse of the wire `clear` would set its zero
 };
 
-/// Result of asking an encoder for its identity, and whether it agrees with the assumed options.
+/// Result of reading an encoder's identity, and whether the identity agrees with the assumed options.
 struct Introduction {
   Answer identity{};
   bool agrees = false;          // whether the encoder reported an identity that does not contradict the options
@@ -112,7 +112,7 @@ class Attempt {
     }
   }
 
-  /// Listens before the first request and returns the unsolicited bytes or frames.
+  /// Listens before the first request of the attempt and returns the unsolicited bytes or frames.
   std::vector<Item> listen() {
     std::vector<Item> items;
     runner_.listen(listening, [&items](std::span<const Item> more) {
@@ -155,7 +155,7 @@ class Attempt {
       if (command.verb != Verb::info || command.changes_encoder || needs_argument) continue;
       std::vector<ObservedExchange> ignored;
       Conversed one = converse(command, options, ignored, &identity);
-      // An access of many frames may fail once on a busy computer.
+      // Tries again, because an access that consists of many frames may fail once on a busy computer.
       if (one.error == Error::timeout || is_damage(one.error)) one = converse(command, options, ignored, &identity);
       all.agrees = all.agrees || one.error == Error::none;
       const bool contradicts = one.error == Error::unexpected_reply || one.error == Error::out_of_range;
@@ -169,7 +169,6 @@ class Attempt {
  private:
   static constexpr bool is_can = std::is_same_v<Item, CanFrame>;
 
-  /// State of the running conversation.
   struct Talk {
     const Options& options;
     std::vector<ObservedExchange> exchanges{};
@@ -222,7 +221,8 @@ class Attempt {
       const auto known = static_cast<std::ptrdiff_t>(exchanges.size());
       Conversed one = converse_once(command, options, exchanges, sink);
       if (is_can || host_clocks(unit_.link)) return one;
-      // A scan that was given up is followed by a reading, whose reply is late, too, if any is.
+      // After a scan that was ended early, no late reply is awaited: the reading that follows shows whether replies are
+      // late.
       const bool is_cut = command.verb == Verb::scan && !one.ended && !effort_.asks_again;
       if (is_unanswered_ && !is_cut) runner_.settle(late_window, longest_settling);
       if (runner_.late() == late || allowance_ == most_allowance) return one;
@@ -322,7 +322,7 @@ class Attempt {
     std::vector<ObservedExchange> exchanges;
     if (converse(read, options, exchanges).heard == 0) {
       if (!effort_.asks_again) return false;
-      // tries once more: the reply may have been late, or the encoder may have missed the first request
+      // asks once more: the reply may have been late, or the encoder may have missed the first request
       exchanges.clear();
       if (converse(read, options, exchanges).heard == 0) return false;
     }

@@ -19,8 +19,8 @@ namespace {
 using capture::Hypothesis;
 using capture::ObservedExchange;
 
-constexpr std::size_t enough = 300;         // number of replies, good or bad, that suffice
-constexpr std::size_t enough_noise = 3000;  // number of bytes outside of frames that suffice
+constexpr std::size_t enough = 300;         // number of replies, good or bad, that are enough evidence
+constexpr std::size_t enough_noise = 3000;  // number of bytes outside of frames that are enough evidence
 
 /// Thrown to stop decoding when enough of the capture was read.
 struct Enough {};
@@ -66,7 +66,9 @@ std::vector<ObservedExchange> heard_as(const Unit& unit, const Options& options,
     }
   } catch (const Enough&) {
   }
-  if (collector.replies == 0) return {};  // the capture has only single bytes, which would be frames with some options
+  // If no frame was found, the collected bytes are no evidence: with some options each single byte would count as a
+  // frame.
+  if (collector.replies == 0) return {};
   return std::move(collector.exchanges);
 }
 
@@ -122,7 +124,7 @@ CaptureFindings search_capture(const CaptureChoices& choices, const std::functio
       for (Hypothesis& one : search_unit(*unit, choices, searches, findings.damages)) {
         findings.candidates.push_back({unit, std::move(one), {}, false, line_of(*unit)});
       }
-    } catch (const UsageError& error) {  // thrown if the protocol needs another kind of capture
+    } catch (const UsageError& error) {  // the decoder throws this if the protocol needs another kind of capture
       findings.refusals.emplace_back(error.what());
     } catch (const Failure& failure) {
       findings.refusals.emplace_back(failure.what());

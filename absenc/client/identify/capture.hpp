@@ -13,8 +13,9 @@ namespace absenc::client {
 
 struct CaptureFindings {
   std::vector<Candidate> candidates{};
-  std::vector<std::string> damages{};   // damage of the capture, if a protocol read all of it; each once
-  std::vector<std::string> refusals{};  // reasons why protocols could not be tried, each once
+  // damage of the capture, as found by protocols that read the whole file; each damage only once
+  std::vector<std::string> damages{};
+  std::vector<std::string> refusals{};  // reasons why protocols could not be tried; each reason only once
 };
 
 /// Decodes the capture with each protocol, only as much of it as needed for evidence, and returns the candidates, the

@@ -89,8 +89,8 @@ TEST_P(Damage, IsWhatTheRunnerSaysWithAndWithoutEcho) {
       SCOPED_TRACE(fmt::format("{}{}", fault, echo ? " with echo" : ""));
       const auto [evidence, requests] = asked(text, {fault}, {.echo = echo});
       const Counted wanted = damaged_by_runner(text, {fault}, evidence.tried, {.echo = echo});
-      // The faults strike other readings if the scan was repeated or found several encoders, so this is no fair
-      // comparison.
+      // The faults do not strike the same readings if the scan was repeated or found several encoders, so no comparison
+      // is made.
       if (wanted.requests != requests) continue;
       EXPECT_EQ(evidence.tried - evidence.explained, wanted.damaged);
       damaged += wanted.damaged;
@@ -140,8 +140,8 @@ unsigned bits_read(Place& place, const Options& options) {
   return read != nullptr && read->reading() != nullptr ? read->reading()->singleturn_bits : 0;
 }
 
-/// Returns whether a position that is read with these options has the resolution of the encoder: they may leave it
-/// open.
+/// Returns whether a position that is read with these options has the encoder's resolution. Options may leave the
+/// resolution open.
 bool reads_right(Place& place, const Options& options) {
   const Unit& unit = *place.encoder.unit;
   const unsigned wanted = unit.resolution(place.encoder.options).singleturn_bits;
@@ -155,7 +155,7 @@ TEST_P(Found, TheFirstCandidateIsTheEncoderOfEachModelAndNumber) {
   const Unit& unit = *GetParam();
   if (host_clocks(unit.link)) GTEST_SKIP() << "an SPI controller is needed";
   std::vector<std::string> settings{""};
-  // Tests addresses and models only of encoders that send nothing unsolicited, because others take seconds to find.
+  // Tests addresses and models only of encoders that send no unsolicited frames: finding those that do takes seconds.
   if (!host::sends_unsolicited(unit, parse_address(fmt::format("sim:{}", unit.id)).options)) {
     settings.push_back(at_last_number(unit));
     for (const Model& model : unit.models) settings.push_back(fmt::format("model={}", model.name));

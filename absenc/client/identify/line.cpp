@@ -21,7 +21,8 @@ namespace absenc::client {
 
 namespace {
 
-constexpr std::size_t busy_line = 32;  // number of bytes received while listening from which on no requests are sent
+// number of unsolicited bytes from which on the search sends no requests on the line
+constexpr std::size_t busy_line = 32;
 constexpr std::size_t most_introduced = 4;  // number of candidates of one encoder that are asked for their identity
 constexpr double beyond_doubt = -3;         // greatest log10 of a candidate's chance that is beyond doubt
 constexpr std::array<std::uint32_t, 10> common_rates{9600,    19'200,  38'400,    57'600,    115'200,
@@ -62,7 +63,8 @@ std::vector<Sender> senders(const Unit& unit, std::span<const CanFrame> frames) 
   return all;
 }
 
-/// A search for encoders: usual settings of each fitting unit, other rates, then, if in doubt, silent units again.
+/// A search for encoders: tries the usual settings of each fitting unit, then other rates and, if no encoder is found
+/// beyond doubt, silent units again.
 class Search {
  public:
   explicit Search(const LineSearch& search) : search_(search), deadline_(search.now() + search.limit) {}
@@ -208,7 +210,7 @@ class Search {
   void attempt_on(const Unit& unit, const SettingTexts& settings, const Effort& effort) {
     if (search_.now() >= deadline_) throw OutOfTime{};
     Attempt<Item> one(search_, unit, settings, effort, deadline_, findings_);
-    // units without a usual rate are tried at other rates later
+    // skips a unit without a usual rate now; it is tried at other rates later
     if (one.line().rate == 0 && medium_of(search_) == Medium::serial) return;
     const std::string line = line_of(unit.link, one.line());
     if (search_.progress) {
@@ -314,7 +316,7 @@ class Search {
   Time deadline_;
   LineFindings findings_;
   std::vector<std::pair<std::tuple<std::uint32_t, Parity, std::uint8_t>, bool>> listened_;
-  std::vector<const Unit*> silent_;  // units whose first requests nobody answered
+  std::vector<const Unit*> silent_;  // units that got no reply to their first requests
   std::optional<os::Failure> failure_;
   bool opened_ = false;
 };

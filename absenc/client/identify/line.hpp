@@ -19,8 +19,9 @@ namespace absenc::client {
 struct LineSearch {
   std::string place;                    // the port: "/dev/ttyUSB0", "tcp:HOST:PORT", "spi:/dev/spidev0.0"
   std::vector<std::string> settings{};  // settings of the port, such as "latency=5"
-  std::uint8_t most_data_bits = 16;     // units with longer characters are not tried
-  Time limit{};                         // time limit of the whole search
+  // greatest length of a character, in data bits; units with longer characters are not tried
+  std::uint8_t most_data_bits = 16;
+  Time limit{};  // time limit of the whole search for encoders
   std::function<void(const std::string&)> progress{};
   OpenLink open = open_link;
   std::function<Time()> now = os::now;  // returns the time of the port's clock

@@ -9,16 +9,16 @@
 
 namespace absenc::client {
 
-/// Decides when to end a conversation without replies, or without valid ones. Time in which this process did not run is
-/// subtracted.
+/// Decides when to end a conversation without replies, or without valid ones. Time in which the operating system did
+/// not run this process does not count.
 template <class Item>
 class Patience {
  public:
   struct Limits {
-    Time quiet{};                 // limit of the time in which no item at all is received
-    Time nonsense{};              // limit of the time in which items but no good reply are received
-    bool is_one_request = false;  // whether one request without any item received is enough
-    Time latency{};               // latency that the port adds to the timeouts of a step
+    Time quiet{};     // longest time in which no item at all is received, before the conversation ends
+    Time nonsense{};  // longest time in which items but no good reply are received, before the conversation ends
+    bool is_one_request = false;  // whether a single request to which nothing is received ends the conversation
+    Time latency{};               // latency of the port, which is added to the timeouts of the conversation's steps
   };
   explicit Patience(const Limits& limits) : limits_(limits) {}
 
@@ -42,7 +42,8 @@ class Patience {
     }
     due_ = step.kind == Kind::wait ? due(step, now) : never;
   }
-  /// Returns whether a limit forbids the step. The caller must know that no good reply arrived.
+  /// Returns whether a limit is reached, so that the step must not be made. To be called only if no good reply has
+  /// arrived.
   [[nodiscard]] bool is_over(const Step<Item>& step, Time now) {
     if (begun_ == never) begun_ = now;
     using Kind = typename Step<Item>::Kind;

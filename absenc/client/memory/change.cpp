@@ -10,7 +10,7 @@ namespace absenc::client {
 
 namespace {
 
-// Wait before a byte is read back whose write was not answered.
+// Wait after an unanswered write, before the byte is read back.
 constexpr Time settling = std::chrono::milliseconds(50);
 
 }  // namespace
@@ -80,7 +80,7 @@ void MemoryChange::settle() {
     if (!there) return;
     written_[at] = value;
     left_.erase(at);
-  } catch (const std::exception&) {  // the byte could not be read: its state remains unknown
+  } catch (const std::exception&) {  // the byte cannot be read, so it stays unknown whether it was written
   }
 }
 

@@ -19,7 +19,7 @@ namespace {
 constexpr std::string_view checksum_name = "checksum: ";
 constexpr std::string_view edited = "edited";
 
-/// CRC-16/IBM-3740 of the significant lines, each with one line feed.
+/// CRC-16/IBM-3740 of the lines of a dump that its checksum covers, each with one line feed.
 class Checksum {
  public:
   void add(std::string_view line) {
@@ -36,7 +36,7 @@ class Checksum {
 
 std::string_view model_name(const Options& options) { return options.model != nullptr ? options.model->name : "none"; }
 
-// Returns the lines of a dump that must match the encoder.
+// Returns the header lines of a dump, which state protocol, model and options and must match those of the encoder.
 std::vector<std::string> header(const Unit& unit, const Options& options) {
   std::vector<std::string> lines{fmt::format("protocol: {}", unit.id), fmt::format("model: {}", model_name(options))};
   if (options.model != nullptr) return lines;
@@ -166,7 +166,8 @@ class DumpParser {
   MemoryAccess access_;
   Checksum sum_;
   Dump dump_;
-  std::map<MemoryAddress, std::size_t> given_in_;  // for each address, the number of the line that gave its content
+  // for each address, the number of the line of the dump that gives its content
+  std::map<MemoryAddress, std::size_t> given_in_;
 };
 
 }  // namespace

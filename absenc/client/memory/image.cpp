@@ -85,7 +85,7 @@ std::string to_text(const Unit& unit, MemoryAddress at) {
 }
 
 std::string addresses_in_words(const Unit& unit, const MemoryImage& image) {
-  std::map<std::uint32_t, std::vector<std::string>> ranges;  // address ranges in words, by page
+  std::map<std::uint32_t, std::vector<std::string>> ranges;  // address ranges as text, by the number of their page
   for (const MemoryRun& run : runs(image)) {
     std::string text = fmt::format("0x{:02X}", run.first.address);
     if (run.words.size() > 1) text += fmt::format(" to 0x{:02X}", run.first.address + run.words.size() - 1);

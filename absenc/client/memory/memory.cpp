@@ -21,7 +21,8 @@ struct ReadBytes final : FieldSink {
     if (field.info->role == Role::data) data.assign(field.bytes.begin(), field.bytes.end());
     if (field.info->role == Role::value) value = static_cast<std::uint32_t>(field.number);
   }
-  // Returns the words of `size` bytes in the data, low byte first; without data, the value.
+  // Returns the received data as words of `size` bytes, low byte first; if the reply has a single value instead, that
+  // value.
   [[nodiscard]] std::vector<std::uint32_t> words(std::size_t size) const {
     if (data.empty() && value) return {*value};
     std::vector<std::uint32_t> all;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Format: the kind of file; lines "protocol: tformat", "model: NAME", "size: BYTES"; then lines "0010: 00 5A ...".
+// Format of the file: a line that names the kind of file; lines "protocol: tformat", "model: NAME", "size: BYTES"; then
+// the content as lines "0010: 00 5A ...".
 #include "absenc/client/memory/memory_file.hpp"
 
 #include <fmt/format.h>

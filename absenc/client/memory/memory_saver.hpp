@@ -11,7 +11,7 @@ namespace absenc::client {
 template <class Item>
 class MemorySaver final : public Machine<Item> {
  public:
-  /// Takes `device`, and the machine on its line, which may be `device` itself.
+  /// Takes the virtual encoder `device`, and the machine that is on its line: `device` itself or one that contains it.
   MemorySaver(Machine<Item>& line, Device<Item>& device, MemoryFile& file)
       : line_(&line), device_(&device), file_(&file), saved_(device.memory_version()), finished_(saved_) {}
 
@@ -19,7 +19,8 @@ class MemorySaver final : public Machine<Item> {
 
   Step<Item> next(Time now) override {
     const Step<Item> step = line_->next(now);
-    if (saved_ != device_->memory_version()) save(os::Durable::no);  // waiting for the disk would delay the reply
+    // Saves without waiting until the file is on the disk, which would delay the reply.
+    if (saved_ != device_->memory_version()) save(os::Durable::no);
     return step;
   }
 

@@ -21,7 +21,8 @@ namespace absenc::client {
 
 namespace {
 
-// `what` is the end of the setting's name: "" for the wire, "_us" or "_active".
+// `what` is the part of the setting's name after that of the wire: "" sets the wire itself, "_us" the width of the
+// pulse, "_active" its level.
 void set_pulse_wire(os::PulseWire& wire, std::string_view what, const OptionText& setting) {
   using Kind = os::PulseWire::Kind;
   constexpr std::string_view gpio = "gpio:";
@@ -134,7 +135,7 @@ void check_speed_limit(const EncoderAddress& uri) {
   }
 }
 
-// Options come first, because line settings follow from them.
+// Applies the options before the other settings, because the defaults of the line follow from them.
 void take_settings(EncoderAddress& uri, std::span<const OptionText> settings) {
   std::vector<OptionText> options;
   std::vector<OptionText> of_link;
@@ -294,7 +295,7 @@ void require_once(std::span<const OptionText> settings) {
   }
 }
 
-// The settings before the last one were checked before.
+// Checks the last one of `settings`; the settings before it were checked by earlier calls.
 void try_settings(EncoderAddress uri, std::span<const OptionText> settings) {
   take_settings(uri, settings);
   const bool options_are_set = find_link_parameter(settings.back().name) != nullptr;

@@ -30,7 +30,7 @@ struct LinkParameter {
   std::string_view name;
   std::string_view value;
   std::string_view meaning;
-  std::string_view port_kinds;  // kinds of ports that can have the setting, as names of `port_kind_names`
+  std::string_view port_kinds;  // kinds of ports to which the setting applies, as names of `port_kind_names`
   bool repeatable = false;
 };
 
@@ -115,10 +115,10 @@ struct EncoderAddress {
   std::string written;  // address as the user wrote it, with the settings given beside it: "elbow?baud=57600"
 };
 
-/// Returns the user's speed limit, or else that of host::speed_limit.
+/// Returns the speed limit that the user set or, if none was set, that of host::speed_limit.
 [[nodiscard]] host::SpeedLimit speed_limit(const EncoderAddress& uri);
 
-/// Returns a port that was written without a protocol; nothing: `text` is no such port.
+/// Returns the port if `text` is the address of a port without a protocol, as "/dev/ttyUSB0"; otherwise nothing.
 [[nodiscard]] std::optional<std::string> bare_port(std::string_view text);
 
 /// Parses an address and further `settings` ("name=value"). Throws UsageError.

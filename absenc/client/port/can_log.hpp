@@ -16,7 +16,7 @@ namespace absenc::client {
 
 class CanLog final : public Port<CanFrame> {
  public:
-  /// Wraps `port`, which `owner` keeps alive.
+  /// Makes a port that logs the frames of `port` and passes them on. `owner` keeps `port` alive.
   CanLog(Port<CanFrame>& port, std::shared_ptr<void> owner, std::shared_ptr<os::LineFile> file, std::string interface);
 
   Time now() override { return port_->now(); }

@@ -94,7 +94,7 @@ std::string meaning(LinkKind link, Subject subject, Error error) {
 }  // namespace
 
 Diagnosis diagnose(const Unit& unit, const Options& options, const Frame& request, const Frame& reply) {
-  // The last reply needs no explanation if it is good: a procedure can fail with good replies.
+  // A good reply needs no explanation: a procedure of several requests can fail although its last reply is good.
   if (reply.empty() || is_good(unit, options, request, reply)) return {};
   if (!reply.bytes.empty() && reply.bits == 0) {
     Diagnosis found = surrounded(unit, options, request, reply.bytes);

@@ -17,16 +17,17 @@ struct Diagnosis {
   std::string setting{};  // model or option "NAME=VALUE" with which the reply would be good; "": none was found
 };
 
-/// Explains a bad reply, as by an echo, further bytes, or another model.
+/// Explains a bad reply, for example by an echo, further bytes, or another model.
 [[nodiscard]] Diagnosis diagnose(const Unit& unit, const Options& options, const Frame& request, const Frame& reply);
 
 /// The frame of an exchange that an error is about.
 enum class Subject : std::uint8_t { request, reply };
 
-/// Returns which frame an error of `decode` is about: the reply, or a bad or unanswered request.
+/// Returns which frame the error of an exchange is about: the reply, or a request that is bad or was not answered.
 [[nodiscard]] Subject subject_of(const Unit& unit, const Options& options, const Frame& request, const Frame& reply);
 
-/// Returns "MEANING: DETAIL; FINDING" or a part of it.
+/// Returns an error in words: its meaning, the detail and the finding, as "MEANING: DETAIL; FINDING"; empty parts are
+/// left out.
 [[nodiscard]] std::string describe(LinkKind link, Subject subject, Error error, std::string_view detail = {},
                                    const Diagnosis& diagnosis = {});
 

@@ -129,7 +129,7 @@ std::vector<std::string> words_of(std::string_view text) {
   return {std::istream_iterator<std::string>(in), {}};
 }
 
-// Returns the message if the frames have a wrong length; "" with another error or none.
+// Returns the error message for an exchange whose frames have a wrong length; "" if they have another error or none.
 std::string said_of(const Unit& unit, const Options& options, const WireFrame& request, const WireFrame& reply) {
   NoFields ignored;
   const Error error = unit.decode(options, request.frame(), reply.frame(), ignored);

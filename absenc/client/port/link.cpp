@@ -38,7 +38,8 @@ ExtraWires extra_wires(const EncoderAddress& uri) {
   return uri.unit->extra_wires == nullptr ? ExtraWires{} : uri.unit->extra_wires(uri.options);
 }
 
-// A port that did not exist when its address was parsed may be a pseudo-terminal.
+// Returns the line settings of a serial port. A port that did not exist when its address was parsed may be a
+// pseudo-terminal, which needs no rate.
 LineSettings line_of_serial(const EncoderAddress& uri) {
   if (uri.line.rate != 0 || os::is_pseudo_terminal(uri.path)) return uri.line.with_some_rate();
   throw UsageError(
@@ -99,7 +100,7 @@ Link open_spi(const EncoderAddress& uri) {
 
 Link open_can(const EncoderAddress& uri) {
   Link link;
-  link.place = uri.path;  // the text names no bit rate, because absenc does not set that of the interface
+  link.place = uri.path;  // names no bit rate, because that of the interface is set by the system, not by absenc
   take(link, std::make_shared<os::SocketCan>(uri.path, uri.line), uri);
   return link;
 }
@@ -117,7 +118,8 @@ Link open_slcan(const EncoderAddress& uri) {
   return link;
 }
 
-// After a loss of the port the log continues in the same file. Not safe for calls from several threads.
+// Returns the log file of this path; after a loss of the port it is the same file. Must not be called by several
+// threads at once.
 std::shared_ptr<os::LineFile> log_file(const std::string& path) {
   static std::map<std::string, std::shared_ptr<os::LineFile>> files;
   std::shared_ptr<os::LineFile>& file = files[path];

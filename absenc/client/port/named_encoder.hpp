@@ -17,19 +17,20 @@ struct NamedEncoder {
   std::string place;    // position of the encoder's port in the file, for errors
   // settings of the encoder itself, and settings of its bus that it does not override
   std::vector<FileSetting> settings;
-  std::vector<FileSetting> defaults;  // settings of the section [defaults], used where they apply
-  bool has_company = false;           // whether other encoders are on the same bus
-  double rate_hz = 0;                 // readings per second for `serve`; 0: not in the file
+  // settings of the section [defaults]; those that do not fit the encoder are ignored
+  std::vector<FileSetting> defaults;
+  bool has_company = false;  // whether other encoders are on the same bus
+  double rate_hz = 0;        // readings per second for `serve`; 0: not in the file
 };
 
-/// The encoders of an absenc.toml that was checked, and is read only once for all encoders.
+/// The encoders of absenc.toml. The file is read and checked only once for all of them.
 class NamedEncoders {
  public:
-  /// Checks names in the file. Throws UsageError.
+  /// Takes the content of absenc.toml and checks its names. Throws UsageError.
   explicit NamedEncoders(SettingsFile file);
   NamedEncoders(NamedEncoders&&) noexcept = default;
   NamedEncoders& operator=(NamedEncoders&&) noexcept = default;
-  NamedEncoders(const NamedEncoders&) = delete;  // not copied, because the maps refer to strings of `file_`
+  NamedEncoders(const NamedEncoders&) = delete;  // no copies: the maps refer to strings in `file_`
   NamedEncoders& operator=(const NamedEncoders&) = delete;
   ~NamedEncoders() = default;
 
@@ -51,7 +52,7 @@ class NamedEncoders {
 /// Reads absenc.toml; `purpose` says why it is needed. Throws UsageError.
 [[nodiscard]] NamedEncoders require_names(std::string_view purpose);
 
-/// Puts `place` before the text of a UsageError.
+/// Calls a function, and puts `place` before the text of a UsageError that it throws.
 template <class Work>
 auto at(const std::string& place, const Work& work) {
   try {

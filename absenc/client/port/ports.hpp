@@ -16,7 +16,7 @@ struct FoundPort {
   std::string_view kind{};  // kind of the port: "serial", "can" or "spi"
   os::ListedPort serial{};  // details of a serial port; empty for other kinds
 
-  /// Returns for example "absenc identify /dev/ttyUSB0"; may be "".
+  /// Returns the command of absenc that may help with the port, as "absenc identify /dev/ttyUSB0"; may be "".
   [[nodiscard]] std::string next_command() const;
 };
 

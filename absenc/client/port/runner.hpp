@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs commands of a unit on a port and keeps the last exchange.
+// Runs commands of a unit on a port and stores the last exchange.
 #pragma once
 
 #include <algorithm>
@@ -27,16 +27,17 @@ struct Attempted {
   std::string advice{};                  // the unit's advice on the error; "": it has none
   Time began{};                          // time at which the command began, by the port's clock
   capture::ObservedExchange exchange{};  // last request and its reply, without echo
-  std::vector<std::uint8_t> raw{};       // bytes of the last exchange, with echo; of a stream: its frame; CAN: none
-  bool heard = false;                    // whether anything was received after the last request, even only an echo
-  bool answered = false;                 // whether something other than an echo was received
-  std::uint64_t unanswered = 0;          // number of requests of this command without reply, except the last request
+  // bytes received in the last exchange, with echo; for a stream those of its frame; empty on CAN
+  std::vector<std::uint8_t> raw{};
+  bool heard = false;            // whether anything was received after the last request; an echo counts, too
+  bool answered = false;         // whether something other than an echo was received after the last request
+  std::uint64_t unanswered = 0;  // number of requests of this command without reply, except the last request
   // number of damaged frames that this command discarded
   std::uint64_t discarded = 0;
-  Time answered_after{};  // time from the end of the request to the beginning of the reply; 0 without one
-  Time limit{};           // limit of `answered_after` by protocol and connection; 0: there is no limit
+  Time answered_after{};  // time from the end of the request to the beginning of the reply; 0 without a reply
+  Time limit{};           // greatest `answered_after` that protocol and connection allow; 0: no limit
   Time after{};           // time from the end of the request to the end of the reply; meaningless without a reply
-  Time allowed{};         // greatest `after` that protocol and length of the reply allow
+  Time allowed{};         // greatest `after` that the protocol allows for a reply of this length
   std::optional<Reading> reading{};
   // value of the first reported field that counts replies; nothing: none was reported
   std::optional<std::int64_t> counter{};
@@ -47,7 +48,7 @@ struct Attempted {
   [[nodiscard]] bool is_late() const { return answered && limit > Time{} && answered_after > limit; }
 };
 
-/// Returns the exchange; of several CAN frames the last is the reply.
+/// Returns request and reply as an exchange; of several received CAN frames, the last one is the reply.
 template <class Item>
 [[nodiscard]] capture::ObservedExchange observed_exchange(std::span<const Item> request, std::span<const Item> reply,
                                                           std::size_t clocks) {
@@ -67,7 +68,7 @@ template <class Item>
   return observed_exchange<Item>(line.request, line.reply(), line.clocks);
 }
 
-/// Stores the first counter of replies among the fields that a command reports.
+/// Stores the value of the first field that counts replies among the fields of a reply.
 class CounterSink final : public FieldSink {
  public:
   explicit CounterSink(Attempted& attempt) : attempt_(attempt) {}
@@ -97,7 +98,7 @@ class Runner {
  public:
   static constexpr bool is_can = std::is_same_v<Item, CanFrame>;
 
-  /// Takes how often a command that may be repeated runs at most.
+  /// Takes the address of the encoder, and how often at most a command that may be repeated is tried.
   explicit Runner(const EncoderAddress& address, unsigned attempts = 1)
       : unit_(*address.unit),
         options_(address.options),
@@ -112,7 +113,7 @@ class Runner {
   Runner(const Runner&) = delete;
   Runner& operator=(const Runner&) = delete;
 
-  /// Uses `port` from now on. `latency` is the delay that the connection to the line adds.
+  /// Uses `port` from now on. `latency` is the delay that the connection from the port to the line adds to a reply.
   void attach(Port<Item>& port, Time latency = {}) {
     port_.attach(port);
     latency_ = latency;
@@ -146,10 +147,12 @@ class Runner {
     session_->set_options(options);
   }
 
-  /// Calls `use` with the session and returns the conversation; null if the unit cannot run the command.
+  /// Calls `use` with the session to start a command, and returns the conversation of the command; null if the unit
+  /// cannot run the command.
   template <class Use>
   const Conversation<Item>* converse(const Use& use) {
-    // If the previous command sent no request, the stored exchange is older than that command.
+    // Clears the stored exchange if the previous command sent no request, because it then belongs to an earlier
+    // command.
     if (requests_before_ == port_.requests) port_.last.clear();
     requests_before_ = port_.requests;
     received_before_ = port_.last.received.size();
@@ -199,7 +202,7 @@ class Runner {
   void repeat(const Series& series, const Attempt& attempt, std::vector<Attempted>& into) {
     const Time begin = port_.now();
     const Time end = series.limit == never ? never : begin + series.limit;
-    // Limits each attempt, too: on a line that is never silent it might not end.
+    // Each attempt has a time limit of its own, because on a line that is never silent an attempt might not end.
     const Time outer = port_.deadline;
     const Time latest = end == never ? never : begin + 2 * series.limit;
     port_.deadline = std::min(outer, latest);
@@ -231,7 +234,7 @@ class Runner {
 
   // ---- Listening without a request
 
-  /// Listens until `on_items(items)` returns false, or for `time`.
+  /// Listens for `time`, but ends earlier if `on_items(items)` returns false.
   template <class OnItems>
   void listen(Time time, const OnItems& on_items) {
     const Step<Item> step{.at = port_.now() + time};
@@ -244,7 +247,8 @@ class Runner {
   void listen(Time time) {
     listen(time, [](std::span<const Item>) { return true; });
   }
-  /// Waits for a silence of `quiet`, or for about `longest`. Returns whether anything came.
+  /// Waits until the line has been silent for `quiet`, but not much longer than `longest`. Returns whether anything was
+  /// received.
   bool settle(Time quiet, Time longest) {
     bool heard = false;
     const Time end = port_.now() + longest;
@@ -260,7 +264,7 @@ class Runner {
 
   // ---- Observations of the line
 
-  /// Returns the last exchange, with what was received since its request.
+  /// Returns the last request with everything that was received since then.
   [[nodiscard]] const LineExchange<Item>& last() const { return port_.last; }
   [[nodiscard]] std::uint64_t late() const {
     const std::uint64_t seen = late_ + (lateness_of(last()) != Time{} ? 1 : 0);
@@ -273,10 +277,10 @@ class Runner {
   [[nodiscard]] std::uint64_t overfull() const { return overfull_; }
   /// Returns the greatest number of further items that followed a good reply.
   [[nodiscard]] std::size_t most_behind() const { return most_behind_; }
-  /// Returns all items of the last exchange in which a good reply was followed by further items.
+  /// Returns all items of the last exchange whose good reply was followed by further items.
   [[nodiscard]] std::span<const Item> overfull_example() const { return overfull_example_; }
 
-  /// Copies the last exchange into `one`, which is the result of the last command.
+  /// Copies the last exchange into `one`, the result of the last command.
   void keep_exchange(Attempted& one) const {
     const LineExchange<Item>& line = last();
     const bool asked = requests_before_ != port_.requests;
@@ -333,7 +337,8 @@ class Runner {
     std::vector<Item> request_;
   };
 
-  // The bytes of a stream may hold several frames, each with a result.
+  // Stores the frame that gave the result: the received bytes of a stream may hold several frames, each with a result
+  // of its own.
   static void keep_frame(Attempted& one, const Conversation<Item>& ended) {
     one.heard = one.answered = one.error != Error::timeout;
     if constexpr (!is_can) {
@@ -357,15 +362,16 @@ class Runner {
     open_ = true;
     opened_at_ = port_.requests;
   }
-  // If no request followed begin_exchange, the last exchange was passed already.
+  // Passes the last exchange to `on_exchange`, unless no request followed `begin_exchange`: then it was passed before.
   void close_exchange() {
     if (std::exchange(open_, false) && opened_at_ != port_.requests && on_exchange) on_exchange(last());
   }
-  // A new session has not seen the echo of an older request, so the greater length counts.
+  // Stores the length of the echo. A new session does not know the echo of a request before it, so the greater length
+  // counts.
   void keep_echo() {
     if constexpr (!is_can) port_.last.echo = std::max(port_.last.echo, session_->echo().echoed());
   }
-  // Returns 0 if the reply was not late, and on CAN, where it may be from another node.
+  // Returns how late the reply was; 0 if it was not late, and on CAN, where it may be from another node.
   [[nodiscard]] Time lateness_of(const LineExchange<Item>& exchange) const {
     if (is_can || exchange.answer == Time{} || exchange.reply().empty()) return {};
     const Time after = exchange.answered_after(character_);
@@ -382,12 +388,12 @@ class Runner {
   Filter filter_;
   std::optional<host::Session<Item>> session_;
   bool open_ = false;                  // whether the last exchange must still be passed to `on_exchange`
-  std::uint64_t opened_at_ = 0;        // number of requests that preceded the open exchange
-  std::uint64_t requests_before_ = 0;  // number of requests that preceded the present command
-  // number of items received before the present command, as a reply to an older request
+  std::uint64_t opened_at_ = 0;        // number of requests that were sent before the open exchange began
+  std::uint64_t requests_before_ = 0;  // number of requests that were sent before the present command
+  // number of items that were received before the present command began, and belong to an older request
   std::size_t received_before_ = 0;
   std::uint64_t unanswered_ = 0;   // number of requests without reply in the present command
-  std::uint64_t late_ = 0;         // number of late replies before the last exchange
+  std::uint64_t late_ = 0;         // number of late replies, without one in the last exchange
   std::uint64_t late_before_ = 0;  // number of late replies that earlier sessions discarded
   Time lateness_{};
   std::size_t answered_ = 0;  // number of received items when the last command ended without an error; else 0

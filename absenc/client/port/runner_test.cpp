@@ -54,7 +54,8 @@ TEST(Runner, SilenceIsATimeoutInEveryUnit) {
 
 // ---- Echo
 
-// An echo of T-Format resembles the beginning of a reply.
+// The echo must be recognised from the first exchange on, although an echo of T-Format resembles the beginning of a
+// reply.
 TEST(Runner, TakesTheEchoFromTheFirstExchangeOn) {
   for (const bool echo : {false, true}) {
     for (const char* const mode : {"auto", "on", "off"}) {
@@ -127,7 +128,7 @@ TEST(Runner, AReplyThatBeginsAfterItsLimitIsLate) {
   EXPECT_LT(bench.runner.lateness(), 21ms);
 }
 
-// The host waits for a quiet line, and receives the late reply in that time.
+// The late reply arrives while the host waits for a quiet line before its next request.
 TEST(Runner, CountsALateReplyThatComesBeforeTheNextRequest) {
   Bench bench(delayed(120us));
   for (int i = 0; i < 10; ++i) EXPECT_EQ(bench.once().error, Error::timeout);
@@ -145,7 +146,7 @@ TEST(Runner, ARequestThatIsRepeatedAtOnceIsUnanswered) {
 // ---- A line that is never silent
 
 TEST(Runner, EndsByTheClockOfItsPort) {
-  // raa38 needs a second to find that no good frame arrives
+  // raa38 must listen for a second to find that no good frame arrives
   const EncoderAddress address = parse_address("sim:raa38");
   auto port = std::make_shared<ScriptedPort<std::uint8_t>>();
   port->babble = {0x55, 0x12};
@@ -182,7 +183,7 @@ std::optional<EncoderAddress> streaming(const Unit& unit) {
       address.options = options;
       address.line = line_settings(unit, options);
       if (Bench(address).once().error == Error::none) return address;
-      // Some encoders send good frames only with another resolution.
+      // The virtual encoders of some units send good frames only if another resolution is set.
       for (const std::size_t index : capture::resolution_options(unit)) {
         address.options.values[index] = std::min<std::int64_t>(unit.options[index].maximum, 16);
       }
@@ -208,14 +209,15 @@ TEST_P(Streams, AGoodOneHasNoDamage) {
   EXPECT_EQ(bench.runner.session().counters().discarded, 0u);
 }
 
-// A single good frame between damaged ones is discarded, too.
+// A single good frame between damaged frames is discarded like these.
 TEST_P(Streams, EachDamagedFrameIsCounted) {
   for (const char* const fault : {"corrupt=0.02", "corrupt=0.3", "truncate=0.1", "drop=0.1"}) {
     Bench bench(with_faults(address, {fault}));
     std::uint64_t discarded = 0;
     for (int i = 0; i < 500; ++i) discarded += bench.once().discarded;
     const std::uint64_t damaged = bench.link.device->damaged_replies().value();
-    // The last frames may be in transit, and two truncated frames may be as long as one.
+    // The last frames may not have arrived yet, and two truncated frames may together be as long as one frame, so the
+    // counts may differ.
     EXPECT_GE((discarded + 2) * 5, damaged * 4) << fault;
     EXPECT_LE(discarded, 4 * damaged) << fault;
     EXPECT_EQ(bench.runner.session().counters().discarded, discarded);
@@ -303,7 +305,7 @@ TEST(ConformTime, OfALineThatIsNeverSilentEndsWithinTenSeconds) {
   }
 }
 
-// Without a limit of time this test took 107 s.
+// The test of a damaged stream must end within 10 s of real time; it took 107 s before it had a time limit.
 TEST(ConformTime, OfADamagedStreamEndsWithinTenSecondsOfOurs) {
   const Time begin = os::now();
   static_cast<void>(conform("sim:raa38?fault=corrupt=1"));

@@ -17,7 +17,7 @@ namespace absenc::client {
 
 namespace {
 
-// `text` is the setting's value or a part of it.
+// Parses a real number. `text` is the value of the setting, or a part of that value.
 double real_in(const OptionText& setting, std::string_view text, double most, bool is_above_zero) {
   const std::optional<double> value = parse_real(text);
   if (value && std::abs(*value) <= most && (!is_above_zero || *value > 0)) return *value;

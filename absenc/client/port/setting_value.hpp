@@ -11,13 +11,13 @@
 
 namespace absenc::client {
 
-/// Returns the value as a whole number within these limits.
+/// Returns the setting's value as a whole number from `minimum` to `maximum`.
 [[nodiscard]] std::int64_t number_of(const OptionText& setting, std::int64_t minimum, std::int64_t maximum);
-/// Returns the value as a number from -`most` to `most`; with `is_above_zero` above 0.
+/// Returns the setting's value as a number from -`most` to `most`; with `is_above_zero`, the number must be above 0.
 [[nodiscard]] double real_of(const OptionText& setting, double most, bool is_above_zero);
-/// Parses a ratio, as "12.5" or "50/3".
+/// Parses the setting's value as a ratio, such as "12.5" or "50/3".
 [[nodiscard]] double ratio_of(const OptionText& setting);
-/// Returns the index of the word that equals the value.
+/// Returns the index of the word that equals the setting's value.
 [[nodiscard]] std::size_t choice_of(const OptionText& setting, std::initializer_list<std::string_view> words);
 
 }  // namespace absenc::client

@@ -41,7 +41,8 @@ std::string_view type_of(const toml::node& node) {
   }
 }
 
-// The first error of the file is reported first; toml++ sorts by name.
+// Returns the entries of the table in the order of the file, so that the first error is reported first; toml++ sorts
+// them by name.
 std::vector<std::pair<const toml::key*, const toml::node*>> in_file_order(const toml::table& table) {
   std::vector<std::pair<const toml::key*, const toml::node*>> entries;
   for (const auto& [key, node] : table) entries.emplace_back(&key, &node);
@@ -139,18 +140,18 @@ std::size_t end_of_string(std::string_view text, std::size_t at) {
     } else if (!lines && (text[i] == quote || text[i] == '\n')) {
       return i;
     } else if (lines && text.substr(i).starts_with(std::string(3, quote))) {
-      // up to two quotes directly before the closing three belong to the string
+      // up to two quotes directly before the three closing quotes belong to the string
       return std::min(text.find_first_not_of(quote, i), i + 5) - 1;
     }
   }
   return text.size();
 }
 
-// Refuses deep nesting, because toml++ calls itself once for each level.
+// Refuses deeply nested tables and arrays, because toml++ calls itself once for each level.
 void check_depth(std::string_view text, const SettingsFileReader& reader) {
   constexpr std::size_t deepest = 16;
   std::size_t brackets = 0;
-  std::size_t dots = 0;  // number of dots in the present dotted name
+  std::size_t dots = 0;  // number of dots in the dotted name that is being read
   for (std::size_t at = 0; at < text.size(); ++at) {
     switch (text[at]) {
       case '#':

@@ -22,7 +22,7 @@ fs::path device(const std::string& path) {
   return error ? fs::path(path) : canonical;
 }
 
-// Returns "" for a virtual encoder.
+// Returns a text that is equal for all encoders on the same port; "" for a virtual encoder, which has no port.
 std::string place_key(const EncoderAddress& one) {
   const std::string_view place = port_kind_names[static_cast<std::size_t>(one.port_kind)];
   switch (one.port_kind) {
@@ -119,7 +119,7 @@ void require_different(std::span<const EncoderAddress> encoders, std::span<const
   }
 }
 
-// Holds the lock, so that a shared port is opened only once.
+// Holds the lock while a port is opened, so that two threads do not open a shared port at the same time.
 std::shared_ptr<SharedLink> connect_link(const EncoderAddress& uri, const OpenLink& open) {
   Registry& all = registry();
   const std::lock_guard lock(all.mutex);

@@ -61,12 +61,12 @@ class SharedLink {
     }
   }
 
-  /// Returns whether the port was lost, so that users need a new link.
+  /// Returns whether the port was lost, so that its users must connect again.
   [[nodiscard]] bool lost() const;
 
   [[nodiscard]] const Link& link() const { return link_; }
 
-  /// Returns state that only a conversation that has the line may use.
+  /// Returns the guard against late replies, which only a conversation that has its turn on the line may use.
   template <class Item>
   [[nodiscard]] host::ReplyGuard<Item>& guard() {
     if constexpr (std::is_same_v<Item, CanFrame>) {
@@ -83,16 +83,17 @@ class SharedLink {
   host::ReplyGuard<std::uint8_t> byte_guard_;
   host::ReplyGuard<CanFrame> frame_guard_;
   Turns turns_;
-  // Threads must not share an exception object.
+  // The loss of the port as data, because threads must not share an exception object.
   struct Loss {
     os::Failure::Kind kind;
     std::string sentence;
   };
-  mutable std::mutex mutex_;  // guards `loss_`, which other threads read without a turn
+  mutable std::mutex mutex_;  // guards `loss_`, which other threads read while a conversation uses the line
   std::optional<Loss> loss_;
 };
 
-/// Returns whether both use one line; false on SPI and sim. Throws UsageError if their line settings differ.
+/// Returns whether both encoders are on one line; always false on SPI and for virtual encoders. Throws UsageError if
+/// they are, but their line settings differ.
 [[nodiscard]] bool share_line(const EncoderAddress& one, const EncoderAddress& other);
 
 /// Throws UsageError if the encoders cannot be read at the same time.

@@ -19,7 +19,7 @@ std::uint64_t checked(std::string_view name, std::optional<std::int64_t> value, 
   if (!value) return 0;
   if (bits == 0) throw UsageError(fmt::format("{} cannot be set: this encoder has no such position", name));
   const std::uint64_t low = low_mask(bits) & static_cast<std::uint64_t>(*value);
-  // Accepts negative turns with a sign, or as the bits on the line.
+  // Accepts negative turns either as a number with a sign, or as the bits that stand for them on the line.
   if (low == static_cast<std::uint64_t>(*value) || (has_sign && with_sign(low, bits) == *value)) return low;
   const std::int64_t minimum = has_sign ? with_sign(std::uint64_t{1} << (bits - 1), bits) : 0;
   throw UsageError(fmt::format("{} is {}, but must be from {} to {}: it has {} bits{}", name, *value, minimum,
@@ -111,7 +111,7 @@ std::optional<std::uint64_t> VirtualDevice::damaged_replies() const {
   return faulty_->damaged_replies();
 }
 
-// Calls `use` with the device, of bytes or of frames.
+// Calls `use` with the virtual encoder, whether its line carries bytes or CAN frames.
 template <class Use>
 void VirtualDevice::each(Use use) {
   if (device_.bytes != nullptr) use(*device_.bytes);

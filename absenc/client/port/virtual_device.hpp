@@ -24,7 +24,7 @@ struct DeviceSettings {
   std::vector<std::string> conditions;  // conditions, each as NAME=VALUE, set before power-on
   std::vector<std::string> alarms;      // names of alarms that are raised from the start
   std::vector<std::string> faults;      // faults to inject, each as KIND=RATE
-  bool faults_may_come = false;         // whether faults may be switched on later
+  bool faults_may_come = false;         // whether faults may be switched on after the start
   std::uint64_t seed = 1;               // seed of the random faults
   Time delay = sim::FaultRates{}.delay;
   bool real_power_on = false;  // whether power-on takes the start-up time of the document
@@ -48,25 +48,25 @@ class VirtualDevice {
 
   [[nodiscard]] const Options& options() const { return options_; }
   [[nodiscard]] bool is_on() const { return is_on_; }
-  /// Switches on; with `real` the encoder needs the start-up time of the document.
+  /// Switches the encoder on; with `real` it starts up as slowly as the document states.
   void switch_on(Time now, bool real);
   void switch_off(Time now);
   /// Raise or lower alarms, given as bits of the unit's alarms.
   void raise_alarms(std::uint32_t bits);
   void lower_alarms(std::uint32_t bits);
-  /// Sets a condition to `value`, which must be in its range.
+  /// Sets a condition of the encoder, as its temperature, to `value`, which must be in the condition's range.
   void set_condition(std::size_t index, std::int64_t value, Time now);
   [[nodiscard]] std::int64_t condition(std::size_t index) const { return conditions_[index]; }
 
   /// Sets the observer of rule checks, which must outlive the device; null: none.
   void watch_rules(RuleWatch* watch);
 
-  /// Sets the rates of all faults from now on. Requires `faults_may_come`, or faults at the start.
+  /// Sets the rates of all faults from now on. Faults must be enabled: by `faults_may_come`, or by faults at the start.
   void set_faults(const sim::FaultRates& rates);
   [[nodiscard]] const sim::FaultRates& fault_rates() const { return rates_; }
 
   [[nodiscard]] const Any<Device>& device() const { return device_; }
-  /// Return the machine on the line; null for the other kind.
+  /// Return the machine that is on the line: `bytes` is null on CAN, `frames` on all other lines.
   [[nodiscard]] Machine<std::uint8_t>* bytes() const;
   [[nodiscard]] Machine<CanFrame>* frames() const;
   /// Returns how often each fault was injected; null if faults were never enabled.

@@ -30,7 +30,7 @@ struct VirtualPort {
   std::optional<sim::RoughRates> rough{};
   std::uint64_t seed = 1;         // seed of the faults of `rough`
   VirtualClock* clock = nullptr;  // clock of the port; null: time begins with the link and jumps from event to event
-  std::uint32_t rate = 0;         // rate of the host's end in bits per second; 0: that of the encoder
+  std::uint32_t rate = 0;         // baud rate of the host's port in bits per second; 0: that of the encoder
 };
 
 /// A port that delays transfers at random.
@@ -41,7 +41,7 @@ class UnevenPort final : public Port<Item> {
   Time now() override { return port_->now(); }
   void begin(const Step<Item>& step) override {
     Step<Item> later = step;
-    // A time that the step names may have a meaning, as inside a procedure.
+    // Delays no transfer that has a time of its own, because that time may have a meaning, as inside a procedure.
     if (step.kind == Step<Item>::Kind::transfer && step.at <= port_->now()) {
       later.at = port_->now() + Time(std::uniform_int_distribution<std::int64_t>(0, 400'000)(random_));
     }

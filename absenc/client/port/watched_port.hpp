@@ -16,7 +16,7 @@
 
 namespace absenc::client {
 
-/// A request and what was received until the next one; of many received items the last are dropped.
+/// A request and everything that was received until the next request; items beyond a limit are dropped.
 template <class Item>
 struct LineExchange {
   std::vector<Item> request{};
@@ -27,7 +27,7 @@ struct LineExchange {
   Time sent_at{};                // time at which the request ended
   Time sent_late{};              // uncertainty of `sent_at`: the request may have ended earlier by up to this time
   Time received_at{};            // time at which the last received item ended
-  /// How many items of `received` had arrived at a time.
+  /// A time, and how many items of `received` had arrived by then.
   struct Mark {
     Time at{};
     std::size_t items = 0;
@@ -37,7 +37,7 @@ struct LineExchange {
   [[nodiscard]] std::span<const Item> reply() const {
     return std::span<const Item>(received).subspan(std::min(echo, received.size()));
   }
-  /// Returns the time from the end of the request to the beginning of the reply; 0 without one.
+  /// Returns the time from the end of the request to the beginning of the reply; 0 without a reply.
   [[nodiscard]] Time answered_after(Time character) const {
     const auto first = std::find_if(marks.begin(), marks.end(), [this](const Mark& one) { return one.items > echo; });
     if (first == marks.end()) return {};
@@ -70,7 +70,7 @@ class WatchedPort final : public Port<Item> {
     port_ = &port;
     rate_ = 0;
   }
-  /// Restores `rate`, which an aborted conversation may have changed.
+  /// Sets the port back to `rate`, if a conversation that was aborted has changed the rate.
   void return_to(std::uint32_t rate) {
     if (rate_ != 0 && rate_ != rate) begin({.kind = Step<Item>::Kind::configure, .rate = rate});
   }
@@ -113,16 +113,17 @@ class WatchedPort final : public Port<Item> {
     return event;
   }
 
-  /// Returns whether a conversation was asked to end early since the last call of this function.
+  /// Returns whether, since the last call of this function, a conversation was asked to end early.
   [[nodiscard]] bool take_aborted() { return std::exchange(aborted_, false); }
 
   // function that is polled during waits; true ends them with os::Ended
   std::function<bool()> over;
   // function that asks the conversation to end early; returns false if it cannot end by itself
   std::function<bool()> abort;
-  Time deadline = never;  // time by the port's clock; a wait that reaches it throws OutOfTime
+  // end of the time that a conversation has, by the port's clock; a wait that reaches it throws OutOfTime
+  Time deadline = never;
   LineExchange<Item> last;
-  Time nothing_until{};  // time at which a wait last ended by its time or by silence
+  Time nothing_until{};  // time at which a wait last ended because its time was over or the line was silent
   std::uint64_t requests = 0;
   std::uint64_t items_sent = 0;
   std::uint64_t items_received = 0;
@@ -141,7 +142,8 @@ class WatchedPort final : public Port<Item> {
       }
     }
   }
-  // Compares with the time read last, because the time of the step may pass before its wait.
+  // Compares the deadline with the time that was read last, because the time of the step may pass before the wait
+  // begins.
   [[nodiscard]] Step<Item> bounded(const Step<Item>& step) const {
     if (deadline == never) return step;
     if (deadline <= looked_at_) throw OutOfTime{};

@@ -30,7 +30,7 @@ Hdf5Attributes attributes_of(const RecordHeader& header) {
           {"part", header.part}};
 }
 
-// Makes the file visible, so that it can already be opened.
+// Makes the new file visible under its name, so that readers can already open it.
 std::uint64_t appear(os::BlockFile& file) {
   file.appear();
   return file.size();
@@ -104,7 +104,7 @@ class Hdf5Record final : public RecordFile {
         }
         commit();
       }
-    } catch (...) {  // `append`, `sync`, `finish` and `require_there` throw the exception again
+    } catch (...) {  // stores the exception; `append`, `sync`, `finish` and `require_there` throw it to the caller
       const std::lock_guard lock(mutex_);
       failure_ = std::current_exception();
       changed_.notify_all();
@@ -141,12 +141,12 @@ class Hdf5Record final : public RecordFile {
   RecordCounts taken_;   // counts of the rows that are being written now
   RecordCounts committed_;
   std::uint64_t size_;
-  // numbers of syncs
+  // calls of `sync` are numbered: the last that was requested, that is being executed, and that is finished
   std::uint64_t asked_ = 0;
   std::uint64_t serving_ = 0;
   std::uint64_t served_ = 0;
   bool ending_ = false;
-  bool is_last_ = false;  // whether the rows that are being written are the last of the file
+  bool is_last_ = false;  // whether the rows that are being written are the last rows of the file
   std::exception_ptr failure_;
   std::jthread thread_;  // last member, because the thread uses all other members
 };

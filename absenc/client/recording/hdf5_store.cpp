@@ -28,7 +28,7 @@ herr_t close_file(H5FD_t* file) {
   return 0;
 }
 
-// With features, the HDF5 library would combine blocks of several types.
+// Reports no features of the driver: with some, the HDF5 library would combine blocks of several types.
 herr_t query(const H5FD_t*, unsigned long* features) {
   *features = 0;
   return 0;
@@ -74,7 +74,7 @@ const H5FD_class_t& driver_class() {
     made.get_eof = allocated;
     made.read = read;
     made.write = write;
-    // Metadata and raw data have separate lists of free space.
+    // The HDF5 library keeps separate lists of free space for metadata and raw data.
     const H5FD_mem_t types[] = H5FD_FLMAP_DICHOTOMY;
     std::copy(std::begin(types), std::end(types), std::begin(made.fl_map));
     return made;
@@ -82,7 +82,7 @@ const H5FD_class_t& driver_class() {
   return driver;
 }
 
-// offset of the level in a B-tree node of version 1, which begins with "TREE", type and level
+// offset of the byte with the node's level in a B-tree node of version 1, which begins with "TREE", type and level
 constexpr std::size_t level_of_node = 5;
 
 }  // namespace
@@ -122,7 +122,7 @@ void Hdf5Store::read(std::uint64_t at, MutableBytes bytes) {
   }
 }
 
-// Returns the place of a block in the order of rewriting: the lowest rank is written first.
+// Returns the rank of a block in the order in which changed blocks are rewritten: the lowest rank comes first.
 int Hdf5Store::rank(const StoredBlock& block) {
   constexpr int last = 1000;
   switch (block.type) {
@@ -142,7 +142,7 @@ int Hdf5Store::rank(const StoredBlock& block) {
 void Hdf5Store::commit() {
   using Entry = std::pair<const std::uint64_t, StoredBlock>;
   std::vector<const Entry*> again;
-  // Writes new blocks first: readers cannot see them until the remaining blocks are written.
+  // Writes new blocks before changed ones: readers cannot see new blocks until the changed ones are written.
   for (const Entry& one : blocks_) {
     if (one.first < committed_end_) {
       again.push_back(&one);

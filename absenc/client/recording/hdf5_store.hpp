@@ -22,13 +22,13 @@ class Hdf5Store {
   };
   explicit Hdf5Store(Disk disk) : disk_(std::move(disk)) {}
 
-  /// Sets this store, which must outlive the file, as the driver.
+  /// Makes this store the driver of files that are opened with the property list `access`; the store must outlive them.
   void attach(hid_t access);
 
   /// Writes the stored blocks to the disk. Throws the exceptions of `disk`.
   void commit();
 
-  // Functions for the HDF5 driver:
+  // Functions that the HDF5 driver calls:
   void write(H5FD_mem_t type, std::uint64_t at, Bytes bytes);
   void read(std::uint64_t at, MutableBytes bytes);
 

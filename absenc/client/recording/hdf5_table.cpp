@@ -13,7 +13,7 @@ namespace absenc::client {
 namespace {
 
 constexpr hsize_t rows_of_a_chunk = 1024;
-// alignment in the file, in bytes: a write inside one page is atomic
+// alignment of objects in the file, in bytes: a write inside one page is assumed to be atomic
 constexpr hsize_t page = 4096;
 constexpr std::size_t text_bytes = 48;  // length of text columns in bytes, which is longer than the name of any error
 
@@ -35,7 +35,7 @@ class Handle {
   ~Handle() { release_(id_); }
   Handle(const Handle&) = delete;
   Handle& operator=(const Handle&) = delete;
-  operator hid_t() const { return id_; }  // converts implicitly, because HDF5 functions take hid_t
+  operator hid_t() const { return id_; }  // implicit conversion, because HDF5 functions take hid_t
 
  private:
   hid_t id_;
@@ -72,7 +72,7 @@ using Elements = std::vector<std::uint8_t>;
 
 template <class T>
 void append(Elements& elements, T value) {
-  // the file is little endian, and so must the host be
+  // The bytes are copied as they are: the file is little endian, and the host must be so, too.
   const auto* const bytes = reinterpret_cast<const std::uint8_t*>(&value);
   elements.insert(elements.end(), bytes, bytes + sizeof value);
 }
@@ -84,7 +84,7 @@ void append_text(Elements& elements, std::string_view text) {
   elements.resize(end);
 }
 
-// Appends the element that a column of this type has for a missing value.
+// Appends the element that stands for a missing value in a column of this type.
 void append_missing(Elements& elements, ColumnType type) {
   switch (type) {
     case ColumnType::int64:
@@ -172,7 +172,7 @@ Hdf5Table::Hdf5Table(Hdf5Store::Disk disk, std::span<const Column> columns, cons
   require(H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr));
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   store_.attach(access);
-  // The oldest format of HDF5 has no checksums over several blocks.
+  // Selects the oldest file format of HDF5, because it has no checksums over several blocks.
   require(H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18));
   require(H5Pset_meta_block_size(access, 0));
   require(H5Pset_alignment(access, 1, page));
@@ -198,7 +198,7 @@ Hdf5Table::Hdf5Table(Hdf5Store::Disk disk, std::span<const Column> columns, cons
 Hdf5Table::~Hdf5Table() {
   const std::lock_guard lock(library());
   for (const hid_t dataset : datasets_) H5Dclose(dataset);
-  // the library's last writes are not committed, and the file is complete without them
+  // the last writes of the library are not committed: the file is complete without them
   if (file_ >= 0) H5Fclose(file_);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes rows as an HDF5 file with one dataset for each column that is no detail.
+// Writes rows as an HDF5 file with one dataset for each column, except columns that are details.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@
 
 namespace absenc::client {
 
-/// Rows in the format of the file.
+/// Rows of a recording, converted to the format of an HDF5 file.
 class Hdf5Rows {
  public:
   explicit Hdf5Rows(std::span<const Column> columns);
@@ -26,7 +26,7 @@ class Hdf5Rows {
 
  private:
   friend class Hdf5Table;
-  std::vector<std::size_t> columns_;  // index in the row of each stored column
+  std::vector<std::size_t> columns_;  // for each stored column, its index in a row
   std::vector<ColumnType> types_;
   std::vector<std::vector<std::uint8_t>> elements_;
   std::uint64_t count_ = 0;
@@ -34,7 +34,7 @@ class Hdf5Rows {
 
 using Hdf5Attributes = std::vector<std::pair<std::string, std::variant<std::string, double, std::uint64_t>>>;
 
-/// Value of the attribute `rows` until `finish`.
+/// Value of the attribute `rows` while the recording is not finished.
 constexpr std::uint64_t hdf5_not_ended = UINT64_MAX;
 
 class Hdf5Table {

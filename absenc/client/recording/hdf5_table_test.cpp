@@ -21,7 +21,8 @@ constexpr std::array<Column, 3> columns{{{"time_s", "s", ColumnType::real, "seco
 
 struct Write {
   std::uint64_t at;
-  std::vector<std::uint8_t> bytes;  // bytes that are written at `at`; empty: the file grows to `at`
+  // bytes that are written to the file at the offset `at`; empty: the file grows to the size `at`
+  std::vector<std::uint8_t> bytes;
 };
 
 struct Bench {
@@ -60,7 +61,7 @@ Hdf5Rows rows_from(std::int64_t first, std::int64_t count) {
   return rows;
 }
 
-/// Returns the number of rows; -1 if the dataset cannot be read or has wrong values.
+/// Returns the number of rows in a dataset; -1 if the dataset cannot be read or has wrong values.
 template <class T>
 std::int64_t whole_rows(const fs::path& path, const char* name, hid_t type, T (*expected)(std::int64_t)) {
   const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
@@ -112,7 +113,7 @@ TEST(Hdf5Table, EveryBeginningOfACommitIsAWholeFile) {
   EXPECT_GT(states, 200u);
 }
 
-// If the disk is full at any write, the rows committed before must remain.
+// If the disk is full at any write, the rows that were committed before this write must remain.
 TEST(Hdf5Table, AWriteThatFailsLosesOnlyItsCommit) {
   for (int failing = 0;; ++failing) {
     ASSERT_LT(failing, 1000);
@@ -141,7 +142,7 @@ TEST(Hdf5Table, AWriteThatFailsLosesOnlyItsCommit) {
     EXPECT_GE(rows, 900) << failing;
     if (failed) continue;
     EXPECT_EQ(rows, 5900) << failing;
-    return;  // all writes succeeded, so every write has been tested as the failing one
+    return;  // all writes succeeded, so each of them has been tested as the one that fails
   }
 }
 

@@ -52,7 +52,8 @@ enum class RecordForm : std::uint8_t { csv, json_lines, hdf5 };
 [[nodiscard]] std::unique_ptr<RecordFile> make_record_file(const std::string& path, std::span<const Column> columns,
                                                            const RecordHeader& header);
 
-// The following functions create a file as `make_record_file` does, each in its own formats.
+// The following functions create a file as `make_record_file` does, but each only in its own formats: CSV and JSON
+// lines, or HDF5.
 [[nodiscard]] std::unique_ptr<RecordFile> make_text_file(const std::string& path, RecordForm form,
                                                          std::span<const Column> columns, const RecordHeader& header);
 [[nodiscard]] std::unique_ptr<RecordFile> make_hdf5_file(const std::string& path, std::span<const Column> columns,

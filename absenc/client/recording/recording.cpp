@@ -63,13 +63,13 @@ struct Recording::Parts {
   std::unique_ptr<RecordFile> file_;
   unsigned part_ = 0;
   Time part_start_{};
-  std::uint64_t finished_bytes_ = 0;  // size of all files before `file_`, in bytes
-  RecordCounts finished_;             // counts of all files before `file_`
+  std::uint64_t finished_bytes_ = 0;  // size of the finished files of the recording, in bytes
+  RecordCounts finished_;             // counts of the rows in the finished files of the recording
   std::uint64_t offered_ = 0;         // number of readings, including those that `RecordingSettings::every` leaves out
   std::uint64_t taken_ = 0;           // number of readings that were written
   std::uint64_t gap_ = 0;             // number of missed readings for which no row was written yet
   Time gap_at_{};
-  std::uint32_t alarms_ = 0;  // alarms of the reading before
+  std::uint32_t alarms_ = 0;  // alarms of the previous reading
   std::uint32_t alarms_reported_ = 0;
 };
 
@@ -80,7 +80,7 @@ Recording::Parts::Parts(const RecordingSettings& settings, Encoder& encoder)
       rows_(encoder.unit(), encoder.options(), start_, SampleRows::With::motion, encoder.joint()),
       started_(date_and_time()) {
   if (settings.every == 0) throw UsageError("`every` is 0, but must be at least 1: 1 writes each reading");
-  static_cast<void>(record_form(settings.path));  // refuses a wrong ending of the name before the folder is read
+  static_cast<void>(record_form(settings.path));  // checks the ending of the name before the folder is read
   if (settings_.part_bytes || settings_.part_time) refuse_parts_of_another_recording();
   open_part();
 }
@@ -99,7 +99,7 @@ bool Recording::Parts::run(const std::function<void(const Sample&)>& on_written)
   Sample sample;
   const auto note_missed = [&] {
     const std::uint64_t missed = pace.take_missed();
-    // While the port is lost, the row of the loss covers missed readings.
+    // Missed readings are counted only while the port is open: while it is lost, the row of the loss stands for them.
     const bool was_there = sample.kind == Sample::Kind::reading || sample.kind == Sample::Kind::failed;
     if (was_there) miss(missed);
   };
@@ -117,7 +117,7 @@ bool Recording::Parts::run(const std::function<void(const Sample&)>& on_written)
   } catch (const os::Interrupted&) {
   } catch (const Cancelled&) {
   }
-  // also counts readings that were due before `end` while the last reading was taken
+  // leaves out readings that were due while the last reading was taken, and counts them as missed
   if (!has_all) pace.leave_out(end);
   note_missed();
   write_gap();
@@ -132,7 +132,8 @@ std::string Recording::Parts::part_path(unsigned part) const {
   return path.parent_path() / name;
 }
 
-// This recording might reach the names of parts of an older one.
+// Throws if the folder has parts of an older recording with the same name, because the names of new parts might reach
+// theirs.
 void Recording::Parts::refuse_parts_of_another_recording() const {
   const fs::path path(settings_.path);
   const std::string begin = path.stem().string() + "-";

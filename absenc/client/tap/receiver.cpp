@@ -25,7 +25,8 @@ Receiver::Receiver() : place_("standard input") {
 
 Receiver::~Receiver() { cancel(); }
 
-// A busy computer may delay a part of a frame for longer than the latency of the link.
+// Returns a duration of silence that no frame contains, although a busy computer may delay a part of a frame for longer
+// than the latency of the link.
 Time Receiver::quiet() const { return 500ms + 2 * link_.latency; }
 
 void Receiver::start(Time end) {

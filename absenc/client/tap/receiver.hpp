@@ -60,7 +60,8 @@ class Receiver {
   [[nodiscard]] Time quiet() const;
 
  private:
-  static constexpr std::size_t most_waiting = 64 << 20;  // limit of the bytes that wait for the caller
+  // greatest number of bytes that may wait until the caller takes them
+  static constexpr std::size_t most_waiting = 64 << 20;
 
   void receive();
   void receive_from_port();
@@ -72,7 +73,7 @@ class Receiver {
   std::string place_;
   Time end_time_ = never;
 
-  mutable std::mutex mutex_;  // guards the following members up to `cancelled_`
+  mutable std::mutex mutex_;  // the mutex guards the following members up to `cancelled_`
   std::condition_variable changed_;
   std::deque<Received> waiting_;
   std::size_t waiting_size_ = 0;

@@ -25,7 +25,7 @@ class RequestRates final : public capture::AnnotationSink {
     capture::Tick begin = 0;   // tick of the first request
     capture::Tick last = 0;    // tick of the last request
 
-    /// Returns the mean number of such requests per second; 0 if the times do not tell it.
+    /// Returns the mean number of such requests per second; 0 if their times do not show it.
     [[nodiscard]] double per_second() const {
       return count > 1 && last > begin
                  ? static_cast<double>(count - 1) * static_cast<double>(arrival_ticks_per_second) /
@@ -65,7 +65,7 @@ class RequestRates final : public capture::AnnotationSink {
   }
 
  private:
-  // limit of the number of kinds; requests of further kinds count as the last kind
+  // greatest number of kinds of requests; requests of further kinds count as the last kind
   static constexpr std::size_t most_kinds = 64;
 
   struct SampleRequest {
@@ -74,7 +74,8 @@ class RequestRates final : public capture::AnnotationSink {
     bool varies;  // whether the command has arguments, which may change its request
   };
 
-  // Assumes that requests of a command with arguments have equal lengths and first bytes.
+  // Returns the name of the command with this request. Requests of a command with arguments are recognised by their
+  // length and first bytes.
   [[nodiscard]] std::string_view command_of(Bytes request) const {
     for (const SampleRequest& one : samples_) {
       if (std::equal(one.bytes.begin(), one.bytes.end(), request.begin(), request.end())) return one.command;

@@ -34,7 +34,7 @@ struct Tap::Parts final : capture::AnnotationSink {
       if (is_over) return end();
       filled = at = 0;
       is_over = !run.advance();
-      --at;  // steps back, so that `++at` then moves to the first row
+      --at;  // prepares for the `++at` that then moves to the first new row
     }
     return &ready[at];
   }
@@ -50,7 +50,7 @@ struct Tap::Parts final : capture::AnnotationSink {
   TapRun run;
   TickClock clock{arrival_ticks_per_second};
   AnnotationRows rows;
-  std::vector<Row> ready;  // rows that are ready for the caller; each step fills the list anew
+  std::vector<Row> ready;  // rows that wait for the caller; each call of `advance` fills the list anew
   std::size_t filled = 0;
   std::size_t at = 0;
   bool is_over = false;

@@ -37,7 +37,8 @@ class TapRecord final : public capture::AnnotationSink {
   [[nodiscard]] const std::string& path() const { return file_.path(); }
 
  private:
-  // `decode` joins lines of the same time to one frame.
+  // Adds a line with a time later than that of the line before, because `decode` joins lines of the same time to one
+  // frame.
   void add(capture::Tick at, Bytes bytes) {
     if (bytes.empty()) return;
     last_ = std::max(at, last_ + 1);

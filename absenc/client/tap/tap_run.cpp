@@ -27,10 +27,11 @@ using namespace std::chrono_literals;
 
 namespace {
 
-// number of bytes that start the first search; it doubles for each further one
+// number of received bytes at which the protocol is searched first; each further search needs twice as many
 constexpr std::size_t first_search = 64;
-constexpr std::size_t last_search = 8192;    // number of bytes after which further bytes do not improve the search
-constexpr std::size_t most_at_other = 2048;  // number of bytes to try at a rate that may be wrong
+// number of received bytes after which the search for the protocol does not improve with further bytes
+constexpr std::size_t last_search = 8192;
+constexpr std::size_t most_at_other = 2048;  // number of bytes that the search decodes at a baud rate that may be wrong
 constexpr Time patience_at_rate = 2s;  // time for which bytes are awaited at one rate before the next rate is tried
 constexpr std::size_t enough_to_settle = 600;
 constexpr Time time_to_settle = 1s;
@@ -39,7 +40,7 @@ bool is_asynchronous(const Unit& unit) {
   return unit.link == LinkKind::half_duplex || unit.link == LinkKind::full_duplex;
 }
 
-// Arrival times are too coarse for response times.
+// Removes response times from annotations, because arrival times are too coarse for them.
 struct Untimed final : capture::AnnotationSink {
   Untimed(TapRecord* of_run, capture::AnnotationSink& next) : record(of_run), sink(next) {}
   void put(const capture::Annotation& annotation) override {

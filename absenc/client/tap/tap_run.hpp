@@ -58,7 +58,7 @@ class TapRun {
   struct Sinks;
   struct LineToTry {
     LineSettings settings;
-    std::optional<EncoderAddress> address;  // address of the port with these settings; nothing: standard input
+    std::optional<EncoderAddress> address;  // address of the port with these settings; nothing for standard input
   };
 
   [[nodiscard]] std::vector<LineToTry> lines_to_try();

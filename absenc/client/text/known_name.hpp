@@ -17,11 +17,12 @@ struct KnownName {
   bool is_model = false;
   std::vector<const Unit*> units;
 
-  /// Returns for example "AksIM-2 is a model of encolink and encolink-spi".
+  /// Returns a sentence about the name, as "AksIM-2 is a model of encolink and encolink-spi".
   [[nodiscard]] std::string sentence() const;
 };
 
-/// Finds a name by its letters and digits, in any case; nothing: there is none, or `word` is a protocol.
+/// Finds a maker, a family or a model by the letters and digits of its name, in any case; nothing: there is none, or
+/// `word` is a protocol.
 [[nodiscard]] std::optional<KnownName> find_known_name(std::string_view word);
 
 }  // namespace absenc::client

@@ -17,7 +17,7 @@ char folded(char c) {
   return c == '_' ? '-' : c;
 }
 
-// Returns the edit distance; a swap of neighbours counts 1.
+// Returns the edit distance of two words; two swapped neighbouring letters count as 1.
 std::size_t distance(std::string_view from, std::string_view to) {
   std::vector<std::size_t> before(to.size() + 1), last(to.size() + 1), row(to.size() + 1);
   for (std::size_t j = 0; j <= to.size(); ++j) last[j] = j;
@@ -39,7 +39,7 @@ std::size_t distance(std::string_view from, std::string_view to) {
 
 std::string_view nearest(std::string_view written, std::span<const std::string_view> names) {
   std::string_view best;
-  // a name is near if at most a third of the letters plus one is wrong
+  // a name is near if its edit distance is at most one third of the written letters plus one
   std::size_t best_distance = written.size() / 3 + 2;
   for (const std::string_view name : names) {
     const bool begins = written.size() >= 3 && name.starts_with(written);

@@ -11,7 +11,8 @@ namespace absenc::client {
 /// Returns the name nearest to `written`; "" if none is near.
 [[nodiscard]] std::string_view nearest(std::string_view written, std::span<const std::string_view> names);
 
-/// Returns "; did you mean X?" or "; known are: A, B, C" or "".
+/// Returns a hint for the user: "; did you mean X?" if a name is near to `written`, else "; known are: A, B, C"; "" if
+/// there are no names.
 [[nodiscard]] std::string suggestion(std::string_view written, std::span<const std::string_view> names);
 
 }  // namespace absenc::client

@@ -67,7 +67,7 @@ Reading checked(Reading reading, bool confirmed) {
   if (confirmed || !reading.ready || !reading.singleturn_valid()) return reading;
   reading.singleturn_valid_bits = 0;
   reading.singleturn_known = false;
-  // invalid turns stay invalid, because the encoder has reported that
+  // invalid turns do not become unknown, because the encoder has reported that they are invalid
   if (reading.multiturn_valid) reading.multiturn_known = false;
   reading.multiturn_valid = false;
   return reading;

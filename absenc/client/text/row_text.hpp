@@ -14,7 +14,7 @@ namespace absenc::client {
 
 /// Returns the names of the columns as a CSV line, without columns that are details.
 [[nodiscard]] std::string csv_header(std::span<const Column> columns);
-/// Append or return a CSV line, without columns that are details.
+/// Append or return the values of a row as a CSV line, without columns that are details.
 void append_csv(std::string& text, const Row& row);
 [[nodiscard]] std::string to_csv(const Row& row);
 

@@ -8,11 +8,11 @@
 
 namespace absenc::client {
 
-// First lines of files, which name the kind of file:
-inline constexpr std::string_view memory_file_title = "absenc memory 1";  // memory of a virtual encoder
-inline constexpr std::string_view dump_title = "absenc dump 1";           // dump: copy of the memory of an encoder
+// The first line of each kind of file, which names the kind:
+inline constexpr std::string_view memory_file_title = "absenc memory 1";  // file with the memory of a virtual encoder
+inline constexpr std::string_view dump_title = "absenc dump 1";           // dump, a copy of the memory of an encoder
 
-/// Returns the content, about 16 MiB at most; `what` says in errors what the file is. Throws Failure.
+/// Returns the content of a file of at most about 16 MiB; `what` says in errors what the file is. Throws Failure.
 [[nodiscard]] std::string read_text_file(std::string_view what, const std::string& path);
 
 /// Returns the absolute path to which `path` leads through up to 40 symbolic links.

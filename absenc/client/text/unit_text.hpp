@@ -69,23 +69,25 @@ struct RoleArgument {
 /// Returns a time as text with a suitable unit: "85 us", "2.1 ms" or "1.5 s".
 [[nodiscard]] std::string to_text(Time time);
 
-/// Returns for example "1 to 24" or "none or odd or even".
+/// Returns the possible values of an option as text, as "1 to 24" or "none or odd or even".
 [[nodiscard]] std::string range_of(const Option& option);
 [[nodiscard]] std::string to_text(const Option& option, std::int64_t value);
-/// Returns `value`, which an option stores as an integer, divided by 10^decimals.
+/// Returns the real number that an option stores as the integer `value`: `value` divided by 10^decimals of the option.
 [[nodiscard]] double real_value(const Option& option, std::int64_t value);
 
-/// Returns for example "baud=57600"; "" if the unit has no such option.
+/// Returns the option `name` with its value as a setting, as "baud=57600"; "" if the unit has no such option.
 [[nodiscard]] std::string option_text(const Unit& unit, const Options& options, std::string_view name);
 
 /// Returns the description of a position word as text: "multiturn:12 position:24 gray".
 [[nodiscard]] std::string to_text(const WordFormat& word);
-/// Returns the options as settings "name=value"; a position word replaces some.
+/// Returns the options as settings "name=value". If the position word is set as a whole, its setting replaces the
+/// options that it contains.
 [[nodiscard]] std::vector<std::string> option_texts(const Unit& unit, const Options& options);
 
 /// Returns the flags of the field that have a name and are set in `bits`.
 [[nodiscard]] std::vector<const FlagInfo*> raised(const FieldInfo& field, std::uint64_t bits);
-/// Returns the advice on a flag; "" with `beside_alarms` if the flag is a sum of others.
+/// Returns the advice on what to do about a flag; "" if `beside_alarms` says that the alarms are shown too and the flag
+/// only sums these up.
 [[nodiscard]] std::string_view action_of(const FlagInfo& flag, bool beside_alarms);
 [[nodiscard]] std::vector<std::string_view> flag_names(const FieldInfo& field, std::uint64_t bits);
 [[nodiscard]] std::string to_text(const FieldValue& value);
@@ -94,7 +96,7 @@ struct RoleArgument {
 /// Returns bytes as text, with '.' for bytes that are not printable ASCII.
 [[nodiscard]] std::string printable(Bytes bytes);
 
-/// Returns for example "100000 writes in total"; "" if unknown.
+/// Returns the endurance of a memory as text, as "100000 writes in total"; "" if unknown.
 [[nodiscard]] std::string life_of(const MemoryArea& area);
 
 /// Returns the name of a kind of line, as "half_duplex".
@@ -111,7 +113,7 @@ struct RoleArgument {
 /// Returns the validity of a field in a reading; `valid` for fields other than position and turns.
 [[nodiscard]] Validity validity_of(const FieldInfo& field, const Reading& reading);
 [[nodiscard]] bool holds(const FieldInfo& field, const Reading& reading);
-/// Returns for example "unknown (74565 counts)" or "INVALID (74565 counts)".
+/// Returns a field's value as text, marked if it is not valid: "unknown (74565 counts)" or "INVALID (74565 counts)".
 [[nodiscard]] std::string marked(const FieldInfo& field, const std::string& value, const Reading& reading);
 
 }  // namespace absenc::client

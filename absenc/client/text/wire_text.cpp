@@ -27,7 +27,7 @@ std::string shown(char c) {
 // Parses bytes in hexadecimal, which begin at the index `from` of `text`.
 std::vector<std::uint8_t> parse_bytes(std::string_view what, std::string_view text, std::size_t from) {
   std::vector<std::uint8_t> bytes;
-  bool inside = false;  // whether the index is inside a run of digits, where 0x is an error
+  bool inside = false;  // whether the present character is inside a run of hexadecimal digits, where 0x is an error
   for (std::size_t i = from; i < text.size();) {
     if (separates(text[i])) {
       inside = false;

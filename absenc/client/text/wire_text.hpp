@@ -29,7 +29,7 @@ struct WireFrame {
 /// Parses a frame, with or without white space between bytes. Throws UsageError.
 [[nodiscard]] WireFrame parse_wire_text(LinkKind link, std::string_view what, std::string_view text);
 
-/// Returns for example "1A 00 2B", "1FF:022B" or "0001 1110".
+/// Returns a frame as text for people: bytes "1A 00 2B", a CAN frame "1FF:022B", bits "0001 1110".
 [[nodiscard]] std::string to_wire_text(LinkKind link, const Frame& frame);
 /// Returns a frame as programs read it, as in vectors.json: "1a002b", "1ff:022b", "00011110".
 [[nodiscard]] std::string to_compact_wire_text(LinkKind link, const Frame& frame);
