@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "absenc/sim/line.hpp"
+#include "absenc/sim/rough_line.hpp"
 #include "tests/shape_toys.hpp"
 
 namespace absenc {
@@ -231,7 +232,71 @@ TEST_F(Clocked, ReportsTooFewClocksToDevice) {
   EXPECT_EQ(notes, "too few clocks: 8");
 }
 
-// (e) CAN at 250 kbit/s: 47 bits for a standard frame, 8 for each data byte, and stuff bits.
+// (e) A data line that turns, at 250 kHz: after the host's bits 0x2D the encoder sends its own.
+struct ClockedBothWays : testing::Test {
+  sim::Line<Byte> line{LinkKind::clocked_bidirectional, {.rate = 250'000}};
+  ByteToy device{[](ByteToy& self, const Event<Byte>& event) {
+    if (event.kind == Kind::received) self.send({event.items[0] == 0x2D ? Byte{0x91} : Byte{0x0F}, 0xA4});
+  }};
+  ByteToy host;
+
+  void run() {
+    line.attach(NodeRole::device, device);
+    EXPECT_TRUE(line.run(line.attach(NodeRole::host, host)));
+  }
+  void finish_after(int received) {
+    host = ByteToy([received, count = 0](ByteToy& self, const Event<Byte>& event) mutable {
+      if (event.kind == Kind::received && ++count == received) self.finish();
+    });
+  }
+};
+
+TEST_F(ClockedBothWays, EncoderSendsInTheClocksThatTheHostLeaves) {
+  finish_after(1);
+  host.exchange({0x2D}, 8, 20, false, microseconds(1));
+  run();
+  EXPECT_EQ(device.log, "1000 selected 4000, 33000 received 2D 8, 81000 sent 20");
+  EXPECT_EQ(host.log, "81000 sent, 81000 received 91 A0 12");
+}
+
+TEST_F(ClockedBothWays, LineIsHighWhereNobodyDrivesIt) {
+  finish_after(1);
+  host.exchange({0x2D}, 8, 26, false, microseconds(1));
+  run();
+  EXPECT_EQ(host.log, "105000 sent, 105000 received 91 A4 C0 18");
+}
+
+TEST_F(ClockedBothWays, ExchangeGoesOnWhileClockRestsLow) {
+  host = ByteToy([count = 0](ByteToy& self, const Event<Byte>& event) mutable {
+    if (event.kind != Kind::received) return;
+    if (++count == 1) self.exchange({}, 0, 4, true, microseconds(100));
+    if (count == 2) self.exchange({0xC0}, 3, 7);
+    if (count == 3) self.finish();
+  });
+  host.exchange({0x2D}, 8, 12, true, microseconds(1));
+  run();
+  EXPECT_EQ(device.log, "1000 selected 4000, 33000 received 2D 8, 128000 received C0 3, 144000 sent 23");
+  EXPECT_EQ(host.log,
+            "49000 sent, 49000 received 90 4, 116000 sent, 116000 received 10 4, 144000 sent, 144000 received 00 4");
+}
+
+TEST_F(ClockedBothWays, RoughLineCarriesTheSame) {
+  sim::RoughLine<Byte> rough(LinkKind::clocked_bidirectional, {.rate = 250'000}, device, 1);
+  const std::vector<Byte> out{0x2D};
+  const auto next_received = [&] {
+    for (;;) {
+      const Event<Byte> event = rough.wait({});
+      if (event.kind == Kind::received) return toy::text_of(event.items[0]) + ' ' + std::to_string(event.bits);
+    }
+  };
+  rough.begin({.kind = ByteStep::Kind::transfer, .goes_on = true, .out = out, .bits = 12, .out_bits = 8});
+  EXPECT_EQ(next_received(), "90 4");
+  rough.begin({.kind = ByteStep::Kind::transfer, .bits = 4});
+  EXPECT_EQ(next_received(), "10 4");
+  EXPECT_EQ(device.log, "0 selected 4000, 32000 received 2D 8, 64000 sent 16");
+}
+
+// (f) CAN at 250 kbit/s: 47 bits for a standard frame, 8 for each data byte, and stuff bits.
 struct Can : testing::Test {
   sim::Line<CanFrame> line{LinkKind::can, {.rate = 250'000}};
   static CanFrame frame(std::uint32_t id, Byte data) { return {.id = id, .size = 1, .data = {data}}; }
@@ -287,7 +352,7 @@ TEST_F(Can, StandardFrameWinsOverExtendedFrameWithSamePrefix) {
   EXPECT_EQ(standard.log, "242000 sent, 534000 received 04800000:");
 }
 
-// (f) A pulse on a separate wire requests each frame.
+// (g) A pulse on a separate wire requests each frame.
 TEST(Trigger, RequestsEachFrameWithLongEnoughPulse) {
   sim::Line<Byte> line(LinkKind::half_duplex, {.rate = 1'000'000});
   ByteToy device([](ByteToy& self, const Event<Byte>& event) {
@@ -310,7 +375,7 @@ TEST(Trigger, RequestsEachFrameWithLongEnoughPulse) {
   EXPECT_EQ(device.log, "0 triggered 10000, 40000 sent, 100000 triggered 9000");
 }
 
-// (g) Another baud rate during the conversation, after the reply to command 19.
+// (h) Another baud rate during the conversation, after the reply to command 19.
 struct BaudChange : testing::Test {
   static constexpr LineSettings fast{.rate = 2'000'000};
   sim::Line<Byte> line{LinkKind::half_duplex, {.rate = 1'000'000}};
@@ -362,7 +427,7 @@ TEST_F(BaudChange, ReportsLineErrorsIfHostDoesNotFollow) {
   EXPECT_EQ(device.log, "10000 received 19, 25000 sent, 40000 error");
 }
 
-// (h) Collisions: the wire carries the AND of the bits of all senders.
+// (i) Collisions: the wire carries the AND of the bits of all senders.
 struct Collision : testing::Test {
   sim::Line<Byte> line{LinkKind::half_duplex, {.rate = 1'000'000}};
   static ByteToy::React answer(std::vector<Byte> bytes, Time delay) {

@@ -15,13 +15,18 @@ enum class LinkKind : std::uint8_t {
   spi,          ///< the host's clock moves one byte in each direction at once
   /// The host clocks bits out of the encoder (SSI, BiSS), packed MSB first, the last byte left-aligned.
   clocked,
+  /// As clocked, but the direction of the data line turns: the host sends bits first, then the encoder (EnDat).
+  clocked_bidirectional,
   can,
 };
 
 /// Returns whether the host clocks every item, so that the encoder sends only while the host clocks.
-[[nodiscard]] constexpr bool host_clocks(LinkKind kind) { return kind == LinkKind::spi || kind == LinkKind::clocked; }
 /// Returns whether frames are sequences of bits, which need not fill whole bytes.
-[[nodiscard]] constexpr bool carries_bits(LinkKind kind) { return kind == LinkKind::clocked; }
+[[nodiscard]] constexpr bool carries_bits(LinkKind kind) {
+  return kind == LinkKind::clocked || kind == LinkKind::clocked_bidirectional;
+}
+/// Returns whether the host clocks every item, so that the encoder sends only while the host clocks.
+[[nodiscard]] constexpr bool host_clocks(LinkKind kind) { return kind == LinkKind::spi || carries_bits(kind); }
 
 /// Parity of a character.
 enum class Parity : std::uint8_t { none, odd, even };

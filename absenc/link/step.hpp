@@ -31,12 +31,18 @@ struct Step {
   /// Transfer, wait: no request of another machine may come before the next step of this machine.
   bool holds_line = false;
   bool hold_low = false;  ///< transfer on a clocked link: the clock line, which idles high, is held low until `at`
+  /// Transfer on a bidirectional clocked link: afterwards the clock line rests low, because the next transfer belongs
+  /// to the same exchange.
+  bool goes_on = false;
   /// Transfer of characters: `out` is sent in frames of this many items, with pauses of `width`; 0: in one piece.
   std::uint8_t frame = 0;
   std::span<const Item> out{};  ///< transfer: items to send; valid until the next feed
   std::size_t expect = 0;       ///< transfer, wait: number of items still expected; 0: unknown, or none
   /// Transfer on a clocked link: number of clocks; a device may set the number of bits that hosts read.
   std::size_t bits = 0;
+  /// Transfer on a bidirectional clocked link: the host drives the data line with `out` during this number of clocks,
+  /// then it releases the line.
+  std::size_t out_bits = 0;
   std::uint32_t rate = 0;  ///< configure: new rate in bits per second
   Time at{};               ///< transfer, pulse: earliest time to begin; wait: time of `timer`, if in the future
   /// Transfer, wait: `silence` is due this long after `sent` if nothing is received; 0: no limit.
@@ -69,8 +75,12 @@ struct Event {
   Kind kind = Kind::timer;        ///< kind of the event
   Time at{};                      ///< time of the event
   std::span<const Item> items{};  ///< received: the items that were received; valid during the call
-  std::size_t bits = 0;           ///< sent, device side of a clocked link: number of clocks counted
-  ExtraWire wire{};               ///< triggered: the wire of the pulse
+  /// Sent, device side of a clocked link: number of clocks counted. Received, on a bidirectional clocked link: number
+  /// of bits in `items`.
+  std::size_t bits = 0;
+  /// Received, device side of a bidirectional clocked link: number of clocks of the exchange before the bits.
+  std::size_t clocks_before = 0;
+  ExtraWire wire{};       ///< triggered: the wire of the pulse
   bool held_low = false;  ///< selected on a clocked link: the clock line was held low before the transfer, not idle
   bool idle_low = false;  ///< received on a clocked link: the data line was low already before the first bit
   /// Triggered: duration of the pulse. Device side, selected (clocked) or sent (SPI): period of the clock, 0 if not

@@ -39,6 +39,7 @@ void Line<Item>::replace(Node node, Machine<Item>& machine) {
   state.active_step = Step<Item>::Kind::wait;
   ++state.begin_generation;
   state.on_wire = 0;
+  state.goes_on_from = never;
   state.silence = Silence(now_);
   serve(node);
 }
@@ -136,6 +137,9 @@ bool Line<Item>::step() {
     case Kind::character:
       if (current) end_character(node);
       break;
+    case Kind::turned:
+      if (current) turn_data_line(node);
+      break;
     case Kind::transferred:
       if (current) end_transfer(node);
       break;
@@ -226,6 +230,8 @@ void Line<Item>::accept_step(Node node, const Step<Item>& step) {
   state.behind_out = step.behind_out();
   state.pulse_wire = step.wire;
   state.hold_low = step.hold_low;
+  state.out_bits = step.out_bits;
+  state.goes_on = step.goes_on;
   state.accepted_at = now_;
   ++state.begin_generation;
   // The begin is scheduled, so that a node that is attached next, at the same time, takes part.

@@ -42,6 +42,12 @@ class Line {
     Time lead{};                ///< Time from chip select to the first clock.
     Time held_low = never;  ///< clocked: time from which the clock line was held low before `start`; never: it was not
     Time low_after{};       ///< clocked: time for which the device drives the data line low after the last clock edge
+    /// Bidirectional clocked: number of bits in `out`; those in `in` follow them.
+    std::size_t out_bits = 0;
+    /// Bidirectional clocked: end of the transfer before, from which on the clock line rests low; never: it rested
+    /// high.
+    Time goes_on_from = never;
+    bool goes_on = false;  ///< bidirectional clocked: the clock line rests low behind the transfer
   };
   /// Called at the end of every transfer of SPI bytes or clocked bits that has at least one bit.
   using TransferObserver = std::function<void(const Transfer& transfer)>;
@@ -90,7 +96,7 @@ class Line {
  private:
   struct State;
   struct ScheduledEvent {
-    enum class Kind : std::uint8_t { begin, character, frame, transferred, finished, arbitrate } kind;
+    enum class Kind : std::uint8_t { begin, character, frame, turned, transferred, finished, arbitrate } kind;
     Time at;
     std::uint64_t order;  // events of the same time are handled in this order, but `arbitrate` last
     Node node;
@@ -119,7 +125,9 @@ class Line {
   void end_character(Node node);
   void deliver(Node node, Node sender, const Item& item, bool garbled);
   void begin_transfer(Node node);
+  void turn_data_line(Node node);
   void end_transfer(Node node);
+  void read_driven_bits(const State& host, std::vector<Item>& in) const;
   void arbitrate();
   void end_frame(Node node);
   [[nodiscard]] bool receives_from(const State& receiver, const State& sender) const;

@@ -46,13 +46,21 @@ struct Line<Item>::State {
   Time width{};                        ///< `width` of the step (link/step.hpp): duration, pause, or time of driving low
   std::uint8_t behind_out = 0xFF;      ///< spi, clocked: byte that the host samples after `out` has ended
   bool hold_low = false;               ///< clocked: the host holds the clock line low before the transfer
-  Time accepted_at{};                  ///< time at which the machine requested the transfer
-  Time lead{};                         ///< spi: time from chip select to the first clock
-  ExtraWire pulse_wire{};              ///< wire of the pulse
-  Time start{};                        ///< start of the transfer, or of its present frame
-  std::size_t index = 0;               ///< index of the item of `out` that is being sent, or is sent next
-  std::size_t on_wire = 0;             ///< characters: number of items of the present or last frame of `out`; 0: none
-  Time each{};                         ///< duration of one byte
+  std::size_t out_bits = 0;            ///< bidirectional clocked, host: number of clocks during which it drives `out`
+  /// Bidirectional clocked, host: whether the clock line rests low behind the transfer.
+  bool goes_on = false;
+  /// Bidirectional clocked, host: end of the last transfer, if the present one belongs to its exchange; else `never`.
+  Time goes_on_from = never;
+  std::size_t clocks_before = 0;  ///< bidirectional clocked, host: number of clocks of the exchange before the transfer
+  /// Bidirectional clocked, device: number of clocks of the exchange before the first bit of `out`.
+  std::size_t driven_from = 0;
+  Time accepted_at{};       ///< time at which the machine requested the transfer
+  Time lead{};              ///< spi: time from chip select to the first clock
+  ExtraWire pulse_wire{};   ///< wire of the pulse
+  Time start{};             ///< start of the transfer, or of its present frame
+  std::size_t index = 0;    ///< index of the item of `out` that is being sent, or is sent next
+  std::size_t on_wire = 0;  ///< characters: number of items of the present or last frame of `out`; 0: none
+  Time each{};              ///< duration of one byte
 
   /// Returns whether a transfer of this node has begun and has items left to send.
   [[nodiscard]] bool frame_pending() const {

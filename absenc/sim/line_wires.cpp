@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <type_traits>
 
+#include "absenc/core/bit_view.hpp"
 #include "absenc/sim/can_bits.hpp"
 #include "absenc/sim/line.hpp"
 #include "absenc/sim/line_state.hpp"
@@ -137,19 +138,62 @@ void Line<Item>::deliver(Node node, Node sender, const Item& item, bool garbled)
 template <class Item>
 void Line<Item>::begin_transfer(Node node) {
   State& host = *nodes_[node];
-  host.expect = carries_bits(kind_) ? (host.bits + 7) / 8 : std::max(host.out.size(), host.expect);
+  const bool turns = kind_ == LinkKind::clocked_bidirectional;
+  host.expect = carries_bits(kind_) ? (host.bits - host.out_bits + 7) / 8 : std::max(host.out.size(), host.expect);
   if (kind_ == LinkKind::spi) host.bits = host.expect * 8;
+  if (turns && host.out_bits > 0) {
+    schedule(ScheduledEvent::Kind::turned, now_ + host.settings.bits(host.out_bits), node);
+  }
+  if (turns && host.goes_on_from != never) {
+    schedule(ScheduledEvent::Kind::transferred, now_ + host.settings.bits(host.bits), node);
+    return;
+  }
+  host.clocks_before = 0;
   for (Node other = 0; other < nodes_.size(); ++other) {
     if (nodes_[other]->role == NodeRole::host) continue;
     nodes_[other]->active_step = Step<Item>::Kind::wait;
     nodes_[other]->out.clear();
     nodes_[other]->width = {};
     nodes_[other]->behind_out = 0xFF;
+    nodes_[other]->driven_from = 0;
     const Time period = carries_bits(kind_) ? host.settings.bits(1) : Time{};
     feed(other, {.kind = Event<Item>::Kind::selected, .at = now_, .held_low = host.hold_low, .width = period});
   }
   if (kind_ == LinkKind::spi) host.lead = host.settings.select_lead;
   schedule(ScheduledEvent::Kind::transferred, now_ + host.lead + host.settings.bits(host.bits), node);
+}
+
+// Passes the bits of the host on to the devices, whose next bits follow them.
+template <class Item>
+void Line<Item>::turn_data_line(Node node) {
+  const State& host = *nodes_[node];
+  for (Node other = 0; other < nodes_.size(); ++other) {
+    if (nodes_[other]->role == NodeRole::host) continue;
+    nodes_[other]->out.clear();
+    nodes_[other]->driven_from = host.clocks_before + host.out_bits;
+    feed(other, {.kind = Event<Item>::Kind::received,
+                 .at = now_,
+                 .items = host.out,
+                 .bits = host.out_bits,
+                 .clocks_before = host.clocks_before});
+  }
+}
+
+// Combines the bits of all devices in the clocks that the host does not drive.
+template <class Item>
+void Line<Item>::read_driven_bits(const State& host, std::vector<Item>& in) const {
+  if constexpr (std::is_same_v<Item, std::uint8_t>) {
+    const std::size_t first = host.clocks_before + host.out_bits;  // clock of the exchange of the first bit
+    for (const auto& other : nodes_) {
+      if (other->role == NodeRole::host) continue;
+      const BitView driven{other->out, 8 * other->out.size()};
+      for (std::size_t bit = 0; bit < 8 * in.size(); ++bit) {
+        const std::size_t place = first + bit - other->driven_from;
+        const bool level = place < driven.size ? driven[place] : other->behind_out != 0;
+        if (!level) in[bit / 8] = static_cast<Item>(in[bit / 8] & ~(0x80u >> bit % 8));
+      }
+    }
+  }
 }
 
 template <class Item>
@@ -162,31 +206,37 @@ void Line<Item>::end_transfer(Node node) {
     for (const auto& other : nodes_) {
       if (other->role == NodeRole::host) continue;
       low_after = std::max(low_after, other->width);
+      if (kind_ == LinkKind::clocked_bidirectional) continue;
       const std::size_t driven = std::min(in.size(), other->out.size());
       for (std::size_t i = 0; i < in.size(); ++i) in[i] &= i < driven ? other->out[i] : other->behind_out;
     }
-    const std::size_t unclocked = in.size() * 8 - host.bits;
+    if (kind_ == LinkKind::clocked_bidirectional) read_driven_bits(host, in);
+    const std::size_t bits = host.bits;
+    const std::size_t unclocked = in.size() * 8 - (bits - host.out_bits);
     if (unclocked != 0) in.back() = static_cast<Item>(in.back() >> unclocked << unclocked);
     std::vector<Item>& out = transferred_out_;
     out.assign(host.out.begin(), host.out.end());
-    out.resize(host.expect, 0);
-    const std::size_t bits = host.bits;
+    if (host.out_bits == 0) out.resize(host.expect, 0);
     if (transfer_observer_ && bits > 0) {
-      transfer_observer_(
-          {host.start, now_, bits, out, in, host.lead, host.hold_low ? host.accepted_at : never, low_after});
+      transfer_observer_({host.start, now_, bits, out, in, host.lead, host.hold_low ? host.accepted_at : never,
+                          low_after, host.out_bits, host.goes_on_from, host.goes_on});
     }
+    host.clocks_before += bits;
+    host.goes_on_from = host.goes_on ? now_ : never;
+    const std::size_t clocks = host.clocks_before;
+    const std::size_t received_bits = kind_ == LinkKind::clocked_bidirectional ? bits - host.out_bits : 0;
     for (Node other = 0; other < nodes_.size(); ++other) {
-      if (nodes_[other]->role == NodeRole::host) continue;
+      if (nodes_[other]->role == NodeRole::host || host.goes_on) continue;
       nodes_[other]->active_step = Step<Item>::Kind::wait;
       if (kind_ == LinkKind::spi) {
         feed(other, {.kind = Event<Item>::Kind::received, .at = now_, .items = out});
       }
       const Time period = kind_ == LinkKind::spi ? host.settings.bits(1) : Time{};
-      feed(other, {.kind = Event<Item>::Kind::sent, .at = now_, .bits = bits, .width = period, .lead = host.lead});
+      feed(other, {.kind = Event<Item>::Kind::sent, .at = now_, .bits = clocks, .width = period, .lead = host.lead});
     }
     finish(node);
     host.silence.received(now_);
-    feed(node, {.kind = Event<Item>::Kind::received, .at = now_, .items = in});
+    feed(node, {.kind = Event<Item>::Kind::received, .at = now_, .items = in, .bits = received_bits});
   }
 }
 
@@ -248,6 +298,8 @@ template void Line<std::uint8_t>::begin_characters(Node);
 template void Line<std::uint8_t>::frame_character(Node);
 template void Line<std::uint8_t>::end_character(Node);
 template void Line<std::uint8_t>::begin_transfer(Node);
+template void Line<std::uint8_t>::turn_data_line(Node);
+template void Line<std::uint8_t>::read_driven_bits(const State&, std::vector<std::uint8_t>&) const;
 template void Line<std::uint8_t>::end_transfer(Node);
 template void Line<std::uint8_t>::arbitrate();
 template void Line<std::uint8_t>::end_frame(Node);
@@ -259,6 +311,8 @@ template void Line<CanFrame>::begin_characters(Node);
 template void Line<CanFrame>::frame_character(Node);
 template void Line<CanFrame>::end_character(Node);
 template void Line<CanFrame>::begin_transfer(Node);
+template void Line<CanFrame>::turn_data_line(Node);
+template void Line<CanFrame>::read_driven_bits(const State&, std::vector<CanFrame>&) const;
 template void Line<CanFrame>::end_transfer(Node);
 template void Line<CanFrame>::arbitrate();
 template void Line<CanFrame>::end_frame(Node);

@@ -7,6 +7,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "absenc/core/bit_view.hpp"
 #include "absenc/sim/can_bits.hpp"
 
 namespace absenc::sim {
@@ -57,7 +58,7 @@ void RoughLine<Item>::begin(const Step<Item>& step) {
     feed({.kind = Event<Item>::Kind::triggered, .at = time_, .wire = step.wire, .width = step.width});
     run_until(time_ + step.width);
   } else if (host_clocks(kind_)) {
-    transfer(step);
+    kind_ == LinkKind::clocked_bidirectional ? exchange_bits(step) : transfer(step);
   } else {
     copy(step.out, request_);
     if constexpr (std::is_same_v<Item, CanFrame>) {
@@ -113,6 +114,43 @@ void RoughLine<Item>::transfer(const Step<Item>& step) {
     enqueue(start, time_, time_, out_);
     if (!clocked) feed({.kind = Kind::received, .at = time_, .items = request_});
     feed({.kind = Kind::sent, .at = time_, .bits = bits_, .width = clocked ? Time{} : period, .lead = lead});
+  }
+}
+
+// The host's bits arrive when the data line turns, the encoder's at the end of the transfer.
+template <class Item>
+void RoughLine<Item>::exchange_bits(const Step<Item>& step) {
+  if constexpr (std::is_same_v<Item, std::uint8_t>) {
+    using Kind = typename Event<Item>::Kind;
+    const Time start = time_;
+    if (!std::exchange(goes_on_, step.goes_on)) {
+      clocks_ = driven_from_ = 0;
+      out_.clear();
+      behind_out_ = Step<Item>{}.behind_out();
+      feed({.kind = Kind::selected, .at = time_, .width = settings_.bits(1)});
+    }
+    request_.assign(step.out.begin(), step.out.end());
+    if (step.out_bits > 0) {
+      run_until(start + settings_.bits(step.out_bits));
+      driven_from_ = clocks_ + step.out_bits;
+      out_.clear();
+      feed({.kind = Kind::received, .at = time_, .items = request_, .bits = step.out_bits, .clocks_before = clocks_});
+    }
+    run_until(start + settings_.bits(step.bits));
+    bits_ = step.bits - step.out_bits;
+    std::vector<Item> in((bits_ + 7) / 8, 0);
+    const BitView driven{out_, 8 * out_.size()};
+    for (std::size_t bit = 0; bit < bits_; ++bit) {
+      const std::size_t place = clocks_ + step.out_bits + bit - driven_from_;
+      const bool level = place < driven.size ? driven[place] : behind_out_ != 0;
+      if (level) in[bit / 8] = static_cast<Item>(in[bit / 8] | 0x80u >> bit % 8);
+    }
+    clocks_ += step.bits;
+    if (!in.empty()) {
+      enqueue(start, time_, time_, in);
+      in_transit_[back_ - 1].bits = bits_;
+    }
+    if (!step.goes_on) feed({.kind = Kind::sent, .at = time_, .bits = clocks_});
   }
 }
 
@@ -177,7 +215,7 @@ Event<Item> RoughLine<Item>::deliver() {
   if (front_ == back_) front_ = back_ = 0;
   silence_.received(time_);
   if (reported_items_.empty()) return report({.kind = Kind::line_error, .at = time_});
-  return report({.kind = Kind::received, .at = time_, .items = reported_items_});
+  return report({.kind = Kind::received, .at = time_, .items = reported_items_, .bits = arrived.bits});
 }
 
 // ---- Device side

@@ -73,6 +73,7 @@ class RoughLine final : public Port<Item> {
     Time first;  // arrival time of the first item
     Time at;     // arrival time of the whole frame
     std::vector<Item> items;
+    std::size_t bits = 0;  // bidirectional clocked links: number of bits in `items`
   };
   // State of the device's end of the line.
   struct Side {
@@ -94,6 +95,7 @@ class RoughLine final : public Port<Item> {
   bool carry_out(const Step<Item>& step);
   void send(const Step<Item>& step);
   void transfer(const Step<Item>& step);
+  void exchange_bits(const Step<Item>& step);
   void enqueue(Time start, Time first, Time end, std::span<const Item> items);
   Event<Item> deliver();
   Event<Item> report(const Event<Item>& event);
@@ -124,6 +126,11 @@ class RoughLine final : public Port<Item> {
   std::vector<Item> out_;  // items that the device sent last
   std::uint8_t behind_out_ = 0xFF;
   std::size_t bits_ = 0;
+  // Bidirectional clocked links: clocks of the present exchange so far, and clocks of it before the first bit of
+  // `out_`.
+  std::size_t clocks_ = 0;
+  std::size_t driven_from_ = 0;
+  bool goes_on_ = false;               // bidirectional clocked links: the next transfer belongs to the same exchange
   std::vector<InTransit> in_transit_;  // entries front_ to back_ - 1 are in transit; the others are reused
   std::size_t front_ = 0;
   std::size_t back_ = 0;

@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t line = 0;
 constexpr std::size_t host = 0, device = 1;
 constexpr std::size_t cs = 0, sck = 1, mosi = 2, miso = 3;
-constexpr std::size_t clock = 0, data = 1;
+constexpr std::size_t clock = 0, data = 1, direction = 2;
 constexpr std::size_t can = 0;
 
 // Divides `length` into equal parts; returns the end of the first `part` parts, rounded to ns.
@@ -58,6 +58,9 @@ Waveform::Waveform(LinkKind kind, const LineSettings& settings, Sink& sink)
       break;
     case LinkKind::clocked:
       wires_ = {{"clock", true}, {"data", true}};
+      break;
+    case LinkKind::clocked_bidirectional:
+      wires_ = {{"clock", true}, {"data", true}, {"direction", false}};
       break;
     case LinkKind::can:
       wires_ = {{"can", true}};
@@ -146,7 +149,13 @@ void Waveform::character(NodeRole sender, Time start, Time end, std::uint16_t va
 }
 
 void Waveform::transfer(const Line<std::uint8_t>::Transfer& seen) {
-  if (carries_bits(kind_)) {
+  if (kind_ == LinkKind::clocked_bidirectional) {
+    draw_both_ways(seen);
+    if (seen.out_bits > 0) comment(seen.start, "host " + std::to_string(seen.out_bits) + " bits " + to_hex(seen.out));
+    const std::size_t in_bits = seen.bits - seen.out_bits;
+    const Time turned = seen.start + settings_.bits(seen.out_bits);
+    if (in_bits > 0) comment(turned, "device " + std::to_string(in_bits) + " bits " + to_hex(seen.in));
+  } else if (kind_ == LinkKind::clocked) {
     draw_clocked(seen);
     comment(seen.start, std::to_string(seen.bits) + " bits " + to_hex(seen.in));
   } else {
@@ -170,6 +179,23 @@ void Waveform::draw_clocked(const Line<std::uint8_t>::Transfer& seen) {
   }
   const Time last_edge = half(2 * (bits + idle) - 1);
   drive(data, last_edge, last_edge + seen.low_after);
+}
+
+// The host changes the data line at the falling edge of a clock, the encoder half a period later at the rising one.
+void Waveform::draw_both_ways(const Line<std::uint8_t>::Transfer& seen) {
+  const auto bits = static_cast<std::int64_t>(seen.bits);
+  const auto out_bits = static_cast<std::int64_t>(seen.out_bits);
+  const EvenDivision half{seen.start, seen.end - seen.start, 2 * bits};
+  if (seen.goes_on_from != never) drive(clock, seen.goes_on_from, seen.start);
+  for (std::int64_t i = 0; i < bits; ++i) drive(clock, half(2 * i), half(2 * i + 1));
+  drive(direction, half(0), half(2 * out_bits));
+  for (std::int64_t i = 0; i < out_bits; ++i) {
+    if (!BitView{seen.out, seen.out_bits}[static_cast<std::size_t>(i)]) drive(data, half(2 * i), half(2 * i + 2));
+  }
+  for (std::int64_t i = out_bits; i < bits; ++i) {
+    const auto bit = static_cast<std::size_t>(i - out_bits);
+    if (!BitView{seen.in, seen.bits - seen.out_bits}[bit]) drive(data, half(2 * i + 1), half(2 * i + 3));
+  }
 }
 
 // With CPHA 0 the leading edge samples data; with CPHA 1 data changes at it.

@@ -21,6 +21,7 @@ namespace absenc::sim {
 /// - half duplex: `line`; full duplex: `host` and `device`, named by the sender; idle is 1
 /// - spi: `cs`, `sck`, `mosi`, `miso`
 /// - clocked: `clock` and `data`, both idle high; `idle_clocks` adds clocks before the first bit
+/// - bidirectional clocked: `clock`, `data`, and `direction`, which is 1 while the host drives `data`
 /// - CAN: `can`, recessive is 1
 /// - for pulses: `trigger` and `clear`, pulled to 0
 class Waveform {
@@ -97,6 +98,7 @@ class Waveform {
   void comment(Time at, std::string words);
   std::size_t pulse_wire(std::string_view name);
   void draw_clocked(const Line<std::uint8_t>::Transfer& transfer);
+  void draw_both_ways(const Line<std::uint8_t>::Transfer& transfer);
   void draw_spi(const Line<std::uint8_t>::Transfer& transfer);
 
   LinkKind kind_;

@@ -196,6 +196,25 @@ TEST(Waveform, ClockedBits) {
             "#3500\n1!\n0\"\n#4000\n0!\n#4500\n1!\n1\"\n#14500\n");
 }
 
+TEST(Waveform, DataLineThatTurns) {
+  Picture picture(LinkKind::clocked_bidirectional, slow);
+  const std::array<std::uint8_t, 1> host{0x40};    // the bits 01
+  const std::array<std::uint8_t, 1> device{0x20};  // the bits 001
+  Line<std::uint8_t>::Transfer first{0us, 5us, 5, host, device};
+  first.out_bits = 2;
+  first.goes_on = true;
+  picture.transfer(first);
+  Line<std::uint8_t>::Transfer second{9us, 10us, 1, host, {}};
+  second.out_bits = 1;
+  second.goes_on_from = 5us;
+  picture.transfer(second);
+  // ! clock, " data, # direction: the host's bits begin at falling edges, the encoder's at rising ones.
+  EXPECT_EQ(body(picture),
+            "#0\n0!\n0\"\n1#\n#500\n1!\n#1000\n0!\n1\"\n#1500\n1!\n#2000\n0!\n0#\n"
+            "#2500\n1!\n0\"\n#3000\n0!\n#3500\n1!\n#4000\n0!\n#4500\n1!\n1\"\n#5000\n0!\n#9000\n0\"\n1#\n"
+            "#9500\n1!\n#10000\n1\"\n0#\n#20000\n");
+}
+
 TEST(Waveform, DataIsLowForTheTimeoutBehindTheLastEdge) {
   const std::array<std::uint8_t, 1> ones{0xE0};
   Picture picture(LinkKind::clocked, slow);
