@@ -44,7 +44,7 @@ class VirtualEncoder final : public modbus::Server {
 
   Format format_;
   Settings settings_;
-  std::uint32_t recent_settings_ = 0;  // number of settings within the minute that began at `recent_since_`
+  std::uint32_t recent_settings_ = 0;  // number of settings written within the minute that began at `recent_since_`
   Time recent_since_{};
 };
 
