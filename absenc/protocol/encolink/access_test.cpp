@@ -192,7 +192,7 @@ TEST_P(EncolinkRegister, ReportsUnpluggedEncoder) {
   struct Case {
     std::string_view command;
     std::vector<std::int64_t> arguments;
-    unsigned after;  // number of positions after which the encoder is switched off
+    unsigned after;  // number of emitted positions after which the test switches the encoder off
     std::string_view words;
   };
   for (const Case& one : std::vector<Case>{

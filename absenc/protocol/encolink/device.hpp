@@ -20,7 +20,7 @@ inline constexpr std::array<Condition, 3> conditions{{
     {"busy", "", "a register access never ends", 0, 1, 0},
     {"channels_disagree", "", "channel 2 has another position than channel 1", 0, 1, 0},
 }};
-/// Index of a condition in `conditions`.
+/// Indices of the conditions in the table `conditions`.
 enum ConditionIndex : std::size_t { condition_temperature, condition_busy, condition_channels_disagree };
 
 /// A virtual AksIM-2 encoder, or an AksIM-4 without registers.

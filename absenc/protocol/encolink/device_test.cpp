@@ -69,7 +69,9 @@ TEST(EncolinkDevice, ReportsBrokenRulesOfAccessAndTransmission) {
 
   Bench loud(testing::single);
   loud.ask({RawBytes(6)});
-  EXPECT_EQ(loud.device.violation_count(), 2u);  // the encoder counts violations per request, not per byte
+  // the six bytes are three requests, two of them during the encoder's reply: violations count per request, not per
+  // byte
+  EXPECT_EQ(loud.device.violation_count(), 2u);
   EXPECT_EQ(loud.first_violation(), "request during the encoder's transmission");
 }
 

@@ -145,7 +145,7 @@ struct RegisterValue {
   std::int64_t number;     ///< Value of a register that is a plain number.
   double celsius;          ///< Temperature of the readhead, in degC.
   double rpm;              ///< Speed of the ring, in rpm.
-  std::uint8_t flags;      ///< Result bits of the last self-calibration.
+  std::uint8_t flags;      ///< Bits that show how the last self-calibration ended.
   author::AsciiText text;  ///< Serial number, order number or part number.
 };
 
@@ -199,7 +199,7 @@ constexpr void put_position(FieldSink& sink, const Format& format, const Positio
                     : wrapped_difference(load_big_endian(bytes), 0, bits);
 }
 
-/// Puts the value of register `index` of the table into `sink`.
+/// Puts the value of the register with this index in the table `registers` into `sink`.
 constexpr void put_value(FieldSink& sink, std::size_t index, Bytes bytes) {
   FieldValue shown{.info = &register_fields[index], .bytes = bytes};
   switch (registers[index].content) {

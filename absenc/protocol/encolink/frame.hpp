@@ -79,26 +79,26 @@ inline constexpr std::size_t reply_capacity = 20;
 inline constexpr unsigned maximum_resolution = 22;
 /// Greatest number of bits of the turns that an encoder can have.
 inline constexpr unsigned maximum_multiturn_bits = 16;
-/// Bytes of one reply.
+/// Buffer for the bytes of one reply.
 using ReplyBytes = ByteBuffer<reply_capacity>;
 
 /// Interface of the encoder. On SPI, the encoder makes its frame before it receives the request in the same transfer.
 enum class Interface : std::uint8_t { uart, spi };
 /// Whether the encoder adds or subtracts the position offset; no document states it.
 enum class OffsetSign : std::uint8_t { add, subtract };
-/// Unit of the position offset; the register map does not state it.
+/// Unit of the position offset: counts, or 2^-32 of a turn. The register map does not state it.
 enum class OffsetUnit : std::uint8_t { counts, turn_fraction };
 /// Generation of the encoder, on which its registers depend.
 enum class Generation : std::uint8_t { aksim2, aksim4 };
 
 /// Layout of an encoder's frames. The host reads unknown members from the encoder's identity.
 struct Format {
-  unsigned resolution = 0;                   ///< Number of bits of the position in a turn, 1 to 22; 0: unknown.
-  int multiturn_bits = -1;                   ///< Number of bits of the turn counter, 0 to 16; -1: unknown.
-  bool has_ch2 = true;                       ///< Whether frames have a channel 2 byte; those of an AksIM-1 have none.
-  Interface interface = Interface::uart;     ///< Line on which the encoder is connected.
-  OffsetSign offset_sign = OffsetSign::add;  ///< Whether the encoder adds or subtracts the position offset.
-  OffsetUnit offset_unit = OffsetUnit::counts;  ///< Unit of the position offset.
+  unsigned resolution = 0;  ///< Number of bits of the position in a turn, 1 to 22; 0: unknown.
+  int multiturn_bits = -1;  ///< Number of bits of the turns, 0 to 16; 0: single-turn encoder; -1: unknown.
+  bool has_ch2 = true;      ///< Whether frames have a channel 2 byte; those of an AksIM-1 have none.
+  Interface interface = Interface::uart;        ///< Interface of the encoder: UART or SPI.
+  OffsetSign offset_sign = OffsetSign::add;     ///< Whether the encoder adds or subtracts the position offset.
+  OffsetUnit offset_unit = OffsetUnit::counts;  ///< Unit of the position offset: counts or a fraction of a turn.
   /// Frames per second that the encoder sends without requests; 0: it answers requests.
   std::uint32_t stream_rate = 0;
   Generation generation = Generation::aksim2;  ///< Generation of the virtual encoder.
@@ -152,7 +152,7 @@ struct Position {
 struct ChannelCycle {
   /// Position of the frame that carried the first byte of the cycle; its member `channel2` is unused.
   Position position{};
-  std::uint16_t status = 0;  ///< Detailed status: bits of `status`.
+  std::uint16_t status = 0;  ///< Detailed status: bits of the namespace `status`.
   /// Byte of channel 3: state of the encoder, or a byte of its answer to a register access.
   std::uint8_t channel3 = 0;
 };
@@ -184,8 +184,8 @@ inline constexpr std::uint32_t warning = 2;
 
 /// Protocol versions in an identity. Both versions have the same frames, but different registers.
 namespace version {
-inline constexpr std::uint8_t aksim2 = 2;  ///< Version of an AksIM-2.
-inline constexpr std::uint8_t aksim4 = 4;  ///< Version of an AksIM-4.
+inline constexpr std::uint8_t aksim2 = 2;  ///< Protocol version of an AksIM-2.
+inline constexpr std::uint8_t aksim4 = 4;  ///< Protocol version of an AksIM-4.
 }  // namespace version
 
 /// Content of an identity frame.
@@ -194,7 +194,7 @@ struct Identity {
   /// Number of bytes of a position frame: 5 without turns, 7 with turns.
   std::uint8_t frame_bytes = 5;
   unsigned resolution = 20;  ///< Number of bits of the position in a turn, 1 to 22.
-  /// All bytes of the identity before the checksum; text[2..17] is the part number.
+  /// All bytes of the identity before its checksum; bytes 2 to 17 are the part number.
   std::array<std::uint8_t, 18> text{};
   /// Returns the characters of the part number.
   [[nodiscard]] constexpr Bytes part_number() const { return Bytes(text).subspan(2); }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of frames, identities and register accesses that the test vectors do not cover.
+// Tests of frames, identities and register accesses, in addition to the test vectors.
 #include "absenc/protocol/encolink/frame.hpp"
 
 #include <gtest/gtest.h>

@@ -18,7 +18,7 @@ enum class Ask : std::uint8_t {
   identity,
 };
 
-/// The protocol as author/dialog.hpp demands it.
+/// Types and functions of the protocol that author/dialog.hpp requires.
 struct Frames {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = encolink::Format;

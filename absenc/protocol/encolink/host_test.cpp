@@ -246,7 +246,8 @@ TEST_P(EncolinkHost, ReportsChannel2ThatDisagrees) {
 
 // The sequence of frames: frame 0 resets the channels, the cycle of channel 2 begins in frame 1.
 TEST_P(EncolinkHost, RepeatsInvalidCycle) {
-  const auto turned = [](unsigned frame, RawBytes& reply) {  // changes the turns in the first frame of the cycle
+  // changes the turns in the first frame of the cycle, so that channel 2 contradicts channel 1
+  const auto turned = [](unsigned frame, RawBytes& reply) {
     if (frame % 10 != 1) return;
     ++reply[1];
     reply[5] = checksum(Bytes(reply).first(5));

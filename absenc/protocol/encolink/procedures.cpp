@@ -91,7 +91,7 @@ Error frame_or_cycle_error(const ProcedureState& found, Error error) {
   return error == Error::none ? found.ended.value_or(Error::none) : error;
 }
 
-// Sends the `ra` bytes of the present register access, one per frame.
+// Sends the bytes of the present register access as the second bytes (`ra`) of successive requests.
 Part<Error> send(Dialog& dialog, ProcedureState& found) {
   found.was_sent = false;
   for (std::size_t sent = 0; !found.was_sent;) {

@@ -15,19 +15,19 @@ namespace absenc::encolink {
 /// Interface by which procedures send requests and await replies.
 using Dialog = author::DialogOf<Frames>;
 
-/// How a register access ended.
+/// How an attempt of a register access ended.
 enum class AccessOutcome : std::uint8_t {
   good,     ///< The encoder executed the access.
   refused,  ///< The encoder refused the access, or was busy with it for longer than `busy_limit`.
-  lost,     ///< Frames arrive, but no valid answer; the access may have been executed.
+  lost,     ///< Valid frames arrive, but no valid answer to the access; the encoder may have executed it.
   gone,     ///< Valid frames no longer arrive; `was_sent` tells whether the encoder may have executed the access.
 };
 
 /// State of a procedure, with its results.
 struct ProcedureState : Channels {
-  /// Value of a register of the table.
+  /// Value of a register of the table `registers`.
   struct Value {
-    std::size_t index;                   ///< Index of the register in the table.
+    std::size_t index;                   ///< Index of the register in the table `registers`.
     ByteBuffer<largest_register> bytes;  ///< Bytes of the register, most significant first.
   };
   /// Identity of the encoder. If it has a value, the procedure reports it with `values` instead of the position.
@@ -66,7 +66,7 @@ struct ProcedureState : Channels {
     again = can_help;
     return access_outcome;
   }
-  /// Adds the value `bytes` of register `index` to the results.
+  /// Adds the value `bytes` of the register with this index in the table to the results.
   void add_value(std::size_t index, Bytes bytes) {
     values.push_back({index, {}});
     values[values.size() - 1].bytes.append(bytes);
@@ -87,12 +87,12 @@ author::Procedure read_identity(Dialog& dialog, ProcedureState& found);
 /// Reads the identity and every register with `in_info` in the table; skips registers that the encoder refuses.
 author::Procedure read_info(Dialog& dialog, ProcedureState& found);
 
-/// Reads register `index` of the table.
+/// Reads the register with this index in the table `registers`.
 author::Procedure read_register(Dialog& dialog, ProcedureState& found, std::size_t index);
 /// Reads a register. Arguments: address, length in bytes (0: that of the table).
 author::Procedure read_memory(Dialog& dialog, ProcedureState& found, Arguments arguments);
 
-/// Writes register `index` of the table, and reads it back.
+/// Writes the register with this index in the table `registers`, and reads it back.
 author::Procedure write_register(Dialog& dialog, ProcedureState& found, std::size_t index, Arguments arguments);
 /// Writes a register, and reads it back. Arguments: address, value, size in bytes (0: that of the table).
 author::Procedure write_memory(Dialog& dialog, ProcedureState& found, Arguments arguments);

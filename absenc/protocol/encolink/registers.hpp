@@ -171,9 +171,9 @@ inline constexpr std::size_t access_capacity = 100;
 
 /// A register access: read or write.
 struct RegisterRequest {
-  /// Operation codes of a register access.
+  /// Operation codes in the bytes of a register access.
   enum class Operation : std::uint8_t { write = 0x58, read = 0x59 };
-  Operation operation = Operation::read;  ///< Whether the access reads or writes.
+  Operation operation = Operation::read;  ///< Whether the register access reads or writes.
   std::uint32_t address = 0;              ///< Address of the accessed register.
   std::uint16_t length = 0;               ///< Number of bytes to read or write.
   ByteBuffer<access_capacity> data{};     ///< Bytes to write, `length` in number; empty for a read.

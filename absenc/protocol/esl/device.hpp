@@ -13,7 +13,7 @@ namespace absenc::esl {
 
 /// Indexes of `conditions`. A condition that makes a channel faulty leaves its CRC right.
 namespace condition {
-/// Index of a condition in `conditions`.
+/// Indexes of the conditions in the table `conditions`.
 enum Index : std::size_t {
   supply_voltage,
   temperature,
@@ -361,7 +361,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
 
   Time ready_at_{};
   std::uint8_t latches_ = 0;
-  std::uint8_t forced_ = 0;  // voltage alarms that `raise_alarms` raised
+  std::uint8_t forced_ = 0;  // mask of the voltage alarms that `raise_alarms` raised
   // whether a reset with data ID D was executed, so that one with ID C can clear multiturn_error
   bool turns_cleared_ = false;
   std::array<std::uint8_t, 2> counters_{};

@@ -51,7 +51,8 @@ TEST(EslDevice, SequenceCounters) {
   each.raw(Request{DataId::temperature});
   EXPECT_EQ(each.read(DataId::position).one.sequence, 2);
   for (unsigned i = 2; i < 256; ++i) bench.read(DataId::position);
-  EXPECT_EQ(bench.read(DataId::position).one.sequence, 1);  // both counters have wrapped: SC1 has 8 bits, SC2 7 bits
+  // both sequence counters have wrapped: that of channel 1 has 8 bits, that of channel 2 has 7 bits
+  EXPECT_EQ(bench.read(DataId::position).one.sequence, 1);
   EXPECT_EQ(bench.read(DataId::position).two.sequence, 2);
 }
 

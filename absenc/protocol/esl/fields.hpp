@@ -79,8 +79,8 @@ struct Shown {
   /// Scan: whether the last of three replies of the address `encoder_address` was damaged.
   std::optional<bool> clash{};
   std::optional<std::string_view> trouble{};     ///< Scan: sentence about the error of a complete reply.
-  std::optional<std::uint8_t> page{};            ///< Page of a memory access.
-  std::optional<std::uint8_t> memory_address{};  ///< Address of a memory access (ADF).
+  std::optional<std::uint8_t> page{};            ///< Page of the memory byte that is accessed.
+  std::optional<std::uint8_t> memory_address{};  ///< Address of the memory byte that is accessed (ADF).
   std::optional<std::uint8_t> busy{};            ///< 1: the memory is busy; no byte was read or written.
   std::optional<std::uint8_t> value{};           ///< Value of the memory byte (EDF).
   std::optional<Bytes> data{};                   ///< Values of several memory bytes, from `memory_address` on.

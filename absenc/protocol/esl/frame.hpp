@@ -39,15 +39,16 @@ inline constexpr std::uint8_t rejected = parity_error | stop_error;
 /// Bits of the alarm field (ALM) of a channel (Table 7).
 namespace alarms {
 inline constexpr std::uint8_t xc_error = 0x01;         ///< alarm: the turn counter failed to count five times in a row
-inline constexpr std::uint8_t multiturn_error = 0x02;  ///< alarm: the turn counter was found wrong
+inline constexpr std::uint8_t multiturn_error = 0x02;  ///< alarm: the encoder found its turn counter wrong
 /// Alarm: the LED current or the signals of the disc are out of range.
 inline constexpr std::uint8_t led_or_lissajous_error = 0x04;
 inline constexpr std::uint8_t overspeed = 0x08;     ///< alarm: the shaft turned faster than 10 000 rpm
 inline constexpr std::uint8_t memory_error = 0x10;  ///< alarm: the encoder could not load its settings from the memory
-inline constexpr std::uint8_t singleturn_error = 0x20;  ///< alarm: the position within the turn was found wrong
+inline constexpr std::uint8_t singleturn_error = 0x20;  ///< alarm: the encoder found its position within the turn wrong
 inline constexpr std::uint8_t under_voltage = 0x40;     ///< alarm: the inner supply is below 2.9 V
 inline constexpr std::uint8_t over_voltage = 0x80;      ///< alarm: the inner supply is above 3.7 V
-inline constexpr std::uint8_t voltage = under_voltage | over_voltage;  ///< mask of the voltage alarms
+/// mask of the two alarms about the inner supply voltage
+inline constexpr std::uint8_t voltage = under_voltage | over_voltage;
 /// Mask of the alarms that make the turns invalid.
 inline constexpr std::uint8_t turns_wrong = xc_error | multiturn_error;
 /// Mask of the alarms that can make the position within the turn unsafe.
@@ -59,9 +60,9 @@ inline constexpr unsigned multiturn_bits = 16;      ///< number of bits of the t
 inline constexpr unsigned redundant_bits = 9;       ///< number of bits of the redundant position of channel 2 (RS)
 inline constexpr std::size_t request_capacity = 4;  ///< Length of the longest request in bytes.
 inline constexpr std::size_t reply_capacity = 18;   ///< Length of the longest reply in bytes.
-/// Bytes of a request.
+/// Buffer for the bytes of a request.
 using RequestBytes = ByteBuffer<request_capacity>;
-/// Bytes of a reply.
+/// Buffer for the bytes of a reply.
 using ReplyBytes = ByteBuffer<reply_capacity>;
 
 // ---- Checksums. The document has Koopman notation: 16'hAC9A is normal 5935, 8'h97 is 2F.
@@ -135,7 +136,7 @@ enum class DataId : std::uint8_t {
   write_memory = 0xF,
 };
 
-/// Parts that a channel of a reply can carry between CF and CRC, one bit each.
+/// Parts that a channel of a reply can carry between control field (CF) and CRC, one bit for each part.
 namespace part {
 inline constexpr unsigned status = 0x0001;       ///< Part of a reply: status field (SF).
 inline constexpr unsigned alarms = 0x0002;       ///< Part of a reply: alarms (ALM).
@@ -161,8 +162,8 @@ inline constexpr unsigned redundant = redundant_sequence | redundant_alone | red
 /// A part of a reply, with its length on the wire.
 template <unsigned part_id, std::size_t part_size>
 struct WirePart {
-  static constexpr unsigned id = part_id;         ///< Identifier of the part: a constant of the namespace `part`.
-  static constexpr std::size_t size = part_size;  ///< Length of the part in bytes.
+  static constexpr unsigned id = part_id;  ///< Identifier of this part of a reply: a constant of the namespace `part`.
+  static constexpr std::size_t size = part_size;  ///< Length in bytes of this part of a reply.
 };
 
 namespace detail {
@@ -210,8 +211,8 @@ struct Layout {
   /// Returns whether a channel of these replies has a part of the set `any_of`.
   [[nodiscard]] constexpr bool has(unsigned any_of) const { return ((one | two) & any_of) != 0; }
 
-  std::uint16_t one = 0;        ///< Set of the parts of channel 1.
-  std::uint16_t two = 0;        ///< Set of the parts of channel 2; 0: the replies have no channel 2.
+  std::uint16_t one = 0;        ///< Mask of the parts that channel 1 has in these replies.
+  std::uint16_t two = 0;        ///< Mask of the parts that channel 2 has in these replies; 0: they have no channel 2.
   std::uint8_t crc_bytes = 1;   ///< Length of the CRC of a channel in bytes, 1 or 2.
   std::uint8_t length_one = 0;  ///< length of channel 1 in bytes, with control field (CF) and CRC
   /// length of channel 2 in bytes, with control field (CF) and CRC; 0: the replies have no channel 2
@@ -315,15 +316,15 @@ struct ChannelReply {
   std::uint8_t status = 0;      ///< status (SF): bits of the namespace `status`, in the order of the document
   std::uint8_t alarms = 0;      ///< Alarms of the channel (ALM): bits of the namespace `alarms`.
   std::uint8_t sequence = 0;    ///< sequence counter: 8 bits in channel 1 (SC1), 7 bits in channel 2 (SC2)
-  std::uint8_t encoder_id = 0;  ///< Encoder id (ENID).
+  std::uint8_t encoder_id = 0;  ///< Encoder id (ENID): kind and number of bits of the encoder.
 };
 
 /// A reply of an encoder. In a decoded reply, members that its data ID does not carry have their initial values.
 struct Reply {
   DataId id = DataId::position;                   ///< Data ID of the reply.
   std::uint8_t encoder_address = 0;               ///< Address of the encoder on the line (EAD), 0 to 7.
-  ChannelReply one{};                             ///< Values of channel 1.
-  ChannelReply two{.status = status::channel_2};  ///< Values of channel 2.
+  ChannelReply one{};                             ///< Values that channel 1 of the reply has for itself.
+  ChannelReply two{.status = status::channel_2};  ///< Values that channel 2 of the reply has for itself.
   std::uint32_t singleturn = 0;                   ///< Position within the turn (ABS), in counts.
   std::uint16_t multiturn = 0;                    ///< Number of turns (ABM).
   /// Redundant position of channel 2 (RS): 9 bits; in replies to data ID 6 16 bits if `id6_rs` is bits_16.

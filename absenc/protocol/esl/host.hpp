@@ -26,13 +26,13 @@ author::Procedure read_encoder_id(Dialog& dialog, ProcedureResult& found);
 
 /// Result of `read_safely`: a safe position. The procedure emits one result after the other.
 struct SafePositionResult : ProcedureResult {
-  static constexpr bool streams = true;  ///< Marks that the procedure delivers results without end.
+  static constexpr bool streams = true;  ///< Marks that the procedure emits results until it is stopped or fails.
 };
 /// Reads safe positions until an error: that of a failed check, or of an exchange.
 author::Procedure read_safely(Dialog& dialog, SafePositionResult& found);
 
-/// Resets by the data ID B (zero), C (alarms) or D (turns), and verifies the result. Errors besides those of the
-/// exchanges: invalid_argument, not_still, cross_check_failed.
+/// Sends the eight requests of a reset with data ID B (zero), C (alarms) or D (turns), and verifies the result. Errors
+/// besides those of the exchanges: invalid_argument, not_still, cross_check_failed.
 author::Procedure reset(Dialog& dialog, ProcedureResult& found, DataId id);
 
 // ---- Memory (Tables 9 to 11, Figures 14 and 15); only with one encoder on the line
@@ -55,9 +55,9 @@ author::Procedure read_error_info(Dialog& dialog, ProcedureResult& found);
 
 // ---- Several encoders on one line
 
-inline constexpr unsigned most_encoders = 8;  ///< most encoders on a line, because an address has 3 bits
+inline constexpr unsigned most_encoders = 8;  ///< greatest number of encoders on a line; an address has 3 bits
 
-/// Result of `scan`: what was received at each address.
+/// Result of `scan`: the reply or the error of each address.
 struct Nodes {
   /// valid reply of each address; no value if none was received
   std::array<std::optional<Reply>, most_encoders> answers{};

@@ -20,11 +20,11 @@ enum class CrcBitOrder : std::uint8_t {
 };
 /// Order of the two bytes of a 16-bit CRC on the wire.
 enum class CrcByteOrder : std::uint8_t {
-  low,      ///< low byte first in both channels
-  high,     ///< high byte first in both channels
+  low,      ///< both channels send the low byte of the CRC first
+  high,     ///< both channels send the high byte of the CRC first
   table12,  ///< as Table 12 draws it: low byte first in channel 1, high byte first in channel 2
 };
-/// Bit of its byte in which RS1, the lowest bit of the redundant position, is sent.
+/// Bit, b7 or b0, of a byte in which RS1, the lowest bit of the redundant position, is sent.
 enum class RedundantBit : std::uint8_t { b7, b0 };
 /// How the sequence counters SC1 and SC2 change from reply to reply.
 enum class SequenceStep : std::uint8_t {
@@ -47,7 +47,7 @@ enum class BadRequest : std::uint8_t { report, silent };
 /// Properties of an encoder, and how its replies are checked: the options of ESL.
 struct Profile {
   CrcBitOrder crc_bit_order = CrcBitOrder::lsb;       ///< Order in which bits enter the CRCs.
-  CrcByteOrder crc16_byte_order = CrcByteOrder::low;  ///< Order of the bytes of 16-bit CRCs.
+  CrcByteOrder crc16_byte_order = CrcByteOrder::low;  ///< Order of the two bytes of 16-bit CRCs on the wire.
   /// Bit in which RS1, the lowest bit of the redundant position, is sent beside the sequence counter SC2.
   RedundantBit rs1_sc2 = RedundantBit::b7;
   SequenceStep sequence_step = SequenceStep::change;  ///< How the sequence counters change from reply to reply.
@@ -55,7 +55,7 @@ struct Profile {
       /// Bits of the control field (CF) that its parity bit covers: the data ID, or the encoder address too.
       ParityScope::command;
   FieldOrder status_order = FieldOrder::document;  ///< Order of the bits in the status field (SF).
-  /// Order of the bits in ADF, the memory address with the busy bit.
+  /// Order of the bits in the address field (ADF), which has the memory address and the busy bit.
   FieldOrder memory_address_order = FieldOrder::document;
   bool request_crc = true;  ///< whether every request ends with a CRC; false: only memory requests do
   /// Bit in which RS1, the lowest bit of the redundant position, is sent in replies to data ID C.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decodes and checks ESL requests and replies; Protocol is what absenc/protocol/author requires.
+// Decodes and checks ESL requests and replies. The class Protocol has the functions that absenc/protocol/author
+// requires.
 #pragma once
 
 #include <array>
@@ -388,7 +389,7 @@ struct Protocol {
   /// Returns the length in bytes of the reply to `request`.
   static constexpr std::size_t reply_size(const Profile&, const Request& request) { return reply_length(request.id); }
   static constexpr auto encode = encode_request;  ///< returns the bytes of a request
-  /// Decodes a request; returns it or the error of the first failed check.
+  /// Decodes a request; returns the request, or the error of the first failed check.
   static constexpr auto decode_request = esl::decode_request;
   /// Checks and decodes a reply. Returns the reply, or the error of the first failed check.
   static constexpr auto decode = decode_reply;

@@ -32,7 +32,7 @@ class SafePosition {
 
 /// Result of judging a reply: a safe position, or the check that failed.
 struct SafetyVerdict {
-  std::optional<SafePosition> position{};  ///< safe position; nothing unless `failed` is Check::passed
+  std::optional<SafePosition> position{};  ///< safe position; no value unless `failed` is Check::passed
   Check failed = Check::passed;            ///< First check that failed; Check::passed if none failed.
 };
 

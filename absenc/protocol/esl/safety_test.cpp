@@ -135,7 +135,7 @@ TEST(EslSafety, OtherRepliesAreCountedAsTheProfileSays) {
       pair.monitor.other_exchange(other);
       EXPECT_EQ(pair.next().failed, Check::passed) << static_cast<int>(step) << " " << static_cast<int>(other);
     }
-    pair.reply_to(DataId::position);  // the encoder sends a reply that the host does not receive
+    pair.reply_to(DataId::position);  // the encoder sends a reply here that the host does not receive
     EXPECT_EQ(pair.next().failed, step == SequenceStep::change ? Check::passed : Check::sequence_jumped);
   }
   EXPECT_EQ(Monitored().judge(DataId::singleturn_short, {}).failed, Check::length);

@@ -33,7 +33,7 @@ class VirtualEncoder final : public author::Responder {
   // shipping, so that an empty memory is that of a new encoder.
   static constexpr std::size_t address_at = 0;
   static constexpr std::size_t interface_at = 1;
-  static constexpr std::size_t codes_at = 2;  // access codes 0 to 3
+  static constexpr std::size_t codes_at = 2;  // index of the access codes 0 to 3 in the memory, 1 byte each
   // position that the encoder sends, minus the position of the shaft; 4 bytes
   static constexpr std::size_t offset_at = 6;
   static constexpr std::size_t counter_at = 10;

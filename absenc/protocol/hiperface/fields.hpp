@@ -37,21 +37,21 @@ struct Values {
   std::optional<std::uint8_t> status_code{};
   std::optional<std::string_view> status_text{};  ///< Meaning of the status code in words.
   std::optional<std::uint32_t> position{};        ///< Position that a request sets; it contains the turns.
-  std::optional<std::uint8_t> channel{};          ///< Channel of an analog value.
+  std::optional<std::uint8_t> channel{};          ///< Channel of an analog value that is read.
   std::optional<std::int16_t> analog_value{};     ///< Analog value as the encoder sends it.
   std::optional<std::int16_t> temperature{};      ///< Temperature of the encoder, in degC.
-  std::optional<std::uint32_t> counter{};         ///< Value of the counter.
-  std::optional<std::uint8_t> field{};            ///< Number of a data field.
-  std::optional<std::uint8_t> address{};          ///< Address of a byte in the data field.
-  std::optional<std::uint8_t> count{};            ///< Number of bytes that a request reads or stores.
-  std::optional<std::uint8_t> value{};            ///< The byte at `address` of the data field.
-  std::optional<Bytes> data{};                    ///< Bytes of the data field from `address` on.
-  std::optional<bool> exists{};                   ///< Whether the data field exists.
-  std::optional<bool> writable{};                 ///< Whether the data field can be written.
-  std::optional<bool> needs_code{};               ///< Whether the data field needs its access code.
-  std::optional<std::uint8_t> number{};           ///< Number of an access code.
-  std::optional<std::uint16_t> size{};            ///< Size of the data field in bytes.
-  std::optional<std::uint32_t> free_memory{};     ///< Number of bytes for which data fields can still be created.
+  std::optional<std::uint32_t> counter{};  ///< Value of the encoder's counter, which a host can increment and clear.
+  std::optional<std::uint8_t> field{};     ///< Number of the data field that a request accesses.
+  std::optional<std::uint8_t> address{};   ///< Address of a byte in the data field.
+  std::optional<std::uint8_t> count{};     ///< Number of bytes that a request reads or stores.
+  std::optional<std::uint8_t> value{};     ///< The byte at `address` of the data field.
+  std::optional<Bytes> data{};             ///< Bytes of the data field from `address` on.
+  std::optional<bool> exists{};            ///< Whether the data field exists.
+  std::optional<bool> writable{};          ///< Whether the data field can be written.
+  std::optional<bool> needs_code{};        ///< Whether the data field needs its access code.
+  std::optional<std::uint8_t> number{};    ///< Number of an access code, 0 to 3.
+  std::optional<std::uint16_t> size{};     ///< Size of the data field in bytes.
+  std::optional<std::uint32_t> free_memory{};  ///< Number of bytes for which data fields can still be created.
   /// Interface setting (Mode_485): baud rate, parity and timeout of the encoder.
   std::optional<std::uint8_t> interface_setting{};
   std::optional<std::uint32_t> baud{};          ///< Baud rate of the interface setting, in bits per second.

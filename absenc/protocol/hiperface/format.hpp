@@ -162,7 +162,7 @@ inline constexpr auto alarms = std::array{
     Alarm{0x23, "multiturn_position_3", "the turns are wrong (code 23)", detail::check_turns},
 };
 
-/// Mask of all alarms.
+/// Mask of all alarms in the alarms of a reading.
 inline constexpr std::uint32_t all_alarms = (1u << alarms.size()) - 1;
 
 /// Status codes of the alarms without their texts, which firmware does not need.
@@ -305,7 +305,7 @@ struct Format {
   std::uint8_t address = first_address;         ///< Address of the encoder, 40 to 5F (hex).
   std::uint8_t code0 = code_at_shipping;        ///< Access code 0, which protects position and settings.
   std::uint8_t access_code = code_at_shipping;  ///< Access code to read, write and create data fields.
-  std::uint8_t rate = rate_at_shipping;         ///< Index of the baud rate in `rates`.
+  std::uint8_t rate = rate_at_shipping;         ///< Index of the line's baud rate in `rates`.
   /// Type of the encoder in the type label; 0: not stated, the virtual encoder then has a type with its resolution.
   std::uint8_t type = 0;
   std::uint8_t status_bytes = 1;   ///< Number of bytes of the status in a reply, 1 or 2.

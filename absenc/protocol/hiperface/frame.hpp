@@ -314,7 +314,7 @@ struct Protocol {
   /// that time.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
 
-  /// Decodes a request. Returns it, or the error of the first failed check.
+  /// Decodes a request. Returns the request, or the error of the first failed check.
   static constexpr auto decode_request = hiperface::decode_request;
   /// Returns the length in bytes of the request that begins with `begin`. Returns the number of bytes needed to know it
   /// if there are fewer, and 0 if no request begins so.

@@ -52,7 +52,7 @@ author::Procedure read_info(Dialog& dialog, ProcedureResult& found);
 author::Procedure ask_about(Dialog& dialog, ProcedureResult& found, CommandCode command, Arguments arguments);
 /// Reads the address of the only encoder of the line.
 author::Procedure read_address(Dialog& dialog, ProcedureResult& found);
-/// Reads the interface setting.
+/// Reads the interface setting (baud rate, parity, timeout) of the encoder.
 author::Procedure read_baud(Dialog& dialog, ProcedureResult& found);
 
 /// Makes the present position within the turn zero; the turns stay. Errors besides those of the exchanges: unsupported
@@ -67,9 +67,9 @@ author::Procedure set_position(Dialog& dialog, ProcedureResult& found, Arguments
 /// Resets the encoder, and waits some seconds for it to answer again.
 author::Procedure reset(Dialog& dialog, ProcedureResult& found);
 
-/// Increments the counter by one.
+/// Increments the encoder's counter by one.
 author::Procedure count_up(Dialog& dialog, ProcedureResult& found);
-/// Sets the counter to 0.
+/// Sets the encoder's counter to 0.
 author::Procedure clear_counter(Dialog& dialog, ProcedureResult& found);
 
 /// Reads bytes of a data field. Arguments: address, data field, number of bytes.

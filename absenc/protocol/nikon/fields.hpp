@@ -44,7 +44,7 @@ struct Values {
   std::optional<std::uint16_t> alarms{};     ///< Alarms (ALM), described by `alarm_flags`.
   std::optional<double> temperature{};       ///< Temperature of the encoder, in degC.
   std::optional<std::uint8_t> address{};     ///< Address of a word of the EEPROM.
-  std::optional<std::uint16_t> value{};      ///< Word of the EEPROM.
+  std::optional<std::uint16_t> value{};      ///< Value of a word of the EEPROM.
   std::optional<Bytes> data{};               ///< Words of the EEPROM from `address` on, the low byte of each first.
   std::optional<std::uint32_t> identification{};  ///< Identification code of the encoder, 24 bits.
   std::optional<bool> written{};                  ///< True if a value was written; false if the encoder had it already.

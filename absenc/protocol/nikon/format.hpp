@@ -74,13 +74,16 @@ enum class Code : std::uint8_t {
 
 /// Bits of the alarms (ALM); bit 0 is the first on the wire.
 namespace alarm {
-inline constexpr std::uint16_t battery = 1u << 0;           ///< alarm: the battery's voltage is low
-inline constexpr std::uint16_t multiturn_error = 1u << 1;   ///< alarm: battery and capacitor were empty
-inline constexpr std::uint16_t overflow = 1u << 2;          ///< alarm: the turn counter has overflowed
-inline constexpr std::uint16_t over_speed = 1u << 3;        ///< alarm: the shaft turned too fast
-inline constexpr std::uint16_t memory_error = 1u << 4;      ///< alarm: an access to the EEPROM failed
-inline constexpr std::uint16_t singleturn_error = 1u << 5;  ///< alarm: absolute and incremental position differ
-inline constexpr std::uint16_t ps_error = 1u << 6;          ///< alarm: position within the turn and turns differ
+inline constexpr std::uint16_t battery = 1u << 0;  ///< alarm: the battery's voltage is low
+/// alarm: battery and capacitor were empty, so the turns are lost
+inline constexpr std::uint16_t multiturn_error = 1u << 1;
+inline constexpr std::uint16_t overflow = 1u << 2;      ///< alarm: the turn counter has overflowed
+inline constexpr std::uint16_t over_speed = 1u << 3;    ///< alarm: the shaft turned too fast
+inline constexpr std::uint16_t memory_error = 1u << 4;  ///< alarm: an access to the EEPROM failed
+/// alarm: the absolute and the incremental position of the encoder differ
+inline constexpr std::uint16_t singleturn_error = 1u << 5;
+/// alarm: the calculations of the position within the turn and of the turns contradict each other
+inline constexpr std::uint16_t ps_error = 1u << 6;
 inline constexpr std::uint16_t busy = 1u << 7;  ///< alarm bit that shows a state: the encoder determines its position
 /// alarm bit that shows a state: the EEPROM is being read or written
 inline constexpr std::uint16_t memory_busy = 1u << 8;
@@ -99,11 +102,12 @@ enum class BitOrder : std::uint8_t { low_first, high_first };
 
 /// Properties of an encoder that its frames depend on; they are the options of the unit.
 struct Format {
-  unsigned singleturn_bits = 20;             ///< number of bits of the position within the turn, 17 to 24
-  unsigned multiturn_bits = 16;              ///< number of bits of the turns, 0 to 16; 0: single-turn encoder
-  std::uint8_t address = 0;                  ///< address of the encoder on its line, 0 to 7
-  std::uint8_t rate = 0;                     ///< index of the bit rate in `rates`
-  BitOrder bit_order = BitOrder::low_first;  ///< order of the bits of words of the EEPROM and of the identification
+  unsigned singleturn_bits = 20;  ///< number of bits of the position within the turn, 17 to 24
+  unsigned multiturn_bits = 16;   ///< number of bits of the turns, 0 to 16; 0: single-turn encoder
+  std::uint8_t address = 0;       ///< address of the encoder on its line, 0 to 7
+  std::uint8_t rate = 0;          ///< index of the bit rate in `rates`
+  /// whether EEPROM words and the identification are sent with their low or their high bit first
+  BitOrder bit_order = BitOrder::low_first;
 
   /// Returns the settings of the RS-485 line: characters of 16 bits.
   [[nodiscard]] constexpr LineSettings line() const { return {.rate = rates[rate], .data_bits = 16}; }

@@ -46,9 +46,9 @@ struct Reply : OneReply {
 
 inline constexpr std::size_t frame_bytes = 2;  ///< number of bytes of a frame, which is one character of 16 bits
 inline constexpr std::size_t longest_one = 8;  ///< length in bytes of the longest reply of one encoder
-/// Bytes of a request.
+/// Buffer for the bytes of a request.
 using RequestBytes = ByteBuffer<4 * frame_bytes>;
-/// Bytes of the reply of one encoder.
+/// Buffer for the bytes of one encoder's reply.
 using OneReplyBytes = ByteBuffer<longest_one>;
 
 namespace detail {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads the position of an encoder with Nikon's A-format, without port, clock, heap or texts.
+// A conversation that reads the position of an encoder with Nikon's A-format; it uses no port, clock, heap or texts.
 #pragma once
 
 #include <new>

@@ -120,7 +120,7 @@ struct Protocol {
   static constexpr std::size_t expected(const Format&, const Request& request, Bytes) {
     return is_for_all(request.code) ? 0 : reply_length(request.code);
   }
-  /// Decodes a request. Returns it, or the error of the first failed check.
+  /// Decodes a request. Returns the request, or the error of the first failed check.
   static constexpr Result<Request> decode_request(const Format& format, Bytes bytes) {
     return decode_captured(format, bytes);
   }

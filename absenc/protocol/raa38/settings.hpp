@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Settings that a virtual RAA38S6 stores over power off, and the number of their writes.
+// Settings that a virtual RAA38S6 keeps during power off, and the number of writes to them.
 #pragma once
 
 #include <algorithm>
@@ -25,7 +25,7 @@ class Settings {
   static constexpr std::size_t zero_at = 3;
   static constexpr std::size_t writes_at = 7;  ///< Index in the memory of the number of writes, 4 bytes.
 
-  /// Creates settings with this number and rate; `shaft` must outlive them.
+  /// Creates settings with this address or node number and this index of the bit rate; `shaft` must outlive them.
   Settings(std::uint8_t number, std::uint8_t rate, unsigned bits, const Shaft& shaft) : bits_(bits), shaft_(&shaft) {
     memory_[number_at] = number;
     memory_[rate_at] = rate;
@@ -33,7 +33,7 @@ class Settings {
 
   /// Returns the bytes of the memory.
   [[nodiscard]] MutableBytes memory() { return memory_; }
-  /// Returns a number that each `write` increments.
+  /// Returns the version of the memory, which each `write` increments.
   [[nodiscard]] std::uint32_t version() const { return version_; }
   /// Returns the number of the encoder on its line: address or node number.
   [[nodiscard]] std::uint8_t number() const { return memory_[number_at]; }

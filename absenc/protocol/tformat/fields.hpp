@@ -54,8 +54,8 @@ struct Values {
   std::optional<std::uint8_t> encoder_id{};   ///< Encoder id (ENID): the kind of encoder.
   std::optional<std::uint32_t> multiturn{};   ///< Number of turns (ABM).
   std::optional<std::uint8_t> alarms{};       ///< Alarms (ALMC), described by `alarm_flags`.
-  std::optional<std::uint8_t> page{};         ///< Page of a memory access.
-  std::optional<std::uint8_t> address{};      ///< Address of a memory access (ADF).
+  std::optional<std::uint8_t> page{};         ///< Page of the memory byte that is accessed.
+  std::optional<std::uint8_t> address{};      ///< Address of the memory byte that is accessed (ADF).
   std::optional<std::uint8_t> busy{};         ///< 1: the encoder is busy and did not execute the request.
   std::optional<std::uint8_t> value{};        ///< Value of the memory byte (EDF).
   std::optional<Bytes> data{};  ///< Values of several memory bytes, from `address` on, low addresses first.

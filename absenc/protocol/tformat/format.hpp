@@ -17,7 +17,7 @@ using namespace std::chrono_literals;
 inline constexpr LineSettings line_settings{.rate = 2'500'000};  ///< settings of the RS-485 line (6.1)
 
 inline constexpr Time answer_time = 3us;  ///< time from the request's delimiter to the reply's start bit, typical (8.1)
-/// Number of consecutive requests with one data ID that make a reset (10).
+/// Number of consecutive requests with one data ID that make a reset (paragraph 10).
 inline constexpr unsigned reset_requests = 10;
 inline constexpr Time reset_interval = 40us;  ///< shortest time between the ten requests of a reset (10)
 /// Largest position that counts as zero after setting the zero: 0.35 degrees (10), 127 counts of 17 bits.
@@ -102,10 +102,10 @@ namespace alarms {
 inline constexpr std::uint8_t over_speed = 0x01;
 /// Alarm: the encoder was switched on at 100 rpm or more, so only the top 5 bits of the position are valid.
 inline constexpr std::uint8_t full_absolute_status = 0x02;
-inline constexpr std::uint8_t counting_error = 0x04;    ///< alarm: the position within the turn was found wrong
+inline constexpr std::uint8_t counting_error = 0x04;    ///< alarm: the encoder found its position within the turn wrong
 inline constexpr std::uint8_t counter_overflow = 0x08;  ///< alarm: the turn counter wrapped around
 inline constexpr std::uint8_t over_heat = 0x10;         ///< alarm: the encoder is or was hotter than its threshold
-/// Alarm: a bit of the turn counter jumped, so the turns are wrong.
+/// Alarm: the encoder found that a bit of its turn counter jumped, so the turns are wrong.
 inline constexpr std::uint8_t multiturn_error = 0x20;
 /// Alarm: the battery was at 2.75 V or less while the power was off, so the turns are lost.
 inline constexpr std::uint8_t battery_error = 0x40;

@@ -27,9 +27,9 @@ inline constexpr std::uint8_t busy_bit = 0x80;  ///< busy bit in the address fie
 inline constexpr unsigned full_absolute_bits = 5;
 inline constexpr std::size_t request_capacity = 4;  ///< Length of the longest request in bytes.
 inline constexpr std::size_t reply_capacity = 11;   ///< Length of the longest reply in bytes.
-/// Bytes of a request.
+/// Buffer for the bytes of a request.
 using RequestBytes = ByteBuffer<request_capacity>;
-/// Bytes of a reply.
+/// Buffer for the bytes of a reply.
 using ReplyBytes = ByteBuffer<reply_capacity>;
 
 /// Parameters of the CRC (6.3.4), which is the exclusive OR of all bytes.
@@ -409,7 +409,7 @@ struct Protocol {
   /// Returns the end of the request: the document does not say when the encoder latches the position.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
 
-  /// Decodes a request. Returns it, or the error of the first failed check.
+  /// Decodes a request. Returns the request, or the error of the first failed check.
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return tformat::decode_request(bytes); }
   /// Returns the length in bytes of the request that begins with `begin[0]`; 0 if no request begins with this byte.
   static constexpr std::size_t request_size(const Format&, Bytes begin) {

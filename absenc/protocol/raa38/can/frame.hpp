@@ -120,7 +120,7 @@ struct Values {
   std::optional<std::string_view> function{};
   std::optional<Bytes> data{};                ///< Data bytes of a frame that this encoder does not use.
   std::optional<std::string_view> command{};  ///< Name of the order that is requested or answered.
-  Number value{};                             ///< Counting direction, as order 22 carries it.
+  Number value{};                             ///< Counting direction: the value that order 22 carries.
   Number new_node{};                          ///< Node number that a setting gives to the node.
   Number bit_rate{};                          ///< Bit rate that a setting gives to the node, in bits per second.
   std::optional<bool> clash{};  ///< Scan: true if two nodes seem to share the number `node`, or the line is bad.
@@ -145,15 +145,15 @@ enum class Answer : std::uint8_t { none, position, code, error };
 
 /// Description of an order, from the document's command tables.
 struct OrderInfo {
-  Order order;            ///< The order that is described.
+  Order order;            ///< Order that this description is for.
   std::uint8_t code;      ///< Value of byte 0, which identifies the order.
   std::string_view name;  ///< Name of the order, as the field `command` reports it.
   /// True: the order is sent on 7E5 to all nodes; false: it is sent on 2NN to node NN, with NN also in byte 1.
   bool for_all;
   Answer answer;              ///< Kind of the answer to the order.
   std::uint8_t value_at = 0;  ///< Index of the data byte that carries the order's value; 0: the order has no value.
-  std::uint8_t least = 0;     ///< Lowest value of the order.
-  std::uint8_t most = 255;    ///< Highest value of the order.
+  std::uint8_t least = 0;     ///< Lowest value that the order may carry.
+  std::uint8_t most = 255;    ///< Highest value that the order may carry.
   /// Member of Values in which the order's value is reported; null: the value is not reported.
   Values::Number Values::*shown = nullptr;
 };

@@ -102,7 +102,7 @@ author::Procedure find_node(Dialog& dialog, Values& found);
 
 // ---- All nodes on the bus
 
-/// Result of a scan for one node number.
+/// Result of a scan for one node number: the frames received from it.
 struct NodeFrames {
   std::uint16_t unsolicited = 0;  ///< Number of the node's frames that count as sent without a request.
   /// Number of unsolicited frames of the node within one second after the first frame of any node.
@@ -133,8 +133,8 @@ author::Procedure scan(Dialog& dialog, Nodes& nodes);
 
 /// Result of `configure`: the result of the setting, and the nodes that were found on the bus before the setting.
 struct ConfigureResult : Values {
-  Nodes nodes{};          ///< Nodes that were found on the bus.
-  bool verified = false;  ///< Whether the written setting was verified.
+  Nodes nodes{};          ///< Nodes that were found on the bus before the setting.
+  bool verified = false;  ///< Whether the host has verified that the node obeys the setting.
 };
 
 /// Changes the node number (order 11) or the bit rate (order 13) of the only node on the bus. Errors: invalid_argument,

@@ -168,7 +168,7 @@ TEST(Raa38CanSetNode, RefusesWithOtherNodesOnTheBus) {
 /// A node that does not obey a setting, and answers it with `answer`.
 struct Settings {
   Frames answer{};
-  bool dies = false;         // whether the node answers nothing after a setting
+  bool dies = false;         // whether the node no longer answers after a setting
   std::uint8_t appears = 0;  // number of another node that answers after a setting; 0: none
 };
 

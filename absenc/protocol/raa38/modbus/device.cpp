@@ -61,7 +61,8 @@ void VirtualEncoder::read(Bytes body, Time at, FrameBytes& reply) {
   const auto registers = static_cast<std::uint16_t>(body[4] << 8 | body[5]);
   if (registers == 0 || registers > modbus::most_registers) return refused(Exception::illegal_data_value);
   if (first != 0 || registers > 2) return refused(Exception::illegal_data_address);
-  // A single register would carry only the lower 16 bits, which look like a whole position.
+  // A request of one register is refused if the position has more than 16 bits: the lower 16 bits would look like a
+  // whole position.
   if (registers == 1 && format_.bits > 16) return refused(Exception::illegal_data_value);
   append_position(registers, at, reply);
 }
@@ -102,7 +103,7 @@ bool VirtualEncoder::apply(std::uint8_t value, Time at) {
   } else if (baud_found != baud_parameters.end()) {
     const auto index = static_cast<std::uint8_t>(baud_found - baud_parameters.begin());
     wrote(settings_.write(Settings::rate_at, {&index, 1}), at);
-    set_rate(baud());  // the reply is still sent at the old baud rate
+    set_rate(baud());  // the reply to the setting is still sent at the old baud rate
   } else {
     return false;
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual RAA38S6 as a Modbus RTU slave. Several can share a line.
+// A virtual RAA38S6 that is a Modbus RTU slave. Several of them can share a line.
 #pragma once
 
 #include <cstdint>

@@ -31,7 +31,8 @@ inline constexpr std::uint8_t set_parameter = 0xCC;  ///< Function code that set
 }
 }  // namespace function
 
-inline constexpr std::uint8_t any_address = 0xFF;  ///< Address to which the request for the encoder's address is sent.
+/// Address (FF) to which a host sends the request that reads the encoder's address.
+inline constexpr std::uint8_t any_address = 0xFF;
 
 namespace parameter {
 inline constexpr std::uint8_t zero = 0x00;      ///< Parameter of function CC that makes the present position zero.
@@ -70,9 +71,9 @@ inline constexpr LineSettings line_settings{.rate = bauds[baud_at_shipping]};
 
 /// Form of the virtual encoder's reply to a request of two registers; examples in the document have all three.
 enum class Data : std::uint8_t {
-  four_bytes,     ///< Byte count 04, four bytes of data.
-  three_bytes,    ///< Byte count 03, three bytes of data.
-  three_as_four,  ///< Byte count 04, but three bytes of data.
+  four_bytes,     ///< Reply with byte count 04 and four bytes of data.
+  three_bytes,    ///< Reply with byte count 03 and three bytes of data.
+  three_as_four,  ///< Reply with byte count 04, but only three bytes of data.
 };
 
 /// Frame layout and settings of one encoder, as the unit's options select them.
@@ -104,7 +105,7 @@ struct Request {
   std::uint16_t registers = 1;       ///< Only for the function `read`: number of registers to read.
 };
 
-/// Bytes of one request.
+/// Buffer for the bytes of one request.
 using RequestBytes = ByteBuffer<8>;
 
 /// Returns the length in bytes of a request with a known function code.
@@ -159,7 +160,7 @@ struct Reply {
   std::uint8_t function = function::read;  ///< Function code of the reply.
   std::uint8_t address = 1;                ///< Address of the encoder; in the reply to set_address, the new address.
   std::uint32_t singleturn = 0;            ///< Only for the function `read`: position in counts.
-  std::uint8_t value = 0;                  ///< Only for the function `set_parameter`: the parameter.
+  std::uint8_t value = 0;                  ///< Only in the reply to the function `set_parameter`: the parameter.
   CrcOrder order = CrcOrder::low_first;    ///< Byte order of the CRC in the reply.
   /// Only for the function `read`: length of the reply in bytes if the CRC cannot prove this length; otherwise 0.
   std::size_t doubtful_size = 0;
@@ -263,7 +264,7 @@ constexpr bool is_answer(const Request& request, Bytes reply) {
 /// Timeout of a reply, assumed: the document gives no reply time.
 inline constexpr Time answer_limit = std::chrono::milliseconds(50);
 
-/// Frames, lengths and times for the classes in absenc/protocol/author.
+/// Types, frames, lengths and times that the classes in absenc/protocol/author require.
 struct Protocol {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = rtu::Format;
@@ -273,13 +274,13 @@ struct Protocol {
   using Reply = rtu::Reply;
   static constexpr std::size_t longest_reply = 9;  ///< Greatest length of a reply in bytes.
 
-  /// Returns the host's times on a line with this baud rate.
+  /// Returns a host's timeouts and pauses on a line with this baud rate.
   static constexpr author::HostTimes host_times(const Format&, std::uint32_t rate) {
     return modbus::client_times({.rate = rate}, answer_limit);
   }
-  /// Returns the host's times on a line with the baud rate of the format.
+  /// Returns a host's timeouts and pauses on a line with the baud rate of the format.
   static constexpr author::HostTimes host_times(const Format& format) { return host_times(format, format.line().rate); }
-  /// Returns how a request is sent: once by default, because each setting wears the memory.
+  /// Returns how a request is sent: once, unless a procedure repeats it, because each setting wears the memory.
   static constexpr author::Manner manner(const Format&, const Request&) { return {}; }
   /// Returns the bytes of `request` as they are sent.
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }

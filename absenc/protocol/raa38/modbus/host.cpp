@@ -176,7 +176,7 @@ void show_position(const Dialog& dialog, CommandValues& found) {
   found.angle = degrees(dialog.last().singleturn, dialog.format().bits);
 }
 
-// Checks whether the encoder answers at the new setting, or else at the old one.
+// Checks whether the encoder answers with the new address or baud rate, or else with the old one.
 Part<Outcome> verify_setting(Dialog& dialog, std::uint8_t address, std::uint32_t rate,
                              std::string_view at_the_old_one) {
   const Format& format = dialog.format();

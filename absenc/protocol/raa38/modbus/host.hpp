@@ -25,15 +25,15 @@ struct Values {
   std::optional<std::uint32_t> singleturn{};      ///< Position within the turn, in counts.
   std::optional<double> angle{};                  ///< Position within the turn, in degrees.
   std::optional<std::uint16_t> new_address{};     ///< Address that function A1 gives to the encoder.
-  std::optional<std::uint16_t> parameter{};       ///< Parameter of function CC.
-  std::optional<std::string_view> setting{};      ///< Meaning of the parameter in words.
+  std::optional<std::uint16_t> parameter{};       ///< Parameter of function CC in the request or reply.
+  std::optional<std::string_view> setting{};      ///< Meaning of the parameter of function CC in words.
   std::optional<std::string_view> crc_order{};    ///< Byte order of the CRC: low_first or high_first.
   std::optional<std::uint32_t> baud{};            ///< Baud rate at which the encoder answers, in bits per second.
   std::optional<std::string_view> direction{};    ///< Sentence for the user: no request reads the counting direction.
   /// Sentence for the user about how the position changed when the direction was set.
   std::optional<std::string_view> effect{};
   std::optional<bool> written{};  ///< True if a setting was sent; false if the encoder had this value already.
-  std::optional<std::uint16_t> encoder_address{};  ///< Address that answered during a scan.
+  std::optional<std::uint16_t> encoder_address{};  ///< Scan: an address that answered.
   std::optional<bool> clash{};  ///< Scan: whether all answers of the address `encoder_address` were damaged.
   /// Scan: true if the address `encoder_address` answers with an exception; otherwise no value.
   std::optional<bool> refuses{};
@@ -64,7 +64,8 @@ author::Procedure find_baud(Dialog& dialog, CommandValues& found);
 struct Slaves {
   /// Result of polling one address: no answer, a valid answer, damaged answers, or a refusal.
   enum class Kind : std::uint8_t { none, answers, clash, refuses };
-  std::array<Kind, modbus::last_address + 1> at{};  ///< Result of each address, which is the index; 0 is unused.
+  /// Result of polling each address, which is the index; index 0 is unused.
+  std::array<Kind, modbus::last_address + 1> at{};
 };
 /// Polls each address on the line for a slave. Errors: invalid_argument, timeout, or that of an exchange.
 author::Procedure scan(Dialog& dialog, Slaves& found, Arguments arguments);

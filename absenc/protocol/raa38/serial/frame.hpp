@@ -21,14 +21,14 @@ using namespace std::chrono_literals;
 /// Event that makes the encoder send a frame.
 enum class Mode : std::uint8_t {
   timing,     ///< The end of each period of the refresh rate: the encoder sends without a request.
-  handshake,  ///< A falling edge on CLK.
+  handshake,  ///< A falling edge on the encoder's input CLK.
   bus,        ///< A request that contains the encoder's number.
 };
 
 /// Second byte of a frame: 81 (fixed), Bx with the encoder's number (echo), or either (automatic).
 enum class SecondByte : std::uint8_t { automatic, fixed, echo };
 
-/// How the zero of an encoder is set; this depends on how the encoder was ordered.
+/// How the zero of an encoder is set; the order code of the encoder decides it.
 enum class Zeroing : std::uint8_t {
   none,
   line,     ///< The zero is set by a pulse on the wire CLR.
@@ -53,7 +53,7 @@ inline constexpr std::size_t frame_capacity = 6;  ///< Length of the longest fra
 // ---- Times. The document states only T2; all others are assumed.
 
 inline constexpr Time trigger_width = 10us;  ///< Time T2: shortest pulse on CLK (3.1.3).
-inline constexpr Time clear_width = 1ms;     ///< Width of the pulse on CLR.
+inline constexpr Time clear_width = 1ms;     ///< Duration of the pulse on CLR, which sets the zero.
 
 // The next times are those of the host.
 /// Timeout of a reply if the options do not state T3.
@@ -119,9 +119,9 @@ struct Position {
   friend constexpr bool operator==(const Position&, const Position&) = default;
 };
 
-/// Bytes of one frame.
+/// Buffer for the bytes of one frame.
 using FrameBytes = ByteBuffer<frame_capacity>;
-/// Bytes of one request.
+/// Buffer for the bytes of one request.
 using RequestBytes = ByteBuffer<request_bytes>;
 
 /// Returns the checksum of `bytes`; it does not depend on their order.
@@ -131,7 +131,7 @@ using RequestBytes = ByteBuffer<request_bytes>;
   return static_cast<std::uint8_t>(sum);
 }
 
-/// Returns the frame of a position.
+/// Returns the frame that carries `position`.
 [[nodiscard]] constexpr FrameBytes encode_position(const Format& format, const Position& position) {
   FrameBytes bytes;
   bytes.push_back(header);
@@ -201,7 +201,7 @@ struct Request {
 /// Values of frames and commands. Only members with a value are reported.
 struct Values {
   std::optional<std::uint8_t> encoder_address{};  ///< Scan: number of a unit that answered, 0 to 15.
-  /// Scan: whether no answer of the unit was valid, as with two encoders of one number, or on a bad line.
+  /// Scan: true if no answer of the unit was valid, because two encoders have its number or the line is bad.
   std::optional<bool> clash{};
   std::optional<std::uint32_t> before{};      ///< Position before the zero was set, in counts.
   std::optional<std::uint32_t> singleturn{};  ///< Position within the turn, in counts.
@@ -220,7 +220,7 @@ struct Values {
           .angle = degrees(position.singleturn, format.bits)};
 }
 
-/// Frames, lengths and times for the classes in absenc/protocol/author.
+/// Types, frames, lengths and times that the classes in absenc/protocol/author require.
 struct Protocol {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = serial::Format;
@@ -270,7 +270,7 @@ struct Protocol {
   }
   /// Decodes a reply with all checks; returns the first error if one fails.
   static constexpr Result<Position> decode(const Format& format, const Request& request, Bytes bytes) {
-    // The encoder does not answer zero clearing.
+    // The encoder sends no reply when its zero is set, so no reply is valid.
     if (request.kind == Request::Kind::zero_clear) return Error::unexpected_reply;
     return decode_position(format, bytes, request.kind == Request::Kind::read ? request.unit : any_unit);
   }

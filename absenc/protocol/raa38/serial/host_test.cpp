@@ -110,7 +110,7 @@ TEST(Raa38SerialHandshake, DoesNotBlameSecondEncoderForBadChecksum) {
 TEST(Raa38SerialBus, RejectsCollisionOfTwoUnits) {
   Bench bench(bus);
   bench.add_twin(with(bus, &Format::second_byte, SecondByte::echo));
-  // the frames FF 81 01 7F 00 and FF B1 01 7E 2F collide
+  // the frames FF 81 01 7F 00 and FF B1 01 7E 2F of two encoders collide
   EXPECT_TRUE(ended(bench.run_command("position"), Error::bad_checksum));
 }
 

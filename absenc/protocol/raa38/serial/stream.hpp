@@ -56,7 +56,7 @@ class StreamDecoder {
   [[nodiscard]] constexpr bool in_step() const { return in_step_; }
   /// Returns the number of received bytes that belong to no frame.
   [[nodiscard]] constexpr std::uint64_t skipped() const { return discarded_.skipped(); }
-  /// Returns the number of discarded frames, as DiscardedFrames computes it.
+  /// Returns the number of discarded frames, which DiscardedFrames computes from the skipped bytes.
   [[nodiscard]] constexpr std::uint64_t discarded() const { return discarded_.count(); }
   /// Returns whether a frame was valid except for a position with more bits than the format has.
   [[nodiscard]] constexpr bool saw_larger_positions() const { return saw_larger_positions_; }
