@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of readings and of refusals.
+// Tests of conversations that read the position, and of refused requests.
 #include "absenc/protocol/tformat/host.hpp"
 
 #include <gtest/gtest.h>

@@ -325,7 +325,7 @@ constexpr Result<Values> decode_answer(const Format& format, const OrderInfo& in
 
 }  // namespace detail
 
-/// Decodes a reply to `request`, or only `request` if `reply` is null. Either may be null.
+/// Decodes `reply` as the reply to `request`; if `reply` is null, decodes `request`. Either of them may be null.
 [[nodiscard]] constexpr Result<Values> decode(const Format& format, const CanFrame* request, const CanFrame* reply) {
   if (reply == nullptr) return request == nullptr ? Error::wrong_length : detail::decode_request(*request);
   if (reply->remote) return Error::bad_framing;

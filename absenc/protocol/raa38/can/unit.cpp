@@ -76,7 +76,7 @@ constexpr auto fields = author::fields_of<Values>(
     field<&Values::before>("before", "counts", "position before the command"),
     field<&Values::after>("after", "counts", "position after it"));
 
-// Puts the fields into `sink`, and the position, if there is one, as a reading.
+// Puts the fields of a decoded frame into `sink`, and its position, if it has one, as a reading.
 constexpr void put_found(FieldSink& sink, const Format& format, const Values& found) {
   fields.put(sink, found);
   if (!found.singleturn) return;
