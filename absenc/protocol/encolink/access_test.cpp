@@ -16,14 +16,14 @@ using PowerOn = Bench::PowerOn;
 class EncolinkRegister : public testing::OnBothInterfaces {};
 INSTANTIATE_TEST_SUITE_P(Interfaces, EncolinkRegister, ::testing::Values(Interface::uart, Interface::spi));
 
-/// Returns a function that damages the replies whose number, from 0, is in `frames`.
+/// Returns a function that damages those replies whose number is in `frames`; the first reply has number 0.
 author::testing::Tamper damaging(std::vector<unsigned> frames) {
   return [=](unsigned nth, RawBytes& reply) {
     if (std::find(frames.begin(), frames.end(), nth) != frames.end()) reply[1] ^= 0x10;
   };
 }
 
-/// Returns a function that replaces the first `times` bytes `right` in the requests by `wrong`.
+/// Returns a function that finds the byte `right` in requests and replaces it by `wrong`, `times` times at most.
 author::testing::Tamper replacing(std::uint8_t right, std::uint8_t wrong, int times) {
   return [=](unsigned, RawBytes& request) mutable {
     for (std::uint8_t& byte : request) {
@@ -32,7 +32,7 @@ author::testing::Tamper replacing(std::uint8_t right, std::uint8_t wrong, int ti
   };
 }
 
-// Counts positions while the longest register is read: channel 3 must not cost a single frame.
+// Counts the positions during the read of the longest register: each frame must still give a position.
 TEST_P(EncolinkRegister, ReadsRegisterWithoutLosingPositions) {
   for (const std::string_view settings : {testing::single, testing::multi}) {
     Bench bench(settings, interface);
@@ -40,7 +40,7 @@ TEST_P(EncolinkRegister, ReadsRegisterWithoutLosingPositions) {
     bench.shaft.put(0, 0x12345);
     std::uint64_t last = 0;
     unsigned wrong = 0;
-    Time begun{};  // time of the first emitted position, after the identity, which the procedure reads first
+    Time begun{};  // time of the first emitted position; the procedure reads the identity before it
     const RunResult read = bench.run("memory-read", {registers[part_number].address}, [&](const auto& emitted) {
       RunResult now;
       now.take(emitted);
@@ -52,7 +52,7 @@ TEST_P(EncolinkRegister, ReadsRegisterWithoutLosingPositions) {
     EXPECT_EQ(wrong, 0u);
     EXPECT_EQ(read.texts.at("register"), "order_number");
     EXPECT_EQ(read.numbers.at("length"), 20);
-    // No position is emitted in the two frames of the identity, nor in the last frame.
+    // The procedure emits a position for each frame but the two of the identity and the last one.
     EXPECT_EQ(read.emits, read.frames - 2 - 1);
     EXPECT_EQ(bench.first_violation(), "");
     const auto size = static_cast<std::int64_t>(bench.encoder.format().frame_bytes());
@@ -156,7 +156,8 @@ TEST_P(EncolinkRegister, StopsAfterTwoSecondsOfBusy) {
   EXPECT_LT(read.took, busy_limit + 10ms);
 }
 
-// A damaged key byte hides the access; a damaged address makes its checksum wrong.
+// If the first byte of the access is damaged, the encoder does not recognise it as an access; if the address is
+// damaged, the checksum is wrong.
 TEST_P(EncolinkRegister, RepeatsAccessThatArrivedDamaged) {
   for (const auto& [right, wrong, error, words] :
        std::to_array<std::tuple<std::uint8_t, std::uint8_t, Error, std::string_view>>(
@@ -176,8 +177,8 @@ TEST_P(EncolinkRegister, RestartsAccessAfterDamagedFrame) {
   for (const auto& [frames, error] : std::vector<std::pair<std::vector<unsigned>, Error>>{
            {{9, 60, 130}, Error::none},
            {{9, 10, 40, 70}, Error::none},
-           {{9, 10, 40, 70, 100}, Error::bad_checksum},  // all five attempts fail
-           {{9, 10, 11}, Error::bad_checksum}}) {        // three damaged frames in a row
+           {{9, 10, 40, 70, 100}, Error::bad_checksum},  // all five attempts of the register access fail
+           {{9, 10, 11}, Error::bad_checksum}}) {        // three damaged frames in a row end the command
     Bench bench(testing::single, interface);
     bench.tampered.replies(damaging(frames));
     const RunResult read = bench.run("memory-read", {0x4C});
@@ -191,7 +192,7 @@ TEST_P(EncolinkRegister, ReportsUnpluggedEncoder) {
   struct Case {
     std::string_view command;
     std::vector<std::int64_t> arguments;
-    unsigned after;  // number of positions after which the encoder is switched off
+    unsigned after;  // number of emitted positions after which the test switches the encoder off
     std::string_view words;
   };
   for (const Case& one : std::vector<Case>{
@@ -209,7 +210,7 @@ TEST_P(EncolinkRegister, ReportsUnpluggedEncoder) {
     EXPECT_FALSE(told.reading);
     EXPECT_EQ(bench.device.memory_version(), 0u);
   }
-  // The identity was not received, so nothing was written.
+  // The host receives no identity, so it writes nothing.
   Bench bench(testing::multi, interface);
   bench.tampered.replies([](unsigned, RawBytes& reply) { reply.clear(); });
   const RunResult save = bench.run("save");
@@ -217,7 +218,7 @@ TEST_P(EncolinkRegister, ReportsUnpluggedEncoder) {
   EXPECT_FALSE(says(save.detail, "may have been executed")) << save.detail;
 }
 
-// The answer to the write is lost, but reading back shows that it was executed.
+// The answer to the write is lost, but the host reads the register back and sees that it was written.
 TEST_P(EncolinkRegister, ReadsBackBeforeRepeatingWrite) {
   Bench bench(testing::single, interface);
   bench.tampered.replies(damaging({22}));
@@ -242,7 +243,7 @@ TEST_P(EncolinkRegister, RepeatsWriteThatWasNotExecuted) {
   }
 }
 
-// Frames 0 and 1 are for the identity, frame 2 resets the channels; cycles of 7 frames follow.
+// The sequence of frames: frames 0 and 1 read the identity, frame 2 resets the channels, cycles of 7 frames follow.
 TEST_P(EncolinkRegister, AcceptsAnswerAfterEightIdleCycles) {
   for (const auto& [more, asked] : std::to_array<std::pair<unsigned, unsigned>>({{7, 1}, {8, 2}})) {
     Bench bench(testing::single, interface);
@@ -272,11 +273,11 @@ TEST_P(EncolinkRegister, AcceptsAnswerAfterEightIdleCycles) {
   }
 }
 
-/// Replaces the channel 3 bytes on a UART, one per cycle of seven frames.
+/// Replaces the channel 3 byte of each cycle of seven frames, on a UART.
 struct OnChannel3 {
   OnChannel3(Bench& bench, std::function<std::uint8_t(std::uint8_t)> change) : change_(std::move(change)) {
     bench.tampered.requests([this](unsigned, RawBytes& request) {
-      if (request[0] == 0xAA) at_ = 7;  // the reply to a reset does not belong to the new cycle yet
+      if (request[0] == 0xAA) at_ = 7;  // the channel 2 byte in the reply to a reset is not in the new cycle yet
     });
     bench.tampered.replies([this](unsigned, RawBytes& reply) {
       if (at_ == 7) {
@@ -303,14 +304,15 @@ TEST(EncolinkAccess, RejectsAnswerWithoutReady) {
   EXPECT_EQ(read.detail, "channel 3 says neither idle nor busy nor ready");
 }
 
-// The counter of calibrations does not change, or the ring is reported as too eccentric.
+// In one case the encoder reports that the ring is too eccentric, in the other its counter of calibrations never
+// changes.
 TEST(EncolinkAccess, ReportsFailedAndEndlessSelfCalibration) {
   for (const auto& [says, error, words] : std::to_array<std::tuple<std::uint8_t, Error, std::string_view>>(
            {{calibration::out_of_range, Error::cross_check_failed, "too eccentric"},
             {0, Error::timeout, "does not end"}})) {
     Bench bench(testing::single);
     unsigned reads = 0;
-    unsigned step = 0;  // byte of the answer that comes next: 0 ready, 1 status, 2 value
+    unsigned step = 0;  // next byte of the encoder's answer: 0 ready, 1 status, 2 value
     const OnChannel3 changed(bench, [&, status = says](std::uint8_t told) {
       if (step == 0)
         step = told == channel3::read_ready ? 1 : 0;
@@ -323,7 +325,8 @@ TEST(EncolinkAccess, ReportsFailedAndEndlessSelfCalibration) {
     const RunResult told = bench.run("self-calibrate");
     EXPECT_EQ(told.error, error);
     EXPECT_TRUE(testing::says(told.detail, words)) << told.detail;
-    EXPECT_EQ(told.took > 10s, error == Error::timeout);  // the vendor allows the shaft 10 s
+    // the timeout is longer than the 10 s within which the vendor wants the shaft turned
+    EXPECT_EQ(told.took > 10s, error == Error::timeout);
   }
 }
 
@@ -359,7 +362,7 @@ TEST_P(EncolinkRegister, PresetFailsWhileShaftTurns) {
 
 TEST_P(EncolinkRegister, NeverRepeatsCommand) {
   Bench bench(testing::single, interface);
-  bench.tampered.replies(damaging({100}));  // frame 100 arrives while the encoder is busy
+  bench.tampered.replies(damaging({100}));  // frame 100 comes while the encoder is busy with saving
   const RunResult save = bench.run("save");
   EXPECT_EQ(save.error, Error::bad_checksum);
   EXPECT_EQ(save.detail, "the answer to the command was lost: it may have been executed");
@@ -368,7 +371,7 @@ TEST_P(EncolinkRegister, NeverRepeatsCommand) {
   EXPECT_EQ(bench.device.memory_version(), 1u);
 }
 
-// After a refusal, the encoder may still send data bytes.
+// The encoder may still send data bytes after it refused a register access, when the next access begins.
 author::Procedure read_twice(Dialog& dialog, ProcedureState& found) {
   const AccessOutcome refused = co_await attempt_read(dialog, found, 0x1234, 20);
   if (refused != AccessOutcome::refused) co_return found.why;

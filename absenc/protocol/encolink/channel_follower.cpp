@@ -17,7 +17,7 @@ void ChannelFollower::follow(std::uint64_t number, Bytes request, Bytes reply) {
     if (!position) return lose();
     if (format.has_ch2) take_byte(format, number, *position);
   }
-  // A request has its effect from the next frame on.
+  // A request acts on the channels from the next frame on.
   if (request.size() < request_bytes) return;
   const auto config = static_cast<Config>(request[0]);
   if (config == Config::position) {
@@ -65,7 +65,7 @@ void ChannelFollower::take_byte(const Format& format, std::uint64_t number, cons
 void ChannelFollower::take_answer(std::uint8_t byte) {
   if (!awaits_answer_) return;
   const bool writes = last_access_[access_keys.size()] == static_cast<std::uint8_t>(RegisterRequest::Operation::write);
-  // A channel 3 byte before the answer, such as idle or busy, is dropped.
+  // Channel 3 bytes before the encoder's answer, such as idle or busy, are dropped.
   if (answer_.empty() && byte != (writes ? channel3::write_ready : channel3::read_ready)) return;
   answer_.push_back(byte);
   if (answer_.size() < 2) return;

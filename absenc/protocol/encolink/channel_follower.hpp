@@ -32,20 +32,20 @@ class ChannelFollower final : public Follower {
   void take_request(std::uint64_t number, std::uint8_t byte);
 
   Format format_;
-  // State of channel 2.
+  // The next members are the state of channel 2.
   bool in_step_ = false;
   Buffer<Position, longest_cycle> frames_;
-  std::uint64_t first_ = 0;  // exchange number of the oldest frame in `frames_`
+  std::uint64_t first_ = 0;  // number of the exchange that has the oldest frame in `frames_`
   std::optional<Composed> cycle_;
   ByteBuffer<longest_cycle> cycle_bytes_;
-  // State of channel 3.
-  AccessBytes partial_access_;  // `ra` bytes of a register access that is not complete yet
+  // The next members are the state of channel 3.
+  AccessBytes partial_access_;  // second bytes (`ra`) of the requests of a register access that is not complete yet
   std::uint64_t partial_access_from_ = 0;
-  AccessBytes last_access_;  // `ra` bytes of the last complete register access
+  AccessBytes last_access_;  // second bytes (`ra`) of the requests of the last complete register access
   std::uint64_t last_access_from_ = 0;
   bool awaits_answer_ = false;
   ByteBuffer<2 + access_capacity> answer_;
-  bool has_answer_ = false;  // whether the last exchange completed the answer to the register access
+  bool has_answer_ = false;  // whether the last exchange completed the encoder's answer to the register access
 };
 
 }  // namespace absenc::encolink

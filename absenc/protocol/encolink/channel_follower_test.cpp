@@ -26,7 +26,7 @@ struct ComposedFrames {
 
 /// Feeds the follower with the captured exchanges of an encoder at standstill.
 struct Conversation {
-  /// Adds one exchange. `channel2`: the channel 2 byte of its reply.
+  /// Adds one exchange. `channel2`: the channel 2 byte of its reply. `at`: the position in its reply.
   void exchange(std::uint8_t config, std::uint8_t ra, std::uint8_t channel2, const Position& at = here) {
     Position position = at;
     position.channel2 = channel2;
@@ -35,12 +35,12 @@ struct Conversation {
     take();
   }
   void reset() { exchange(0xAA, 0, 0); }
-  /// Adds the exchanges of a whole cycle. `ra`: the register access bytes in its requests.
+  /// Adds the exchanges of a whole cycle of channel 2. `ra`: second bytes of the first requests; the others are 0.
   void cycle(std::uint8_t channel3 = channel3::idle, std::uint16_t status = 0, Bytes ra = {}, Position at = here) {
     const ReplyBytes bytes = encode_cycle(format, {at, status, channel3});
     for (std::size_t i = 0; i < bytes.size(); ++i) exchange(0, i < ra.size() ? ra[i] : std::uint8_t{0}, bytes[i]);
   }
-  /// Adds as many cycles as the register access needs.
+  /// Adds as many cycles of channel 2 as the bytes of the register access need.
   void ask(const RegisterRequest& request) {
     for (Bytes left = encode_access(request).view(); !left.empty();) {
       const AccessBytes all = encode_access(request);
@@ -57,7 +57,7 @@ struct Conversation {
           {{one.request.begin(), one.request.end()}, {one.reply.begin(), one.reply.end()}, one.first, one.error});
     }
   }
-  /// Returns the register accesses that the follower found, without the cycles.
+  /// Returns the register accesses that the follower found; cycles of channel 2 are left out.
   [[nodiscard]] std::vector<ComposedFrames> accesses() const {
     std::vector<ComposedFrames> all;
     for (const ComposedFrames& one : composed) {
@@ -175,7 +175,7 @@ TEST(EncolinkFollower, ComposesRefusedAccessWithReason) {
     line.ask(writes ? write_request(0x4C, 2, 1) : read_request(0x4C, 3));
     line.cycle(writes ? channel3::write_ready : channel3::read_ready);
     line.cycle(static_cast<std::uint8_t>(writes ? AccessStatus::denied : AccessStatus::byte_count));
-    for (int i = 0; i < 4; ++i) line.cycle(0);  // bytes that belong to no access
+    for (int i = 0; i < 4; ++i) line.cycle(0);  // channel 3 bytes that belong to no register access
     const std::vector<ComposedFrames> composed = line.accesses();
     ASSERT_EQ(composed.size(), 1u);
     std::string fields;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Requirements of the document on encoder and host, for conformance tests.
+// Requirements of the EncoLink document on encoder and host, for conformance tests.
 #include <array>
 
 #include "absenc/protocol/encolink/unit.hpp"
@@ -7,7 +7,7 @@
 namespace absenc::encolink {
 namespace {
 
-/// Requirements of the document that an encoder on a UART must fulfil.
+/// Requirements of the EncoLink document that an encoder on a UART must fulfil.
 constexpr auto clauses = std::array{
     Clause{"answer", "UART, Communication parameters", "a request is answered", Demand::answered},
     Clause{.id = "stream",
@@ -53,7 +53,7 @@ constexpr auto clauses = std::array{
            .field = "position_offset"},
 };
 
-/// Requirements of the document that an encoder on SPI must fulfil.
+/// Requirements of the EncoLink document that an encoder on SPI must fulfil.
 constexpr auto spi_clauses = std::array{
     Clause{"answer", "SPI timing diagram", "the encoder drives its output while it is selected", Demand::answered},
     Clause{"crc", "SPI, Channel 1", "the inverted CRC of polynomial 97 is right", Demand::checked},
@@ -93,7 +93,7 @@ constexpr auto zeros_and_keys =
                HostStep{pause, "00 10"}, HostStep{pause, "00 00", {}, 3}, HostStep{pause, "00 cd"}};
 }  // namespace script
 
-/// Requirements of the document that a host on SPI must fulfil.
+/// Requirements of the EncoLink document that a host on SPI must fulfil.
 constexpr std::array<HostClause, 8> spi_host_clauses{{
     {"asks", "SPI, Channel 1", "the first byte of a frame is a command", HostDemand::asks},
     {"silence", "SPI, Channel 1", "after a data line that stayed as it was it asks again", HostDemand::after_silence},
@@ -113,7 +113,7 @@ constexpr std::array<HostClause, 8> spi_host_clauses{{
      .breaks = {script::keys_again, script::zeros_and_keys}},
 }};
 
-/// Requirements of the document that a host on a UART must fulfil.
+/// Requirements of the EncoLink document that a host on a UART must fulfil.
 constexpr std::array<HostClause, 4> host_clauses{{
     {"asks", "UART, Channel 1", "requests are two bytes, command and data", HostDemand::asks},
     {"silence", "UART, Channel 1", "after no reply it asks again", HostDemand::after_silence},

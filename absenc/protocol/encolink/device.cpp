@@ -7,9 +7,10 @@ namespace absenc::encolink {
 
 namespace {
 
-constexpr std::string_view part_text = "MB080SLA20MENT00";  // part number, 16 characters; [8..9] are the resolution
+// part number, 16 characters; characters 8 and 9 are the resolution in bits
+constexpr std::string_view part_text = "MB080SLA20MENT00";
 constexpr std::string_view access_rule = "register access before the last one was answered";
-// time from a register access until its answer is ready; assumed
+// Assumed time from the last byte of a register access until its answer is ready.
 constexpr Time access_time = 200us;
 
 struct Text {
@@ -21,7 +22,7 @@ constexpr std::array<Text, 3> texts{
 
 // Index in `values_` of the turns that a preset subtracts from the shaft's turns.
 constexpr std::size_t turns_taken = registers.size();
-// Values of `values_` at shipping: 0 unless stated here.
+// Register values at shipping; registers that are not set here are 0.
 constexpr auto at_shipping = [] {
   std::array<std::uint32_t, turns_taken + 1> values{};
   values[firmware_major] = 1;
@@ -30,7 +31,7 @@ constexpr auto at_shipping = [] {
   return values;
 }();
 
-// Indices of the values that `save` stores, in the order of their bytes.
+// Indices of the register values that the command `save` stores, in the order of their bytes in the memory.
 constexpr std::array<std::size_t, 9> stored_registers{position_offset, multiturn_preset,      write_lock,
                                                       turns_taken,     position_filter,       position_filter_speed,
                                                       velocity_filter, velocity_filter_speed, calibration_range};
@@ -75,7 +76,7 @@ void VirtualEncoder::feed(const ByteEvent& event) {
 VirtualEncoder::Answer VirtualEncoder::respond(Bytes request, Time at, ByteBuffer<64>& reply) {
   const ReplyBytes frame = make_frame(at);
   reply.append(frame);
-  // Hosts with the vendor's library read 20 bytes for the identity and for the frame before it.
+  // The vendor's library reads 20 bytes both for the identity and for the frame before it.
   const bool identifies = frame.size() == identity_bytes || request[0] == static_cast<std::uint8_t>(Config::identify);
   while (identifies && reply.size() < format_.identity_size && format_.identity_size > identity_bytes) {
     reply.push_back(0);
@@ -116,7 +117,7 @@ Identity VirtualEncoder::identity() const {
   return identity;
 }
 
-// The frame of this exchange was made before, so the effect is in the next frame.
+// Executes a request. The reply of this exchange was made before, so the effect shows in the next frame.
 void VirtualEncoder::handle(Bytes request, Time at) {
   if (at < zeros_until_) return;
   const auto config = static_cast<Config>(request[0]);
@@ -166,7 +167,7 @@ void VirtualEncoder::ra_received(std::uint8_t byte, Time at) {
 
 // ---- State
 
-// Returns the offset position in 2^-32 revolution, as if the turn counter had no limit.
+// Returns the position of the shaft with the offset applied, in 2^-32 revolution, as if the turn counter had no limit.
 std::int64_t VirtualEncoder::offset_position(Time now) const {
   const auto fraction = static_cast<std::int32_t>(format_.offset_fraction(offset()));
   const std::int64_t position = shaft_->at(now).position;
@@ -184,7 +185,7 @@ Position VirtualEncoder::measure(Time now) const {
   return position;
 }
 
-// Applies all changes that are due until `now`.
+// Executes a pending save and ends a self-calibration, if they are due at `now`.
 void VirtualEncoder::update(Time now) {
   if (save_pending_ && now >= busy_until_) save();
   if (calibrating_ && now >= calibrated_at_) end_calibration(now);
@@ -240,7 +241,7 @@ void VirtualEncoder::execute(Time at) {
   if (!request || writes) return;
   if (status == AccessStatus::ok) {
     answer_.append(value_of(index, at));
-  } else {  // the vendor's host reads all requested bytes, whatever the status is
+  } else {  // the vendor's host reads all requested bytes even if the status is an error
     for (std::size_t i = 0; i < std::min<std::size_t>(request->length, access_capacity); ++i) answer_.push_back(0);
   }
 }
@@ -329,7 +330,7 @@ void VirtualEncoder::save() {
     bytes = bytes.subspan(stored_size(index));
   }
   change_memory();
-  lower_alarms(status::configuration_error);  // the stored configuration is complete again
+  lower_alarms(status::configuration_error);  // the stored configuration is complete again after a save
 }
 
 }  // namespace absenc::encolink

@@ -20,13 +20,14 @@ inline constexpr std::array<Condition, 3> conditions{{
     {"busy", "", "a register access never ends", 0, 1, 0},
     {"channels_disagree", "", "channel 2 has another position than channel 1", 0, 1, 0},
 }};
-/// Index of a condition in `conditions`.
+/// Indices of the conditions in the table `conditions`.
 enum ConditionIndex : std::size_t { condition_temperature, condition_busy, condition_channels_disagree };
 
 /// A virtual AksIM-2 encoder, or an AksIM-4 without registers.
 class VirtualEncoder final : public author::Responder {
  public:
-  /// Creates an encoder that is off; unknown members of `format` are those of virtual_format. `shaft` must outlive it.
+  /// Creates an encoder that is off. Members of `format` that are unknown get the values of `virtual_format`. `shaft`
+  /// must outlive the encoder.
   VirtualEncoder(const Format& format, const Shaft& shaft);
 
   /// Processes an event of the port, such as received data or silence.
@@ -37,7 +38,7 @@ class VirtualEncoder final : public author::Responder {
   /// Switches the encoder on.
   void power_on(Time now, PowerOn kind) override;
   void set_condition(std::size_t index, std::int64_t value, Time) override { conditions_[index] = value; }
-  /// Returns the 31 bytes that the command `save` stores.
+  /// Returns the memory: the 31 bytes that the command `save` stores.
   [[nodiscard]] MutableBytes memory() override { return memory_; }
 
   /// Returns the format of the encoder.
@@ -80,7 +81,7 @@ class VirtualEncoder final : public author::Responder {
   Format format_;
   const Shaft* shaft_;
   std::array<std::int64_t, conditions.size()> conditions_{};
-  // Numbers of the registers, by index in the table, and behind them `turns_taken`.
+  // Values of the numeric registers, by index in the table, and behind them the value at index `turns_taken`.
   std::array<std::uint32_t, registers.size() + 1> values_{};
   std::array<std::uint8_t, 31> memory_{};
 
@@ -99,7 +100,7 @@ class VirtualEncoder final : public author::Responder {
   ByteBuffer<access_capacity + 2> answer_;
   std::size_t sent_answer_bytes_ = 0;
 
-  Time next_frame_{};  // time at which an encoder that streams sends its next frame
+  Time next_frame_{};  // time of the next frame of an encoder that sends without requests
   Time pause_since_{};
   bool was_selected_ = false;
 };

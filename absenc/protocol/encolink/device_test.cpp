@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of the virtual AksIM-2 without the host code.
+// Tests of the virtual AksIM-2 with single requests; the host's code is not used.
 #include "absenc/protocol/encolink/device.hpp"
 
 #include "absenc/core/hex.hpp"
@@ -53,7 +53,7 @@ TEST(EncolinkDevice, DropsInvalidRequest) {
   Bench bench(testing::single);
   const auto replies = bench.ask({{0xAB, 0x00}, {0x55, 0x00}, position_request, {0xBB}, position_request});
   for (std::size_t i = 0; i < replies.size(); ++i) {
-    EXPECT_EQ(decode_position(single, replies[i]).has_value(), i != 3) << i;  // request 3 was cut short
+    EXPECT_EQ(decode_position(single, replies[i]).has_value(), i != 3) << i;  // request 3 has only one byte
   }
 }
 
@@ -69,7 +69,9 @@ TEST(EncolinkDevice, ReportsBrokenRulesOfAccessAndTransmission) {
 
   Bench loud(testing::single);
   loud.ask({RawBytes(6)});
-  EXPECT_EQ(loud.device.violation_count(), 2u);  // the encoder counts violations per request, not per byte
+  // the six bytes are three requests, two of them during the encoder's reply: violations count per request, not per
+  // byte
+  EXPECT_EQ(loud.device.violation_count(), 2u);
   EXPECT_EQ(loud.first_violation(), "request during the encoder's transmission");
 }
 
@@ -103,7 +105,7 @@ TEST(EncolinkDevice, ReportsBrokenSpiTimes) {
   fastest.rate = 4'000'000;
   LineSettings fast = spi_settings;
   fast.rate = 8'000'000;
-  LineSettings early = spi_settings;  // the settings of the line decide how long NCS is low before the first clock
+  LineSettings early = spi_settings;  // an SPI host may have NCS low for less than 5 us before the first clock
   early.select_lead = 4999ns;
   for (const auto& [settings, pause, rule] : std::to_array<std::tuple<LineSettings, Time, std::string>>(
            {{spi_settings, 5us, ""},
@@ -161,7 +163,7 @@ TEST(EncolinkDevice, StreamsAtItsRate) {
   EXPECT_EQ(ends[95] - ends[0], 19 * 500us);
 }
 
-/// Returns the channel 3 bytes, one per cycle, with which the encoder answers a register access.
+/// Returns the encoder's answer to a register access: its channel 3 bytes, one from each cycle of channel 2.
 RawBytes answer_to(Bench& bench, Bytes access) {
   std::vector<RawBytes> requests(80, position_request);
   requests[0] = {0xAA, 0x00};

@@ -17,13 +17,13 @@
 
 namespace absenc::encolink {
 
-/// Names of the bits of the general status.
+/// Names of the two status bits (error, warning) of a position frame.
 inline constexpr std::array<FlagInfo, 2> general_flags{{
     {"error", "the position is not valid", read_the_alarms, false, status::errors},
     {"warning", "the position is valid, but something is near its limit", read_the_alarms, false, status::warnings},
 }};
 
-/// Cause and advice for a position with the error out_of_range.
+/// Advice if a position does not fit the configured resolution (error out_of_range).
 inline constexpr std::string_view wrong_resolution =
     "padding bits are set: the encoder has more bits than the options resolution and multiturn_bits say; `absenc info` "
     "asks it";
@@ -75,28 +75,29 @@ struct Values {
   /// A value that may be absent.
   template <class T>
   using Maybe = std::optional<T>;
-  /// Never set: the field is declared for the names of its bits, which a reading carries.
+  /// Error and warning bit as one field. This member never has a value: the field only gives names to the status bits
+  /// of a reading.
   Maybe<std::uint8_t> general_status{};
-  Maybe<Position> position{};        ///< Position and its error and warning bits.
-  Maybe<std::uint16_t> multiturn{};  ///< Turns of the turn counter.
+  Maybe<Position> position{};        ///< Position with its error and warning bits.
+  Maybe<std::uint16_t> multiturn{};  ///< Number of turns.
   Maybe<std::uint8_t> channel2{};    ///< Byte of channel 2 in a position frame.
-  Maybe<std::uint16_t> status{};     ///< Detailed status in a cycle of channel 2.
-  Maybe<std::uint8_t> channel3{};    ///< Byte of channel 3 in a cycle of channel 2.
+  Maybe<std::uint16_t> status{};     ///< Detailed status from a cycle of channel 2.
+  Maybe<std::uint8_t> channel3{};    ///< Channel 3 byte from a cycle of channel 2.
   Maybe<Identity> identity{};        ///< Content of an identity frame.
   /// First byte of a request: 00 position, AA reset of the channels, BB identify.
   Maybe<std::uint8_t> config{};
-  Maybe<std::uint8_t> ra{};        ///< Second byte of a request, which is one byte of a register access.
+  Maybe<std::uint8_t> ra{};        ///< Second byte of a request (`ra`), which is one byte of a register access.
   Maybe<std::string_view> op{};    ///< Operation of a register access: read or write.
-  Maybe<std::string_view> name{};  ///< Name of the accessed register in the table.
+  Maybe<std::string_view> name{};  ///< Name of the accessed register; no value if the table has no such register.
   Maybe<std::uint32_t> address{};  ///< Address of the accessed register.
   Maybe<std::size_t> length{};     ///< Number of bytes of the accessed register.
   Maybe<Bytes> data{};             ///< Bytes of the accessed register, most significant first.
-  /// `data` as a number, if it has fewer than 8 bytes and no field with the name of the register.
+  /// Bytes of the register as a number; no value if there are 8 or more, or if a field of its own shows the register.
   Maybe<std::int64_t> value{};
 };
 
 namespace detail {
-// Returns a member of an optional struct in Values; no value if the struct is absent.
+// Returns member `member` of the struct `part` of Values; no value if the struct is absent.
 template <auto part, auto member>
 constexpr auto of(const Values& values) {
   return values.*part ? std::optional((*(values.*part)).*member) : std::nullopt;
@@ -139,12 +140,12 @@ inline constexpr auto frame_fields = [] {
       field<&Values::value>("value", "", "the same as a number", Role::value));
 }();
 
-/// The value of a register. The register's content decides which member is used.
+/// The value of a register; the register's content decides which of the members has it.
 struct RegisterValue {
   std::int64_t number;     ///< Value of a register that is a plain number.
   double celsius;          ///< Temperature of the readhead, in degC.
   double rpm;              ///< Speed of the ring, in rpm.
-  std::uint8_t flags;      ///< Result bits of the last self-calibration.
+  std::uint8_t flags;      ///< Bits that show how the last self-calibration ended.
   author::AsciiText text;  ///< Serial number, order number or part number.
 };
 
@@ -157,7 +158,7 @@ inline constexpr auto register_fields = [] {
       field<&RegisterValue::rpm>("", "rpm", "register: speed of the ring"),
       field<&RegisterValue::flags>("", "how the last self-calibration ended", calibration_flags),
       field<&RegisterValue::text>("", "", "register",
-                                  Role::identity));  // all texts are numbers that identify the encoder
+                                  Role::identity));  // all registers with text have numbers that identify the encoder
   std::array<FieldInfo, registers.size()> made{};
   for (std::size_t i = 0; i < made.size(); ++i) {
     made[i] = by_content.infos[static_cast<std::size_t>(registers[i].content)];
@@ -166,7 +167,7 @@ inline constexpr auto register_fields = [] {
   return made;
 }();
 
-/// Values of procedures that are neither in frames nor in registers.
+/// Fields of procedures that belong neither to a frame nor to a register.
 struct ProcedureValues {
   std::uint8_t calibrations;        ///< Counter of self-calibrations in the encoder, modulo 4.
   bool running;                     ///< Whether a self-calibration is running.
@@ -181,7 +182,7 @@ inline constexpr auto procedure_fields = author::fields_of<ProcedureValues>(
 /// All fields of the unit: those of frames, registers and procedures.
 inline constexpr auto fields = author::joined(frame_fields.infos, register_fields, procedure_fields.infos);
 
-/// Puts a position into `sink`, with the detailed status and channel 3 byte if they are known.
+/// Puts a position into `sink`, with the detailed status and the channel 3 byte if a cycle of channel 2 has given them.
 constexpr void put_position(FieldSink& sink, const Format& format, const Position& position,
                             std::optional<std::uint16_t> detailed = {}, std::optional<std::uint8_t> channel3 = {}) {
   Values values{.position = position, .status = detailed, .channel3 = channel3};
@@ -198,7 +199,7 @@ constexpr void put_position(FieldSink& sink, const Format& format, const Positio
                     : wrapped_difference(load_big_endian(bytes), 0, bits);
 }
 
-/// Puts the value of register `index` of the table into `sink`.
+/// Puts the value of the register with this index in the table `registers` into `sink`.
 constexpr void put_value(FieldSink& sink, std::size_t index, Bytes bytes) {
   FieldValue shown{.info = &register_fields[index], .bytes = bytes};
   switch (registers[index].content) {
@@ -219,7 +220,7 @@ constexpr void put_value(FieldSink& sink, std::size_t index, Bytes bytes) {
   }
 }
 
-/// Puts a register that was read or written into `sink`.
+/// Puts a register that was read or written into `sink`: its name, address and value.
 constexpr void put_register(FieldSink& sink, std::uint32_t address, Bytes data,
                             std::optional<std::string_view> op = {}) {
   const Register* known = find_register(address);
@@ -231,7 +232,7 @@ constexpr void put_register(FieldSink& sink, std::uint32_t address, Bytes data,
   if (in_table) put_value(sink, static_cast<std::size_t>(known - registers.data()), data);
 }
 
-/// Returns `format` with assumed values for its unknown members, to decode `reply`.
+/// Returns `format` with assumed values for unknown resolution or turns, so that `reply` can be decoded.
 [[nodiscard]] constexpr Format assumed(const Format& format, Bytes reply) {
   Format known = format;
   if (known.resolution == 0) known.resolution = maximum_resolution;
@@ -249,10 +250,10 @@ constexpr BitRanges identity_bits(const FieldInfo& field) {
   using author::bits_of;
   if (&field == frame_fields.of<of<&Values::identity, &Identity::protocol_version>>()) return bits_of(0, 0, 8);
   if (&field == frame_fields.of<of<&Values::identity, &Identity::frame_bytes>>()) return bits_of(1, 0, 8);
-  return {};  // the resolution is two decimal digits, so its bits are not reported
+  return {};  // the identity has its resolution as two decimal digits, so no bits are reported for it
 }
 
-// Channel 1 is one big-endian number with two active-low bits at its end.
+// Returns the bits of channel 1 that carry `field`: it is one big-endian number with two active-low bits at its end.
 constexpr BitRanges position_bits(const Format& format, const FieldInfo& field) {
   const std::size_t size = format.position_bytes();
   if (&field == frame_fields.of<of<&Values::position, &Position::singleturn>>()) {
@@ -270,7 +271,7 @@ constexpr BitRanges position_bits(const Format& format, const FieldInfo& field) 
 
 }  // namespace detail
 
-/// Returns the bits of a valid reply that hold `field`, a field that `decode` reports for it.
+/// Returns the bits of a valid reply that carry `field`.
 [[nodiscard]] constexpr BitRanges bits_of(const Format& format, Bytes reply, const FieldInfo& field) {
   if (reply.size() == identity_bytes || reply.size() == padded_identity_bytes) return detail::identity_bits(field);
   const Format known = assumed(format, reply);
@@ -283,7 +284,7 @@ constexpr BitRanges position_bits(const Format& format, const FieldInfo& field) 
   return detail::position_bits(known, field);
 }
 
-/// Decodes a request: two bytes, or all `ra` bytes of a register access.
+/// Decodes a request: its two bytes, or all `ra` bytes (second bytes of requests) of a register access.
 constexpr Error decode_request(Bytes request, FieldSink& sink) {
   if (request.size() == request_bytes) {
     if (!is_config(request[0])) return Error::unsupported;
@@ -311,7 +312,7 @@ constexpr Error decode_access_answer(Bytes request, Bytes reply, FieldSink& sink
   return Error::none;
 }
 
-/// Decodes a reply, or without one the request, into `sink` and returns the first error.
+/// Decodes a reply into `sink`, or the request if there is no reply. Returns the first error.
 constexpr Error decode(const Format& format, Bytes request, Bytes reply, FieldSink& sink) {
   if (reply.empty()) return decode_request(request, sink);
   if (is_access(request)) return decode_access_answer(request, reply, sink);

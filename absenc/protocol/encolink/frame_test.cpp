@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of frames, identities and register accesses that the test vectors do not cover.
+// Tests of frames, identities and register accesses, in addition to the test vectors.
 #include "absenc/protocol/encolink/frame.hpp"
 
 #include <gtest/gtest.h>
@@ -61,7 +61,8 @@ TEST(EncolinkFrame, ReadingValidityFollowsStatus) {
   EXPECT_FALSE(to_reading(single, {}).multiturn_valid);
 }
 
-// A position frame reports alarms of a kind only while its bit for that kind is clear.
+// A position frame shows that no error is raised if its error bit is clear, and that no warning is if its warning bit
+// is clear; a set bit shows no single alarm.
 TEST(EncolinkFrame, StatusBitsReportOnlyClearAlarms) {
   EXPECT_EQ(to_reading(multi, {}).status_reported, general::error | general::warning);
   EXPECT_EQ(to_reading(multi, {}).alarms_reported, 0xFFFFu);
@@ -74,7 +75,7 @@ TEST(EncolinkFrame, StatusBitsReportOnlyClearAlarms) {
   EXPECT_EQ(to_reading(alone, {}).status_reported, general::error | general::warning);
 }
 
-// The status bits of a later frame only show whether an error or a warning is set.
+// The two status bits of a later position frame only show if there is an error or a warning, not which.
 TEST(EncolinkFrame, RemembersAlarmsOfCycleWhileStatusBitsAgree) {
   constexpr Position bad{.singleturn = 5, .error = true};
   constexpr Position warned{.singleturn = 5, .warning = true};
@@ -84,7 +85,7 @@ TEST(EncolinkFrame, RemembersAlarmsOfCycleWhileStatusBitsAgree) {
   EXPECT_EQ(remembered(lost, to_reading(multi, bad)).alarms_reported, 0xFFFFu);
   EXPECT_EQ(remembered(hot, to_reading(multi, warned)).alarms, status::temperature);
   EXPECT_EQ(remembered(hot, to_reading(multi, warned)).alarms_reported, 0xFFFFu);
-  // A set bit does not say which alarm was raised.
+  // If a status bit was clear before and is set now, it is unknown which alarm was raised.
   EXPECT_EQ(remembered(hot, to_reading(multi, bad)).alarms, 0u);
   EXPECT_EQ(remembered(hot, to_reading(multi, bad)).alarms_reported, status::warnings);
   EXPECT_EQ(remembered(lost, to_reading(multi, {.singleturn = 5})).alarms, 0u);
@@ -173,9 +174,10 @@ TEST(EncolinkUnit, EncodesRequestOfEachCommand) {
                          {"temperature", {}, of(hex<"00CDEF89AB5900020000004C05">)},
                          {"save", {}, of(hex<"00CDEF89AB580001000000496342">)},
                          {"memory-write", {0, 0x12345678, 0}, of(hex<"00CDEF89AB58000400000000123456787B">)},
-                         {"memory-read", {0x1234, 0}, {}},  // the number of bytes is unknown
+                         // the table has no register at 0x1234, so the number of bytes is unknown
+                         {"memory-read", {0x1234, 0}, {}},
                          {"memory-write", {0x1234, 0, 0}, {}},
-                         {"memory-write", {0x64, 1, 0}, {}},  // the register at 0x64 has 20 bytes
+                         {"memory-write", {0x64, 1, 0}, {}},  // the register at 0x64 has 20 bytes, which is no number
                          {"memory-write", {0x49, 0x63, 9}, {}}}) {
     std::array<std::uint8_t, 64> bytes{};
     const Result<std::size_t> size = unit.encode({}, *find_command(unit, one.command), one.arguments, bytes);

@@ -8,13 +8,14 @@ namespace absenc::encolink {
 // ---- Frames
 
 std::array<std::uint8_t, request_bytes> Frames::encode(const Format&, const Request& request) {
-  Config config = Config::position;  // Ask::identity has this config: the request before it asked for the identity
+  // to read the identity, a position request follows the request that announced the identity
+  Config config = Config::position;
   if (request.ask == Ask::reset) config = Config::reset_channels;
   if (request.ask == Ask::identify) config = Config::identify;
   return {static_cast<std::uint8_t>(config), request.ra};
 }
 
-// On a UART only silence shows the end of an identity: one more byte may follow it.
+// Returns 0, unknown, for an identity on a UART: one more byte may follow it, so only silence shows its end.
 std::size_t Frames::expected(const Format& format, const Request& request, Bytes) {
   const bool identifies = request.ask == Ask::identify || request.ask == Ask::identity;
   if (!identifies) return format.frame_bytes();
@@ -36,7 +37,7 @@ void Channels::take(const author::HostOf<Frames>& host) {
   const Format& format = host.format();
   const Position& position = host.last();
   ended.reset();
-  // The channel 2 byte of this reply still belongs to the cycle before the reset.
+  // The channel 2 byte in the reply to a reset still belongs to the cycle before the reset.
   if (host.request().ask == Ask::reset) {
     bytes_.clear();
     in_step = true;
@@ -57,7 +58,7 @@ void Channels::take(const author::HostOf<Frames>& host) {
     }
   }
   reading = to_reading(format, position, status);
-  // On SPI the position is of the time when NCS falls; for a UART the time is assumed.
+  // The time of the position: on SPI when NCS falls; on a UART it is assumed to be the end of the request.
   reading.latched = format.interface == Interface::spi ? host.begun_at() : host.sent_at();
   reading.received = host.received_at();
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host side of EncoLink: requests for one frame, and what successive frames carry.
+// Host side of EncoLink: requests for one frame, and the channels that successive frames carry.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 
 namespace absenc::encolink {
 
-/// Purpose of a request. Every request asks for a position frame except `identity`.
+/// Purpose of a request. The reply to each request but `identity` has a position.
 enum class Ask : std::uint8_t {
   position,
   reset,     ///< Requests a position, and that channels 2 and 3 restart in the next frame.
@@ -18,14 +18,14 @@ enum class Ask : std::uint8_t {
   identity,
 };
 
-/// The protocol as author/dialog.hpp demands it.
+/// Types and functions of the protocol that author/dialog.hpp requires.
 struct Frames {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = encolink::Format;
   /// A request to the encoder.
   struct Request {
     Ask ask = Ask::position;  ///< Purpose of the request.
-    std::uint8_t ra = 0;      ///< One byte of a register access.
+    std::uint8_t ra = 0;      ///< Second byte of the request: one byte of a register access, or 0.
   };
   /// Type of replies; empty for the requests `identify` and `identity`.
   using Reply = Position;
@@ -38,40 +38,44 @@ struct Frames {
   }
   /// Returns how a host sends a request.
   static constexpr author::Manner manner(const Format&, const Request& request) {
-    return {.holds_line = request.ask == Ask::identify};  // the next request must be the one for the identity
+    // the request after `identify` must be the one that reads the identity
+    return {.holds_line = request.ask == Ask::identify};
   }
   /// Returns the bytes of `request` as they are sent.
   static std::array<std::uint8_t, request_bytes> encode(const Format&, const Request& request);
   /// Returns the length of the reply to `request` in bytes; 0 if only silence ends the reply.
   static std::size_t expected(const Format& format, const Request& request, Bytes);
-  /// Decodes a reply; the content of one to `identify` is ignored.
+  /// Decodes a reply. The reply to `identify` is checked, but its content is ignored.
   static Result<Position> decode(const Format& format, const Request& request, Bytes reply);
-  /// Returns whether an invalid reply is complete, as on SPI, where a transfer has a fixed length.
+  /// Returns whether a reply with an error is complete: on SPI it is, because a transfer has a fixed length.
   static bool is_whole(const Format& format, Error) { return format.interface == Interface::spi; }
-  static constexpr bool replies_carry_position = true;  ///< Each frame but the identity has the position.
-  /// Returns the position of a frame; an empty reading without one.
+  /// Marks that replies carry a position; only the identity carries none.
+  static constexpr bool replies_carry_position = true;
+  /// Returns the position of a reply as a reading; an empty reading if the reply has no position.
   static Reading reading(const Format& format, const Request& request, const Reply& reply) {
     const bool has_position = request.ask == Ask::position || request.ask == Ask::reset;
     return has_position && format.known() ? to_reading(format, reply) : Reading{};
   }
-  /// Returns `sent_at`, the assumed time of the position.
+  /// Returns `sent_at`, the end of the request, which is assumed to be the time of the position.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
-  /// Returns the shortest time between two frames.
+  /// Returns the pause that a host keeps between two frames.
   static constexpr Time pause(const Format& format) { return format.interface == Interface::spi ? spi_pause : Time{}; }
 };
 
 /// The content of successive frames: the position, and cycles of channel 2, one byte per frame.
 struct Channels {
-  Reading reading{};                      ///< Reading from the last valid frame; empty before the first.
-  std::optional<std::uint16_t> status{};  ///< Detailed status in the last valid cycle; no value before it.
-  /// Set if the last frame completed a cycle: `none`, or the error of the cycle.
+  Reading reading{};  ///< Reading from the last valid frame; empty before the first valid frame.
+  /// Detailed status in the last valid cycle of channel 2; no value before the first valid cycle.
+  std::optional<std::uint16_t> status{};
+  /// Set if the last frame completed a cycle of channel 2: `none`, or the error of the cycle.
   std::optional<Error> ended{};
-  std::uint8_t channel3 = 0;  ///< Channel 3 byte of the last valid cycle.
-  bool in_step = false;       ///< Whether the channel 2 bytes are aligned to a cycle.
-  /// Whether all bytes of the last cycle were 0, as while the encoder starts.
+  std::uint8_t channel3 = 0;  ///< Channel 3 byte of the last valid cycle of channel 2.
+  bool in_step = false;       ///< Whether the host knows which byte of its cycle each channel 2 byte is.
+  /// Whether all bytes of the last cycle of channel 2 were 0, as while the encoder starts.
   bool silent = false;
 
-  /// Processes the valid frame that `host` has received; a cycle with an error ends the alignment.
+  /// Processes the valid frame that `host` has received. If a cycle of channel 2 ends with an error, its alignment
+  /// ends.
   void take(const author::HostOf<Frames>& host);
 
  private:
@@ -79,7 +83,8 @@ struct Channels {
   Position first_{};
 };
 
-/// Reads a position and, where needed, the identity before it and the alarms behind it.
+/// Reads a position. Reads the identity first if the format is not known, and a cycle of channel 2 after it if alarms
+/// are needed.
 class ReadPosition : public author::HostOf<Frames> {
  public:
   /// Creates a conversation that reads an encoder of this format.
@@ -87,7 +92,7 @@ class ReadPosition : public author::HostOf<Frames> {
   [[nodiscard]] const Reading* reading() const final {
     return error() == Error::none && channels_.reading.singleturn_bits != 0 ? &channels_.reading : nullptr;
   }
-  /// Returns the content of channels 2 and 3 that was received.
+  /// Returns the content of channels 2 and 3 that was received so far.
   [[nodiscard]] const Channels& found() const { return channels_; }
 
  private:

@@ -34,7 +34,7 @@ TEST(EncolinkHostSpi, LatchesPositionWhenNcsFalls) {
   bench.pass(1ms);
   const RunResult read = bench.run("position");
   ASSERT_TRUE(read.reading);
-  // The line was idle for an unknown time, so the host waits for `spi_pause` first.
+  // The host waits for `spi_pause` before its first transfer, because it does not know when the last one ended.
   EXPECT_EQ(read.reading->latched, 1ms + spi_pause);
   EXPECT_EQ(read.reading->received, 1ms + spi_pause + spi_lead + 40us);
   EXPECT_EQ(read.took, spi_pause + spi_lead + 40us);
@@ -201,7 +201,7 @@ TEST_P(EncolinkHost, ReadsDetailedStatusInOneCycle) {
   constexpr std::uint16_t raised = status::temperature | status::multiturn_mismatch;
   for (const std::string_view settings : {testing::single, testing::multi}) {
     Bench bench(settings, interface);
-    // each frame has another position; that of the cycle's first frame counts
+    // the shaft turns, so each frame has another position; the cycle must carry that of its first frame
     bench.shaft.spin(3000, bench.line.now());
     bench.device.raise_alarms(raised);
     const RunResult read = bench.run("alarms");
@@ -236,16 +236,18 @@ TEST_P(EncolinkHost, ReportsChannel2ThatDisagrees) {
   EXPECT_EQ(status.error, Error::cross_check_failed);
   EXPECT_TRUE(says(status.detail, "channel 2 has another position")) << status.detail;
   bench.pass(spi_pause);
-  EXPECT_EQ(bench.run("position").error, Error::none);  // positions can still be read
+  // single positions can still be read although channel 2 is wrong
+  EXPECT_EQ(bench.run("position").error, Error::none);
   const RunResult read = bench.run("memory-read", {0x4C});
   EXPECT_EQ(read.error, Error::cross_check_failed);
   EXPECT_TRUE(says(read.detail, "channel 2 has another position")) << read.detail;
   EXPECT_GT(read.emits, 20u);
 }
 
-// Frame 0 resets the channels; the cycle begins in frame 1.
+// The sequence of frames: frame 0 resets the channels, the cycle of channel 2 begins in frame 1.
 TEST_P(EncolinkHost, RepeatsInvalidCycle) {
-  const auto turned = [](unsigned frame, RawBytes& reply) {  // changes the turns in the first frame of the cycle
+  // changes the turns in the first frame of the cycle, so that channel 2 contradicts channel 1
+  const auto turned = [](unsigned frame, RawBytes& reply) {
     if (frame % 10 != 1) return;
     ++reply[1];
     reply[5] = checksum(Bytes(reply).first(5));
@@ -259,8 +261,8 @@ TEST_P(EncolinkHost, RepeatsInvalidCycle) {
     Error error;
     unsigned frames;
   };
-  for (const Case& one : std::vector<Case>{{at(4, 6), Error::none, 2 * 10},      // damages a channel 2 byte
-                                           {at(3, 0), Error::none, 3 + 1 + 10},  // damages a position frame
+  for (const Case& one : std::vector<Case>{{at(4, 6), Error::none, 2 * 10},      // this row damages one channel 2 byte
+                                           {at(3, 0), Error::none, 3 + 1 + 10},  // this row damages one position frame
                                            {turned, Error::cross_check_failed, 3 * 10},
                                            {damaged, Error::bad_checksum, 3 * 10}}) {
     Bench bench(testing::multi, interface);
@@ -276,7 +278,7 @@ TEST_P(EncolinkHost, ZerosWithoutChannel2AreNotReady) {
   bench.restart(PowerOn::real);
   bench.line.wake(0);
   const RunResult early = bench.run("position");
-  ASSERT_TRUE(early.reading);  // the zeros are a well-formed position
+  ASSERT_TRUE(early.reading);  // a starting encoder sends zeros, which are a well-formed position
   EXPECT_FALSE(early.reading->ready);
   bench.pass(start_up);
   bench.shaft.put(0, 0);
@@ -285,7 +287,7 @@ TEST_P(EncolinkHost, ZerosWithoutChannel2AreNotReady) {
   EXPECT_TRUE(late.reading->ready);
 }
 
-// The position is really zero and channel 2 is wrong: the encoder is not starting.
+// The shaft is at position zero and channel 2 is wrong: the host must not take the encoder for one that is starting.
 TEST_P(EncolinkHost, ZerosWithWrongChannel2AreReady) {
   const auto damaged = [](unsigned, RawBytes& reply) { reply.back() ^= 0x01; };
   const auto none = [](unsigned, RawBytes&) {};
@@ -337,7 +339,7 @@ constexpr std::string_view streaming = "resolution=20 multiturn_bits=16 stream_r
 TEST(EncolinkListen, FindsFramesByChecksum) {
   Bench bench("resolution=20 multiturn_bits=16 stream_rate=5000");
   bench.shaft.spin(60, bench.line.now());
-  bench.pass(1ms + 95us);  // starts to listen while the encoder sends
+  bench.pass(1ms + 95us);  // the host starts to listen in the middle of a frame
   Listen listen(testing::multi_format);
   std::vector<std::uint64_t> seen;
   bench.listen(listen, [&] {
@@ -396,7 +398,7 @@ TEST(EncolinkListen, ReportsDamagedFramesAndContinues) {
   bench.listen(listen, [&] {
     if (listen.error() != Error::none) errors.push_back(listen.error());
     if (listen.error() != Error::none) return true;
-    // The first position was taken before the shaft was set.
+    // The encoder sent the first position before the test set the shaft.
     EXPECT_TRUE(good == 0 || listen.reading()->singleturn == 0x12345u) << listen.reading()->singleturn;
     return ++good < 40;
   });
@@ -431,7 +433,7 @@ TEST(EncolinkListen, HasNoReadingAfterStreamEnds) {
   for (int i = 0; i < 3; ++i) {
     listen.feed({.kind = Event<std::uint8_t>::Kind::received, .at = 1ms, .items = frame});
   }
-  for (int i = 0; i < 2; ++i) {  // the first of the three frames only establishes alignment
+  for (int i = 0; i < 2; ++i) {  // the host does not emit the first of the three frames, which only gives alignment
     EXPECT_EQ(listen.next(1ms).kind, Kind::emit);
     EXPECT_NE(listen.reading(), nullptr);
   }

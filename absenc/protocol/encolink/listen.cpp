@@ -23,12 +23,12 @@ void Listen::end(Error error, std::string_view detail) {
 
 ByteStep Listen::next(Time now) {
   if (!done_ && find()) {
-    // the time that the caller takes for the emitted frame does not count
+    // the timeout restarts at the next call, so that the time in which the caller processes the frame does not count
     deadline_ = Time{};
     return {.kind = ByteStep::Kind::emit};
   }
   if (deadline_ == Time{}) deadline_ = now + listen_limit;
-  // Bytes that form no frames do not extend the deadline.
+  // Received bytes that form no valid frame do not extend the deadline.
   if (!done_ && now >= deadline_) {
     frame_.clear();
     if (!received_anything_) {
@@ -63,7 +63,7 @@ void Listen::feed(const ByteEvent& event) {
   counts_.discarded = discarded_.count();
 }
 
-// Finds the next valid frame, or the loss of alignment. Returns whether it found one of these.
+// Finds the next valid frame or the loss of alignment. Returns false if the received bytes contain neither.
 bool Listen::find() {
   if (std::exchange(disturbed_, false)) {
     lose(Error::bad_framing, {});
@@ -75,7 +75,7 @@ bool Listen::find() {
     const Result<Position> position = decode_position(format_, first);
     const bool good = position && (in_step_ || decode_position(format_, waiting().subspan(size, size)));
     if (good) {
-      // The older frame is dropped, because the time at which it began is unknown.
+      // At alignment the first of two frames is dropped, because the time at which it began is unknown.
       if (!std::exchange(in_step_, true)) begin_ += size;
       discarded_.found();
       const Bytes frame = waiting().first(size);

@@ -12,10 +12,10 @@
 
 namespace absenc::encolink {
 
-/// Receives the frames of a streaming encoder, which it finds by their checksums; sends nothing.
+/// Conversation that sends nothing and receives the frames of a streaming encoder, which it finds by their checksums.
 class Listen final : public Conversation<std::uint8_t> {
  public:
-  /// Creates a conversation that receives an encoder of this format, which must be known.
+  /// Creates a conversation for an encoder of this format, whose resolution and turns must be known.
   explicit Listen(const Format& format);
 
   /// Processes received data or a damaged character; ignores other events.
@@ -29,7 +29,8 @@ class Listen final : public Conversation<std::uint8_t> {
     return error_ == Error::none && !frame_.empty() ? &reading_ : nullptr;
   }
   void report(FieldSink& sink) const override;
-  /// Returns the bytes of the last frame, valid or damaged; without one, unexamined bytes.
+  /// Returns the bytes of the last frame, valid or damaged; if there is none, the received bytes that were not examined
+  /// yet.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const override {
     return {{}, frame_.empty() ? waiting() : frame_.view(), received_at_, received_at_};
   }
@@ -51,7 +52,7 @@ class Listen final : public Conversation<std::uint8_t> {
   bool received_anything_ = false;  // whether bytes or damaged characters were received since the last valid frame
   bool done_ = false;
   Error last_bad_ = Error::wrong_length;
-  std::array<std::uint8_t, 1024> bytes_{};  // received bytes; those for which there is no room are skipped
+  std::array<std::uint8_t, 1024> bytes_{};  // received bytes; bytes that find no room are counted as skipped
   std::size_t begin_ = 0;                   // index of the first byte that was not examined yet
   std::size_t end_ = 0;
   ReplyBytes frame_;  // last frame that was received, valid or damaged

@@ -15,10 +15,11 @@ namespace {
 
 constexpr unsigned frame_attempts = 3;
 constexpr unsigned cycle_attempts = 3;
-// greatest number of attempts of a register access, which takes many valid frames
+// Greatest number of attempts of a register access. It is larger than that of a frame, because one access takes many
+// valid frames.
 constexpr unsigned access_attempts = 5;
 constexpr unsigned write_attempts = 3;
-// number of idle cycles allowed between the last byte of an access and its answer
+// Greatest number of cycles in which channel 3 may be idle between the last byte of a register access and its answer.
 constexpr unsigned idle_cycles_allowed = 8;
 
 constexpr std::string_view channel2_damaged = "channel 2 is damaged: positions go on, but registers cannot be reached";
@@ -29,7 +30,7 @@ constexpr std::string_view size_needed = "this address is not in the table of re
 
 // ---- Frames
 
-// Requests one frame and returns its error; a lost frame ends the alignment of channel 2.
+// Requests one frame and returns its error. After an invalid frame, channel 2 is no longer aligned.
 Part<Error> ask_frame(Dialog& dialog, ProcedureState& found, Frames::Request request) {
   if (found.emits && found.is_new) dialog.emit();
   found.is_new = false;
@@ -56,7 +57,7 @@ Outcome stopped(const ProcedureState& found, Error error) {
   return {error, in_access ? "the encoder stopped answering during a register access" : std::string_view{}};
 }
 
-// Reads the identity; if `trusted`, it overrides the options, otherwise it must agree with them.
+// Reads the identity. If `trusted`, its resolution and turns replace those of the options; otherwise they must agree.
 Part<Identity> identify(Dialog& dialog, ProcedureState& found, bool trusted) {
   for (;;) {
     Error error = co_await ask_frame(dialog, found, {Ask::identify});
@@ -73,7 +74,7 @@ Part<Identity> identify(Dialog& dialog, ProcedureState& found, bool trusted) {
   co_return identity;
 }
 
-// Reads the next valid frame, requested with `ask` if channel 2 is not aligned.
+// Reads the next valid frame. The request is `ask` if channel 2 is not aligned, otherwise a position request.
 Part<bool> next_frame(Dialog& dialog, ProcedureState& found, Ask ask = Ask::position) {
   if (!dialog.format().known()) co_await identify(dialog, found, false);
   for (;;) {
@@ -85,12 +86,12 @@ Part<bool> next_frame(Dialog& dialog, ProcedureState& found, Ask ask = Ask::posi
 
 // ---- Register accesses
 
-// Returns the error of the last frame, or of the cycle that the frame completed.
+// Returns `error`, the error of the last frame; if that is none, the error of the cycle that the frame completed.
 Error frame_or_cycle_error(const ProcedureState& found, Error error) {
   return error == Error::none ? found.ended.value_or(Error::none) : error;
 }
 
-// Sends the `ra` bytes of the present register access, one per frame.
+// Sends the bytes of the present register access as the second bytes (`ra`) of successive requests.
 Part<Error> send(Dialog& dialog, ProcedureState& found) {
   found.was_sent = false;
   for (std::size_t sent = 0; !found.was_sent;) {
@@ -104,7 +105,7 @@ Part<Error> send(Dialog& dialog, ProcedureState& found) {
   co_return Error::none;
 }
 
-// Requests frames until a cycle of channel 2 ends or a frame is lost.
+// Requests frames until a cycle of channel 2 ends or a frame is invalid.
 Part<Error> receive(Dialog& dialog, ProcedureState& found) {
   do {
     const Error error = co_await ask_frame(dialog, found, {});
@@ -113,7 +114,7 @@ Part<Error> receive(Dialog& dialog, ProcedureState& found) {
   co_return Error::none;
 }
 
-// Ends an attempt without a valid answer; a write that may have been executed is not repeated.
+// Ends an attempt of a register access that got no valid answer. A write that may have been executed is not repeated.
 AccessOutcome lost(ProcedureState& found, Error error, std::string_view detail = {}) {
   if (found.ended.value_or(Error::none) != Error::none) {
     detail = *found.ended == Error::cross_check_failed ? channels_disagree : channel2_damaged;
@@ -164,7 +165,7 @@ Part<AccessOutcome> execute(Dialog& dialog, ProcedureState& found) {
   if (found.protocol_version == version::aksim4) co_await dialog.stop({Error::unsupported, not_described});
   for (unsigned left = access_attempts - 1;; --left) {
     const AccessOutcome access_outcome = co_await try_to_execute(dialog, found);
-    // The encoder may send more bytes of the answer, so the channels must be reset.
+    // Without a good answer, the encoder may still send bytes of it, so the next frame must reset the channels.
     if (access_outcome != AccessOutcome::good) found.in_step = false;
     if (is_lost(dialog, found)) co_return found.end(AccessOutcome::gone, stopped(found, found.why.error));
     if (!found.again || left == 0) co_return access_outcome;
@@ -197,13 +198,14 @@ Part<bool> read(Dialog& dialog, ProcedureState& found, RegisterIndex index) {
   return read(dialog, found, registers[index].address, registers[index].size);
 }
 
-// Records that the encoder rejected a write, unless an earlier write has changed it.
+// Records that the encoder refused a write, unless an earlier write of the procedure has changed a register.
 void note_refusal(Dialog& dialog, const ProcedureState& found, AccessOutcome access_outcome) {
   if (access_outcome == AccessOutcome::refused && found.why.error == Error::request_rejected && !found.changed)
     dialog.refused();
 }
 
-// A write that may have been executed is repeated only if reading back shows another value.
+// Writes a register and reads it back. A write that may have been executed is repeated only if the register has another
+// value.
 Part<bool> write(Dialog& dialog, ProcedureState& found, std::uint32_t address, std::uint16_t size,
                  std::uint64_t value) {
   constexpr std::string_view in_the_middle =
@@ -251,7 +253,7 @@ bool is_near(const Dialog& dialog, std::uint32_t singleturn,
   return author::is_near(dialog.last().singleturn, singleturn, dialog.format().resolution, millidegrees);
 }
 
-// Stops the procedure if the zero must not be set now.
+// Reads the position twice; stops the procedure if it is invalid or the shaft turns, so that the zero must not be set.
 Part<bool> may_set_zero(Dialog& dialog, ProcedureState& found) {
   const Reading first = to_reading(dialog.format(), dialog.last(), found.status);
   const Time first_at = dialog.received_at();
@@ -390,7 +392,8 @@ Procedure preset_multiturn(Dialog& dialog, ProcedureState& found, Arguments argu
   co_return done;
 }
 
-// The self-calibration has ended when its counter changes or a new failure is reported.
+// The self-calibration has ended when its counter has changed or the encoder reports a failure that it did not report
+// before.
 Procedure self_calibrate(Dialog& dialog, ProcedureState& found) {
   co_await read(dialog, found, calibration_status);
   const std::uint8_t before = found.data[0];

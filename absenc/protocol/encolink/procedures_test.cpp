@@ -24,13 +24,13 @@ TEST_P(EncolinkProcedure, ZeroSurvivesPowerOffWhenSaved) {
   bench.shaft.put(7, 0x22345);
   bench.restart(PowerOn::skip);
   EXPECT_EQ(bench.run("position").reading->singleturn, 0x10000u);
-  // A second zero adds to the stored offset, and is lost at power off because it is not saved.
+  // The second `zero` changes the offset that the first one stored; it is not saved, so its effect ends at power off.
   ASSERT_EQ(bench.run("zero", {0}).error, Error::none);
   EXPECT_EQ(bench.run("position").reading->singleturn, 0u);
   EXPECT_EQ(bench.device.memory_version(), 1u);
   bench.restart(PowerOn::skip);
   EXPECT_EQ(bench.run("position").reading->singleturn, 0x10000u);
-  // `reset` does not store the offset 0, so the stored offset returns at power on.
+  // The command `reset` sets the offset to 0 without storing it, so the stored offset returns at power on.
   ASSERT_EQ(bench.run("reset").error, Error::none);
   EXPECT_EQ(bench.run("position").reading->singleturn, 0x22345u);
   bench.restart(PowerOn::skip);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Channel 3 of EncoLink: the registers of an AksIM-2, and the bytes of a register access.
+// Channel 3 of EncoLink carries register accesses: the registers of an AksIM-2, and the bytes of an access.
 #pragma once
 
 #include <algorithm>
@@ -18,8 +18,8 @@ namespace absenc::encolink {
 
 /// Values of the channel 3 byte that show the state of the encoder.
 namespace channel3 {
-inline constexpr std::uint8_t idle = 0x33;  ///< The encoder executes no register access.
-inline constexpr std::uint8_t busy = 0x66;  ///< The encoder is executing a register access.
+inline constexpr std::uint8_t idle = 0x33;  ///< Idle: the encoder executes no register access.
+inline constexpr std::uint8_t busy = 0x66;  ///< Busy: the encoder is executing a register access.
 /// The encoder's answer to a read begins: status and data follow, one byte per cycle.
 inline constexpr std::uint8_t read_ready = 0x88;
 /// The encoder's answer to a write begins: the status follows in the next cycle.
@@ -33,19 +33,20 @@ enum class AccessStatus : std::uint8_t {
   out_of_range = 0x56,
   denied = 0x96,
   read_checksum = 0xE4,
-  read_checksum_too = 0xE6,  ///< Same meaning as read_checksum; used in other code of the vendor.
+  /// Status with the same meaning as read_checksum; other code of the vendor uses this value.
+  read_checksum_too = 0xE6,
   byte_count = 0xEE,
   locked = 0xF6,
   write_checksum = 0xF9,
 };
 
-/// Returns whether the encoder received a damaged request, so that a repetition may help.
+/// Returns whether the status means that the encoder received damaged bytes, so that a repetition may help.
 [[nodiscard]] constexpr bool is_damaged(AccessStatus status) {
   return status == AccessStatus::read_checksum || status == AccessStatus::read_checksum_too ||
          status == AccessStatus::write_checksum;
 }
 
-/// Returns the meaning of a status byte as a sentence.
+/// Returns the meaning of the encoder's status byte as a sentence.
 [[nodiscard]] constexpr std::string_view text_of(AccessStatus status) {
   constexpr auto texts = std::to_array<std::pair<AccessStatus, std::string_view>>({
       {AccessStatus::ok, "done"},
@@ -66,11 +67,12 @@ enum class AccessStatus : std::uint8_t {
 enum class Access : std::uint8_t { read_only, read_write, write_only };
 
 /// How the bytes of a register are decoded. All numbers are big endian.
-enum class Content : std::uint8_t { number, celsius, rpm, flags, text };  // celsius and rpm: signed numbers in tenths
+// celsius and rpm are signed numbers in tenths
+enum class Content : std::uint8_t { number, celsius, rpm, flags, text };
 
-/// Description of a register of the encoder.
+/// Description of a register of the encoder: a row of the table `registers`.
 struct Register {
-  std::string_view name;              ///< Name of the register in fields and commands.
+  std::string_view name;              ///< Name of the register, as fields and commands have it.
   std::uint16_t address;              ///< Address of the register.
   std::uint8_t size;                  ///< Number of bytes of the register.
   Access access;                      ///< Whether hosts can read and write the register.
@@ -142,20 +144,21 @@ inline constexpr std::size_t largest_register = 20;  ///< Number of bytes of the
 
 /// Values that a host writes to the command register.
 namespace commands {
-inline constexpr std::uint8_t save = 0x63;            ///< Stores the configuration in the non-volatile memory.
-inline constexpr std::uint8_t reset = 0x72;           ///< Restores shipping values, until power off unless saved.
-inline constexpr std::uint8_t self_calibrate = 0x41;  ///< Starts the self-calibration.
+inline constexpr std::uint8_t save = 0x63;  ///< Command that stores the configuration in the non-volatile memory.
+/// Command that restores the values at shipping; without `save` they are lost at power off.
+inline constexpr std::uint8_t reset = 0x72;
+inline constexpr std::uint8_t self_calibrate = 0x41;  ///< Command that starts the self-calibration.
 }  // namespace commands
 
 /// Bits of the register calibration_status.
 namespace calibration {
-inline constexpr std::uint8_t count = 0x03;  ///< Mask of the number of finished self-calibrations, modulo 4.
-/// The shaft did not turn far enough in time for the last self-calibration.
+inline constexpr std::uint8_t count = 0x03;  ///< Mask of the counter of finished self-calibrations, modulo 4.
+/// Bit: the shaft did not turn far enough in time for the last self-calibration.
 inline constexpr std::uint8_t timed_out = 0x04;
-inline constexpr std::uint8_t out_of_range = 0x08;  ///< The last self-calibration found the ring too eccentric.
+inline constexpr std::uint8_t out_of_range = 0x08;  ///< Bit: the last self-calibration found the ring too eccentric.
 }  // namespace calibration
 
-/// Returns the register at `address`, or null if the table has none there.
+/// Returns the register at `address`; null if the table has no register with this address.
 [[nodiscard]] constexpr const Register* find_register(std::uint32_t address) {
   for (const Register& one : registers) {
     if (one.address == address) return &one;
@@ -168,11 +171,11 @@ inline constexpr std::size_t access_capacity = 100;
 
 /// A register access: read or write.
 struct RegisterRequest {
-  /// Operation codes of a register access.
+  /// Operation codes in the bytes of a register access.
   enum class Operation : std::uint8_t { write = 0x58, read = 0x59 };
-  Operation operation = Operation::read;  ///< Whether the access reads or writes.
+  Operation operation = Operation::read;  ///< Whether the register access reads or writes.
   std::uint32_t address = 0;              ///< Address of the accessed register.
-  std::uint16_t length = 0;               ///< Number of data bytes.
+  std::uint16_t length = 0;               ///< Number of bytes to read or write.
   ByteBuffer<access_capacity> data{};     ///< Bytes to write, `length` in number; empty for a read.
 };
 
@@ -180,7 +183,7 @@ struct RegisterRequest {
 inline constexpr std::array<std::uint8_t, 5> access_keys{0x00, 0xCD, 0xEF, 0x89, 0xAB};
 /// Number of bytes before the data: keys, operation, length and address.
 inline constexpr std::size_t access_header = access_keys.size() + 1 + 2 + 4;
-/// All bytes of a register access.
+/// Buffer for all bytes of a register access.
 using AccessBytes = ByteBuffer<access_header + access_capacity + 1>;
 
 /// Returns a register access that reads `length` bytes at `address`.
@@ -197,7 +200,7 @@ using AccessBytes = ByteBuffer<access_header + access_capacity + 1>;
   return request;
 }
 
-/// Returns all `ra` bytes of a register access, in the order in which requests carry them.
+/// Returns all bytes of a register access; successive requests carry them as their second bytes (`ra`).
 [[nodiscard]] constexpr AccessBytes encode_access(const RegisterRequest& request) {
   AccessBytes bytes;
   bytes.append(access_keys);
@@ -210,14 +213,15 @@ using AccessBytes = ByteBuffer<access_header + access_capacity + 1>;
   return bytes;
 }
 
-/// Returns whether `request` has more than two bytes, apart from the zeros that SPI clocks.
+/// Returns whether `request` is the bytes of a register access: it has a byte other than 0 behind its first two.
 [[nodiscard]] constexpr bool is_access(Bytes request) {
   if (request.size() <= request_bytes) return false;
   const Bytes behind = request.subspan(request_bytes);
   return std::any_of(behind.begin(), behind.end(), [](std::uint8_t byte) { return byte != 0; });
 }
 
-/// Decodes the `ra` bytes of a register access. Errors: bad_framing, unsupported, wrong_length, bad_checksum.
+/// Decodes the bytes of a register access, collected from the second bytes (`ra`) of requests. Errors: bad_framing,
+/// unsupported, wrong_length, bad_checksum.
 [[nodiscard]] constexpr Result<RegisterRequest> decode_access(Bytes bytes) {
   for (std::size_t i = 0; i < access_keys.size(); ++i) {
     if (i == bytes.size()) return Error::wrong_length;

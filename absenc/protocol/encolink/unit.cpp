@@ -57,7 +57,7 @@ constexpr auto options = author::OptionsOf{
 
 // ---- Requests
 
-/// Content of a request: its first byte, or all `ra` bytes of a register access.
+/// Content of a request: its first byte, or a register access whose bytes several requests carried.
 struct Request {
   Config config = Config::position;
   std::optional<RegisterRequest> access{};
@@ -124,7 +124,7 @@ Result<Request> memory_writing(const Format&, Arguments arguments) {
   return writing(static_cast<std::uint32_t>(arguments[0]), arguments[2], arguments[1]);
 }
 
-// null where the value depends on the position, or where nothing is sent
+// A null function marks a command without a single request: its requests depend on the position, or it sends nothing.
 constexpr MakeRequest not_encodable = nullptr;
 
 // ---- End of a frame: the shortest of the possible lengths with a right checksum decides
@@ -143,10 +143,12 @@ constexpr std::size_t reply_size(const Format& format, Bytes begin) {
   return 0;
 }
 
-// Outside the checksum are the channel 2 byte, and a byte that follows an identity.
+// Returns whether a checksum covers `bit` of a reply. It does not cover the channel 2 byte of a frame, nor the byte
+// that may follow an identity.
 bool is_checked(const Options& values, Frame request, Frame reply, std::size_t bit) {
   const Format format = assumed(options.format(values), reply.bytes);
-  // The checksums of an access are in its cycles: only its ready and status are checked here.
+  // The answer to a register access has no checksum of its own, so only its first two bytes, ready and status, are
+  // checked.
   if (is_access(request.bytes)) return bit / 8 < 2;
   if (reply.bytes.size() == padded_identity_bytes) return bit / 8 < identity_bytes;
   return !format.has_ch2 || reply.bytes.size() != format.frame_bytes() || bit / 8 != format.frame_bytes() - 1;
@@ -200,7 +202,7 @@ Explanation explain_host(const Host& host) {
       return {};
   }
 }
-/// Returns the cause of an error of a captured frame or register access; empty if unknown.
+/// Returns the cause of the error of a captured frame or register access; empty if the cause is unknown.
 constexpr Explanation explain(const Format&, Error error, Bytes request, Bytes reply) {
   if (is_access(request)) {
     if (error != Error::request_rejected || reply.size() < 2) return {};
@@ -313,12 +315,13 @@ constexpr auto commands_of_unit = std::array{
 constexpr std::size_t option_resolution = options.find("resolution");
 constexpr std::size_t option_multiturn_bits = options.find("multiturn_bits");
 
-// Evidence for the format: the identity, or the lengths of position frames.
+// Evidence for resolution and turns: the identity, or the lengths of position frames.
 struct FormatEvidence {
   std::optional<Identity> identity{};
-  std::size_t identity_at = 0;         // index of the capture with the identity
-  std::array<std::size_t, 2> good{};   // number of valid position frames: [0] without turns, [1] with turns
-  std::array<std::size_t, 2> first{};  // index of the first valid capture: [0] without turns, [1] with turns
+  std::size_t identity_at = 0;  // index of the capture with the identity
+  // number of captures that are valid position frames: [0] without turns, [1] with turns
+  std::array<std::size_t, 2> good{};
+  std::array<std::size_t, 2> first{};  // index of the first such capture: [0] without turns, [1] with turns
 
   [[nodiscard]] bool is_conclusive() const { return identity || good[0] != good[1]; }
   [[nodiscard]] bool has_turns() const { return identity ? identity->frame_bytes == 7 : good[1] > good[0]; }
@@ -342,7 +345,8 @@ FormatEvidence collect_evidence(const Format& format, std::span<const Capture> c
   return evidence;
 }
 
-// A shorter part of a frame with turns may have a valid checksum too.
+// Judges which values of resolution and turns fit the captures. A frame with turns may have a valid checksum also at
+// the length without turns, so the more frequent length decides.
 bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sink) {
   const FormatEvidence evidence = collect_evidence(options.format(values), captures);
   constexpr std::string_view open = "these frames do not tell";
@@ -391,7 +395,7 @@ constexpr Format format_of(const Options& values) {
   made.interface = interface;
   return made;
 }
-// Unknown members get the values of the virtual encoder.
+// Returns the resolution; unknown members of the format get the values of the virtual encoder.
 constexpr Resolution resolution_of(const Format& format) {
   return {format.resolution != 0 ? format.resolution : virtual_format.resolution,
           static_cast<unsigned>(format.multiturn_bits >= 0 ? format.multiturn_bits : virtual_format.multiturn_bits)};
@@ -417,7 +421,7 @@ Follower* make_follower(const Options& values, std::span<std::byte> storage) {
 
 constexpr auto known_as = std::array<std::string_view, 2>{"RLS", "AksIM"};
 
-/// Declaration of the protocol on `interface`.
+/// Declaration of the EncoLink unit for `interface`, UART or SPI.
 template <Interface interface>
 constexpr author::Declaration<Protocol, VirtualEncoder, Host> declaration{
     .id = interface == Interface::spi ? "encolink-spi" : "encolink",

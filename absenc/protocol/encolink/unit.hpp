@@ -6,9 +6,9 @@
 
 namespace absenc::encolink {
 
-extern constinit const Unit unit;       ///< EncoLink on a UART.
-extern constinit const Unit spi_unit;   ///< EncoLink on SPI.
-extern const Clauses unit_clauses;      ///< The demands on EncoLink on a UART.
-extern const Clauses spi_unit_clauses;  ///< The demands on EncoLink on SPI.
+extern constinit const Unit unit;       ///< Protocol unit of EncoLink on a UART.
+extern constinit const Unit spi_unit;   ///< Protocol unit of EncoLink on SPI.
+extern const Clauses unit_clauses;      ///< Clauses of the EncoLink document for UART, for conformance tests.
+extern const Clauses spi_unit_clauses;  ///< Clauses of the EncoLink document for SPI, for conformance tests.
 
 }  // namespace absenc::encolink

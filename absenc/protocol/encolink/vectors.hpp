@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// EncoLink test frames with their source, checked at compile time.
+// EncoLink test frames with their source; the compiler decodes each of them.
 #pragma once
 
 #include <array>
@@ -75,7 +75,7 @@ inline constexpr std::array uart{
                "bad_checksum"},
 };
 
-// SPI carries the same frames as the UART, so three vectors are enough.
+// SPI carries the same frames as the UART, so three test vectors are enough for SPI.
 inline constexpr std::array spi{
     VectorText{"encolink-spi-001", "ST res 19 pos 275096", derived, "resolution=19 multiturn_bits=0", ask, "8653036200",
                "singleturn=275096 error=0 warning=0 channel2=0"},

@@ -72,12 +72,13 @@ TEST(EslBus, ScanFindsEncodersAndDamagedAnswers) {
         EXPECT_EQ(encoder->violation_count(), 0u);
       }
       EXPECT_EQ(encoder->answer_count(),
-                clashes.empty() || encoder == bus.encoders[0] ? 1u : 3u);  // a damaged reply is requested three times
+                // the host requests a damaged reply three times
+                clashes.empty() || encoder == bus.encoders[0] ? 1u : 3u);
     }
   }
 }
 
-// A complete answer comes from one encoder, so "disconnect one" would be bad advice.
+// A complete reply with an error comes from one encoder only, so the advice "disconnect one" would be wrong.
 TEST(EslBus, RefusalIsNoClash) {
   struct Scan final : FieldSink {
     void put(const FieldValue& value) override {

@@ -11,7 +11,7 @@ namespace {
 // ---- Requests that no host sends
 
 namespace request {
-// Writes a command frame with this control field, and returns its length.
+// Writes a position request with the control field `field`, and returns its length in bytes.
 inline Result<std::size_t> seal(const Profile& profile, std::uint8_t field, MutableBytes request) {
   const std::size_t size = request_length(profile, DataId::position);
   if (request.size() < size) return Error::buffer_too_small;
@@ -19,23 +19,23 @@ inline Result<std::size_t> seal(const Profile& profile, std::uint8_t field, Muta
   if (size > 1) request[1] = checksum8(profile.crc_bit_order, Bytes(request).first(1));
   return size;
 }
-// Writes a position request whose parity bit alone is wrong; returns its length.
+// Writes a position request that has only a wrong parity bit, and returns its length in bytes.
 inline Result<std::size_t> wrong_parity(const Options& values, MutableBytes request) {
   const Profile profile = options.format(values);
   const std::uint8_t good = control_field(profile, profile.address, DataId::position);
   return seal(profile, static_cast<std::uint8_t>(good ^ 0x80U), request);
 }
-// Table 3 does not list ID 3.
+// Writes a request with data ID 3, which Table 3 does not list.
 inline Result<std::size_t> unknown_id(const Options& values, MutableBytes request) {
   const Profile profile = options.format(values);
   return seal(profile, control_field(profile, profile.address, DataId{3}), request);
 }
 }  // namespace request
 
-/// Alarms that command C alone clears, in both channels (mask of Reading::alarms).
+/// Alarms of both channels that the reset with data ID C alone clears (mask of Reading::alarms).
 constexpr std::int64_t cleared_by_c = alarms::xc_error | alarms::xc_error << 8;
 
-/// Clauses of the ESL document for encoders.
+/// Clauses of the ESL document for encoders, as the conformance test checks them.
 constexpr auto clauses = std::array{
     Clause{"answer", "Figure 2", "a read request is answered", Demand::answered},
     Clause{"answer-time", "Figure 2",
@@ -132,7 +132,7 @@ constexpr auto asked_and_written = std::array{select, HostStep{milliseconds(20),
                                               HostStep{milliseconds(20), "memory-write", byte_2}};
 }  // namespace script
 
-/// Clauses of the ESL document for hosts.
+/// Clauses of the ESL document for hosts, as the conformance test checks them.
 constexpr std::array<HostClause, 12> host_clauses{{
     {"asks", "Figure 2", "requests are as drawn", HostDemand::asks},
     {"silence", "Overview of Communication", "after no reply it asks again", HostDemand::after_silence},

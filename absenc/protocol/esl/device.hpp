@@ -11,9 +11,9 @@
 
 namespace absenc::esl {
 
-/// Indexes of `conditions`; the CRCs of a faulty channel stay right.
+/// Indexes of `conditions`. A condition that makes a channel faulty leaves its CRC right.
 namespace condition {
-/// Index of a condition in `conditions`.
+/// Indexes of the conditions in the table `conditions`.
 enum Index : std::size_t {
   supply_voltage,
   temperature,
@@ -21,7 +21,7 @@ enum Index : std::size_t {
   lissajous,
   id_d_clears_singleturn,
   redundant_offset,
-  ch1_stuck,  ///< first condition of a single channel; channel 2 follows channel 1
+  ch1_stuck,  ///< first condition of a single channel; the condition of channel 2 follows that of channel 1
   ch2_stuck,
   ch1_sequence,
   ch2_sequence,
@@ -94,17 +94,18 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     condition_[index] = static_cast<std::int32_t>(value);
   }
   void raise_alarms(std::uint32_t bits) override {
-    // A turn counter that was cleared before multiturn_error is raised does not count as cleared.
+    // A reset of the turns (data ID D) permits clearing multiturn_error only if the alarm was raised before it.
     if ((bits & ~unsigned{latches_} & alarms::multiturn_error) != 0) turns_cleared_ = false;
     latches_ |= static_cast<std::uint8_t>(bits & ~unsigned{alarms::voltage});
     forced_ |= static_cast<std::uint8_t>(bits & alarms::voltage);
   }
-  /// Ends raised or latched alarms; those that a condition causes stay while it lasts.
+  /// Ends the alarms in `bits` that were raised or are latched; an alarm that a condition causes stays raised.
   void lower_alarms(std::uint32_t bits) override {
     latches_ &= static_cast<std::uint8_t>(~bits);
     forced_ &= static_cast<std::uint8_t>(~bits);
   }
-  /// Returns the reply to a request with `id` at `now`, with all values of both channels.
+  /// Returns the reply to data ID `id` at the time `now`; it has the values of both channels, also those that `id` does
+  /// not carry.
   [[nodiscard]] Reply reply_to(DataId id, Time now) const {
     Reply reply{.id = id, .encoder_address = profile_.address};
     reply.one = channel_now(Channel::one, now);
@@ -118,7 +119,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     reply.temperature = static_cast<std::int8_t>(value_of(condition::temperature));
     return reply;
   }
-  /// Switches the encoder on; with PowerOn::real, SF reports `ready` only after the start-up time.
+  /// Switches the encoder on; with PowerOn::real, the status field (SF) has `ready` only after the start-up time.
   void power_on(Time now, PowerOn kind) override {
     ready_at_ = kind == PowerOn::real ? now + start_up : now;
     Responder::power_on(now, kind);
@@ -132,15 +133,15 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   static constexpr std::int32_t over_voltage_above = 3700;
   // Greatest speed in 1/1000 rpm at which the shaft counts as at rest.
   static constexpr std::int32_t standing_still = 1'000;
-  // Temperature in degC above which SF warns; assumed, because the document states no limit.
+  // Temperature in degC above which the status field (SF) warns; assumed, because the document states no limit.
   static constexpr std::int32_t warning_above = 105;
-  // Time from power on until SF reports `ready`; assumed, because the document states none.
+  // Time from power on until the status field (SF) has `ready`; assumed, because the document states none.
   static constexpr Time start_up = 100ms;
 
   static constexpr std::int32_t magnitude(std::int32_t value) { return value < 0 ? -value : value; }
   static constexpr std::uint32_t counts_of(std::int64_t position) { return static_cast<std::uint32_t>(position) >> 8; }
 
-  // Offsets in `memory_` of the zeros of both channels (4 bytes each) and of the turns (8 bytes).
+  // Offsets in `memory_` of the zeros of both channels (4 bytes each) and of the turns' offset (8 bytes).
   static constexpr std::size_t zero_at = stored_bytes;
   static constexpr std::size_t turns_at = zero_at + 8;
 
@@ -151,7 +152,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   [[nodiscard]] bool has_wrong_checksum(Bytes request) const {
     return request.size() > 1 && !has_checksum8(profile_, request);
   }
-  // Returns whether the last bytes of `heard`, but not all, are a complete request for this encoder.
+  // Returns whether the bytes of `heard` end with a complete request for this encoder that begins behind their first
+  // byte.
   [[nodiscard]] bool contains_own_request(Bytes heard) const {
     for (std::size_t begin = 1; begin < heard.size(); ++begin) {
       const Bytes rest = heard.subspan(begin);
@@ -160,7 +162,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     }
     return false;
   }
-  // A wrong parity bit is ignored here, because the reply may report it.
+  // A request with a wrong parity bit has its usual length here, because the reply may report the parity error.
   [[nodiscard]] std::size_t request_size(Bytes begin) const override {
     const std::optional<DataId> id = data_id(begin[0]);
     if (!id) return 0;
@@ -187,7 +189,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
         is_memory_access(request->id) ? access_memory(*request, at) : reply_to(request->id, at);
     if (!made) return Answer::for_others;
     reply.append(encode_reply(profile_, *made));
-    // The reset is executed after its reply is made, because the reply still shows the old state.
+    // The reset is executed after its reply is made, because the reply still has the old position, turns and alarms.
     if (executes) execute_reset(request->id, at);
     return Answer::sent;
   }
@@ -201,11 +203,12 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   void refuse(Time at, ByteBuffer<64>& reply) override {
     report_bad_request(refused_field_, status::stop_error, at, reply);
   }
-  // Table 5 demands a report in SF, the overview demands silence; memory replies have no SF.
+  // A damaged request: Table 5 demands a report in the status field (SF), the overview demands silence. Replies to
+  // memory requests have no SF, so they report nothing.
   [[nodiscard]] bool is_reported(std::uint8_t field) const {
     return profile_.bad_request == BadRequest::report && !is_memory_access(*data_id(field));
   }
-  // Makes the reply that reports a wrong request in SF, with its CF as received.
+  // Makes the reply that reports a damaged request in the status field (SF); it echoes the control field as received.
   Answer report_bad_request(std::uint8_t field, std::uint8_t status_bit, Time at, ByteBuffer<64>& reply) {
     if (!is_reported(field)) return Answer::for_others;
     const DataId id = *data_id(field);
@@ -219,7 +222,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     resets_.forget();
     encoder_ids_ = 0;
   }
-  // Counts a request, and returns whether it completes a reset at standstill.
+  // Counts a request for the sequence counters and the resets. Returns whether it is the eighth of a reset and the
+  // shaft is at rest.
   bool count(DataId id, Time at) {
     encoder_ids_ = id == DataId::encoder_id ? encoder_ids_ + 1 : 0;
     if (id == DataId::encoder_id) {
@@ -236,7 +240,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   bool stands(Time at) {
     return expect(magnitude(shaft_->at(at).speed_millirpm) <= standing_still, "reset while the shaft turns", at);
   }
-  // Executes a memory request and returns the reply, if the document defines one.
+  // Executes a memory request and returns the reply; no reply if the document defines none.
   std::optional<Reply> access_memory(const Request& request, Time at) {
     if (!expect(profile_.bus != sharing_yes, "memory access with several encoders on the line", at))
       return std::nullopt;
@@ -265,7 +269,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     }
     const std::uint16_t turns_before = turns(at);
     if (id == DataId::zero || value_of(condition::id_d_clears_singleturn) != 0) {
-      // Each channel stores the position of the shaft as its zero.
+      // Both channels take the present position of the shaft as their zero.
       for (const std::size_t to : {zero_at, zero_at + 4}) {
         store_little_endian(MutableBytes(memory_).subspan(to, 4), counts_of(shaft_->at(at).position));
       }
@@ -281,13 +285,13 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     const std::size_t at = channel == Channel::one ? zero_at : zero_at + 4;
     return static_cast<std::uint32_t>(load_little_endian(Bytes(memory_).subspan(at, 4)));
   }
-  // Each channel has a zero of its own.
+  // Returns the position within the turn that `channel` measures from its own zero.
   [[nodiscard]] std::uint32_t singleturn(Channel channel, Time now) const {
     const std::int32_t stuck = value_of(condition::ch1_stuck, channel);
     const std::uint32_t seen = counts_of(shaft_->at(now).position) - zero(channel);
     return (stuck >= 0 ? static_cast<std::uint32_t>(stuck) : seen) & 0xFFFFFF;
   }
-  // Counts from the zero of channel 1, so that turns change where the position wraps.
+  // Returns the turns of the shaft since the zero of channel 1, so that they change where its position wraps.
   [[nodiscard]] std::uint64_t shaft_turns(Time now) const {
     return static_cast<std::uint64_t>((shaft_->at(now).position - (std::int64_t{zero(Channel::one)} << 8)) >> 32);
   }
@@ -338,12 +342,12 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     counters_.fill(0);
   }
   void stopped(Time) override {
-    // Alarms about turns survive power off; other latched alarms end with the power.
+    // The alarms about turns survive power off; the other latched alarms do not.
     latches_ &= alarms::turns_wrong;
     turns_cleared_ = false;
     forget_rows();
   }
-  // `index` is that of channel 1's condition; that of channel 2 follows it.
+  // Returns the value of a condition. `index` is that of channel 1; the condition of channel 2 has the next index.
   [[nodiscard]] std::int32_t value_of(std::size_t index, Channel channel = Channel::one) const {
     return condition_[index + (channel == Channel::two ? 1 : 0)];
   }
@@ -352,18 +356,21 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   const Shaft* shaft_;
   std::array<std::int32_t, conditions.size()> condition_{};
   std::array<std::uint8_t, turns_at + 8> memory_{};
-  std::array<std::uint8_t, register_bytes> registers_{};  // bytes of the register areas, lost at power off
+  // bytes of the memory areas with registers, which are lost at power off
+  std::array<std::uint8_t, register_bytes> registers_{};
 
   Time ready_at_{};
   std::uint8_t latches_ = 0;
-  std::uint8_t forced_ = 0;     // voltage alarms that `raise_alarms` raised
-  bool turns_cleared_ = false;  // whether an ID D was executed, so that an ID C can clear multiturn_error
+  std::uint8_t forced_ = 0;  // mask of the voltage alarms that `raise_alarms` raised
+  // whether a reset with data ID D was executed, so that one with ID C can clear multiturn_error
+  bool turns_cleared_ = false;
   std::array<std::uint8_t, 2> counters_{};
 
   author::RowCounter resets_{reset_row, rules()};
-  unsigned encoder_ids_ = 0;        // number of consecutive requests with ID 8
-  std::uint8_t refused_field_ = 0;  // CF of the last damaged request for this encoder
-  std::uint8_t others_field_ = 0;   // CF of the last request; the reply of another encoder begins with the same byte
+  unsigned encoder_ids_ = 0;        // number of consecutive requests with data ID 8
+  std::uint8_t refused_field_ = 0;  // control field of the last damaged request for this encoder
+  // control field of the last request; if it was for another encoder, that encoder's reply begins with the same byte
+  std::uint8_t others_field_ = 0;
 };
 
 }  // namespace absenc::esl

@@ -38,7 +38,7 @@ TEST(EslDevice, AnswersTwoMicrosecondsAfterTheRequest) {
   EXPECT_EQ(host.reply.size(), 18u);
 }
 
-// IDs 9 and A are counted only if the profile states that every request is counted.
+// The sequence counters count requests with data ID 9 or A only if the profile states that all requests are counted.
 TEST(EslDevice, SequenceCounters) {
   Bench bench;
   EXPECT_EQ(bench.read(DataId::position).one.sequence, 1);
@@ -51,7 +51,8 @@ TEST(EslDevice, SequenceCounters) {
   each.raw(Request{DataId::temperature});
   EXPECT_EQ(each.read(DataId::position).one.sequence, 2);
   for (unsigned i = 2; i < 256; ++i) bench.read(DataId::position);
-  EXPECT_EQ(bench.read(DataId::position).one.sequence, 1);  // both counters have wrapped: SC1 has 8 bits, SC2 7 bits
+  // both sequence counters have wrapped: that of channel 1 has 8 bits, that of channel 2 has 7 bits
+  EXPECT_EQ(bench.read(DataId::position).one.sequence, 1);
   EXPECT_EQ(bench.read(DataId::position).two.sequence, 2);
 }
 
@@ -61,13 +62,15 @@ TEST(EslDevice, AnswersOnlyItsOwnValidRequests) {
   EXPECT_TRUE(bench.raw(wire_of({DataId::position, 3})).empty());  // request to another address
   EXPECT_TRUE(bench.raw(wire(hex<"18">)).empty());                 // request with an unknown ID
   EXPECT_TRUE(bench.raw(wire(hex<"08">)).empty());                 // incomplete request
-  EXPECT_EQ(bench.raw(wire(hex<"0875">)).size(), 18u);             // the request after the faulty ones is answered
+  // the encoder answers the valid request that follows the faulty ones
+  EXPECT_EQ(bench.raw(wire(hex<"0875">)).size(), 18u);
   EXPECT_TRUE(bench.raw(memory_write(page_select_address, 7)).empty());
-  EXPECT_TRUE(bench.raw(memory_read(0x30)).empty());  // the addresses of page 8 end at 0x2F
+  EXPECT_TRUE(bench.raw(memory_read(0x30)).empty());  // page 8 of the memory ends at address 0x2F
   EXPECT_EQ(bench.encoder.answer_count(), 1u);
 }
 
-// "Else, it will continue to search for the next available logic of low state."
+// The document on bytes that are no request: "Else, it will continue to search for the next available logic of low
+// state."
 TEST(EslDevice, FindsRequestAfterOtherBytes) {
   for (const Wire& before : {wire(hex<"AB7B">), wire(hex<"AB">), wire(hex<"FF">), wire(hex<"FF10">), wire(hex<"18">),
                              wire(hex<"0874">), wire(hex<"08">), wire(hex<"ABFF">), wire(hex<"70">)}) {
@@ -80,7 +83,7 @@ TEST(EslDevice, FindsRequestAfterOtherBytes) {
   }
 }
 
-// The reply of another encoder contains bytes that look like a request for this encoder.
+// The reply of another encoder on the line contains bytes that look like a request for this encoder.
 TEST(EslDevice, FindsNoRequestInAnotherEncodersReply) {
   Bench bench;
   const Wire reply = wire({.id = DataId::position_short,
@@ -113,7 +116,7 @@ TEST(EslDevice, ReportsWrongParityBitByProfile) {
   }
 }
 
-// A virtual encoder without a line: the test feeds the events itself.
+// A virtual encoder without a line: the test passes the line's events to it.
 struct Alone {
   using LinkEvent = Event<std::uint8_t>::Kind;
   Alone() { encoder.power_on(Time{}, PowerOn::skip); }
@@ -126,7 +129,7 @@ struct Alone {
 };
 constexpr auto waits = Step<std::uint8_t>::Kind::wait;
 
-// The answer follows the end of the frame set, whose second character is damaged.
+// The second character of the request is damaged; the answer follows the time at which the request would have ended.
 TEST(EslDevice, ReportsWrongStopBitAfterTheRequest) {
   Alone alone;
   alone.feed(Alone::LinkEvent::received, 1us, {control_field({}, 0, DataId::position)});
@@ -200,7 +203,7 @@ TEST(EslDevice, ReadyOnlyAfterStartUp) {
 // ---- Memory
 
 TEST(EslDevice, ReadsRegistersAtOnceAndEepromInTwoSteps) {
-  Bench bench;  // page 8 is selected after power on
+  Bench bench;  // page 8, which has registers, is selected after power on
   bench.raw(memory_write(0x05, 0x11));
   EXPECT_EQ(bench.raw(memory_read(0x05)), memory_reply(memory_read(0x05), false, 0x11));
   bench.raw(memory_write(page_select_address, 0));
@@ -223,7 +226,7 @@ TEST(EslDevice, ReadsRegistersAtOnceAndEepromInTwoSteps) {
   ASSERT_EQ(bench.violations(), 1u);
   EXPECT_EQ(bench.encoder.violations()[0].rule, "memory read again less than 200 us after the request before");
   bench.pass(eeprom_read_time);
-  // The reply is busy, because the byte at address 7 was fetched before.
+  // The reply is busy, because the encoder had fetched the byte at address 7 and must first fetch that at 5.
   EXPECT_EQ(bench.raw(memory_read(5)), memory_reply(memory_read(5), true, 0));
 }
 
@@ -238,7 +241,7 @@ TEST(EslDevice, PageChangeTakes18Milliseconds) {
   EXPECT_EQ(bench.raw(memory_read(page_select_address)), memory_reply(memory_read(page_select_address), false, 4));
 }
 
-// Some broken rules are no violations; the encoder reports them to its RuleWatch only.
+// Some broken rules do not count as violations of the host; the encoder reports them to its RuleWatch only.
 TEST(EslDevice, ReportsRulesThatAreNoViolations) {
   using Rules = std::vector<std::string>;
   const std::string once = "an EEPROM byte asked for only once";
@@ -267,7 +270,8 @@ TEST(EslDevice, ReportsRulesThatAreNoViolations) {
   EXPECT_EQ(broken.rules, Rules{"reset not sent eight times in a row"});
 }
 
-// A request that is delivered late may have arrived earlier, so its host need not wait longer.
+// If a request is delivered late, the encoder measures the host's pause from its earliest possible arrival to the next
+// request.
 TEST(EslDevice, TimesCountFromEarliestArrival) {
   const auto rules = [](const Request& first, const Request& second, Time apart, Time late) {
     Alone alone;
@@ -346,7 +350,7 @@ TEST(EslDevice, AlarmsAreClearedAsInTable8) {
   }
 }
 
-// Table 8: "perform MT counter reset and all error clear".
+// Table 8 on clearing the alarm multiturn_error: "perform MT counter reset and all error clear".
 TEST(EslDevice, ClearsMultiturnErrorOnlyAfterItsTurnReset) {
   Bench bench;
   reset(bench, DataId::reset_multiturn);
@@ -356,7 +360,7 @@ TEST(EslDevice, ClearsMultiturnErrorOnlyAfterItsTurnReset) {
   EXPECT_EQ(bench.read().one.alarms, alarms::multiturn_error);
   reset(bench, DataId::reset_multiturn);
   bench.pass(10ms);
-  // The alarm multiturn_error is raised already, so raising it again changes nothing.
+  // The alarm multiturn_error was raised before the turn reset, so raising it again here changes nothing.
   bench.encoder.raise_alarms(alarms::multiturn_error);
   reset(bench, DataId::clear_alarms);
   EXPECT_EQ(bench.read().one.alarms, 0);
@@ -406,7 +410,8 @@ TEST(EslDevice, OtherOrTooFastRequestRestartsTheCount) {
   bench.raw(Request{DataId::temperature});
   reset(bench, DataId::zero, 1);
   EXPECT_EQ(bench.read().singleturn, 1'000'000u);
-  for (unsigned i = 0; i < 8; ++i) bench.raw(Request{DataId::zero});  // these eight requests are less than 35 us apart
+  // these eight requests of a reset follow each other after less than 35 us
+  for (unsigned i = 0; i < 8; ++i) bench.raw(Request{DataId::zero});
   EXPECT_EQ(bench.read().singleturn, 1'000'000u);
   EXPECT_GT(bench.violations(), 0u);
   reset(bench, DataId::zero);
@@ -438,7 +443,7 @@ TEST(EslDevice, FaultsStayInTheirChannel) {
   EXPECT_EQ(reply.redundant, 0u);
 }
 
-// A damaged request is answered only if its valid begin is for this encoder.
+// The encoder answers a damaged request only if the undamaged characters at its begin address this encoder.
 TEST(EslDevice, IgnoresDamagedRequestForAnotherEncoder) {
   using Kind = Event<std::uint8_t>::Kind;
   for (const auto& [begun, is_answered] :

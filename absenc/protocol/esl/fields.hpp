@@ -11,7 +11,7 @@
 
 namespace absenc::esl {
 
-/// Descriptions of the bits of SF, the status field of replies (Table 5), from bit 0 on.
+/// Descriptions of the bits of the status field (SF) of replies (Table 5), from bit 0 on.
 inline constexpr std::array<FlagInfo, 8> status_flags{{
     {"parity_error", "the encoder received the request with a wrong parity bit and did not execute it",
      "send the same request again; if it stays, set parity_scope"},
@@ -28,7 +28,7 @@ inline constexpr std::array<FlagInfo, 8> status_flags{{
     {"forced_test_passed", "the forced test has passed", ""},
 }};
 
-/// Descriptions of the bits of ALM, the alarms of a channel (Tables 7 and 8), from bit 0 on.
+/// Descriptions of the bits of the alarm field (ALM) of a channel (Tables 7 and 8), from bit 0 on.
 inline constexpr std::array<FlagInfo, 8> alarm_flags{{
     {"xc_error", "the turn counter missed five times in a row: turns may be wrong",
      "return to the origin, then `absenc clear-alarms`, and check the turns"},
@@ -61,7 +61,7 @@ struct Shown {
   /// Constructs the values of a reply.
   constexpr explicit Shown(const Reply& one) { show(one); }
 
-  /// Adds the values of a reply.
+  /// Adds the values of a reply to those of the request.
   constexpr void show(const Reply& one) {
     data_id = one.id;
     encoder_address = one.encoder_address;
@@ -75,25 +75,26 @@ struct Shown {
   std::optional<DataId> data_id{};              ///< Data ID of the request or reply.
   std::optional<std::uint8_t> control_field{};  ///< Control field (CF) of a request: encoder address, data ID, parity.
   std::optional<std::uint8_t> encoder_address{};  ///< Address of the encoder on the line (EAD).
-  std::optional<Reply> reply{};                   ///< The reply; its data ID decides which values it has.
-  std::optional<bool> clash{};  ///< Whether, in a scan, the last of three replies of the address was damaged.
-  std::optional<std::string_view> trouble{};       ///< Sentence about the error of a complete reply in a scan.
-  std::optional<std::uint8_t> page{};              ///< Page of a memory access.
-  std::optional<std::uint8_t> memory_address{};    ///< Address of a memory access (ADF).
-  std::optional<std::uint8_t> busy{};              ///< 1: the memory is busy; no byte was read or written.
-  std::optional<std::uint8_t> value{};             ///< Value of the memory byte (EDF).
-  std::optional<Bytes> data{};                     ///< Values of several memory bytes, from `memory_address` on.
-  std::optional<bool> written{};                   ///< Whether the byte was written; false: it had the value already.
-  std::optional<bool> led_error{};                 ///< Whether the LED current is out of range.
-  std::optional<bool> lissajous_error{};           ///< Whether the signals of the disc are out of range.
+  std::optional<Reply> reply{};  ///< The decoded reply; its data ID decides which of its values are shown.
+  /// Scan: whether the last of three replies of the address `encoder_address` was damaged.
+  std::optional<bool> clash{};
+  std::optional<std::string_view> trouble{};     ///< Scan: sentence about the error of a complete reply.
+  std::optional<std::uint8_t> page{};            ///< Page of the memory byte that is accessed.
+  std::optional<std::uint8_t> memory_address{};  ///< Address of the memory byte that is accessed (ADF).
+  std::optional<std::uint8_t> busy{};            ///< 1: the memory is busy; no byte was read or written.
+  std::optional<std::uint8_t> value{};           ///< Value of the memory byte (EDF).
+  std::optional<Bytes> data{};                   ///< Values of several memory bytes, from `memory_address` on.
+  std::optional<bool> written{};          ///< True if the memory byte was written; false if it had the value already.
+  std::optional<bool> led_error{};        ///< Whether the LED current is out of range.
+  std::optional<bool> lissajous_error{};  ///< Whether the signals of the disc are out of range.
   std::optional<std::uint32_t> safe_singleturn{};  ///< Safe position within the turn, in counts.
-  /// Page that a procedure leaves selected, if it may not be the page from before.
+  /// Memory page that a procedure leaves selected, if it may differ from the page selected before the procedure.
   std::optional<std::uint8_t> page_left{};
-  bool has_turns = true;  ///< false: the turns (ABM) of the reply are not shown
+  bool has_turns = true;  ///< whether the turns (ABM) of the reply are shown
 };
 
 namespace detail {
-// Returns the member of the reply that `part` carries in this channel; no value if the reply lacks it.
+// Returns `member` of the reply if the reply has `part` in this channel; otherwise no value.
 template <Channel channel, unsigned part, auto member>
 constexpr auto in(const Shown& all) {
   const Reply reply = all.reply.value_or(Reply{});
@@ -108,7 +109,7 @@ constexpr auto in(const Shown& all) {
 constexpr std::optional<std::uint16_t> turns_in(const Shown& all) {
   return all.has_turns ? in<Channel::one, part::multiturn, &Reply::multiturn>(all) : std::nullopt;
 }
-// Returns some bits of ENID, which is the same in both channels.
+// Returns the bits of the encoder id (ENID) that `shift` and `mask` select; the id is the same in both channels.
 template <unsigned shift, unsigned mask>
 constexpr std::optional<unsigned> of_encoder_id(const Shown& all) {
   const auto id = in<Channel::one, part::encoder_id, &ChannelReply::encoder_id>(all);
@@ -166,12 +167,12 @@ inline constexpr auto fields = [] {
 }();
 
 namespace detail {
-// Returns the bits of a reply that carry `field` in one part, whose first byte is `here`.
+// Returns the bits of a reply that carry `field` in its part `id`, whose first byte has the index `here`.
 template <Channel channel, unsigned id>
 constexpr BitRanges place_in_part(const Profile& profile, std::size_t here, const FieldInfo& field) {
   using author::bits_of;
   const auto is = [&field](const FieldInfo* one) { return one == &field; };
-  // The lowest bit of RS is in the second byte, the others are in the first.
+  // Returns the bits of the redundant position (RS): its lowest bit is in the second byte, the others are in the first.
   const auto redundant = [here](RedundantBit low) {
     BitRanges ranges = bits_of(here + 1, low == RedundantBit::b7 ? 7 : 0, 1);
     ranges.push_back({8 * here, 8});
@@ -243,7 +244,7 @@ constexpr BitRanges place_in(const Profile& profile, unsigned parts, std::size_t
 }
 }  // namespace detail
 
-/// Returns the bits of a valid reply that carry `field`; none if the field has no fixed place.
+/// Returns the bits of a valid reply that carry `field`; no bits if the field has no fixed place.
 [[nodiscard]] constexpr BitRanges place_of(const Profile& profile, Bytes reply, const FieldInfo& field) {
   if (&field == fields.of<&Shown::encoder_address>()) return author::bits_of(0, 0, 3);
   if (&field == fields.of<&Shown::data_id>()) return author::bits_of(0, 3, 4);

@@ -17,7 +17,7 @@
 
 namespace absenc::esl {
 
-/// Bits of SF, the status field of a channel, in the order of the document (Table 5).
+/// Bits of the status field (SF) of a channel, in the order of the document (Table 5).
 namespace status {
 /// Status bit: the request was received with a wrong parity bit and not executed.
 inline constexpr std::uint8_t parity_error = 0x01;
@@ -29,24 +29,26 @@ inline constexpr std::uint8_t non_safety_error = 0x08;  ///< status bit: an erro
 inline constexpr std::uint8_t temperature_warning = 0x10;  ///< status bit: the encoder is too warm
 /// Status bit: set in the status of channel 2, clear in that of channel 1.
 inline constexpr std::uint8_t channel_2 = 0x20;
-inline constexpr std::uint8_t ready = 0x40;               ///< status bit: the encoder has started
-inline constexpr std::uint8_t forced_test_passed = 0x80;  ///< status bit: the forced test has passed
+inline constexpr std::uint8_t ready = 0x40;  ///< status bit: the encoder has started
+/// status bit: the self-test that the document calls forced test has passed
+inline constexpr std::uint8_t forced_test_passed = 0x80;
 /// Mask of the bits that show that the encoder refused the request.
 inline constexpr std::uint8_t rejected = parity_error | stop_error;
 }  // namespace status
 
-/// Bits of ALM, the alarms of a channel (Table 7).
+/// Bits of the alarm field (ALM) of a channel (Table 7).
 namespace alarms {
-inline constexpr std::uint8_t xc_error = 0x01;         ///< alarm: the turn counter missed five times in a row
-inline constexpr std::uint8_t multiturn_error = 0x02;  ///< alarm: the turn counter was found wrong
+inline constexpr std::uint8_t xc_error = 0x01;         ///< alarm: the turn counter failed to count five times in a row
+inline constexpr std::uint8_t multiturn_error = 0x02;  ///< alarm: the encoder found its turn counter wrong
 /// Alarm: the LED current or the signals of the disc are out of range.
 inline constexpr std::uint8_t led_or_lissajous_error = 0x04;
-inline constexpr std::uint8_t overspeed = 0x08;         ///< alarm: the shaft turned faster than 10 000 rpm
-inline constexpr std::uint8_t memory_error = 0x10;      ///< alarm: the encoder could not load its settings
-inline constexpr std::uint8_t singleturn_error = 0x20;  ///< alarm: the position within the turn was found wrong
+inline constexpr std::uint8_t overspeed = 0x08;     ///< alarm: the shaft turned faster than 10 000 rpm
+inline constexpr std::uint8_t memory_error = 0x10;  ///< alarm: the encoder could not load its settings from the memory
+inline constexpr std::uint8_t singleturn_error = 0x20;  ///< alarm: the encoder found its position within the turn wrong
 inline constexpr std::uint8_t under_voltage = 0x40;     ///< alarm: the inner supply is below 2.9 V
 inline constexpr std::uint8_t over_voltage = 0x80;      ///< alarm: the inner supply is above 3.7 V
-inline constexpr std::uint8_t voltage = under_voltage | over_voltage;  ///< mask of the voltage alarms
+/// mask of the two alarms about the inner supply voltage
+inline constexpr std::uint8_t voltage = under_voltage | over_voltage;
 /// Mask of the alarms that make the turns invalid.
 inline constexpr std::uint8_t turns_wrong = xc_error | multiturn_error;
 /// Mask of the alarms that can make the position within the turn unsafe.
@@ -58,9 +60,9 @@ inline constexpr unsigned multiturn_bits = 16;      ///< number of bits of the t
 inline constexpr unsigned redundant_bits = 9;       ///< number of bits of the redundant position of channel 2 (RS)
 inline constexpr std::size_t request_capacity = 4;  ///< Length of the longest request in bytes.
 inline constexpr std::size_t reply_capacity = 18;   ///< Length of the longest reply in bytes.
-/// Bytes of a request.
+/// Buffer for the bytes of a request.
 using RequestBytes = ByteBuffer<request_capacity>;
-/// Bytes of a reply.
+/// Buffer for the bytes of a reply.
 using ReplyBytes = ByteBuffer<reply_capacity>;
 
 // ---- Checksums. The document has Koopman notation: 16'hAC9A is normal 5935, 8'h97 is 2F.
@@ -81,7 +83,8 @@ inline constexpr CrcParameters crc8_msb{8, 0x2F, 0, false, false, 0};
 [[nodiscard]] constexpr std::uint16_t initial_value(Channel channel) { return channel == Channel::two ? 0xFFFF : 0; }
 
 namespace detail {
-// Returns the 16-bit CRC of 16-bit words; `swapped`: the second byte of each word enters the CRC first.
+// Returns the 16-bit CRC of bytes that are taken as 16-bit words; `swapped`: the second byte of each word enters the
+// CRC first.
 template <CrcParameters parameters>
 constexpr std::uint16_t crc_of_pairs(Channel channel, Bytes bytes, bool swapped) {
   Crc<parameters, CrcTable::nibble> crc(initial_value(channel));
@@ -94,13 +97,13 @@ constexpr std::uint16_t crc_of_pairs(Channel channel, Bytes bytes, bool swapped)
 }
 }  // namespace detail
 
-/// Returns the 16-bit CRC of a channel's bytes, computed in this bit order.
+/// Returns the 16-bit CRC of a channel's bytes, computed in the bit order `order`.
 [[nodiscard]] constexpr std::uint16_t checksum16(CrcBitOrder order, Channel channel, Bytes bytes) {
   return order == CrcBitOrder::lsb ? detail::crc_of_pairs<crc16_lsb>(channel, bytes, false)
                                    : detail::crc_of_pairs<crc16_msb>(channel, bytes, order == CrcBitOrder::word);
 }
 
-/// Returns the 8-bit CRC of `bytes`, computed in this bit order.
+/// Returns the 8-bit CRC of `bytes`, computed in the bit order `order`.
 [[nodiscard]] constexpr std::uint8_t checksum8(CrcBitOrder order, Bytes bytes) {
   return order == CrcBitOrder::lsb ? Crc<crc8_lsb, CrcTable::nibble>::of(bytes)
                                    : Crc<crc8_msb, CrcTable::nibble>::of(bytes);
@@ -114,14 +117,15 @@ constexpr std::uint16_t crc_of_pairs(Channel channel, Bytes bytes, bool swapped)
 
 // ---- Tables 3 and 12 as data: the command ids, and the parts of each channel of their replies
 
-/// Data ID: code of a request's kind (Table 3; ID 6 is in Tables 6 and 12 only).
+/// Data ID of a request: the code of what the host asks for (Table 3; ID 6 is in Tables 6 and 12 only).
 enum class DataId : std::uint8_t {
   position = 1,          ///< Position and turns, with both channels; the reply can make a safe position.
   singleturn = 2,        ///< Position within the turn, with both channels; the reply can make a safe position.
   position_short = 4,    ///< Position and turns of channel 1 alone; the reply cannot make a safe position.
   singleturn_short = 5,  ///< Position within the turn of channel 1 alone; the reply cannot make a safe position.
   calibration = 6,       ///< Position within the turn of each channel; the reply cannot make a safe position.
-  /// Never to be sent eight times in a row: that is "dynamic addressing", which is not described.
+  /// Encoder id. A host must not send it eight times in a row: that is "dynamic addressing", which the document does
+  /// not describe.
   encoder_id = 8,
   temperature = 9,
   alarms = 0xA,
@@ -132,34 +136,34 @@ enum class DataId : std::uint8_t {
   write_memory = 0xF,
 };
 
-/// Parts that a channel of a reply can carry between CF and CRC, one bit each.
+/// Parts that a channel of a reply can carry between control field (CF) and CRC, one bit for each part.
 namespace part {
-inline constexpr unsigned status = 0x0001;       ///< Part: status (SF).
-inline constexpr unsigned alarms = 0x0002;       ///< Part: alarms (ALM).
-inline constexpr unsigned singleturn = 0x0004;   ///< Part: position within the turn (ABS).
-inline constexpr unsigned multiturn = 0x0008;    ///< Part: turns (ABM).
-inline constexpr unsigned encoder_id = 0x0010;   ///< Part: encoder id (ENID).
-inline constexpr unsigned temperature = 0x0020;  ///< Part: temperature (TEMP).
-inline constexpr unsigned sequence = 0x0040;     ///< Part: sequence counter of channel 1 (SC1).
-/// Part: sequence counter of channel 2 in a byte of its own, 0 and SC2.
+inline constexpr unsigned status = 0x0001;       ///< Part of a reply: status field (SF).
+inline constexpr unsigned alarms = 0x0002;       ///< Part of a reply: alarms (ALM).
+inline constexpr unsigned singleturn = 0x0004;   ///< Part of a reply: position within the turn (ABS).
+inline constexpr unsigned multiturn = 0x0008;    ///< Part of a reply: turns (ABM).
+inline constexpr unsigned encoder_id = 0x0010;   ///< Part of a reply: encoder id (ENID).
+inline constexpr unsigned temperature = 0x0020;  ///< Part of a reply: temperature (TEMP).
+inline constexpr unsigned sequence = 0x0040;     ///< Part of a reply: sequence counter of channel 1 (SC1).
+/// Part of a reply: a byte that has only the sequence counter of channel 2 (SC2, 7 bits) and a 0.
 inline constexpr unsigned zero_sequence = 0x0080;
-/// Part: redundant position and sequence counter of channel 2 in two bytes.
+/// Part of a reply: redundant position and sequence counter of channel 2, together in two bytes.
 inline constexpr unsigned redundant_sequence = 0x0100;
-/// Part: redundant position in two bytes, RS0 and RS1, in replies to ID C.
+/// Part of a reply to data ID C: redundant position in two bytes, RS0 and RS1.
 inline constexpr unsigned redundant_alone = 0x0200;
-/// Part: redundant position in two bytes, in replies to ID 6.
+/// Part of a reply to data ID 6: redundant position in two bytes.
 inline constexpr unsigned redundant_calibration = 0x0400;
-inline constexpr unsigned memory_address = 0x0800;  ///< Part: memory address and busy bit (ADF).
-inline constexpr unsigned value = 0x1000;           ///< Part: value of the memory byte (EDF).
-/// Set of the parts that carry a redundant position.
+inline constexpr unsigned memory_address = 0x0800;  ///< Part of a reply: memory address and busy bit (ADF).
+inline constexpr unsigned value = 0x1000;           ///< Part of a reply: value of the memory byte (EDF).
+/// Mask of the parts that contain a redundant position.
 inline constexpr unsigned redundant = redundant_sequence | redundant_alone | redundant_calibration;
 }  // namespace part
 
 /// A part of a reply, with its length on the wire.
 template <unsigned part_id, std::size_t part_size>
 struct WirePart {
-  static constexpr unsigned id = part_id;         ///< Identifier of the part: a constant of the namespace `part`.
-  static constexpr std::size_t size = part_size;  ///< Length of the part in bytes.
+  static constexpr unsigned id = part_id;  ///< Identifier of this part of a reply: a constant of the namespace `part`.
+  static constexpr std::size_t size = part_size;  ///< Length in bytes of this part of a reply.
 };
 
 namespace detail {
@@ -184,8 +188,8 @@ using WireOrder =
                  WirePart<part::memory_address, 1>, WirePart<part::value, 1>>;
 }  // namespace detail
 
-/// Calls `visit(part, byte)` for each part, in the order of the wire; `byte` is the index of its first byte. Returns
-/// the index after the last part.
+/// Calls `visit(part, byte)` for each part of a channel, in the order of the wire; `byte` is the index of the part's
+/// first byte. Returns the index behind the last part.
 template <class Visit>
 constexpr std::size_t walk_parts(unsigned parts, std::size_t control_field, const Visit& visit) {
   return detail::WireOrder::walk(parts, control_field + 1, visit);
@@ -202,16 +206,17 @@ struct Layout {
         length_one(length(crc, parts_one)),
         length_two(has_two() ? length(crc, parts_two) : std::uint8_t{0}) {}
 
-  /// Returns whether the replies have channel 2.
+  /// Returns whether these replies have channel 2.
   [[nodiscard]] constexpr bool has_two() const { return two != 0; }
-  /// Returns whether a channel has a part in the set `any_of`.
+  /// Returns whether a channel of these replies has a part of the set `any_of`.
   [[nodiscard]] constexpr bool has(unsigned any_of) const { return ((one | two) & any_of) != 0; }
 
-  std::uint16_t one = 0;        ///< Set of the parts of channel 1.
-  std::uint16_t two = 0;        ///< Set of the parts of channel 2; 0: the replies have no channel 2.
+  std::uint16_t one = 0;        ///< Mask of the parts that channel 1 has in these replies.
+  std::uint16_t two = 0;        ///< Mask of the parts that channel 2 has in these replies; 0: they have no channel 2.
   std::uint8_t crc_bytes = 1;   ///< Length of the CRC of a channel in bytes, 1 or 2.
-  std::uint8_t length_one = 0;  ///< length of channel 1 in bytes, with CF and CRC
-  std::uint8_t length_two = 0;  ///< length of channel 2 in bytes, with CF and CRC; 0: none
+  std::uint8_t length_one = 0;  ///< length of channel 1 in bytes, with control field (CF) and CRC
+  /// length of channel 2 in bytes, with control field (CF) and CRC; 0: the replies have no channel 2
+  std::uint8_t length_two = 0;
 
  private:
   static constexpr std::uint8_t length(unsigned crc, unsigned parts) {
@@ -220,7 +225,7 @@ struct Layout {
 };
 
 namespace detail {
-// Layouts of replies by data ID; empty for an ID that does not exist.
+// Layouts of replies; the index is the data ID. The layout of a data ID that does not exist is empty.
 inline constexpr std::array<Layout, 16> layouts = [] {
   using part::status, part::alarms, part::singleturn, part::multiturn, part::encoder_id, part::temperature;
   using part::sequence, part::zero_sequence, part::redundant_sequence, part::redundant_alone;
@@ -245,7 +250,7 @@ inline constexpr std::array<Layout, 16> layouts = [] {
 /// Returns the layout of replies to this data ID.
 [[nodiscard]] constexpr const Layout& layout_of(DataId id) { return detail::layouts[static_cast<std::size_t>(id)]; }
 
-/// Returns the data ID in a control field, whatever its parity; nothing for an unlisted ID.
+/// Returns the data ID in the control field `field`; its parity bit is not checked. No value for an ID without layout.
 [[nodiscard]] constexpr std::optional<DataId> data_id(std::uint8_t field) {
   const std::uint8_t id = (field >> 3) & 0xF;
   if (detail::layouts[id].length_one == 0) return std::nullopt;
@@ -256,7 +261,7 @@ inline constexpr std::array<Layout, 16> layouts = [] {
 [[nodiscard]] constexpr bool is_memory_access(DataId id) {
   return id == DataId::read_memory || id == DataId::write_memory;
 }
-/// Returns whether eight requests with this data ID reset something.
+/// Returns whether eight consecutive requests with this data ID reset something: IDs B, C and D.
 [[nodiscard]] constexpr bool is_reset(DataId id) {
   return id == DataId::zero || id == DataId::clear_alarms || id == DataId::reset_multiturn;
 }
@@ -264,7 +269,7 @@ inline constexpr std::array<Layout, 16> layouts = [] {
 [[nodiscard]] constexpr bool is_safety_position(DataId id) {
   return id == DataId::position || id == DataId::singleturn;
 }
-/// Returns the data ID of a position with both channels, and turns if the encoder counts them.
+/// Returns the data ID that reads the position with both channels; it also reads the turns if the encoder counts them.
 [[nodiscard]] constexpr DataId position_id(const Profile& profile) {
   return profile.turns ? DataId::position : DataId::singleturn;
 }
@@ -282,13 +287,14 @@ inline constexpr std::array<Layout, 16> layouts = [] {
   return profile.request_crc ? 2 : 1;
 }
 
-/// Returns CF, the control field of a request: encoder address, data ID and odd parity.
+/// Returns the control field (CF) of a request: encoder address, data ID and odd parity.
 [[nodiscard]] constexpr std::uint8_t control_field(const Profile& profile, unsigned address, DataId data) {
   const auto id = static_cast<unsigned>(data);
   const unsigned covered = profile.parity_scope == ParityScope::all ? address << 4 | id : id;
   return static_cast<std::uint8_t>((address & 7) | id << 3 | (odd_parity(covered) ? 0 : 0x80));
 }
-/// Returns ENID: b7 a safety encoder, b6..5 bytes of the turns, b4..0 bits of the position.
+/// Returns the encoder id (ENID): b7 is 1 for a safety encoder, b6..5 the number of bytes of the turns, b4..0 the
+/// number of bits of the position.
 [[nodiscard]] constexpr std::uint8_t encoder_id(const Profile& profile) {
   constexpr unsigned safety = 0x80;
   const unsigned turn_bytes = profile.turns ? multiturn_bits / 8 : 0;
@@ -301,40 +307,41 @@ inline constexpr std::array<Layout, 16> layouts = [] {
 struct Request {
   DataId id = DataId::position;      ///< Data ID of the request.
   std::uint8_t encoder_address = 0;  ///< address of the encoder on the line, 0 to 7
-  std::uint8_t memory_address = 0;   ///< data IDs of memory access: address of the byte, 0 to 0x7F
-  std::uint8_t value = 0;            ///< data ID write_memory: byte to be written
+  std::uint8_t memory_address = 0;   ///< for data IDs that access the memory: address of the byte, 0 to 0x7F
+  std::uint8_t value = 0;            ///< for data ID write_memory: byte to be written
 };
 
-/// The values that each channel of a reply has for itself.
+/// Values of a reply that each of the two channels reports for itself.
 struct ChannelReply {
   std::uint8_t status = 0;      ///< status (SF): bits of the namespace `status`, in the order of the document
   std::uint8_t alarms = 0;      ///< Alarms of the channel (ALM): bits of the namespace `alarms`.
   std::uint8_t sequence = 0;    ///< sequence counter: 8 bits in channel 1 (SC1), 7 bits in channel 2 (SC2)
-  std::uint8_t encoder_id = 0;  ///< Encoder id (ENID).
+  std::uint8_t encoder_id = 0;  ///< Encoder id (ENID): kind and number of bits of the encoder.
 };
 
-/// A reply; in a decoded one, members that its data ID does not carry have their initial values.
+/// A reply of an encoder. In a decoded reply, members that its data ID does not carry have their initial values.
 struct Reply {
   DataId id = DataId::position;                   ///< Data ID of the reply.
   std::uint8_t encoder_address = 0;               ///< Address of the encoder on the line (EAD), 0 to 7.
-  ChannelReply one{};                             ///< Values of channel 1.
-  ChannelReply two{.status = status::channel_2};  ///< Values of channel 2.
-  std::uint32_t singleturn = 0;                   ///< Position within the turn, in counts (ABS).
+  ChannelReply one{};                             ///< Values that channel 1 of the reply has for itself.
+  ChannelReply two{.status = status::channel_2};  ///< Values that channel 2 of the reply has for itself.
+  std::uint32_t singleturn = 0;                   ///< Position within the turn (ABS), in counts.
   std::uint16_t multiturn = 0;                    ///< Number of turns (ABM).
-  /// Redundant position of channel 2 (RS): 9 bits, with ID 6 16 bits if `id6_rs` is bits_16.
+  /// Redundant position of channel 2 (RS): 9 bits; in replies to data ID 6 16 bits if `id6_rs` is bits_16.
   std::uint16_t redundant = 0;
-  std::int8_t temperature = 0;      ///< temperature in degC; that it is signed is assumed
+  std::int8_t temperature = 0;      ///< temperature in degC, assumed to be signed
   std::uint8_t memory_address = 0;  ///< Address of the memory byte (ADF).
   bool busy = false;                ///< Whether the memory is busy; if so, no byte was read or written.
   std::uint8_t value = 0;           ///< Value of the memory byte (EDF).
-  bool unused_bits = false;         ///< in a decoded reply: a bit that must be 0 was set
+  bool unused_bits = false;         ///< in a decoded reply: whether a bit was set that must be 0
 };
 
 // ---- Bits whose place the document leaves open
 
 namespace detail {
 
-// In T-format order b0..3 are information, b4..5 encoder errors, b6..7 communication errors.
+// Returns the status field as sent. In T-format order b0..3 are information, b4..5 encoder errors, b6..7 communication
+// errors.
 [[nodiscard]] constexpr std::uint8_t status_to_wire(const Profile& profile, std::uint8_t value) {
   if (profile.status_order == FieldOrder::document) return value;
   return static_cast<std::uint8_t>(value >> 4 | (value & 0x0C) << 2 | (value & 0x03) << 6);
@@ -344,7 +351,7 @@ namespace detail {
   return static_cast<std::uint8_t>(value << 4 | (value >> 2 & 0x0C) | value >> 6);
 }
 
-// Rotates a byte to the left by one bit if `at_b0`, so that its b7 is sent as b0.
+// If `at_b0`, rotates a byte to the left by one bit, so that its bit 7 is sent as bit 0.
 [[nodiscard]] constexpr std::uint8_t to_wire(bool at_b0, unsigned byte) {
   return std::rotl(static_cast<std::uint8_t>(byte), at_b0 ? 1 : 0);
 }
@@ -368,11 +375,11 @@ namespace detail {
 
 namespace detail {
 
-// Returns the bytes of one part as a number whose lowest byte is sent first.
+// Returns the bytes of the part `id` as a number whose lowest byte is sent first.
 template <unsigned id>
 constexpr std::uint32_t part_to_wire(const Profile& profile, const Reply& reply, const ChannelReply& channel) {
   const unsigned counter = channel.sequence & 0x7Fu;
-  // Returns the upper bits of RS, then its lowest bit RS1 with SC2.
+  // Returns two bytes: the upper bits of the redundant position (RS), then its lowest bit together with `sequence`.
   const auto redundant = [&reply](RedundantBit order, unsigned sequence) {
     const unsigned second = to_wire(order == RedundantBit::b0, (reply.redundant & 1u) << 7 | sequence);
     return reply.redundant >> 1 | second << 8;
@@ -426,7 +433,7 @@ constexpr void encode_channel(const Profile& profile, const Reply& reply, std::u
 
 }  // namespace detail
 
-/// Returns the bytes of a reply; `field` echoes the control field of the request.
+/// Returns the bytes of a reply; each channel begins with `field`, the control field of the request.
 [[nodiscard]] constexpr ReplyBytes encode_reply(const Profile& profile, const Reply& reply, std::uint8_t field) {
   ReplyBytes bytes;
   detail::encode_channel(profile, reply, field, Channel::one, bytes);
@@ -434,7 +441,7 @@ constexpr void encode_channel(const Profile& profile, const Reply& reply, std::u
   return bytes;
 }
 
-/// Returns the bytes of a reply, whose control field has the right parity.
+/// Returns the bytes of a reply that echoes a control field with a right parity bit.
 [[nodiscard]] constexpr ReplyBytes encode_reply(const Profile& profile, const Reply& reply) {
   return encode_reply(profile, reply, control_field(profile, reply.encoder_address, reply.id));
 }

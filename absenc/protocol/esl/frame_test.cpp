@@ -24,7 +24,8 @@ constexpr std::array all_ids{DataId::position,         DataId::singleturn,      
 
 constexpr std::array<std::uint8_t, 9> check_input{'1', '2', '3', '4', '5', '6', '7', '8', '9'};
 
-// Returns each combination of the open options but sequence_step, which changes no frame.
+// Returns all combinations of the options for properties that the document leaves open. Option sequence_step is left
+// out, because it changes no frame.
 std::vector<Profile> all_profiles() {
   std::vector<Profile> profiles{Profile{}};
   for (std::size_t option = 0; option < open_options; ++option) {
@@ -97,7 +98,7 @@ TEST(EslFrame, EveryFieldWithEitherParityScope) {
   }
 }
 
-// Bits of SF in both orders (Table 5).
+// Bits of the status field (SF) in both orders (Table 5).
 TEST(EslFrame, StatusBitsInBothOrders) {
   const Profile tformat{.status_order = FieldOrder::tformat};
   const std::array<std::pair<std::uint8_t, std::uint8_t>, 8> places{{{status::temperature_warning, 0x01},
@@ -204,12 +205,14 @@ TEST(EslFrame, ValidityOfEachPart) {
   EXPECT_TRUE(to_reading(short_reply).multiturn_valid);
   short_reply.one.status = status::ready | status::non_safety_error;
   EXPECT_TRUE(to_reading(short_reply).singleturn_valid());
-  // SF does not show whether the turns, Lissajous signals or overspeed cause a non-safety error.
+  // The status field does not show if turns, Lissajous signals or overspeed cause a non-safety error, so the turns may
+  // be valid or not.
   EXPECT_EQ(to_reading(short_reply).multiturn_validity(), Validity::unknown);
   EXPECT_EQ(to_reading({.id = DataId::temperature}).singleturn_bits, 0u);
 }
 
-// Every data reply has SF, only some have ALM, in each of their channels.
+// Each row lists the flags of both channels that replies to a data ID carry: all have the status field (SF), only some
+// the alarms (ALM).
 TEST(EslFrame, RepliesReportTheFlagsThatTheyCarry) {
   struct Row {
     DataId id;
@@ -227,7 +230,8 @@ TEST(EslFrame, RepliesReportTheFlagsThatTheyCarry) {
   }
 }
 
-// Table 5: with led_or_lissajous_error, a non-safety error alone means the Lissajous signals.
+// Table 5: if the alarm led_or_lissajous_error is raised and the status has only non_safety_error, the Lissajous
+// signals cause the alarm.
 TEST(EslFrame, LedAndLissajousErrorsCountForEveryId) {
   for (const auto& [error, validity] :
        {std::pair{status::safety_error, Validity::invalid}, std::pair{status::non_safety_error, Validity::valid}}) {
@@ -241,7 +245,8 @@ TEST(EslFrame, LedAndLissajousErrorsCountForEveryId) {
       EXPECT_NE(to_reading(reply).multiturn_validity(), Validity::invalid) << static_cast<int>(id);
     }
   }
-  // Two cases: alarm and non-safety error are in different channels; SF has both errors at once.
+  // In these two cases the position is not valid: alarm and non_safety_error are in different channels, or one
+  // channel's status has safety_error too.
   Reply reply = sample(DataId::position);
   reply.one = {.status = status::ready | status::non_safety_error};
   reply.two = {.status = status::channel_2 | status::ready, .alarms = alarms::led_or_lissajous_error};
@@ -252,7 +257,7 @@ TEST(EslFrame, LedAndLissajousErrorsCountForEveryId) {
   EXPECT_EQ(to_reading(reply).singleturn_validity(), Validity::invalid);
 }
 
-// The request has a right checksum but a wrong parity bit, which the encoder reports.
+// The request has a right checksum but a wrong parity bit; the encoder's reply reports the parity error.
 TEST(EslUnit, AnswerToAWrongParityBitIsARefusal) {
   const Options values = author::testing::options_of(unit, "");
   const auto field = static_cast<std::uint8_t>(control_field({}, 0, DataId::position) ^ 0x80);
@@ -267,7 +272,7 @@ TEST(EslUnit, AnswerToAWrongParityBitIsARefusal) {
     const Explanation why = unit.explain(values, Error::request_rejected, {.bytes = asked}, {.bytes = refused});
     EXPECT_NE(why.detail.find("wrong parity bit"), std::string_view::npos) << why.detail;
   }
-  // A reply that is no refusal does not give request_rejected.
+  // A reply to the same request that reports no parity error does not give request_rejected.
   reply.one.status = status::ready;
   reply.two.status = status::ready | status::channel_2;
   const ReplyBytes taken = encode_reply({}, reply, field);

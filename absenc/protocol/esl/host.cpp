@@ -18,13 +18,13 @@ constexpr unsigned safe_attempts = 6;
 
 Request request_of(const Dialog& dialog, DataId id) { return {id, dialog.format().address}; }
 
-// Stores the last valid reply, and its reading with times, in `found`.
+// Stores in `found` the last valid reply and its reading with times.
 void show_last(const Dialog& dialog, ProcedureResult& found) {
   found.show(dialog.last());
   found.reading = dialog.last_reading();
 }
 
-// Appends a description of an ENID: "24 bits and turns".
+// Appends a description of an encoder id (ENID), such as "24 bits and turns".
 void describe(Sentence& words, std::uint8_t id) {
   const std::array<char, 2> bits{static_cast<char>('0' + (id & 0x1F) / 10), static_cast<char>('0' + (id & 0x1F) % 10)};
   words.add({bits.data(), bits.size()}).add(" bits and ").add((id >> 5 & 3) != 0 ? "turns" : "no turns");
@@ -74,7 +74,7 @@ Procedure read_safely(Dialog& dialog, SafePositionResult& found) {
 
 namespace {
 
-// Appends the names of the alarms that remain after an ID C, and advice (Table 8).
+// Appends the names of the alarms that remain after a reset with data ID C; returns advice (Table 8).
 std::string_view what_remains(Sentence& words, unsigned remaining) {
   constexpr unsigned until_power_off =
       alarms::led_or_lissajous_error | alarms::overspeed | alarms::memory_error | alarms::singleturn_error;
@@ -88,7 +88,7 @@ std::string_view what_remains(Sentence& words, unsigned remaining) {
   return words.view();
 }
 
-// Returns how the reply `now` contradicts a reset; empty if it does not.
+// Returns an explanation if the reply `now`, after a reset, shows that the reset failed; otherwise an empty one.
 Explanation failed_part(Sentence& words, DataId id, const Reply& before, const Reply& now) {
   const unsigned remaining = now.one.alarms | now.two.alarms;
   if (id == DataId::clear_alarms) {
@@ -102,7 +102,8 @@ Explanation failed_part(Sentence& words, DataId id, const Reply& before, const R
   if (now.multiturn != 0) {
     return {"the turns are still not zero", "hold the shaft still, then `absenc reset-multiturn` again"};
   }
-  // Rev 1.4 of the document added a single-turn clear to ID D and left it out elsewhere.
+  // According to rev 1.4 of the document, data ID D also clears the single-turn position; other revisions and places do
+  // not say so.
   if (author::is_near(now.singleturn, before.singleturn, singleturn_bits)) return {};
   return {"the turns are zero, but the encoder has moved its single-turn zero too", "find the origin again"};
 }
@@ -121,7 +122,7 @@ Procedure reset(Dialog& dialog, ProcedureResult& found, DataId id) {
                                       : author::objection_to_moving(to_reading(first), to_reading(before));
   if (why_not.error != Error::none) co_return why_not;
   co_await author::send_in_a_row(dialog, request_of(dialog, id), reset_row);
-  // ID B writes the zero to the EEPROM, and ID D may write to it.
+  // After a reset the EEPROM is busy: data ID B writes the zero to it, and data ID D may write to it.
   const Time pause = id == DataId::clear_alarms ? reset_interval : eeprom_write_pause;
   const Reply now = co_await dialog.ask(look).repeated(attempts).after(pause).or_say(
       "all eight requests were sent, but whether the encoder obeyed could not be read");
@@ -140,7 +141,8 @@ constexpr Time busy_limit = 2 * page_time;
 
 constexpr std::string_view unknown_area = "Table 11 lists no such page and address; nothing was sent";
 
-// `after_busy`: a byte counts only after a busy reply, because another host may have requested it.
+// Sends a memory request until the memory is not busy. `after_busy`: a byte counts only after a busy reply, because
+// without one it may be a byte that another host requested.
 author::Part<Result<Reply>> when_ready(Dialog& dialog, const Request& request, bool after_busy = false) {
   const bool writes = request.id == DataId::write_memory && !selects_page(request);
   return author::until_ready<Protocol>(dialog, request,
@@ -156,7 +158,7 @@ author::Outcome failure(Error error, std::string_view words, Time hold) {
   return {error, words, {}, hold};
 }
 
-// Selects a page, waits until it is ready, and returns it.
+// Selects a memory page, waits until it is ready, and returns its number.
 author::Part<std::uint8_t> turn_to(Dialog& dialog, std::uint8_t page, std::string_view words) {
   const Request request{DataId::write_memory, dialog.format().address, page_select_address, page};
   const Result<Reply> reply = co_await when_ready(dialog, request);
@@ -212,7 +214,7 @@ Procedure write_memory(Dialog& dialog, ProcedureResult& found, Arguments argumen
   const std::uint8_t before = co_await read_byte(dialog, page, address, nothing_written);
   found.written = before != value;
   if (before == value) co_return done;
-  // A lost reply does not show whether the byte was written, but reading it back does.
+  // If the reply to the write is lost, reading the byte back shows whether it was written.
   const Request write{DataId::write_memory, dialog.format().address, address, value};
   dialog.changes();
   const Result<Reply> written = co_await when_ready(dialog, write);
@@ -239,7 +241,8 @@ Procedure select_page(Dialog& dialog, ProcedureResult& found, Arguments argument
 
 namespace {
 
-// Finds in SF whether LED or Lissajous signals raise led_or_lissajous_error, if SF decides it.
+// Finds from the status field (SF) whether LED or Lissajous signals raise led_or_lissajous_error. Returns false if SF
+// does not decide it.
 bool find_cause_in_status(ProcedureResult& found, const Reply& reply) {
   constexpr unsigned other_safety = alarms::unsafe & ~unsigned{alarms::led_or_lissajous_error};
   constexpr unsigned other_non_safety = alarms::turns_wrong | alarms::overspeed;
@@ -277,7 +280,7 @@ Procedure read_error_info(Dialog& dialog, ProcedureResult& found) {
   if (known && before->value == register_page) co_return done;
   found.page_left = register_page;
   if (!known) co_return done;
-  // The page stays selected for the next user of the encoder, so it must be verified.
+  // The memory page stays selected after the procedure, so it is read back to verify that it is the page from before.
   const Request restore{DataId::write_memory, dialog.format().address, page_select_address, before->value};
   const Result<Reply> restored = co_await when_ready(dialog, restore);
   if (restored.error() == Error::busy) co_return failure(Error::busy, {}, page_time);

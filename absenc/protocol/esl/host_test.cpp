@@ -27,7 +27,7 @@ TEST(EslHost, ReadsTheSafetyPositionInTheTimeOfTheWire) {
   EXPECT_EQ(read.reading->singleturn, 0xABCDEFu);
   EXPECT_EQ(read.reading->multiturn, 4660u);
   EXPECT_TRUE(read.reading->singleturn_valid() && read.reading->multiturn_valid && read.reading->ready);
-  // The position is finished 4.3 us after CF, which ends after one character.
+  // The encoder finishes the position 4.3 us after the request's control field, which is one character of 1 us.
   EXPECT_EQ(read.reading->latched, request_pause + 1us + 4300ns);
   EXPECT_EQ(read.reading->received, request_pause + 22us);
   EXPECT_EQ(read.numbers.at("redundant_singleturn"), 0xABCDEF >> 15);
@@ -38,7 +38,7 @@ TEST(EslHost, Id8IsNeverSentEightTimesInARow) {
   for (unsigned i = 0; i < 20; ++i) EXPECT_EQ(bench.run("encoder-id").error, Error::none);
   EXPECT_EQ(bench.violations(), 0u);
   for (unsigned i = 0; i < 8; ++i) bench.raw(Request{DataId::encoder_id});
-  ASSERT_EQ(bench.violations(), 1u);  // the virtual encoder reports the broken rule
+  ASSERT_EQ(bench.violations(), 1u);  // the virtual encoder has noticed that its host broke the rule
 }
 
 // The host pauses for at least two bits between a reply and its next request.
@@ -147,7 +147,8 @@ TEST(EslHost, DetectsStoppedSequenceCounter) {
   unsigned safe = 0;
   bench.line.on_emit = [&] {
     if (++safe == 10) {
-      bench.condition(condition::ch1_sequence, 11);  // sequence counter of channel 1 stuck at that of the last reply
+      // the sequence counter of channel 1 stays at its value in the last reply
+      bench.condition(condition::ch1_sequence, 11);
       bench.condition(condition::ch2_sequence, 11);
     }
     return safe < 20;
@@ -192,7 +193,7 @@ TEST(EslHost, SilenceIsATimeout) {
   EXPECT_TRUE(bench.run("memory-read", {0}).says("(Figure 18)"));
 }
 
-// Each of these failed checks has an error and a sentence.
+// Each row is a failed check with its error and with words of the sentence that explains it.
 TEST(EslHost, ExplainsInvalidReplies) {
   struct Row {
     const char* sentence;
@@ -223,7 +224,7 @@ TEST(EslHost, ExplainsInvalidReplies) {
   }
 }
 
-// The content of damaged characters is unknown.
+// After damaged characters the host explains nothing, because their content is unknown.
 TEST(EslHost, DoesNotExplainDamagedReplies) {
   using LinkEvent = Event<std::uint8_t>;
   const testing::Talk made(unit, testing::options_of({}), "position");

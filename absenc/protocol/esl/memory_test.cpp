@@ -21,7 +21,8 @@ TEST(EslMemory, WritesMemoryOnlyIfItDiffersAndReadsItBack) {
   const RunResult first = bench.run(write, {0x7E, 0x5A, 0});
   EXPECT_EQ(first.error, Error::none) << first.detail;
   EXPECT_EQ(first.numbers.at("written"), 1);
-  EXPECT_EQ(bench.encoder.answer_count(), 6u);  // replies to: page select, two reads, the write, and two reads after it
+  // the command gets these replies: page select, two reads, the write, and two reads after it
+  EXPECT_EQ(bench.encoder.answer_count(), 6u);
   EXPECT_EQ(*bench.encoder.stored(0, 0x7E), 0x5A);
   const RunResult same = bench.run(write, {0x7E, 0x5A, 0});
   EXPECT_EQ(same.error, Error::none);
@@ -70,7 +71,7 @@ TEST(EslMemory, RestoresThePageBefore) {
     EXPECT_EQ(bench.raw(Request{DataId::read_memory, 0, page_select_address})[2], before);
     EXPECT_EQ(bench.violations(), 0u);
   }
-  // The selected page is not reported, at the begin or at the end.
+  // The encoder does not report the selected page, either at the begin of the command or at its end.
   for (const auto& [first, last] : {std::pair{1u, 3u}, std::pair{5u, 5u}}) {
     Bench bench({}, [first = first, last = last](unsigned index, Wire& reply) {
       if (index < first || index > last) return;
@@ -118,7 +119,7 @@ TEST(EslMemory, EndsIfMemoryStaysBusy) {
   EXPECT_LT(bench.line.now(), 100ms);
 }
 
-// The temporary register may hold a byte that another host requested.
+// The encoder's temporary register may hold a byte that another host requested.
 TEST(EslMemory, IgnoresEepromByteWithoutABusyReplyBefore) {
   Bench bench({}, [](unsigned index, Wire& reply) {
     if (index == 1) reply = wire({.id = DataId::read_memory, .memory_address = 5, .value = 0x77});
@@ -143,7 +144,8 @@ TEST(EslMemory, WriteErrors) {
     reply = wire({.id = DataId::read_memory, .memory_address = 10, .value = 0x32});
   };
   for (const Row& row : {Row{0, Error::none, "", 1, cut}, Row{2, Error::none, "", 1, cut},
-                         // A cut reply to the write: reading back decides, and the write is not repeated.
+                         // If the reply to the write is cut, the host does not repeat the write; it reads the byte
+                         // back.
                          Row{3, Error::none, "", 1, cut},
                          Row{5, Error::cross_check_failed, "reading back gave another value", 1, other}}) {
     Bench bench({}, [&row](unsigned index, Wire& reply) {
@@ -182,7 +184,8 @@ TEST(EslMemory, DistinguishesLedAndLissajous) {
   }
 }
 
-// SF is ambiguous if both error bits are set and another raised alarm sets one of them.
+// The status field (SF) is ambiguous if it has both error bits and an alarm other than led_or_lissajous_error causes
+// one of them.
 TEST(EslMemory, DistinguishesLedAndLissajousOnABusByStatus) {
   constexpr int open = -1;
   struct Row {

@@ -23,7 +23,8 @@ constexpr std::size_t combinations = [] {
   return product;
 }();
 
-// Returns combination `number` of the open options but sequence_step; number 0: the defaults.
+// Returns a profile with combination `number` of the options that the document leaves open, without sequence_step.
+// Number 0 is the combination of the defaults.
 Profile nth_profile(const Profile& base, std::size_t number) {
   Profile profile = base;
   for (std::size_t i = 0; i < open_options; ++i) {
@@ -41,7 +42,8 @@ Profile with_other_parity(Profile profile) {
   return profile;
 }
 
-// The request of a capture, or the one that its reply echoes, decoded as far as a profile permits.
+// The request of a capture, decoded as far as a profile permits; without a captured request, the one that the reply
+// echoes.
 struct SentRequest {
   Request request{};
   bool parity_wrong = false;
@@ -62,7 +64,8 @@ SentRequest request_in(const Profile& profile, const Capture& capture) {
           .accepted = good || capture.request.empty()};
 }
 
-// An encoder answers only requests that it accepts.
+// Returns the check that the reply of a capture fails under this profile. An encoder answers only requests that it
+// accepts, so a reply to another request is a failure too.
 Check explain(const Profile& profile, const Capture& capture) {
   if (capture.reply.empty()) return Check::passed;
   const SentRequest asked = request_in(profile, capture);
@@ -72,7 +75,7 @@ Check explain(const Profile& profile, const Capture& capture) {
   const Check check = check_reply(as_sent, asked.request, capture.reply, reply);
   if (!asked.parity_wrong) return check;
   if (check == Check::parity_reported) {
-    // Apart from the reported error, all parts of the reply must be right.
+    // In a reply that reports a parity error, all the other parts must be right.
     reply.one.status &= static_cast<std::uint8_t>(~status::rejected);
     reply.two.status &= static_cast<std::uint8_t>(~status::rejected);
     return detail::check_content(as_sent, layout_of(reply.id), reply);
@@ -80,12 +83,13 @@ Check explain(const Profile& profile, const Capture& capture) {
   return check == Check::passed && !is_memory_access(asked.request.id) ? Check::request_not_accepted : check;
 }
 
-// How far a profile explains the captures: the first that it does not, and the failed check.
+// Result of comparing a profile with captures: the first capture that it does not explain, and the check that this
+// capture failed.
 struct Progress {
   std::size_t capture = 0;
   Check failed = Check::passed;
 
-  // A profile under which the encoder would not have answered explains least.
+  // The lowest rank is for a profile under which the encoder would not have answered the request.
   [[nodiscard]] int rank() const { return failed == Check::request_not_accepted ? 0 : static_cast<int>(failed); }
   [[nodiscard]] bool fits() const { return failed == Check::passed; }
   [[nodiscard]] bool better_than(const Progress& other) const {
@@ -103,20 +107,20 @@ Progress progress_of(const Profile& profile, std::span<const Capture> captures) 
   return {};
 }
 
-// For each value of an option: how far the best profile with this value explains the captures.
+// For each value of an option: the progress of the best profile with this value.
 using ReachedByValue = std::array<Progress, most_choices>;
 using Reached = std::array<ReachedByValue, open_options>;
 
-// Stores in `values` which values of sequence_step fit, and the first fitting one in `best`.
+// Stores in `values` which values of the option sequence_step fit the captures, and in `best` the first of them.
 void judge_sequence(Profile& best, std::span<const Capture> captures, ReachedByValue& values) {
   values.fill({});
   bool known = false;
   std::uint8_t last = 0;
-  std::uint8_t safety = 0;   // number of replies with a counter since the last received counter
-  std::uint8_t request = 0;  // number of requests since the last received counter
+  std::uint8_t safety = 0;   // number of replies with a sequence counter since the last one that was received
+  std::uint8_t request = 0;  // number of requests since the last sequence counter that was received
   for (std::size_t i = 0; i < captures.size(); ++i) {
     ++request;
-    if (captures[i].reply.empty()) {  // it is unknown whether the encoder counted the request
+    if (captures[i].reply.empty()) {  // without a reply it is unknown whether the encoder counted the request
       known = false;
       continue;
     }
@@ -163,7 +167,7 @@ bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sin
   Profile best = nth_profile(base, 0);
   bool any = false;
   Reached reached;
-  // Start value: the progress of every profile exceeds or equals it.
+  // The start value is the least progress that a profile can have.
   for (auto& option : reached) option.fill({0, Check::request_not_accepted});
   for (std::size_t number = 0; number < combinations; ++number) {
     const Profile profile = nth_profile(base, number);
@@ -175,7 +179,7 @@ bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sin
       if (progress.better_than(so_far)) so_far = progress;
     }
   }
-  // sequence_step does not change single frames, so sequences of replies must decide it.
+  // The option sequence_step does not change single frames, so only a sequence of replies can show its value.
   auto& sequence = reached[option_sequence_step];
   sequence.fill(sequence[static_cast<std::size_t>(best.sequence_step)]);
   if (any) judge_sequence(best, captures, sequence);
@@ -186,7 +190,7 @@ bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sin
 
 namespace {
 
-// Returns whether the other parity_scope explains a parity error that the encoder reports.
+// Returns whether the other value of the option parity_scope explains the parity error that the reply reports.
 bool parity_is_it(const Profile& profile, const Capture& capture) {
   const SentRequest asked = request_in(profile, capture);
   Reply reply;
@@ -214,7 +218,7 @@ Profile changed(Profile profile, const OptionValue& change) {
 
 }  // namespace
 
-// Only the reply is evidence, because the host encoded the request with the profile in use.
+// The request is no evidence, because the host encoded it with `profile`; only the reply is.
 Buffer<OptionValue, 2> find_change(const Profile& profile, Bytes reply) {
   const Capture capture{.reply = reply};
   Buffer<OptionValue, 2> found;
@@ -223,7 +227,8 @@ Buffer<OptionValue, 2> find_change(const Profile& profile, Bytes reply) {
     found.push_back({option_parity_scope, profile.parity_scope == ParityScope::all ? 0 : 1});
     return found;
   }
-  if (explain(profile, capture) == Check::passed) return found;  // the reply is valid, so no change is needed
+  // the reply is valid under this profile, so no option must change
+  if (explain(profile, capture) == Check::passed) return found;
   for (const OptionValue& one : changes.view()) {
     if (explain(changed(profile, one), capture) != Check::passed) continue;
     found.push_back(one);

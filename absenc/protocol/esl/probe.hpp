@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds the profiles that fit captured frames, which show what the document leaves open.
+// Finds the profiles (option values) that fit captured frames; they decide what the document leaves open.
 #pragma once
 
 #include <span>
@@ -9,10 +9,11 @@
 
 namespace absenc::esl {
 
-/// Finds the options that fit all captures, as Unit::probe. For sequence_step the captures must be consecutive.
+/// Finds the options that fit all captures, as Unit::probe describes. For the option sequence_step the captures must be
+/// consecutive.
 bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sink);
 
-/// Returns new values of one or two options that explain an invalid reply; empty if none do.
+/// Returns new values of one or two options under which an invalid reply is valid; empty if there are none.
 [[nodiscard]] Buffer<OptionValue, 2> find_change(const Profile& profile, Bytes reply);
 
 }  // namespace absenc::esl

@@ -17,7 +17,7 @@ struct Taken {
   Wire reply;
 };
 
-// Returns a capture of these requests to a virtual encoder of this profile, with its replies.
+// Returns a capture of these requests to a virtual encoder with this profile, and of its replies.
 std::vector<Taken> captured(const Profile& profile, const std::vector<Request>& requests) {
   testing::Bench bench(profile);
   bench.shaft.put(77, 0xABCDEF);
@@ -60,12 +60,14 @@ const std::vector<Request> everything{{DataId::position},    {DataId::temperatur
                                       {DataId::position},    {DataId::clear_alarms},
                                       {DataId::calibration}, {DataId::write_memory, 0, page_select_address, 8}};
 
-// Each value of each option is found, and is the only possible one, if the frames show it.
+// For each value of each open option, the frames of an encoder with this value must show that it is possible, and if
+// they can, that no other is.
 TEST(EslProbe, EveryValueIsFound) {
   for (std::size_t option = 0; option < open_options; ++option) {
     const std::string_view name = options.infos[option].name;
     for (std::size_t value = 0; value < options.infos[option].choices.size(); ++value) {
-      // Value `change` is never the only one, because the other values are special cases of it.
+      // Value `change` of sequence_step is never the only possible one, because the other values are special cases of
+      // it.
       if (name == "sequence_step" && value == 0) continue;
       Profile profile{.address = 1};
       options.put(profile, option, static_cast<std::int64_t>(value));
@@ -73,7 +75,7 @@ TEST(EslProbe, EveryValueIsFound) {
       SCOPED_TRACE(std::string(name) + "=" + std::string(options.infos[option].choices[value]));
       ASSERT_TRUE(result.any);
       EXPECT_TRUE(result.of[name][value].possible);
-      // The nine bits of RS may always be the top of sixteen.
+      // The value bits_9 of id6_rs is never the only possible one: the nine bits may be the top of sixteen.
       const bool sure = name != "sequence_step" && !(name == "id6_rs" && value == 1);
       if (sure) {
         EXPECT_EQ(options.get(result.best, option), static_cast<std::int64_t>(value));
@@ -123,7 +125,7 @@ TEST(EslProbe, ReportedParityErrorShowsTheScope) {
 }
 
 TEST(EslProbe, OpenOptionsAreFirst) {
-  EXPECT_EQ(open_options, 10u);  // README.md names each option
+  EXPECT_EQ(open_options, 10u);  // README.md names each of these ten options
   for (const Option& option : std::span(options.infos).subspan(open_options))
     EXPECT_FALSE(option.probeable) << option.name;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Options of ESL. README.md states how hardware shows the properties that the document leaves open.
+// Options of ESL. README.md states how a test with hardware can find the properties that the document leaves open.
 #pragma once
 
 #include <algorithm>
@@ -15,53 +15,61 @@ namespace absenc::esl {
 enum class CrcBitOrder : std::uint8_t {
   lsb,  ///< bits enter the CRC byte by byte, LSB first, as on the wire
   msb,  ///< bits enter the CRC byte by byte, MSB first
-  /// 16-bit words enter the CRC MSB first; an 8-bit CRC is computed as with msb.
+  /// 16-bit words enter the CRC MSB first; an 8-bit CRC is computed as with the value msb.
   word,
 };
 /// Order of the two bytes of a 16-bit CRC on the wire.
 enum class CrcByteOrder : std::uint8_t {
-  low,      ///< low byte first in both channels
-  high,     ///< high byte first in both channels
-  table12,  ///< as in Table 12: channel 1 low byte first, channel 2 high byte first
+  low,      ///< both channels send the low byte of the CRC first
+  high,     ///< both channels send the high byte of the CRC first
+  table12,  ///< as Table 12 draws it: low byte first in channel 1, high byte first in channel 2
 };
-/// Bit of its byte in which RS1, the lowest bit of the redundant position, is sent.
+/// Bit, b7 or b0, of a byte in which RS1, the lowest bit of the redundant position, is sent.
 enum class RedundantBit : std::uint8_t { b7, b0 };
-/// How the sequence counters SC1 and SC2 move from reply to reply.
+/// How the sequence counters SC1 and SC2 change from reply to reply.
 enum class SequenceStep : std::uint8_t {
-  change,   ///< the counter differs from that of the reply before
-  safety,   ///< the counter counts the replies to IDs 1, 2, 8 and B
-  request,  ///< the counter counts all requests
+  change,   ///< each reply has another counter value than the reply before it
+  safety,   ///< the counter counts the replies to data IDs 1, 2, 8 and B
+  request,  ///< the counter counts all requests that the encoder accepts
 };
-/// Bits that the parity bit of CF covers: the data ID, or (all) the encoder address too.
+/// Bits of the control field (CF) that its parity bit covers: the data ID alone (command), or the encoder address too
+/// (all).
 enum class ParityScope : std::uint8_t { command, all };
-/// Order of the bits in SF or ADF: that of the QS35 document, or that of Tamagawa's T-format.
+/// Order of the bits in the status field (SF) or the memory address field (ADF): that of the QS35 document, or that of
+/// Tamagawa's T-format.
 enum class FieldOrder : std::uint8_t { document, tformat };
-/// Number of bits of the redundant position in replies to ID 6.
+/// Number of bits of the redundant position in replies to data ID 6.
 enum class Id6Redundant : std::uint8_t { bits_16, bits_9 };
-/// Reaction of the virtual encoder to a wrong parity or stop bit in a request.
+/// Reaction of the virtual encoder to a request with a wrong parity or stop bit: it reports the error in its reply, or
+/// is silent.
 enum class BadRequest : std::uint8_t { report, silent };
 
 /// Properties of an encoder, and how its replies are checked: the options of ESL.
 struct Profile {
   CrcBitOrder crc_bit_order = CrcBitOrder::lsb;       ///< Order in which bits enter the CRCs.
-  CrcByteOrder crc16_byte_order = CrcByteOrder::low;  ///< Order of the bytes of 16-bit CRCs.
-  RedundantBit rs1_sc2 = RedundantBit::b7;            ///< Place of RS1 in the byte that it shares with SC2.
-  SequenceStep sequence_step = SequenceStep::change;  ///< How the sequence counters move.
+  CrcByteOrder crc16_byte_order = CrcByteOrder::low;  ///< Order of the two bytes of 16-bit CRCs on the wire.
+  /// Bit in which RS1, the lowest bit of the redundant position, is sent beside the sequence counter SC2.
+  RedundantBit rs1_sc2 = RedundantBit::b7;
+  SequenceStep sequence_step = SequenceStep::change;  ///< How the sequence counters change from reply to reply.
   ParityScope parity_scope =
-      ParityScope::command;  ///< Which bits of CF its parity bit covers: the data ID, or the encoder address too.
-  FieldOrder status_order = FieldOrder::document;  ///< Order of the bits in SF.
-  /// Order of the bits in ADF, the memory address with the busy bit.
+      /// Bits of the control field (CF) that its parity bit covers: the data ID, or the encoder address too.
+      ParityScope::command;
+  FieldOrder status_order = FieldOrder::document;  ///< Order of the bits in the status field (SF).
+  /// Order of the bits in the address field (ADF), which has the memory address and the busy bit.
   FieldOrder memory_address_order = FieldOrder::document;
-  bool request_crc = true;                      ///< whether every request has a CRC; false: only memory requests
-  RedundantBit idc_rs1 = RedundantBit::b7;      ///< Place of RS1 in its byte in replies to ID C.
-  Id6Redundant id6_rs = Id6Redundant::bits_16;  ///< Bits of the redundant position in replies to ID 6.
+  bool request_crc = true;  ///< whether every request ends with a CRC; false: only memory requests do
+  /// Bit in which RS1, the lowest bit of the redundant position, is sent in replies to data ID C.
+  RedundantBit idc_rs1 = RedundantBit::b7;
+  Id6Redundant id6_rs = Id6Redundant::bits_16;  ///< Number of bits of the redundant position in replies to data ID 6.
 
   std::uint8_t address = 0;  ///< address of the encoder on the line (EAD), 0 to 7
   bool turns = true;         ///< whether the encoder counts turns; false: a single-turn encoder
-  /// Whether other encoders share the line; if so, memory cannot be accessed (Figure 18).
+  /// Whether other encoders share the line; if they do, the memory cannot be accessed (Figure 18).
   Sharing bus = sharing_automatic;
-  bool require_forced_test = false;  ///< whether a safe position requires forced_test_passed in both channels
-  /// Largest permitted difference between RS and the top 9 bits of ABS, in 1/512 turn, 0 to 255.
+  /// whether a position counts as safe only if both channels report forced_test_passed
+  bool require_forced_test = false;
+  /// Largest permitted difference between the redundant position (RS) and the top 9 bits of the position (ABS), in
+  /// 1/512 turn, 0 to 255.
   std::uint8_t redundant_tolerance = 1;
   /// Reaction of the virtual encoder to a request with a wrong parity or stop bit.
   BadRequest bad_request = BadRequest::report;
@@ -81,7 +89,7 @@ inline constexpr Names<2> bad_request{"report", "silent"};
 }  // namespace choices
 
 namespace detail {
-// Declares an option that the document leaves open and that captured frames can show.
+// Declares an option for a property that the document leaves open and that captured frames can show.
 template <auto member, class... Choices>
 constexpr auto open_option(std::string_view name, std::string_view meaning, const Choices&... choices) {
   return author::probeable(author::option<member>(name, meaning, choices...));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Decodes and checks ESL requests and replies; Protocol is what absenc/protocol/author requires.
+// Decodes and checks ESL requests and replies. The class Protocol has the functions that absenc/protocol/author
+// requires.
 #pragma once
 
 #include <array>
@@ -15,10 +16,10 @@
 
 namespace absenc::esl {
 
-/// The first check of a reply that failed; `passed`: none did.
+/// The first check that a reply failed; `passed` if it failed none.
 enum class Check : std::uint8_t {
   passed,
-  // Checks of every frame
+  // The next checks are made for every reply.
   length,
   channel_2_missing,
   ch1_checksum,
@@ -40,7 +41,7 @@ enum class Check : std::uint8_t {
   sequences_differ,
   redundant_position,
   encoder_ids_differ,
-  // Checks of a safe position
+  // The next checks are made for a safe position only.
   not_a_safety_reply,
   ch1_not_ready,
   ch2_not_ready,
@@ -50,7 +51,7 @@ enum class Check : std::uint8_t {
   sequence_unknown,
   sequence_still,
   sequence_jumped,
-  // Reported by `probe` (probe.hpp) only
+  // Only `probe` (probe.hpp) reports the next check.
   request_not_accepted,
 };
 
@@ -58,7 +59,7 @@ enum class Check : std::uint8_t {
 struct CheckText {
   Error error;                ///< Error that the failed check gives.
   std::string_view sentence;  ///< Sentence that states the flaw of the reply.
-  std::string_view advice{};  ///< Advice that replaces the advice of the error; empty: none.
+  std::string_view advice{};  ///< Advice that replaces the general advice for the error; empty: it is not replaced.
 };
 
 /// Error and texts of each check, in the order of Check.
@@ -112,7 +113,7 @@ inline constexpr std::array<Error, check_texts.size()> check_errors = [] {
 [[nodiscard]] constexpr Error error_of(Check check) { return check_errors[static_cast<std::size_t>(check)]; }
 
 namespace detail {
-// Returns the content of a request, or of one that a reply echoes, without checking it.
+// Returns the content of `bytes`, a request or a reply that echoes one, without checking it.
 constexpr Request split_request(const Profile& profile, DataId id, Bytes bytes, bool& busy) {
   Request request{id, address_of(bytes[0])};
   if (!is_memory_access(id) || bytes.size() < 3) return request;
@@ -144,7 +145,7 @@ constexpr Request split_request(const Profile& profile, DataId id, Bytes bytes, 
 
 namespace detail {
 
-// Decodes RS from two bytes; returns the other seven bits of the second one.
+// Decodes the redundant position (RS) from two bytes; returns the other seven bits of the second byte.
 constexpr std::uint8_t split_redundant(RedundantBit order, Bytes bytes, Reply& reply) {
   const std::uint8_t second = from_wire(order == RedundantBit::b0, bytes[1]);
   reply.redundant = static_cast<std::uint16_t>(bytes[0] << 1 | second >> 7);
@@ -206,7 +207,7 @@ constexpr Check check_checksums(const Profile& profile, const Layout& layout, By
   if (two.empty()) return Check::both_checksums;
   if (one_holds) return Check::ch2_checksum;
   if (two_holds) return Check::ch1_checksum;
-  // If both CRCs fail, channel 2 may have been sent before channel 1.
+  // Both CRCs may be wrong because channel 2 was sent before channel 1.
   const Bytes all(one.data(), one.size() + two.size());
   const bool swapped = checksum_holds(profile, layout.crc_bytes, Channel::two, all.first(two.size())) &&
                        checksum_holds(profile, layout.crc_bytes, Channel::one, all.subspan(two.size()));
@@ -221,7 +222,7 @@ constexpr Check check_echo(std::uint8_t asked, std::uint8_t one, std::uint8_t tw
 
 constexpr Check check_memory(const Request& request, const Reply& reply) {
   if (reply.memory_address != request.memory_address) return Check::other_memory_address;
-  // Table 10: a busy encoder replies with the value 00; an accepted write echoes its value.
+  // Table 10: a busy encoder replies with the value 00; the reply to an accepted write echoes the written value.
   if (reply.busy) return reply.value == 0 ? Check::passed : Check::busy_with_data;
   return reply.id == DataId::write_memory && reply.value != request.value ? Check::other_value : Check::passed;
 }
@@ -247,7 +248,7 @@ constexpr Check check_content(const Profile& profile, const Layout& layout, cons
 }  // namespace detail
 
 namespace detail {
-// `asked`: control field of the request, even if its parity bit is wrong.
+// Checks and decodes a reply to `request`. `asked`: control field of the request as sent, even with a wrong parity bit.
 constexpr Check check_reply_to(const Profile& profile, const Request& request, std::uint8_t asked, Bytes bytes,
                                Reply& reply) {
   const Layout& layout = layout_of(request.id);
@@ -276,7 +277,8 @@ constexpr Check check_reply_to(const Profile& profile, const Request& request, s
   return detail::check_reply_to(profile, request, asked, bytes, reply);
 }
 
-/// Returns the refusal in a reply to a request whose parity bit alone is wrong, else `passed`.
+/// Returns the refusal that a reply states, if the request has a wrong parity bit and no other error; otherwise
+/// `passed`.
 [[nodiscard]] constexpr Check check_refusal(const Profile& profile, Bytes request, Bytes bytes) {
   if (bytes.empty()) return Check::passed;
   const Bytes sent = request.empty() ? bytes : request;
@@ -300,7 +302,8 @@ constexpr Check check_reply_to(const Profile& profile, const Request& request, s
 }
 
 namespace detail {
-// A non-safety error alone in SF means the Lissajous signals (Table 5), which are not unsafe.
+// Returns the alarms of a channel that make its position unsafe. If the status has only non_safety_error, the Lissajous
+// signals caused led_or_lissajous_error (Table 5), which is then not unsafe.
 constexpr unsigned unsafe_alarms(const ChannelReply& channel) {
   constexpr std::uint8_t errors = status::safety_error | status::non_safety_error;
   const bool lissajous = (channel.status & errors) == status::non_safety_error;
@@ -308,8 +311,8 @@ constexpr unsigned unsafe_alarms(const ChannelReply& channel) {
 }
 }  // namespace detail
 
-/// Returns the position and turns of a valid reply to `id`; not a safe position (safety.hpp). In status and alarms the
-/// flags of channel 2 are above those of channel 1.
+/// Returns the position and turns of a valid reply to data ID `id`; they are not a safe position (safety.hpp). In
+/// status and alarms of the reading, the flags of channel 2 are above those of channel 1.
 [[nodiscard]] constexpr Reading to_reading(DataId id, const Reply& reply) {
   const Layout& layout = layout_of(id);
   const std::uint8_t second = layout.has_two() ? reply.two.status : reply.one.status;
@@ -338,7 +341,7 @@ constexpr unsigned unsafe_alarms(const ChannelReply& channel) {
   }
   return reading;
 }
-/// Returns the position and turns of a valid reply, by the data ID that it carries.
+/// Returns the position and turns of a valid reply; the reply's own data ID decides which it has.
 [[nodiscard]] constexpr Reading to_reading(const Reply& reply) { return to_reading(reply.id, reply); }
 
 // ---- Protocol, for author's engine
@@ -348,7 +351,7 @@ constexpr unsigned unsafe_alarms(const ChannelReply& channel) {
   return request.id == DataId::write_memory && request.memory_address == page_select_address;
 }
 
-/// The requests of a reset (Table 4); 40 us are typical, from start to start.
+/// Rules for the requests of a reset (Table 4); 40 us from start to start are typical.
 inline constexpr author::InARow reset_row{
     .requests = reset_requests,
     .interval = reset_interval,
@@ -368,16 +371,16 @@ struct Protocol {
   using Reply = esl::Reply;
   static constexpr std::size_t longest_reply = reply_capacity;  ///< Greatest length of a reply in bytes.
 
-  /// Returns the time limits and the pause of a host.
+  /// Returns a host's timeouts and its pause between requests.
   static constexpr author::HostTimes host_times(const Profile&) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit, .pause = request_pause};
   }
-  /// Returns how a request is sent; after memory requests the encoder may be busy.
+  /// Returns how a request is sent and repeated; after memory requests the encoder may be busy.
   static constexpr author::Manner manner(const Profile&, const Request& request) {
     const Time busy = selects_page(request) ? page_time : is_memory_access(request.id) ? eeprom_read_pause : Time{};
     return {.pause = busy, .hold = busy};
   }
-  /// Returns the length in bytes of the request that begins with `begin`; 0: wrong parity or ID.
+  /// Returns the length in bytes of the request that begins with `begin`; 0 if its parity bit or its data ID is wrong.
   static constexpr std::size_t request_size(const Profile& profile, Bytes begin) {
     const std::optional<DataId> id = data_id(begin[0]);
     if (!id || begin[0] != control_field(profile, address_of(begin[0]), *id)) return 0;
@@ -386,13 +389,13 @@ struct Protocol {
   /// Returns the length in bytes of the reply to `request`.
   static constexpr std::size_t reply_size(const Profile&, const Request& request) { return reply_length(request.id); }
   static constexpr auto encode = encode_request;  ///< returns the bytes of a request
-  /// Decodes a request; returns it or the error of the first failed check.
+  /// Decodes a request; returns the request, or the error of the first failed check.
   static constexpr auto decode_request = esl::decode_request;
   /// Checks and decodes a reply. Returns the reply, or the error of the first failed check.
   static constexpr auto decode = decode_reply;
-  /// Returns the position and turns of a valid reply; without turns if the profile has none.
+  /// Returns the position and turns of a valid reply; no turns if the profile's encoder counts none.
   static constexpr Reading reading(const Profile& profile, const Request& request, const Reply& reply) {
-    // The ID of the request is used, because it may be known at compile time.
+    // The data ID is taken from the request, where the compiler may know it.
     Reading reading = to_reading(request.id, reply);
     if (!profile.turns) reading.multiturn_bits = 0;
     if (!profile.turns) reading.multiturn_valid = false;
@@ -402,9 +405,9 @@ struct Protocol {
   static constexpr std::size_t expected(const Profile& profile, const Request& request, Bytes) {
     return reply_size(profile, request);
   }
-  /// Returns false: after any error of a reply more bytes may follow.
+  /// Returns false: a reply with any error may be incomplete, so the host awaits more bytes.
   static constexpr bool is_whole(const Profile&, Error) { return false; }
-  static constexpr auto latched = latch_time;  ///< returns the typical time of the latch
+  static constexpr auto latched = latch_time;  ///< returns the typical time at which the encoder latched the position
 };
 
 /// Conversation that reads a position with a constant profile and request.

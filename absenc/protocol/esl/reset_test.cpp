@@ -32,7 +32,7 @@ TEST(EslReset, Resets) {
   EXPECT_EQ(after.reading->multiturn, 0u);
   EXPECT_EQ(after.reading->singleturn, 0u);
   EXPECT_EQ(bench.violations(), 0u);
-  // The zeros of both channels survive power off.
+  // The zeros of both channels must survive power off.
   bench.restart();
   EXPECT_EQ(bench.read().singleturn, 0u);
   EXPECT_EQ(bench.read().redundant, 0u);
@@ -53,7 +53,7 @@ TEST(EslReset, ResetKeepsItsTimes) {
     });
     EXPECT_EQ(bench.run(command).error, Error::none);
     ASSERT_EQ(starts.size(), 8u);
-    // The host keeps 40 us from the end of a request, which lasts 2 us.
+    // The host waits 40 us from the end of each request, which lasts 2 us, to the next.
     for (std::size_t i = 1; i < 8; ++i) EXPECT_EQ(starts[i] - starts[i - 1], 42us);
     ASSERT_EQ(looks.size(), 3u);
     const Time reply = 18us + answer_time + 2us;
@@ -111,7 +111,7 @@ TEST(EslReset, SendsNoResetToTurningOrStartingEncoder) {
     const RunResult zero = bench.run("zero");
     EXPECT_EQ(zero.error, Error::not_still);
     EXPECT_TRUE(zero.says("nothing was changed"));
-    EXPECT_EQ(bench.encoder.answer_count(), 2u);  // only two positions were read
+    EXPECT_EQ(bench.encoder.answer_count(), 2u);  // the host only read two positions and sent no reset
   }
   Bench starting;
   starting.restart(testing::PowerOn::real);
@@ -120,7 +120,7 @@ TEST(EslReset, SendsNoResetToTurningOrStartingEncoder) {
   EXPECT_TRUE(zero.says("not ready"));
 }
 
-// A zero survives power off, so none may be set at an invalid position.
+// The zero survives power off, so the host must not set it at an invalid position.
 TEST(EslReset, SendsNoZeroAtInvalidPosition) {
   Bench bench;
   bench.shaft.put(7, 1'000'000);
@@ -132,7 +132,7 @@ TEST(EslReset, SendsNoZeroAtInvalidPosition) {
   EXPECT_EQ(bench.encoder.memory_version(), 0u);
 }
 
-// Without repetitions, replies 2 to 9 answer the reset and reply 10 verifies it.
+// If no exchange is repeated, replies 2 to 9 answer the reset and reply 10 verifies it.
 TEST(EslReset, LostReplyStopsAResetUnlessItIsTheLast) {
   struct Row {
     unsigned first;

@@ -17,7 +17,7 @@ class SafePosition {
   [[nodiscard]] constexpr std::uint32_t singleturn() const { return singleturn_; }
   /// Returns the address of the encoder on its line, 0 to 7.
   [[nodiscard]] constexpr std::uint8_t encoder_address() const { return encoder_address_; }
-  /// Returns the time taken as the latch of the position: see `latch_time`.
+  /// Returns the time at which the encoder is taken to have latched the position: see `latch_time`.
   [[nodiscard]] constexpr Time latched() const { return latched_; }
 
  private:
@@ -32,25 +32,24 @@ class SafePosition {
 
 /// Result of judging a reply: a safe position, or the check that failed.
 struct SafetyVerdict {
-  std::optional<SafePosition> position{};  ///< safe position; nothing unless `failed` is Check::passed
-  Check failed = Check::passed;            ///< First check that failed; Check::passed: none.
+  std::optional<SafePosition> position{};  ///< safe position; no value unless `failed` is Check::passed
+  Check failed = Check::passed;            ///< First check that failed; Check::passed if none failed.
 };
 
-/// Decides from consecutive replies of one encoder which positions are safe.
-///
-/// The first good reply after the start or an error gives no safe position.
+/// Decides from consecutive replies of one encoder which positions are safe. The first good reply after the start or
+/// after an error gives no safe position yet.
 class SafetyMonitor {
  public:
   /// Constructs a monitor for an encoder of this profile.
   constexpr explicit SafetyMonitor(const Profile& profile) : profile_(profile) {}
 
-  /// Returns the data ID for the next request; ignores `wanted` while the monitor does not trust the line.
+  /// Returns the data ID for the next request: `wanted` if the last replies were good, otherwise 1 and 2 in turn.
   [[nodiscard]] constexpr DataId next_id(DataId wanted = DataId::position) const {
     if (trust_ == Trust::full) return wanted;
     return last_id_ == DataId::position ? DataId::singleturn : DataId::position;
   }
 
-  /// Judges the reply `bytes` to `request`, which ended at `sent_at`.
+  /// Judges the reply `bytes` to `request`; the request ended at `sent_at`.
   constexpr SafetyVerdict judge(const Request& request, Bytes bytes, Time sent_at) {
     Reply reply;
     Check check = check_reply(profile_, request, bytes, reply);
@@ -65,13 +64,13 @@ class SafetyMonitor {
     return {.position = SafePosition(reply, latch_time(profile_, sent_at))};
   }
 
-  /// Notes that `request` got no reply. The monitor no longer trusts the line then.
+  /// Notes that `request` got no reply. After that the next good reply gives no safe position.
   constexpr void missed(const Request& request) {
     trust_ = Trust::none;
     last_id_ = request.id;
   }
 
-  /// Notes that the encoder answered a request with `id` that is not judged.
+  /// Notes that the encoder answered a request with data ID `id` whose reply is not judged.
   constexpr void other_exchange(DataId id) {
     if (profile_.sequence_step == SequenceStep::request || has_sequence(id)) ++step_;
   }
@@ -111,7 +110,7 @@ class SafetyMonitor {
   DataId last_id_ = DataId::position;
   DataId baseline_id_ = DataId::position;
   std::uint8_t last_sequence_ = 0;
-  std::uint8_t step_ = 1;  // how far the sequence counter must have moved at the next judged reply
+  std::uint8_t step_ = 1;  // number of steps by which the sequence counter must have moved at the next judged reply
 };
 
 }  // namespace absenc::esl

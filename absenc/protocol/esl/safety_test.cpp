@@ -19,7 +19,7 @@ namespace {
 
 using testing::Wire;
 
-/// Faults inside the encoder: conditions with their values.
+/// Faults inside the encoder: indexes of conditions with their values.
 using Faults = std::vector<std::pair<condition::Index, std::int64_t>>;
 
 static_assert(!std::is_default_constructible_v<SafePosition>);
@@ -30,7 +30,7 @@ void print(const char* kind, unsigned tried, unsigned accepted) {
   std::printf("%-58s %7u tried %6u accepted\n", kind, tried, accepted);
 }
 
-/// An encoder with its monitor and without a line; the shaft stays where the test puts it.
+/// A virtual encoder with its SafetyMonitor and without a line; the shaft stays where the test puts it.
 class Monitored {
  public:
   explicit Monitored(const Profile& profile = {}) : profile_(profile), encoder(profile, shaft), monitor(profile) {
@@ -111,7 +111,7 @@ TEST(EslSafety, EveryCheckHasAName) {
     const SafetyVerdict verdict = pair.next();
     EXPECT_EQ(verdict.failed, row.failed) << text_of(verdict.failed).sentence << " / " << text_of(row.failed).sentence;
     EXPECT_FALSE(verdict.position.has_value());
-    // After an error one valid reply is not enough for a safe position.
+    // After an error, one valid reply does not yet give a safe position.
     pair.heal();
     EXPECT_EQ(pair.next().failed, Check::sequence_unknown);
     EXPECT_EQ(pair.next().failed, Check::passed);
@@ -135,7 +135,7 @@ TEST(EslSafety, OtherRepliesAreCountedAsTheProfileSays) {
       pair.monitor.other_exchange(other);
       EXPECT_EQ(pair.next().failed, Check::passed) << static_cast<int>(step) << " " << static_cast<int>(other);
     }
-    pair.reply_to(DataId::position);  // the encoder sends a reply that the host does not receive
+    pair.reply_to(DataId::position);  // the encoder sends a reply here that the host does not receive
     EXPECT_EQ(pair.next().failed, step == SequenceStep::change ? Check::passed : Check::sequence_jumped);
   }
   EXPECT_EQ(Monitored().judge(DataId::singleturn_short, {}).failed, Check::length);
@@ -143,7 +143,8 @@ TEST(EslSafety, OtherRepliesAreCountedAsTheProfileSays) {
 
 // ---- The campaign
 
-// Returns the number of accepted replies; raises `off` to their largest error.
+// Returns the number of replies that the monitor accepts under a faulty condition; raises `off` to the largest error of
+// their positions, in counts.
 unsigned accepted_with(condition::Index index, std::int64_t value, unsigned exchanges, std::int64_t& off) {
   Monitored pair;
   pair.trust();
@@ -159,7 +160,7 @@ unsigned accepted_with(condition::Index index, std::int64_t value, unsigned exch
 }
 
 TEST(EslSafetyCampaign, StuckCountersAndPositionsOfOneChannel) {
-  constexpr unsigned each = 600;  // number of exchanges: more than the counters take to wrap
+  constexpr unsigned each = 600;  // number of exchanges for each fault; the sequence counters wrap within them
   for (const bool second : {false, true}) {
     const auto of_it = [second](condition::Index first) {
       return static_cast<condition::Index>(first + (second ? 1 : 0));
@@ -174,7 +175,7 @@ TEST(EslSafetyCampaign, StuckCountersAndPositionsOfOneChannel) {
     unsigned tried = 0;
     unsigned near = 0;
     off = 0;
-    // Each value of the top 9 bits occurs twice.
+    // Stuck positions in steps that take each value of the top 9 bits twice.
     for (std::uint32_t stuck = 0; stuck < 0x1000000; stuck += 0x4001, ++tried) {
       const bool is_near = std::abs(wrapped_difference(stuck >> 15, 0x123456 >> 15, 9)) <= 1;
       (is_near ? near : accepted) += accepted_with(of_it(condition::ch1_stuck), stuck, 4, off);
@@ -194,7 +195,7 @@ TEST(EslSafetyCampaign, StuckCountersAndPositionsOfOneChannel) {
   EXPECT_EQ(accepted, 0u);
 }
 
-// A byte of a reply to ID 1; `seen`: bits that the checks detect when they are stuck.
+// A byte of a reply to data ID 1; `seen` is the mask of the bits that the checks detect when they are stuck.
 struct StuckField {
   const char* name;
   std::size_t byte;
@@ -206,20 +207,20 @@ constexpr std::array<StuckField, 14> stuck_fields{{
     {"CF1", 0, 0xFF},
     {"SF1", 1, seen_status},
     {"ALM1", 2, alarms::unsafe},
-    {"ABS0", 3, 0},  // undetected: these bits are below the resolution of channel 2
-    {"ABS1", 4, 0},  // undetected: below the resolution of channel 2, or within the tolerance
+    {"ABS0", 3, 0},  // ABS0 is undetected, because its bits are below the resolution of channel 2
+    {"ABS1", 4, 0},  // ABS1 is undetected: its bits are below the resolution of channel 2 or within the tolerance
     {"ABS2", 5, 0xFF},
-    {"ABM0", 6, 0},  // undetected: turns are no part of a safe position
+    {"ABM0", 6, 0},  // a stuck turn counter is undetected, because a safe position has no turns
     {"ABM1", 7, 0},
-    {"SC1", 8, 0x7F},  // the top bit is undetected, because SC2 has seven bits
+    {"SC1", 8, 0x7F},  // the top bit of SC1 is undetected, because SC2 has seven bits
     {"CF2", 11, 0xFF},
     {"SF2", 12, seen_status},
     {"ALM2", 13, alarms::unsafe},
     {"RS0", 14, 0xFF},
-    {"RS1, SC2", 15, 0x7F},  // RS1 is undetected, because it is within the tolerance
+    {"RS1, SC2", 15, 0x7F},  // the bit RS1 is undetected, because it is within the tolerance
 }};
 
-// Returns the reply with one bit stuck and the CRC of its channel right.
+// Returns the reply with one bit set to `value`; the CRC of its channel is made right again.
 Wire stuck(Wire reply, std::size_t byte, unsigned bit, bool value) {
   const auto mask = static_cast<std::uint8_t>(1u << bit);
   reply[byte] = static_cast<std::uint8_t>(value ? reply[byte] | mask : reply[byte] & ~mask);
@@ -233,7 +234,7 @@ Wire stuck(Wire reply, std::size_t byte, unsigned bit, bool value) {
   return reply;
 }
 
-// Counts accepted replies in which one bit is stuck.
+// Counts how many replies with one stuck bit the monitor accepts.
 TEST(EslSafetyCampaign, EveryBitOfEveryFieldStuckAt0AndAt1) {
   sim::Random random(7);
   for (const StuckField& field : stuck_fields) {
@@ -348,7 +349,7 @@ TEST(EslSafetyCampaign, ReplaysAndDelays) {
     print(step == SequenceStep::change ? "an older reply once (cannot be seen)" : "an older reply once", 990, older);
     EXPECT_EQ(older, step == SequenceStep::change ? 990u : 0u);
 
-    // Every reply is delivered one cycle late, so the first cycle has none.
+    // Here the host gets every reply one cycle late, so in the first cycle it gets none.
     unsigned late = 0;
     pair.trust();
     Wire held = pair.reply_to(pair.monitor.next_id());
@@ -364,7 +365,7 @@ TEST(EslSafetyCampaign, ReplaysAndDelays) {
   }
 }
 
-// Random bytes pass both CRCs about once in 2^32 times.
+// Random bytes pass the CRCs of both channels about once in 2^32 times.
 TEST(EslSafetyCampaign, NoiseOfTheRightLength) {
   sim::Random random(1);
   Monitored pair;

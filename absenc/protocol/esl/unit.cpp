@@ -60,7 +60,7 @@ constexpr std::string_view no_turns(const Profile& profile) {
 
 // ---- Errors
 
-// Returns the request of an exchange; without `request`, the one that the reply echoes; or an error.
+// Returns the request of an exchange. If `request` is empty, returns the request that the reply echoes, or an error.
 constexpr Result<Request> request_behind(const Profile& profile, Bytes request, Bytes reply) {
   if (!request.empty()) return decode_request(profile, request);
   const auto id = data_id(reply[0]);
@@ -69,7 +69,7 @@ constexpr Result<Request> request_behind(const Profile& profile, Bytes request, 
   return detail::split_request(profile, *id, reply, busy);
 }
 
-// Returns the check of the reply that explains `error`, or `passed`.
+// Returns the failed check of the reply that gives the error `error`; `passed` if there is none.
 Check check_of(const Profile& profile, Error error, Bytes request, Bytes reply) {
   if (reply.empty()) return Check::passed;
   if (const Check refusal = check_refusal(profile, request, reply); refusal != Check::passed) return refusal;
@@ -110,7 +110,7 @@ void put_nodes(FieldSink& sink, const Profile&, const Nodes& nodes) {
     if (reply) sink.put_reading(to_reading(*reply));
   }
 }
-// Writes an explanation of the last exchange, if there is one.
+// Writes an explanation of the last exchange of `host`, if there is one.
 void tell(Sentence& words, const HostOf<Protocol>& host) {
   const Profile& profile = host.format();
   const Bytes request = host.exchange().sent;
@@ -136,7 +136,7 @@ void tell(Sentence& words, const HostOf<Protocol>& host) {
 }
 Explanation explain_reply(const Profile& profile, Error error, Bytes request, Bytes reply) {
   const Check check = check_of(profile, error, request, reply);
-  if (check == Check::length) return {};  // the error's own text is enough
+  if (check == Check::length) return {};  // for a wrong length, the general text of the error is enough
   return {.detail = text_of(check).sentence};
 }
 
@@ -216,7 +216,7 @@ BitRanges bits_in(const Options& values, Frame, Frame reply, const FieldInfo& fi
 constexpr std::size_t size_of_reply(const Profile& profile, Bytes begin) {
   return Protocol::request_size(profile, begin) == 0 ? 0 : reply_length(*data_id(begin[0]));
 }
-// Returns the refusal that the reply states, or otherwise `error`.
+// Returns the error of the refusal that the reply states; if it states none, returns `error`.
 constexpr Error answer_to_bad(const Profile& profile, Bytes request, Error error, Bytes reply) {
   const Check refusal = check_refusal(profile, request, reply);
   return refusal == Check::passed ? error : error_of(refusal);

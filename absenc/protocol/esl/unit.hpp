@@ -6,7 +6,7 @@
 
 namespace absenc::esl {
 
-extern constinit const Unit unit;   ///< Descriptor of ESL.
-extern const Clauses unit_clauses;  ///< The demands of the protocol's document.
+extern constinit const Unit unit;   ///< Protocol unit of ESL.
+extern const Clauses unit_clauses;  ///< The clauses of the ESL document, for conformance tests of encoders and hosts.
 
 }  // namespace absenc::esl

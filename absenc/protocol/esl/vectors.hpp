@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Test vectors of ESL; each is decoded at compile time.
+// Test frames of ESL; the compiler decodes each of them.
 #pragma once
 
 #include <array>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds in a capture the status that a host reads after a position with the error bit: only both together show whether
-// the position is valid.
+// Joins, in a capture, a position whose reply has the error bit with the status that the host reads after it: only both
+// together show whether the position is valid.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +10,8 @@
 
 namespace absenc::hiperface {
 
-/// Joins a position with the error bit to the status replies of its encoder that follow directly, until a code comes
-/// again or is no alarm. Each joined status makes a composed frame.
+/// Joins a captured position with the error bit to the status replies of the same encoder that follow it directly. It
+/// stops when a status code comes again or is no alarm. With each joined status reply it makes a composed frame.
 class AlarmFollower final : public Follower {
  public:
   /// Creates a follower for encoders with this format.
@@ -37,12 +37,14 @@ class AlarmFollower final : public Follower {
     const std::uint32_t alarm = alarm_of(static_cast<std::uint8_t>(got->value));
     is_complete_ = (alarm & ~alarms_) == 0;
     alarms_ |= alarm;
-    if (alarms_ == 0) return;  // the error bit may be that of an earlier request
+    // without an alarm, the error bit may be that of an earlier request, so no frame is composed
+    if (alarms_ == 0) return;
     request_.append(request);
     reply_.append(reply);
     is_new_ = true;
   }
-  /// Does nothing: a host repeats a damaged request for the status, and its reply still belongs to the position.
+  /// Does nothing when an exchange is lost: a host repeats a damaged request for the status, and its reply still
+  /// belongs to the position.
   void lose() override {}
   bool take(Composed& one) override {
     if (!is_new_) return false;
@@ -53,12 +55,13 @@ class AlarmFollower final : public Follower {
 
  private:
   Format format_;
-  RequestBytes request_;  // request for the position with those for the status; empty: no position waits for a status
+  // requests for the position and the status; empty while there is no position with the error bit
+  RequestBytes request_;
   ReplyBytes reply_;
-  std::uint32_t alarms_ = 0;  // alarms that the joined replies name
+  std::uint32_t alarms_ = 0;  // mask of the alarms in the joined status replies
   std::uint64_t first_ = 0;   // number of the exchange with the position
-  bool is_complete_ = false;  // whether a code came again or was no alarm
-  bool is_new_ = false;       // whether the last exchange completed a composed frame
+  bool is_complete_ = false;  // whether a status code came again or was no alarm, so that no further status is joined
+  bool is_new_ = false;       // whether the last exchange has completed a composed frame
 };
 
 }  // namespace absenc::hiperface

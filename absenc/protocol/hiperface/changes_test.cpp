@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests that each change of an encoder is verified: lost replies, requests that the encoder ignores, and what a host
-// that does not know the resolution sets.
+// Tests that the host verifies each change of an encoder: if the reply is lost, if the encoder ignores the request, and
+// if the host does not know the encoder's resolution.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,7 +27,7 @@ Wire framed(Wire bytes) {
 struct Change {
   std::string_view command;
   std::vector<std::int64_t> arguments;
-  std::uint8_t code;  // of the request that changes the encoder
+  std::uint8_t code;  // code of the request that changes the encoder
 };
 const std::vector<Change> changes{
     {"zero", {}, 0x43},
@@ -42,7 +42,8 @@ const std::vector<Change> changes{
     {"set-baud", {38400}, 0x57},
 };
 
-// Makes the encoder take requests with this command for unknown ones, and the host take the refusal for a reply.
+// Makes the encoder refuse requests with this command code as unknown, and replaces the refusal by a valid reply. So
+// the host believes that the encoder has executed the request.
 void ignore(Bench& bench, std::uint8_t code, std::uint8_t subject) {
   bench.tampered.requests([code](unsigned, Wire& received) {
     if (received == Wire{code}) received[0] = 0;
@@ -55,11 +56,12 @@ void ignore(Bench& bench, std::uint8_t code, std::uint8_t subject) {
   });
 }
 
-// The encoder may still be storing when its reply was lost or damaged: the host waits before it reads back.
+// After a lost or damaged reply the encoder may still be storing, so the host waits before it reads back.
 TEST(HiperfaceChanges, LostOrDamagedReplyIsDecidedByReadingBack) {
   for (const bool lost : {true, false}) {
     for (const Change& change : changes) {
-      if (change.code == 0x4F) continue;  // its second request shows whether the encoder has the new code
+      // the command 4F (access code) has no reading back; its second request shows whether the encoder has the new code
+      if (change.code == 0x4F) continue;
       SCOPED_TRACE(change.command);
       Bench bench(unit, known);
       bench.shaft.put(9, 0x4000'0000);
@@ -79,11 +81,11 @@ TEST(HiperfaceChanges, LostOrDamagedReplyIsDecidedByReadingBack) {
 }
 TEST(HiperfaceChanges, IgnoredRequestIsFailureWithoutChange) {
   for (const Change& change : changes) {
-    if (change.code == 0x4F) continue;  // no request reads an access code
+    if (change.code == 0x4F) continue;  // the access code (command 4F) cannot be read back
     SCOPED_TRACE(change.command);
     Bench bench(unit, known);
     bench.shaft.put(9, 0x4000'0000);
-    bench.run("count-up");  // with a counter of 0, an ignored clear would not show
+    bench.run("count-up");  // the counter must not be 0, or else it would not show that the encoder ignored the clear
     ignore(bench, change.code,
            change.code == 0x57 ? 0xE6 : static_cast<std::uint8_t>(change.arguments.empty() ? 0 : change.arguments[0]));
     const Talk<std::uint8_t> talk(unit, bench.options, change.command, change.arguments);
@@ -126,7 +128,7 @@ TEST(HiperfaceChanges, PositionThatMayBeInvalidIsNotChanged) {
   Bench bench(unit, known);
   bench.device.raise_alarms(alarm_of(0x1E));
   bench.tampered.replies([](unsigned, Wire& reply) {
-    if (reply[1] == 0xD0) reply = framed({0x40, 0xD0, 0x77});  // in no source
+    if (reply[1] == 0xD0) reply = framed({0x40, 0xD0, 0x77});  // status code 77 (hex) is in no source
   });
   for (const char* const name : {"zero", "reset-multiturn"}) {
     const Talk<std::uint8_t> talk(unit, bench.options, name);
@@ -136,7 +138,7 @@ TEST(HiperfaceChanges, PositionThatMayBeInvalidIsNotChanged) {
 }
 TEST(HiperfaceChanges, BaudRateThatTakesEffectAfterResetIsWaitedFor) {
   Bench bench(unit, known);
-  bench.device.raise_alarms(alarm_of(0x1D));  // a reset ends this alarm
+  bench.device.raise_alarms(alarm_of(0x1D));  // a reset of the encoder ends this alarm
   ignore(bench, 0x57, 0xE6);
   bench.tampered.replies([](unsigned nth, Wire& reply) {
     if (reply[1] == 0xD0) reply = framed({0x40, 0x57, 0xE6});
@@ -145,7 +147,7 @@ TEST(HiperfaceChanges, BaudRateThatTakesEffectAfterResetIsWaitedFor) {
   const RunResult failed = bench.run("set-baud", {38400});
   EXPECT_EQ(failed.error, Error::cross_check_failed);
   EXPECT_TRUE(failed.says("after a reset")) << failed.detail;
-  // Two times three requests at the new rate are not answered, and the reset takes 500 ms.
+  // The encoder does not answer two times three requests at the new rate, and the reset takes 500 ms.
   EXPECT_GE(failed.took, 800ms);
   bench.tampered.replies({});
   EXPECT_EQ(bench.run("status").numbers.at("alarms"), 0);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The clauses of HIPERFACE for encoders and hosts. Paragraphs are those of the unit's README, which has the sources.
+// The clauses of HIPERFACE for encoders and hosts, for conformance tests. Paragraphs are those of the unit's README,
+// which has the sources.
 #include <array>
 
 #include "absenc/protocol/clause.hpp"
@@ -8,7 +9,7 @@
 namespace absenc::hiperface {
 namespace {
 
-/// Clauses for encoders.
+/// Clauses of HIPERFACE for encoders.
 constexpr auto clauses = std::array{
     Clause{"answer", "Frames", "a request is answered", Demand::answered},
     Clause{"answer-time", "Times", "the reply begins within 50 ms and 5 characters, as drivers wait", Demand::in_time},
@@ -39,7 +40,7 @@ constexpr auto clauses = std::array{
            .verb = Verb::reset_multiturn},
 };
 
-/// Clauses for hosts.
+/// Clauses of HIPERFACE for hosts.
 constexpr std::array<HostClause, 4> host_clauses{{
     {"asks", "Frames", "requests are as drawn", HostDemand::asks},
     {"silence", "Times", "after no reply it asks again", HostDemand::after_silence},

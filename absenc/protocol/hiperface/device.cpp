@@ -9,9 +9,9 @@
 namespace absenc::hiperface {
 
 namespace {
-// Most bytes of a data field that the virtual encoder sends in one reply.
+// Greatest number of bytes of a data field that the virtual encoder sends in one reply.
 constexpr std::size_t most_read = 56;
-// Serial number and program version of the virtual encoder, cut or filled with spaces to the lengths of the format.
+// Serial number and program version of the virtual encoder. The format's lengths cut them or fill them with spaces.
 constexpr std::string_view serial_number = "VIRTUAL01";
 constexpr std::string_view version = "absenc HIPERFACE 1.0";
 
@@ -23,7 +23,7 @@ void append_text(FieldBytes& bytes, std::string_view text, std::size_t size) {
 VirtualEncoder::VirtualEncoder(const Format& format, const Shaft& shaft)
     : Responder(Protocol::device_times(format)), format_(format), shaft_(&shaft) {}
 
-// A memory from a file may have any content.
+// A memory from a file may hold an invalid address or baud rate; the format's values then replace them.
 void VirtualEncoder::started(Time) {
   const bool has_address = address() >= first_address && address() <= last_address;
   const bool has_rate = (interface_setting() & rate_bits) < rates.size();
@@ -83,7 +83,7 @@ bool VirtualEncoder::is_refused(Flaw flaw, Bytes heard) {
   if (flaw == Flaw::damaged) {
     refusal_ = refusal::parity;
   } else if (heard.size() < 2) {
-    return false;  // a single byte may be noise
+    return false;  // a single byte is not refused, because it may be noise
   } else if (flaw == Flaw::cut_short) {
     refusal_ = refusal::length;
   } else {
@@ -195,7 +195,8 @@ std::size_t VirtualEncoder::free_memory() const {
   return user_fields * field_capacity - used;
 }
 
-// Returns why a request must not access its bytes of a data field with this status, apart from `writable`; 0: it may.
+// Returns the status code that refuses access to a data field with this status: it is missing, the access code is
+// wrong, or the bytes are outside it. Returns 0 if the bytes may be read.
 VirtualEncoder::StatusCode VirtualEncoder::access(const Request& request, std::uint8_t status) const {
   if (field_size(status) == 0) return refusal::no_field;
   const std::size_t size = request.subject == description_field ? description_size : field_size(status);
@@ -282,8 +283,8 @@ std::uint32_t VirtualEncoder::alarms_now() const {
   return raised() | (temperature_ > critical_temperature ? alarm_of(0x1E) : 0);
 }
 
-// Returns the status code of one alarm; 0: there is none. Each request gets the next one, after the last one the first
-// again.
+// Returns the status code of one raised alarm; 0 if none is raised. Successive calls return the alarms one after the
+// other, and then begin again.
 VirtualEncoder::StatusCode VirtualEncoder::status_now() {
   const std::uint32_t now = alarms_now() & all_alarms;
   if (now == 0) return 0;

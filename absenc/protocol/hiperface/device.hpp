@@ -29,17 +29,18 @@ class VirtualEncoder final : public author::Responder {
   Step<std::uint8_t> next(Time now) override;
 
  private:
-  // Layout of the memory. Each setting is stored as the exclusive OR with its value at shipping, so that an empty
-  // memory is that of a new encoder.
+  // The next constants are the layout of the memory. Each setting is stored as the exclusive OR with its value at
+  // shipping, so that an empty memory is that of a new encoder.
   static constexpr std::size_t address_at = 0;
   static constexpr std::size_t interface_at = 1;
-  static constexpr std::size_t codes_at = 2;   // access codes 0 to 3
-  static constexpr std::size_t offset_at = 6;  // position minus that of the shaft, 4 bytes
+  static constexpr std::size_t codes_at = 2;  // index of the access codes 0 to 3 in the memory, 1 byte each
+  // position that the encoder sends, minus the position of the shaft; 4 bytes
+  static constexpr std::size_t offset_at = 6;
   static constexpr std::size_t counter_at = 10;
-  static constexpr std::size_t fields_at = 14;  // for each data field its status, then its bytes
+  static constexpr std::size_t fields_at = 14;  // for each data field one byte with its status, then its bytes
   static constexpr std::size_t field_stride = 1 + field_capacity;
   static constexpr std::size_t memory_size = fields_at + user_fields * field_stride;
-  // Data fields 0 and 1 exist at shipping. Their status: 128 bytes, writable, with access code 1.
+  // Data fields 0 and 1 exist at shipping. Each has 128 bytes, is writable, and needs access code 1.
   static constexpr std::uint8_t fields_at_shipping = 2;
   static constexpr std::uint8_t shipped_field =
       field_status::exists | field_status::writable | 0x10 | field_status::needs_code | field_status::size;
@@ -70,7 +71,7 @@ class VirtualEncoder final : public author::Responder {
 
   [[nodiscard]] std::uint8_t address() const { return memory_[address_at] ^ format_.address; }
   [[nodiscard]] std::uint8_t interface_setting() const;
-  // Returns access code `number`, 0 to 3; number 0 also protects the settings.
+  // Returns access code `number`, 0 to 3. Access code 0 also protects the settings.
   [[nodiscard]] std::uint8_t access_code(std::size_t number) const;
   [[nodiscard]] std::uint8_t status_of(std::uint8_t field) const;
   [[nodiscard]] std::size_t free_memory() const;
@@ -85,9 +86,10 @@ class VirtualEncoder final : public author::Responder {
   const Shaft* shaft_;
   std::array<std::uint8_t, memory_size> memory_{};
   std::int64_t temperature_ = conditions[0].normal;
-  std::uint32_t sent_ = 0;       // alarms that the status has reported since all were reported
-  std::uint8_t refusal_ = 0;     // status code that `refuse` sends
-  std::uint32_t next_rate_ = 0;  // rate of the line as soon as nothing is being sent; 0: the rate stays
+  // mask of the alarms that status replies have reported since the round over all alarms began
+  std::uint32_t sent_ = 0;
+  std::uint8_t refusal_ = 0;     // status code of the next refusal
+  std::uint32_t next_rate_ = 0;  // rate that the line gets as soon as nothing is being sent; 0: the rate stays
 };
 
 }  // namespace absenc::hiperface

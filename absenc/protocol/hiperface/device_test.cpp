@@ -18,9 +18,11 @@ Wire framed(Wire bytes) {
 
 TEST(HiperfaceDevice, AnswersTheFramesThatOthersPrint) {
   Bench bench(unit, "type=0xFF");
-  EXPECT_EQ(bench.raw({0x40, 0x52, 0x12}).reply, (Wire{0x40, 0x52, 0xE4, 0xFF, 0x80, 0x01, 0x88}));  // Nilab
+  // this frame is from Nilab's source code
+  EXPECT_EQ(bench.raw({0x40, 0x52, 0x12}).reply, (Wire{0x40, 0x52, 0xE4, 0xFF, 0x80, 0x01, 0x88}));
   bench.shaft.put(10, 0x5A5u << 20);
-  EXPECT_EQ(bench.raw({0x40, 0x42, 0x02}).reply, (Wire{0x40, 0x42, 0x00, 0x00, 0xA5, 0xA5, 0x02}));  // HPMicro
+  // this frame is from HPMicro's sample
+  EXPECT_EQ(bench.raw({0x40, 0x42, 0x02}).reply, (Wire{0x40, 0x42, 0x00, 0x00, 0xA5, 0xA5, 0x02}));
   EXPECT_EQ(bench.raw({0x40, 0x50, 0x10}).reply, (Wire{0x40, 0x50, 0x00, 0x10}));
   EXPECT_TRUE(bench.raw({0x40, 0x53, 0x13}).reply.empty());
 }
@@ -51,7 +53,8 @@ TEST(HiperfaceDevice, AnswersItsAddressAndBroadcastOnly) {
 }
 TEST(HiperfaceDevice, IgnoresReplyOfAnotherEncoder) {
   Bench bench(unit, "address=0x41");
-  // The reply of encoder 40 has bytes that look like a request to encoder 41.
+  // The reply of the encoder with address 40 (hex) has bytes that look like a request to the encoder with address 41
+  // (hex).
   Wire both = framed({0x40, 0x42});
   const Wire reply = framed({0x40, 0x42, 0x41, 0x42, 0x03, 0x00});
   both.insert(both.end(), reply.begin(), reply.end());
@@ -111,7 +114,7 @@ TEST(HiperfaceDevice, RefusesFlawedRequestsWithTheirStatusCode) {
 }
 TEST(HiperfaceDevice, RefusesCharacterWithWrongParity) {
   Bench bench(unit, "");
-  // Characters that are sent at another rate arrive damaged.
+  // If the host sends at another baud rate, its characters arrive damaged.
   const std::array<std::uint8_t, 1> address{0x40};
   bench.device.feed({.kind = ByteEvent::Kind::received, .at = bench.line.now(), .items = address});
   bench.device.feed({.kind = ByteEvent::Kind::line_error, .at = bench.line.now() + 1ms});
@@ -132,7 +135,8 @@ TEST(HiperfaceDevice, StartsWithMemoryOfAnyContent) {
   Bench bench(unit, "");
   bench.device.power_off(bench.line.now());
   for (std::uint8_t& byte : bench.device.memory()) byte = 0xFF;
-  bench.device.memory()[1] = interface_at_shipping ^ 0xE7;  // a rate that does not exist
+  // stores an interface setting with a code of a baud rate that does not exist
+  bench.device.memory()[1] = interface_at_shipping ^ 0xE7;
   bench.device.power_on(bench.line.now(), Bench::PowerOn::skip);
   EXPECT_EQ(bench.raw(framed({0xFF, 0x52})).reply.size(), 7u);
   EXPECT_EQ(bench.raw(framed({0xFF, 0x4E})).reply.size(), 4u);

@@ -13,10 +13,10 @@
 
 namespace absenc::hiperface {
 
-/// The one status flag of a reply: the error bit of its command.
+/// The one status flag of a reply: the error bit, bit 7 of its command byte.
 inline constexpr std::array<FlagInfo, 1> status_flags{
     {{"error", "the encoder has an error or a warning", read_the_alarms, false, all_alarms}}};
-/// The alarms, as `alarms` of format.hpp lists them.
+/// Descriptions of the alarms, in the order of the table `alarms` in format.hpp.
 inline constexpr auto alarm_flags = [] {
   std::array<FlagInfo, alarms.size()> flags{};
   for (std::size_t i = 0; i < flags.size(); ++i) {
@@ -27,43 +27,48 @@ inline constexpr auto alarm_flags = [] {
 
 /// Values of the fields of a frame, or of a procedure's result. A member without a value is not in the frame.
 struct Values {
-  std::optional<std::uint8_t> encoder_address{};     ///< Address of the encoder.
-  std::optional<std::string_view> command{};         ///< Command in words.
-  std::optional<std::uint32_t> singleturn{};         ///< Position within the turn, in counts.
-  std::optional<std::uint32_t> multiturn{};          ///< Number of turns.
-  std::optional<std::uint8_t> status{};              ///< Status of the reply, described by `status_flags`.
-  std::optional<std::uint32_t> alarms{};             ///< Alarms, described by `alarm_flags`.
-  std::optional<std::uint8_t> status_code{};         ///< Status code of the encoder.
-  std::optional<std::string_view> status_text{};     ///< Status code in words.
-  std::optional<std::uint32_t> position{};           ///< Position with its turns that a request sets.
-  std::optional<std::uint8_t> channel{};             ///< Channel of an analog value.
-  std::optional<std::int16_t> analog_value{};        ///< Analog value as the encoder sends it.
-  std::optional<std::int16_t> temperature{};         ///< Temperature of the encoder, in degC.
-  std::optional<std::uint32_t> counter{};            ///< Value of the counter.
-  std::optional<std::uint8_t> field{};               ///< Number of a data field.
-  std::optional<std::uint8_t> address{};             ///< Address in the data field.
-  std::optional<std::uint8_t> count{};               ///< Number of bytes that a request reads or stores.
-  std::optional<std::uint8_t> value{};               ///< The byte at `address` of the data field.
-  std::optional<Bytes> data{};                       ///< Bytes of the data field from `address` on.
-  std::optional<bool> exists{};                      ///< Whether the data field exists.
-  std::optional<bool> writable{};                    ///< Whether the data field can be written.
-  std::optional<bool> needs_code{};                  ///< Whether the data field needs its access code.
-  std::optional<std::uint8_t> number{};              ///< Number of an access code.
-  std::optional<std::uint16_t> size{};               ///< Size of the data field in bytes.
-  std::optional<std::uint32_t> free_memory{};        ///< Bytes for which data fields can still be created.
-  std::optional<std::uint8_t> interface_setting{};   ///< Interface setting (Mode_485).
-  std::optional<std::uint32_t> baud{};               ///< Baud rate of the interface setting, in bits per second.
-  std::optional<std::uint8_t> type{};                ///< Type in the type label.
-  std::optional<std::string_view> type_name{};       ///< Families of encoders of this type.
-  std::optional<std::uint32_t> memory_size{};        ///< Bytes of the memory.
-  std::optional<std::uint8_t> type_options{};        ///< Options in the type label.
-  std::optional<std::uint32_t> periods{};            ///< Sine periods of a turn, from the description.
-  std::optional<std::uint32_t> range{};              ///< Turns, from the description.
-  std::optional<author::AsciiText> serial_number{};  ///< Serial number.
-  std::optional<author::AsciiText> version{};        ///< Program version with its date.
-  std::optional<std::uint8_t> new_address{};         ///< Address that the encoder shall have, or has now.
-  std::optional<bool> written{};                     ///< Whether a request that stores was sent.
-  /// Scan: whether no answer of the address was valid, and at least one was damaged.
+  std::optional<std::uint8_t> encoder_address{};  ///< Address of the encoder.
+  std::optional<std::string_view> command{};      ///< Name of the request's command.
+  std::optional<std::uint32_t> singleturn{};      ///< Position within the turn, in counts.
+  std::optional<std::uint32_t> multiturn{};       ///< Number of turns.
+  std::optional<std::uint8_t> status{};           ///< Status of the reply, described by `status_flags`.
+  std::optional<std::uint32_t> alarms{};          ///< Alarms, described by `alarm_flags`.
+  /// Status code that the encoder reports: an alarm, the reason of a refusal, or 0.
+  std::optional<std::uint8_t> status_code{};
+  std::optional<std::string_view> status_text{};  ///< Meaning of the status code in words.
+  std::optional<std::uint32_t> position{};        ///< Position that a request sets; it contains the turns.
+  std::optional<std::uint8_t> channel{};          ///< Channel of an analog value that is read.
+  std::optional<std::int16_t> analog_value{};     ///< Analog value as the encoder sends it.
+  std::optional<std::int16_t> temperature{};      ///< Temperature of the encoder, in degC.
+  std::optional<std::uint32_t> counter{};  ///< Value of the encoder's counter, which a host can increment and clear.
+  std::optional<std::uint8_t> field{};     ///< Number of the data field that a request accesses.
+  std::optional<std::uint8_t> address{};   ///< Address of a byte in the data field.
+  std::optional<std::uint8_t> count{};     ///< Number of bytes that a request reads or stores.
+  std::optional<std::uint8_t> value{};     ///< The byte at `address` of the data field.
+  std::optional<Bytes> data{};             ///< Bytes of the data field from `address` on.
+  std::optional<bool> exists{};            ///< Whether the data field exists.
+  std::optional<bool> writable{};          ///< Whether the data field can be written.
+  std::optional<bool> needs_code{};        ///< Whether the data field needs its access code.
+  std::optional<std::uint8_t> number{};    ///< Number of an access code, 0 to 3.
+  std::optional<std::uint16_t> size{};     ///< Size of the data field in bytes.
+  std::optional<std::uint32_t> free_memory{};  ///< Number of bytes for which data fields can still be created.
+  /// Interface setting (Mode_485): baud rate, parity and timeout of the encoder.
+  std::optional<std::uint8_t> interface_setting{};
+  std::optional<std::uint32_t> baud{};          ///< Baud rate of the interface setting, in bits per second.
+  std::optional<std::uint8_t> type{};           ///< Type of the encoder, from the type label.
+  std::optional<std::string_view> type_name{};  ///< Names of the encoder families that have this type.
+  std::optional<std::uint32_t> memory_size{};   ///< Size of the encoder's memory in bytes, from the type label.
+  std::optional<std::uint8_t> type_options{};   ///< Options of the encoder, from the type label.
+  std::optional<std::uint32_t> periods{};  ///< Number of sine periods of a turn, from the description in data field FF.
+  /// Number of turns that the encoder counts, from the description in data field FF.
+  std::optional<std::uint32_t> range{};
+  std::optional<author::AsciiText> serial_number{};  ///< Serial number of the encoder.
+  std::optional<author::AsciiText> version{};        ///< Program version of the encoder, with its date.
+  /// Address that a request gives to the encoder, or that a command has given to it.
+  std::optional<std::uint8_t> new_address{};
+  /// Whether the host sent a request that stores something; false if the encoder had the value already.
+  std::optional<bool> written{};
+  /// Scan: true if no reply of the address was valid and at least one was damaged.
   std::optional<bool> clash{};
 };
 
@@ -154,13 +159,13 @@ inline constexpr auto fields = [] {
   return "";
 }
 
-/// Adds the parts of an interface setting.
+/// Adds the parts of an interface setting to the values.
 constexpr void show_interface(Values& all, std::uint8_t setting) {
   all.interface_setting = setting;
   const unsigned rate = setting & rate_bits;
   if (rate < rates.size()) all.baud = rates[rate];
 }
-/// Adds the parts of the status of a data field.
+/// Adds the parts of a data field's status to the values.
 constexpr void show_field_status(Values& all, std::uint8_t status) {
   all.exists = (status & field_status::exists) != 0;
   if (!*all.exists) return;
@@ -169,12 +174,12 @@ constexpr void show_field_status(Values& all, std::uint8_t status) {
   all.number = static_cast<std::uint8_t>((status & field_status::code_number) >> 4);
   all.size = static_cast<std::uint16_t>(field_size(status));
 }
-/// Adds a status code.
+/// Adds a status code and its meaning to the values.
 constexpr void show_status(Values& all, std::uint8_t code) {
   all.status_code = code;
   all.status_text = text_of_status(code);
 }
-/// Adds the parts of a type label.
+/// Adds the parts of a type label to the values.
 constexpr void show_label(Values& all, const Reply& reply) {
   show_interface(all, reply.label[0]);
   all.type = reply.label[1];
@@ -223,9 +228,10 @@ constexpr void show_label(Values& all, const Reply& reply) {
   return all;
 }
 
-/// Returns the values of the fields of a reply. They refer to the bytes of `reply`.
+/// Returns the values of the fields of a reply. Byte and text values refer to the bytes of `reply`, which must outlive
+/// them.
 [[nodiscard]] constexpr Values values_of(const Format& format, const Request& request, const Reply& reply) {
-  Request without_data = request;  // the stored bytes are not in the reply
+  Request without_data = request;  // a reply does not contain the bytes that its request stores
   without_data.data.clear();
   Values all = values_of(without_data);
   if (request.command != CommandCode::set_address) all.encoder_address = reply.address;
@@ -272,7 +278,7 @@ constexpr void show_label(Values& all, const Reply& reply) {
   return all;
 }
 
-/// Returns the bits of a valid reply that carry `field`; may be none.
+/// Returns the bits of a valid reply that carry `field`; no bits if the reply does not carry it.
 [[nodiscard]] constexpr BitRanges place_of(const Format& format, Bytes reply, const FieldInfo& field) {
   using author::big_endian_bits;
   using author::bits_of;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Constants of SICK's HIPERFACE parameter channel: commands, status codes, types, times; and Format, the differences
-// between encoders. README.md has the source of each.
+// Constants of SICK's HIPERFACE parameter channel (commands, status codes, types, times), and Format, the properties in
+// which encoders differ. README.md has the source of each value.
 #pragma once
 
 #include <algorithm>
@@ -19,35 +19,39 @@ namespace absenc::hiperface {
 
 using namespace std::chrono_literals;
 
-/// Baud rates of the line in bits per second. The index is the code of the rate in the interface setting.
+/// Baud rates of the line in bits per second. The index of a rate is its code in the interface setting.
 inline constexpr std::array<std::uint32_t, 7> rates{600, 1'200, 2'400, 4'800, 9'600, 19'200, 38'400};
-inline constexpr std::uint8_t rate_at_shipping = 4;  ///< Index in `rates` of the rate at shipping.
-/// Bits of the interface setting that are the code of the rate.
+inline constexpr std::uint8_t rate_at_shipping = 4;  ///< Index in `rates` of the baud rate at shipping.
+/// Mask of the bits of the interface setting that are the code of the baud rate.
 inline constexpr std::uint8_t rate_bits = 0x07;
 /// Interface setting at shipping (Mode_485): 9600 baud, parity even.
 inline constexpr std::uint8_t interface_at_shipping = 0xE4;
 
-inline constexpr std::uint8_t first_address = 0x40;      ///< Lowest address of an encoder; that at shipping.
+inline constexpr std::uint8_t first_address = 0x40;      ///< Lowest address of an encoder, which it has at shipping.
 inline constexpr std::uint8_t last_address = 0x5F;       ///< Highest address of an encoder.
 inline constexpr std::uint8_t broadcast_address = 0xFF;  ///< Address that every encoder answers.
-inline constexpr std::uint8_t code_at_shipping = 0x55;   ///< Value of each access code at shipping; code 0 is one.
-/// Bit of the command in a reply: the encoder has an error or a warning, which the status names.
+/// Value of each access code at shipping; the code that protects settings is access code 0.
+inline constexpr std::uint8_t code_at_shipping = 0x55;
+/// Error bit in the command byte of a reply: an alarm is raised, which the status names.
 inline constexpr std::uint8_t error_bit = 0x80;
 
 // ---- Times, of drivers or assumed (README.md)
 
-inline constexpr Time answer_time = 5ms;    ///< Least time from a request to the reply of the virtual encoder.
-inline constexpr Time store_time = 20ms;    ///< Time that the virtual encoder needs in addition to store something.
+inline constexpr Time answer_time = 5ms;  ///< Time from a request to the reply of the virtual encoder.
+/// Additional time of the virtual encoder until its reply to a request that stores something.
+inline constexpr Time store_time = 20ms;
 inline constexpr Time request_pause = 6ms;  ///< Shortest time from a reply to the host's next request.
-/// Time in which the reply to a request that reads must begin; see `reply_characters`.
+/// Longest time that a host waits for the reply to a request that reads; `reply_characters` is added to it.
 inline constexpr Time read_limit = 50ms;
-/// Time in which the reply to a request that stores something must begin; see `reply_characters`.
+/// Longest time that a host waits for the reply to a request that stores something; `reply_characters` is added to it.
 inline constexpr Time store_limit = 250ms;
-/// Longest pause inside a frame, in characters; hosts also add its duration to the time limits above.
+/// Longest pause inside a frame, in durations of a character; a host adds the same time to its timeouts `read_limit`
+/// and `store_limit`.
 inline constexpr int reply_characters = 5;
 inline constexpr Time create_time = 200ms;  ///< Time that a host waits after it has created a data field.
 inline constexpr Time start_time = 250ms;   ///< Time from power on or a reset until the virtual encoder answers.
-inline constexpr Time start_limit = 2s;     ///< Greatest sum of a host's pauses after a reset, until an answer.
+/// Longest time for which a host waits, between its requests after a reset, for the encoder to answer again.
+inline constexpr Time start_limit = 2s;
 
 /// Code of a command: the second byte of requests and replies.
 enum class CommandCode : std::uint8_t {
@@ -71,18 +75,21 @@ enum class CommandCode : std::uint8_t {
   interface = 0x57,
 };
 
-/// Channel of the command 44 whose value is the temperature of the encoder in degC.
+/// Channel of the command 44 (read analog value) that carries the temperature of the encoder in degC.
 inline constexpr std::uint8_t temperature_channel = 0x48;
 
 // ---- Data fields
 
 inline constexpr std::size_t field_capacity = 128;  ///< Greatest size of a data field in bytes.
-inline constexpr std::size_t block_size = 16;       ///< Sizes of data fields and of the memory are multiples of this.
-inline constexpr std::uint8_t user_fields = 14;     ///< Number of data fields, from 0 on, that hosts access.
-/// Data field with the resolution and the range of the encoder.
+/// Size in bytes of a memory block; sizes of data fields and of the memory are multiples of it.
+inline constexpr std::size_t block_size = 16;
+/// Number of data fields that hosts can access, beside the description: 0 to 13.
+inline constexpr std::uint8_t user_fields = 14;
+/// Number of the data field with the description: the resolution and the range of the encoder.
 inline constexpr std::uint8_t description_field = 0xFF;
-inline constexpr std::size_t description_size = 10;        ///< Bytes of the description that drivers read.
-inline constexpr std::uint8_t type_in_description = 0xFF;  ///< Type of encoders whose description must be read.
+inline constexpr std::size_t description_size = 10;  ///< Number of bytes of the description that drivers read.
+/// Type in the type label of encoders whose resolution only the description shows.
+inline constexpr std::uint8_t type_in_description = 0xFF;
 /// Size of the memory in the type label of the virtual encoder, in blocks of 16 bytes.
 inline constexpr std::uint8_t memory_blocks = 0x80;
 /// Greatest number of bytes that a host reads from a data field with one request.
@@ -90,11 +97,12 @@ inline constexpr std::size_t read_at_once = 32;
 
 /// Bits of the status of a data field.
 namespace field_status {
-inline constexpr std::uint8_t exists = 0x80;       ///< The field exists.
-inline constexpr std::uint8_t writable = 0x40;     ///< The field can be written.
-inline constexpr std::uint8_t code_number = 0x30;  ///< Number of the access code, 0 to 3.
-inline constexpr std::uint8_t needs_code = 0x08;   ///< The field needs its access code.
-inline constexpr std::uint8_t size = 0x07;         ///< Number of blocks of 16 bytes, minus one.
+inline constexpr std::uint8_t exists = 0x80;       ///< Status bit: the data field exists.
+inline constexpr std::uint8_t writable = 0x40;     ///< Status bit: the data field can be written.
+inline constexpr std::uint8_t code_number = 0x30;  ///< Mask of the number of the data field's access code, 0 to 3.
+/// Status bit: the data field cannot be accessed without its access code.
+inline constexpr std::uint8_t needs_code = 0x08;
+inline constexpr std::uint8_t size = 0x07;  ///< Mask of the data field's size: number of blocks of 16 bytes, minus one.
 }  // namespace field_status
 
 /// Returns the size in bytes of a data field with this status; 0 if it does not exist.
@@ -102,7 +110,7 @@ inline constexpr std::uint8_t size = 0x07;         ///< Number of blocks of 16 b
   return (status & field_status::exists) == 0 ? 0 : block_size * ((status & field_status::size) + 1u);
 }
 
-/// Areas of the memory that hosts can access: pages are data fields.
+/// Areas of the memory that hosts can access; a page is a data field.
 inline constexpr std::array<MemoryArea, 3> memory_areas{{
     {0, 0, field_capacity, "data field 0; it may be smaller"},
     {.page = 1,
@@ -118,10 +126,10 @@ inline constexpr std::array<MemoryArea, 3> memory_areas{{
 
 /// An alarm of the encoder: a status code that describes its state, not a refused request.
 struct Alarm {
-  std::uint8_t code;         ///< Status code.
+  std::uint8_t code;         ///< Status code that reports the alarm.
   std::string_view name;     ///< Name of the alarm.
-  std::string_view meaning;  ///< What happened, as a phrase.
-  std::string_view action;   ///< What the operator can do.
+  std::string_view meaning;  ///< Description of the alarm's cause, as a phrase.
+  std::string_view action;   ///< Advice to the operator.
 };
 
 namespace detail {
@@ -130,7 +138,7 @@ inline constexpr std::string_view check_turns =
     "`absenc run ... reset`, then compare the turns with a known position; if it stays, replace the encoder";
 }  // namespace detail
 
-/// All alarms; the index is the number of the bit in the alarms of a reading.
+/// All alarms. The index of an alarm is its bit number in the alarms of a reading.
 inline constexpr auto alarms = std::array{
     Alarm{0x01, "analog_signals", "sine and cosine are outside their limits, or the compensation data is wrong",
           detail::restart},
@@ -154,10 +162,10 @@ inline constexpr auto alarms = std::array{
     Alarm{0x23, "multiturn_position_3", "the turns are wrong (code 23)", detail::check_turns},
 };
 
-/// Mask of all alarms.
+/// Mask of all alarms in the alarms of a reading.
 inline constexpr std::uint32_t all_alarms = (1u << alarms.size()) - 1;
 
-/// Status codes of the alarms, apart from their texts, which firmware does not need.
+/// Status codes of the alarms without their texts, which firmware does not need.
 inline constexpr auto alarm_codes = [] {
   std::array<std::uint8_t, alarms.size()> codes{};
   for (std::size_t i = 0; i < codes.size(); ++i) codes[i] = alarms[i].code;
@@ -179,18 +187,18 @@ inline constexpr std::uint32_t turns_lost = alarm_of(0x21) | alarm_of(0x22) | al
 
 /// Status codes with which an encoder refuses a request.
 namespace refusal {
-inline constexpr std::uint8_t parity = 0x09;         ///< A character of the request had a wrong parity.
-inline constexpr std::uint8_t checksum = 0x0A;       ///< The checksum of the request is wrong.
-inline constexpr std::uint8_t command = 0x0B;        ///< The encoder does not have this command.
-inline constexpr std::uint8_t length = 0x0C;         ///< The number of bytes of the request is wrong.
-inline constexpr std::uint8_t argument = 0x0D;       ///< A value of the request is not permitted.
-inline constexpr std::uint8_t not_writable = 0x0E;   ///< The data field must not be written.
-inline constexpr std::uint8_t access_code = 0x0F;    ///< The access code is wrong.
-inline constexpr std::uint8_t size_is_fixed = 0x10;  ///< The size of the data field cannot be changed.
-inline constexpr std::uint8_t outside = 0x11;        ///< The address is outside the data field.
-inline constexpr std::uint8_t no_field = 0x12;       ///< The data field does not exist.
+inline constexpr std::uint8_t parity = 0x09;         ///< Refusal: a character of the request had a wrong parity.
+inline constexpr std::uint8_t checksum = 0x0A;       ///< Refusal: the checksum of the request is wrong.
+inline constexpr std::uint8_t command = 0x0B;        ///< Refusal: the encoder does not have this command.
+inline constexpr std::uint8_t length = 0x0C;         ///< Refusal: the number of bytes of the request is wrong.
+inline constexpr std::uint8_t argument = 0x0D;       ///< Refusal: a value of the request is not permitted.
+inline constexpr std::uint8_t not_writable = 0x0E;   ///< Refusal: the data field must not be written.
+inline constexpr std::uint8_t access_code = 0x0F;    ///< Refusal: the access code is wrong.
+inline constexpr std::uint8_t size_is_fixed = 0x10;  ///< Refusal: the size of the data field cannot be changed.
+inline constexpr std::uint8_t outside = 0x11;        ///< Refusal: the address is outside the data field.
+inline constexpr std::uint8_t no_field = 0x12;       ///< Refusal: the data field does not exist.
 
-/// Texts for the codes from `parity` to `no_field`, in their order.
+/// Texts for the status codes from `parity` to `no_field`, in the order of the codes.
 inline constexpr auto texts = std::array<std::string_view, 10>{
     "09: it received a character with a wrong parity",
     "0A: it received the request with a wrong checksum",
@@ -205,12 +213,12 @@ inline constexpr auto texts = std::array<std::string_view, 10>{
 };
 }  // namespace refusal
 
-/// Returns whether no source explains a status code: it is not 0, no alarm, and refuses no request.
+/// Returns whether no source explains a status code: it is not 0, is no alarm, and is no refusal.
 [[nodiscard]] constexpr bool is_unexplained(std::uint8_t code) {
   return code != 0 && alarm_of(code) == 0 && (code < refusal::parity || code > refusal::no_field);
 }
 
-/// Returns a status code in words.
+/// Returns the meaning of a status code in words.
 [[nodiscard]] constexpr std::string_view text_of_status(std::uint8_t code) {
   if (code == 0) return "no error";
   if (code >= refusal::parity && code <= refusal::no_field) return refusal::texts[code - refusal::parity];
@@ -222,13 +230,13 @@ inline constexpr auto texts = std::array<std::string_view, 10>{
 
 // ---- Types
 
-/// A type of encoder, as the type label names it.
+/// A type of encoder as the type label states it; encoders of one or more families have it.
 struct Type {
-  std::uint8_t id;          ///< Type in the type label.
-  std::string_view name;    ///< Names of the families of this type.
+  std::uint8_t id;          ///< Number of the type in the type label.
+  std::string_view name;    ///< Names of the encoder families of this type.
   Resolution resolution{};  ///< Numbers of bits of position and turns; 0 and 0: the type does not show them.
 };
-/// All types whose names drivers know.
+/// Table of all types whose names drivers know.
 inline constexpr auto types = std::array{
     Type{0x02, "SHS, SCS", {14, 0}},
     Type{0x07, "SCM", {14, 12}},
@@ -246,7 +254,7 @@ inline constexpr auto types = std::array{
     Type{0x94, "DME, 16 mm"},
     Type{type_in_description, "described by data field FF"},
 };
-/// Returns the name of a type; "unknown" if no driver knows it.
+/// Returns the names of the families of a type; "unknown" if no driver knows it.
 [[nodiscard]] constexpr std::string_view name_of_type(std::uint8_t id) {
   for (const Type& type : types) {
     if (type.id == id) return type.name;
@@ -254,14 +262,14 @@ inline constexpr auto types = std::array{
   return "unknown";
 }
 
-/// Types with their numbers of bits, apart from their names, which firmware does not need.
+/// Types with their numbers of bits, without their names, which firmware does not need.
 inline constexpr auto type_resolutions = [] {
   std::array<std::pair<std::uint8_t, Resolution>, types.size()> all{};
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = {types[i].id, types[i].resolution};
   return all;
 }();
 
-/// Returns the numbers of bits of a type; 0 and 0 if the type does not show them.
+/// Returns the numbers of position and turn bits of a type; 0 and 0 if the type does not show them.
 [[nodiscard]] constexpr Resolution resolution_of_type(std::uint8_t id) {
   for (const auto& [type, resolution] : type_resolutions) {
     if (type == id) return resolution;
@@ -269,7 +277,8 @@ inline constexpr auto type_resolutions = [] {
   return {};
 }
 
-/// Returns the type with these numbers of bits; that of an encoder that data field FF describes if there is none.
+/// Returns the type that has these numbers of bits. If there is none, returns the type whose resolution data field FF
+/// describes.
 [[nodiscard]] constexpr std::uint8_t type_with(const Resolution& bits) {
   for (const Type& type : types) {
     if (type.resolution.singleturn_bits == bits.singleturn_bits &&
@@ -280,35 +289,38 @@ inline constexpr auto type_resolutions = [] {
   return type_in_description;
 }
 
-/// Fewest bits of the position in a turn: the 5 bits of one sine period.
+/// Least number of bits of the position in a turn: the 5 bits of one sine period.
 inline constexpr std::uint8_t least_singleturn_bits = 5;
 inline constexpr std::uint8_t most_singleturn_bits = 20;  ///< Greatest number of bits of the position in a turn.
 inline constexpr std::uint8_t most_multiturn_bits = 12;   ///< Greatest number of bits of the turns.
-/// Resolution of encoders whose options and type do not show it: that of an SKM.
+/// Resolution that is assumed if neither options nor type show it: that of an SKM.
 inline constexpr Resolution assumed_resolution{12, 12};
 
-/// Properties of an encoder that its frames depend on, and how it is asked. Its members are the options of the unit.
+/// Properties of an encoder that its frames depend on, and its access codes. The members are the options of the unit.
 struct Format {
-  std::uint8_t singleturn_bits = 0;  ///< Bits of the position within the turn, 5 to 20; 0: the type label shows them.
-  /// Bits of the turns, 0 to 12; 0: single-turn encoder; -1: the type label shows them.
+  /// Number of bits of the position within the turn, 5 to 20; 0: the host reads it from the type label.
+  std::uint8_t singleturn_bits = 0;
+  /// Number of bits of the turns, 0 to 12; 0: single-turn encoder; -1: the host reads it from the type label.
   std::int8_t multiturn_bits = -1;
-  std::uint8_t address = first_address;         ///< Address of the encoder.
-  std::uint8_t code0 = code_at_shipping;        ///< Code 0, which protects settings.
+  std::uint8_t address = first_address;         ///< Address of the encoder, 40 to 5F (hex).
+  std::uint8_t code0 = code_at_shipping;        ///< Access code 0, which protects position and settings.
   std::uint8_t access_code = code_at_shipping;  ///< Access code to read, write and create data fields.
-  std::uint8_t rate = rate_at_shipping;         ///< Index of the baud rate in `rates`.
-  /// Type of the encoder; 0: not stated, and the virtual encoder has the one with its resolution.
+  std::uint8_t rate = rate_at_shipping;         ///< Index of the line's baud rate in `rates`.
+  /// Type of the encoder in the type label; 0: not stated, the virtual encoder then has a type with its resolution.
   std::uint8_t type = 0;
-  std::uint8_t status_bytes = 1;    ///< Bytes of the status in a reply, 1 or 2.
-  std::uint8_t counter_bytes = 3;   ///< Bytes of the counter in a reply, 1 to 4.
-  std::uint8_t free_bytes = 1;      ///< Bytes of the free memory in a reply. 1: in blocks of 16 bytes; 2: in bytes.
-  std::uint8_t serial_bytes = 9;    ///< Characters of the serial number.
-  std::uint8_t version_bytes = 28;  ///< Characters of the program version with its date.
+  std::uint8_t status_bytes = 1;   ///< Number of bytes of the status in a reply, 1 or 2.
+  std::uint8_t counter_bytes = 3;  ///< Number of bytes of the counter in a reply, 1 to 4.
+  /// Number of bytes of the free memory in a reply. 1: it is in blocks of 16 bytes; 2: it is in bytes.
+  std::uint8_t free_bytes = 1;
+  std::uint8_t serial_bytes = 9;    ///< Number of characters of the serial number.
+  std::uint8_t version_bytes = 28;  ///< Number of characters of the program version with its date.
 
   /// Returns the settings of the RS-485 line.
   [[nodiscard]] constexpr LineSettings line() const { return {.rate = rates[rate], .parity = Parity::even}; }
   /// Returns whether the options state the numbers of bits of position and turns.
   [[nodiscard]] constexpr bool is_known() const { return singleturn_bits != 0 && multiturn_bits >= 0; }
-  /// Returns the numbers of bits of position and turns. Those that the options do not state are of `type`, or assumed.
+  /// Returns the numbers of bits of position and turns. If the options do not state them, those of `type` are used, or
+  /// assumed ones.
   [[nodiscard]] constexpr Resolution resolution() const {
     Resolution bits = resolution_of_type(type);
     if (bits.singleturn_bits == 0) bits = assumed_resolution;
@@ -316,20 +328,21 @@ struct Format {
     if (multiturn_bits >= 0) bits.multiturn_bits = static_cast<unsigned>(multiturn_bits);
     return bits;
   }
-  /// Returns the number of bits of the whole position.
+  /// Returns the number of bits of position and turns together.
   [[nodiscard]] constexpr unsigned position_bits() const {
     const Resolution bits = resolution();
     return bits.singleturn_bits + bits.multiturn_bits;
   }
-  /// Returns the type in the type label of the virtual encoder.
+  /// Returns the type that the virtual encoder has in its type label.
   [[nodiscard]] constexpr std::uint8_t type_in_label() const { return type != 0 ? type : type_with(resolution()); }
-  /// Returns whether `bits`, which an encoder reports, differs from what the options state; 0 and 0: it reports none.
+  /// Returns whether `bits`, the resolution that an encoder reports, contradicts the options; 0 and 0, no report,
+  /// contradicts nothing.
   [[nodiscard]] constexpr bool contradicts(const Resolution& bits) const {
     const bool is_other_turn = singleturn_bits != 0 && singleturn_bits != bits.singleturn_bits;
     const bool are_other_turns = multiturn_bits >= 0 && static_cast<unsigned>(multiturn_bits) != bits.multiturn_bits;
     return bits.singleturn_bits != 0 && (is_other_turn || are_other_turns);
   }
-  /// Returns this format with the resolution `bits`.
+  /// Returns a copy of this format with the resolution `bits`.
   [[nodiscard]] constexpr Format with(const Resolution& bits) const {
     Format known = *this;
     known.singleturn_bits = static_cast<std::uint8_t>(bits.singleturn_bits);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Replies of the HIPERFACE parameter channel: encoding, decoding, all checks, and the reading of a valid reply.
-// README.md draws them.
+// README.md draws the replies.
 #pragma once
 
 #include <algorithm>
@@ -23,31 +23,34 @@ namespace absenc::hiperface {
 /// A decoded reply. Members that its command does not carry are 0.
 struct Reply {
   std::uint8_t address = first_address;  ///< Address of the encoder that sent the reply.
-  bool has_error = false;                ///< Whether the error bit is set: an error or a warning.
-  std::uint32_t value = 0;  ///< Position, analog value, counter, free memory, status code, status of a data field.
-  std::array<std::uint8_t, 4> label{};  ///< Type label: interface setting, type, memory in blocks, options.
-  FieldBytes data{};                    ///< Bytes of a data field; characters of serial number and program version.
-  std::uint32_t alarms = 0;             ///< Alarms of the status replies that a capture joins to a position.
-  /// Joined status replies: whether another status code may make the position invalid, because the last one names a
-  /// further alarm or is in no source.
+  bool has_error = false;  ///< Whether the reply has the error bit: the encoder has an error or a warning.
+  /// Value of the reply, by command: position, analog value, counter, free memory, status code, or status of a data
+  /// field.
+  std::uint32_t value = 0;
+  std::array<std::uint8_t, 4> label{};  ///< Type label: interface setting, type, memory in blocks of 16 bytes, options.
+  FieldBytes data{};                    ///< Bytes of a data field, or characters of serial number and program version.
+  std::uint32_t alarms = 0;  ///< Mask of the alarms in the status replies that a capture joins to a position.
+  /// In a position joined to status replies: whether another status code may follow that makes the position invalid,
+  /// because the last code names a new alarm or is in no source.
   bool is_open = false;
 };
 
-/// Returns whether the bytes begin the status of the encoder although another command was requested: the encoder
-/// refuses the request.
+/// Returns whether `reply` begins like a refusal: it has the command of the status, although another command was
+/// requested.
 [[nodiscard]] constexpr bool begins_refusal(CommandCode asked, Bytes reply) {
   return asked != CommandCode::status && reply.size() > 1 &&
          (reply[1] & ~error_bit) == static_cast<unsigned>(CommandCode::status);
 }
 
-/// Returns the greatest length in bytes of a reply that does not refuse the request; 0: the request is not answered.
+/// Returns the greatest length in bytes of a reply to `request` that is no refusal; 0 if the encoder does not answer
+/// the request.
 [[nodiscard]] constexpr std::size_t reply_length(const Format& format, const Request& request) {
   if (request.command == CommandCode::reset) return 0;
   const std::size_t size = data_sizes(format, static_cast<std::uint8_t>(request.command))->reply;
   return shortest_frame + size + (request.command == CommandCode::read_data ? request.count : 0u);
 }
 
-/// Returns the bytes of a request that the data of a full reply repeats.
+/// Returns the bytes of `request` that the encoder's reply may repeat behind its command.
 [[nodiscard]] constexpr ByteBuffer<3> echo_of(const Request& request) {
   ByteBuffer<3> echo;
   switch (request.command) {
@@ -112,7 +115,7 @@ struct Reply {
   return bytes;
 }
 
-/// Returns the bytes with which an encoder refuses a request: its status instead of the reply.
+/// Returns the bytes with which an encoder refuses a request: a status with the error bit instead of the reply.
 [[nodiscard]] constexpr ReplyBytes encode_refusal(const Format& format, std::uint8_t address, std::uint8_t code) {
   return encode_reply(format, {.command = CommandCode::status}, {.address = address, .has_error = true, .value = code});
 }
@@ -120,7 +123,7 @@ struct Reply {
 namespace detail {
 constexpr bool is_sender(const Request& request, std::uint8_t address) {
   if (address == request.address) return true;
-  // A new address may be in the reply already.
+  // The reply to a request that assigns an address may already have the new address.
   if (request.command == CommandCode::set_address && address == request.subject) return true;
   return request.address == broadcast_address && is_address(address);
 }
@@ -139,8 +142,8 @@ constexpr Error check_frame(const Format& format, const Request& request, Bytes 
 }
 }  // namespace detail
 
-/// Returns the numbers of bits of position and turns that the description in data field FF states; 0 and 0 if the
-/// unit does not support them.
+/// Returns the numbers of bits of position and turns that the description in data field FF states; 0 and 0 if they are
+/// no powers of two or are outside the range of the unit.
 [[nodiscard]] constexpr Resolution resolution_in(Bytes description) {
   const std::uint64_t periods = load_big_endian(description.subspan(2, 4));
   const std::uint64_t turns = std::max<std::uint64_t>(load_big_endian(description.subspan(6, 4)), 1);
@@ -152,7 +155,8 @@ constexpr Error check_frame(const Format& format, const Request& request, Bytes 
 }
 
 namespace detail {
-// Returns the resolution in a type label or a description that must be that of the options; 0 and 0: none must.
+// Returns the resolution that a type label or a description reports and that must agree with the options; 0 and 0 if
+// the reply reports none or any resolution is accepted.
 constexpr Resolution reported_resolution(const Request& request, const Reply& reply) {
   if (request.any_resolution) return {};
   if (request.command == CommandCode::type_label) return resolution_of_type(reply.label[1]);
@@ -163,7 +167,7 @@ constexpr Resolution reported_resolution(const Request& request, const Reply& re
 }  // namespace detail
 
 namespace detail {
-// Decodes one frame, of at least one byte.
+// Checks and decodes one frame, which has at least one byte.
 [[nodiscard]] constexpr Result<Reply> decode_frame(const Format& format, const Request& request, Bytes bytes) {
   if (const Error error = check_frame(format, request, bytes); error != Error::none) return error;
   const Bytes data = bytes.subspan(2, bytes.size() - shortest_frame);
@@ -226,7 +230,7 @@ namespace detail {
   return joined;
 }
 
-/// Sets which alarms the reading reports, and which of its parts they make invalid.
+/// Sets the alarms of the reading, and makes the parts invalid that these alarms affect.
 constexpr void judge(Reading& reading, std::uint32_t raised, std::uint32_t reported) {
   reading.alarms = raised;
   reading.alarms_reported = reported;
@@ -236,14 +240,14 @@ constexpr void judge(Reading& reading, std::uint32_t raised, std::uint32_t repor
   reading.singleturn_known = reading.multiturn_known = true;
 }
 
-/// Makes those parts of the reading unknown that the reported alarms leave valid.
+/// Changes the validity of those parts of the reading that count as valid to unknown.
 constexpr void doubt(Reading& reading) {
   if (std::exchange(reading.singleturn_valid_bits, 0) != 0) reading.singleturn_known = false;
   if (std::exchange(reading.multiturn_valid, false)) reading.multiturn_known = false;
 }
 
-/// Returns the position and turns of a valid reply to the command 42; an empty reading for any other reply. With the
-/// error bit the reply alone does not show whether the position is valid: the status that is joined to it may.
+/// Returns the position and turns of a valid reply to the command 42 (read position); an empty reading for any other
+/// reply. If the reply has the error bit, only the status that is joined to it can show whether the position is valid.
 [[nodiscard]] constexpr Reading to_reading(const Format& format, const Request& request, const Reply& reply) {
   if (request.command != CommandCode::position) return {};
   const Resolution bits = format.resolution();
@@ -273,18 +277,18 @@ struct Protocol {
   using Reply = hiperface::Reply;
   static constexpr std::size_t longest_reply = reply_capacity;  ///< Greatest length of a reply in bytes.
 
-  /// Returns the time limits of a host. They grow with the duration of a character, because encoders may measure their
-  /// times in bits.
+  /// Returns the timeouts and the pause of a host. The timeouts grow with the duration of a character, because encoders
+  /// may measure their times in bits.
   static constexpr author::HostTimes host_times(const Format& format) {
     const Time character = format.line().character();
     return {.answer_limit = read_limit + reply_characters * character,
             .gap_limit = reply_characters * character,
-            // The longest reply takes 2.5 s at 600 baud.
+            // The host must not give up within the longest reply, which takes 2.5 s at 600 baud.
             .patience = noise_limit + static_cast<int>(reply_capacity) * character,
             .pause = request_pause};
   }
-  /// Returns how a request is sent: one that reads up to three times, one that stores something and the reset once. A
-  /// reply is accepted only if silence follows it: an echo that was not expected and the first bytes of the reply can
+  /// Returns how a request is sent: up to three times if it reads, once if it stores something or is the reset. A reply
+  /// is accepted only if silence follows it, because an unexpected echo together with the first bytes of the reply can
   /// be a valid reply (README.md, What is checked).
   static constexpr author::Manner manner(const Format& format, const Request& request) {
     if (request.command == CommandCode::reset) return {.expects_reply = false};
@@ -295,25 +299,27 @@ struct Protocol {
   }
   /// Returns the bytes of a request.
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
-  /// Returns the length of the reply in bytes, as its first bytes `so_far` show it.
+  /// Returns the length in bytes of the reply to the request; its first bytes `so_far` show whether it is a refusal.
   static constexpr std::size_t expected(const Format& format, const Request& request, Bytes so_far) {
     return begins_refusal(request.command, so_far) ? shortest_frame + format.status_bytes
                                                    : reply_length(format, request);
   }
   /// Checks and decodes the bytes of a reply; returns the reply or the error of the first failed check.
   static constexpr auto decode = decode_reply;
-  /// Returns whether no bytes can follow a reply with this error: true for a refusal.
+  /// Returns whether a reply with this error is complete: only a refusal is.
   static constexpr bool is_whole(const Format&, Error error) { return error == Error::request_rejected; }
   /// Returns the position and turns of a valid reply.
   static constexpr auto reading = to_reading;
-  /// Returns when the encoder latched the position that answers a request sent at `sent_at`; no source states it.
+  /// Returns `sent_at`, the end of the request, as the time at which the encoder latched the position; no source states
+  /// that time.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
 
-  /// Decodes a request. Returns it, or the error of the first failed check.
+  /// Decodes a request. Returns the request, or the error of the first failed check.
   static constexpr auto decode_request = hiperface::decode_request;
-  /// Returns the length of the request that begins with `begin`, or how many bytes are needed to know it; 0: none does.
+  /// Returns the length in bytes of the request that begins with `begin`. Returns the number of bytes needed to know it
+  /// if there are fewer, and 0 if no request begins so.
   static constexpr auto request_size = request_length;
-  /// Returns the greatest length in bytes of the reply to `request`; 0: it is not answered.
+  /// Returns the greatest length in bytes of the reply to `request`; 0 if the encoder does not answer it.
   static constexpr auto reply_size = reply_length;
   /// Returns the times of a virtual encoder.
   static constexpr author::DeviceTimes device_times(const Format& format) {

@@ -24,14 +24,14 @@ Wire frame_of(const Reply& reply, const Request& request = position_request, con
   return {bytes.view().begin(), bytes.view().end()};
 }
 
-// A line of the log of HPMicro's samples: position and checksum.
+// A position with its checksum, as a line of the log of HPMicro's samples prints them.
 struct Printed {
   std::uint32_t position;
   std::uint8_t checksum;
 };
 
 TEST(HiperfaceFrame, EncodesThePositionsThatHpmicroPrints) {
-  // Slave sample, log of 2025.
+  // Lines of the log of HPMicro's slave sample, of 2025.
   for (const auto& [position, sum] : std::to_array<Printed>({{0xA5A5, 0x02},
                                                              {0xA5A6, 0x01},
                                                              {0xA5A7, 0x00},
@@ -47,8 +47,8 @@ TEST(HiperfaceFrame, EncodesThePositionsThatHpmicroPrints) {
 }
 
 TEST(HiperfaceFrame, DecodesThePositionsOfTheEncoderThatHpmicroReads) {
-  // Master sample, log of 2023, which prints the turns, the position within the turn in the highest bits, and the
-  // checksum with its bits reversed.
+  // Lines of the log of HPMicro's master sample, of 2023. They print the turns, the position within the turn in the
+  // highest bits, and the checksum with its bits reversed.
   struct Line {
     std::uint16_t turns;
     std::uint32_t position;
@@ -82,7 +82,8 @@ TEST(HiperfaceFrame, DetectsEveryWrongBitOfReply) {
   for (std::size_t bit = 0; bit < 8 * good.size(); ++bit) {
     Wire bad = good;
     bad[bit / 8] ^= static_cast<std::uint8_t>(1u << bit % 8);
-    // No single flipped bit makes the command 42 a 50, and the checksum is checked before the refusal.
+    // A single wrong bit gives bad_checksum, not a refusal: it cannot change the command 42 to 50, and the checksum is
+    // checked first.
     EXPECT_EQ(decode_reply({}, position_request, bad).error(), Error::bad_checksum) << bit;
   }
 }
@@ -173,13 +174,15 @@ TEST(HiperfaceFrame, StatusAfterPositionCompletesItInCaptures) {
     const Result<Reply> decoded = decode_reply({}, *joined, one.reply);
     return decoded ? to_reading({}, *joined, *decoded) : Reading{};
   };
-  EXPECT_EQ(exchange(CommandCode::status, 0x1E).singleturn_bits, 0u);  // no position before
+  // no position came before this status, so nothing is joined
+  EXPECT_EQ(exchange(CommandCode::status, 0x1E).singleturn_bits, 0u);
   EXPECT_EQ(exchange(CommandCode::position, 0x1234).singleturn_bits, 0u);
   const Reading warned = exchange(CommandCode::status, 0x1E);
   EXPECT_EQ(warned.singleturn, 0x234u);
   EXPECT_EQ(warned.alarms, alarm_of(0x1E));
   EXPECT_EQ(warned.alarms_reported, alarm_of(0x1E));
-  EXPECT_EQ(warned.singleturn_validity(), Validity::unknown);  // another code may follow
+  // the validity is unknown, because another status code may follow
+  EXPECT_EQ(warned.singleturn_validity(), Validity::unknown);
   const Reading wrong = exchange(CommandCode::status, 0x21);
   EXPECT_EQ(wrong.alarms, alarm_of(0x1E) | alarm_of(0x21));
   EXPECT_EQ(wrong.singleturn_validity(), Validity::unknown);
@@ -188,15 +191,17 @@ TEST(HiperfaceFrame, StatusAfterPositionCompletesItInCaptures) {
   EXPECT_EQ(complete.alarms, wrong.alarms);
   EXPECT_EQ(complete.singleturn_validity(), Validity::valid);
   EXPECT_EQ(complete.multiturn_validity(), Validity::invalid);
-  EXPECT_EQ(exchange(CommandCode::status, 0x01).singleturn_bits, 0u);  // after all alarms were reported
+  // all alarms were reported before this status, so it is not joined
+  EXPECT_EQ(exchange(CommandCode::status, 0x01).singleturn_bits, 0u);
   EXPECT_EQ(exchange(CommandCode::position, 0x1234).singleturn_bits, 0u);
-  EXPECT_EQ(exchange(CommandCode::status, 0x00).singleturn_bits, 0u);  // no alarm
+  EXPECT_EQ(exchange(CommandCode::status, 0x00).singleturn_bits, 0u);  // this status code is no alarm
   EXPECT_EQ(exchange(CommandCode::status, 0x1E).singleturn_bits, 0u);
   EXPECT_EQ(exchange(CommandCode::position, 0x1234).singleturn_bits, 0u);
   EXPECT_EQ(exchange(CommandCode::status, 0x1E).singleturn_validity(), Validity::unknown);
-  EXPECT_EQ(exchange(CommandCode::status, 0x77).singleturn_validity(), Validity::unknown);  // in no source
+  // this status code is in no source
+  EXPECT_EQ(exchange(CommandCode::status, 0x77).singleturn_validity(), Validity::unknown);
   EXPECT_EQ(exchange(CommandCode::position, 0x1234).singleturn_bits, 0u);
-  EXPECT_EQ(exchange(CommandCode::status, 0x1E, 0x41).singleturn_bits, 0u);  // the status of another encoder
+  EXPECT_EQ(exchange(CommandCode::status, 0x1E, 0x41).singleturn_bits, 0u);  // this is the status of another encoder
   EXPECT_EQ(exchange(CommandCode::status, 0x1E).singleturn_bits, 0u);
 }
 
@@ -238,7 +243,7 @@ TEST(HiperfaceFrame, RefusesFramesOfNoEncoder) {
   EXPECT_EQ(error_of({0x40, 0x45}), Error::unexpected_reply);
   EXPECT_EQ(error_of({0x40, 0x4A, 0, 0, 129, 0x55}), Error::out_of_range);
   EXPECT_EQ(decode_reply(format, position_request, {}).error(), Error::timeout);
-  // Errors of a reply without its request
+  // The next checks are for a captured reply without its request.
   const auto alone = [&](Wire bytes) {
     bytes.push_back(checksum(bytes));
     return unit.check(author::testing::options_of(unit, ""), {}, {.bytes = bytes});

@@ -29,14 +29,14 @@ Request description_request(const Format& format) {
 
 // ---- Position and status
 
-// The status codes that an encoder reports one after the other.
+// Result of reading the status several times, because an encoder reports its alarms one after the other.
 struct Codes {
-  std::uint32_t alarms = 0;  // alarms that they name
-  std::uint8_t first = 0;    // the first code
-  bool unexplained = false;  // whether one of them is in no source
+  std::uint32_t alarms = 0;  // mask of the alarms that the status codes name
+  std::uint8_t first = 0;    // status code of the first reply
+  bool unexplained = false;  // whether one of the status codes is in no source
 };
 
-// Reads the status until a code comes again or is no alarm.
+// Reads the status until the encoder sends a code for the second time or a code that is no alarm.
 Part<Codes> read_codes(Dialog& dialog) {
   Codes codes;
   for (std::size_t i = 0; i <= alarms.size(); ++i) {
@@ -50,8 +50,8 @@ Part<Codes> read_codes(Dialog& dialog) {
   co_return codes;
 }
 
-// Reads the resolution from the type label, and of types that need it from the description in data field FF, unless the
-// options state it.
+// Reads the resolution if the options do not state it: from the type label, or from the description in data field FF if
+// the type does not show it.
 Part<bool> know_resolution(Dialog& dialog) {
   if (dialog.format().is_known()) co_return true;
   const Reply label = co_await dialog.ask(plain_request(dialog.format(), CommandCode::type_label));
@@ -68,8 +68,8 @@ Part<bool> know_resolution(Dialog& dialog) {
   co_return true;
 }
 
-// Reads the position, and with its error bit the status. An error bit without an alarm may be that of an earlier
-// request, so the position is read again.
+// Reads the position, and the status if the reply has the error bit. If the status then has no alarm, the error bit may
+// be that of an earlier request, so the position is read again.
 Part<Reading> look(Dialog& dialog, ProcedureResult& found) {
   co_await know_resolution(dialog);
   Reading reading;
@@ -82,7 +82,7 @@ Part<Reading> look(Dialog& dialog, ProcedureResult& found) {
       break;
     }
     const Codes codes = co_await read_codes(dialog);
-    found.command.reset();  // the values are those of several exchanges
+    found.command.reset();  // the values are of several exchanges, so no command is shown
     show_status(found, codes.first);
     if (codes.alarms == 0) continue;
     found.alarms = codes.alarms;
@@ -98,8 +98,8 @@ std::uint32_t whole_position(const Format& format, const Reading& reading) {
   return static_cast<std::uint32_t>(reading.multiturn << format.resolution().singleturn_bits | reading.singleturn);
 }
 
-// Reads the position twice. Ends the procedure if the position must not be set now; `needs_turns`: also if the turns
-// are not valid.
+// Reads the position twice. Ends the procedure if the position must not be set now: it is invalid or the shaft turns.
+// `needs_turns`: the turns must be valid too.
 Part<Reading> may_set(Dialog& dialog, ProcedureResult& found, bool needs_turns) {
   const Reading first = co_await look(dialog, found);
   co_await dialog.rest(between_looks);
@@ -116,14 +116,15 @@ Part<Reading> may_set(Dialog& dialog, ProcedureResult& found, bool needs_turns) 
   co_return second;
 }
 
-// Sets the position once, and reads it back.
+// Sends one request that sets the position, and reads the position back.
 Part<bool> store_position(Dialog& dialog, ProcedureResult& found, std::uint32_t position) {
   Request request = plain_request(dialog.format(), CommandCode::set_position);
   request.position = position;
   request.code = dialog.format().code0;
   const Result<Reply> stored = co_await dialog.attempt(request).changes();
   if (stored.error() == Error::request_rejected) co_await dialog.stop({stored.error(), "nothing was changed"});
-  if (!stored) co_await dialog.rest(store_limit);  // it may still be stored
+  // without a valid reply, the encoder may still be storing the position
+  if (!stored) co_await dialog.rest(store_limit);
   const Reading now = co_await look(dialog, found);
   const Format& format = dialog.format();
   const std::int64_t apart = wrapped_difference(whole_position(format, now), position, format.position_bits());
@@ -137,7 +138,7 @@ Part<bool> store_position(Dialog& dialog, ProcedureResult& found, std::uint32_t 
 
 // ---- Data fields
 
-// Returns why these bytes of a data field cannot be accessed; no error: they may exist.
+// Returns an error if no encoder has these bytes of a data field, or they cannot be written; otherwise no error.
 Outcome objection_to_access(std::int64_t field, std::int64_t first, std::int64_t count, bool writes) {
   const MemoryArea* const area = find_area(memory_areas, static_cast<unsigned>(field), static_cast<unsigned>(first));
   const bool fits = area != nullptr && first + count <= area->first + area->count;
@@ -264,8 +265,8 @@ Procedure clear_counter(Dialog& dialog, ProcedureResult& found) {
 
 namespace {
 
-// Returns the request for the two bytes that contain the byte at `address`. The request for a single byte is as long as
-// its reply, so that its echo on the line would be a valid reply, with the access code as the byte.
+// Returns the request that reads the byte at `address` and its neighbour. A request for one byte would be as long as
+// its reply, so that its echo on the line could be taken for a reply with the access code as the byte.
 Request pair_at(const Format& format, std::int64_t field, std::int64_t address) {
   return data_request(format, CommandCode::read_data, field, address & ~std::int64_t{1}, 2);
 }
@@ -353,8 +354,8 @@ Procedure set_access_code(Dialog& dialog, ProcedureResult& found, Arguments argu
   const Result<Reply> changed = co_await dialog.attempt(change).changes();
   if (changed.error() == Error::request_rejected) co_return {changed.error(), "the access code stays as it was"};
   if (!changed) co_await dialog.rest(store_limit);
-  // No request reads an access code. An encoder that has another code than the new one refuses to change the new code
-  // to itself.
+  // The access code cannot be read back. Instead the new code is changed to itself, which the encoder refuses if it has
+  // another code.
   change.code = change.new_value;
   const Result<Reply> same = co_await dialog.attempt(change).changes();
   if (!same) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Procedures of a host of HIPERFACE encoders. A request that stores something is not repeated after an error; another
-// request shows its effect.
+// Procedures of a host for HIPERFACE encoders. A request that stores something is not repeated after an error; another
+// request shows whether it was executed.
 #pragma once
 
 #include <cstdint>
@@ -14,19 +14,20 @@ namespace absenc::hiperface {
 /// Interface by which procedures send requests and await replies.
 using Dialog = author::DialogOf<Protocol>;
 
-/// Result of a procedure: the values of its fields, and the data to which they refer.
+/// Result of a procedure: the values of its fields, a reading, and the bytes that fields show.
 struct ProcedureResult : Values {
-  Reading reading{};   ///< Position; empty if none was read.
-  FieldBytes bytes{};  ///< Bytes to which fields of bytes and texts refer.
+  Reading reading{};   ///< Position and turns; empty if the procedure read none.
+  FieldBytes bytes{};  ///< Bytes that fields with bytes or text show.
 };
 
-/// Returns an argument, whose range is that of a byte, as a byte.
+/// Converts an argument, whose value is 0 to 255, to a byte.
 [[nodiscard]] constexpr std::uint8_t byte(std::int64_t argument) { return static_cast<std::uint8_t>(argument); }
-/// Returns the request of a command without data. Unless the options state the resolution, the reply may report any.
+/// Returns the request of a command without data. If the options do not state the resolution, any resolution in the
+/// reply is accepted.
 [[nodiscard]] constexpr Request plain_request(const Format& format, CommandCode command) {
   return {.command = command, .address = format.address, .any_resolution = !format.is_known()};
 }
-/// Returns the index of a baud rate in `rates`; nothing if the encoder does not have the rate.
+/// Returns the index of a baud rate in `rates`; no value if the encoder does not have the rate.
 [[nodiscard]] constexpr std::optional<std::uint8_t> rate_index(std::int64_t baud) {
   for (std::uint8_t i = 0; i < rates.size(); ++i) {
     if (rates[i] == baud) return i;
@@ -42,51 +43,51 @@ struct ProcedureResult : Values {
 
 /// Reads the position. If the reply has the error bit, also reads the status, to learn whether the position is valid.
 author::Procedure read_position(Dialog& dialog, ProcedureResult& found);
-/// Reads the status until a code comes again or is no alarm, and reports the codes as alarms.
+/// Reads the status until a code comes again or is no alarm, and reports the alarms that the codes name.
 author::Procedure read_status(Dialog& dialog, ProcedureResult& found);
-/// Reads the type label; serial number and program version unless refused; of types that need it the description in
-/// data field FF.
+/// Reads the type label, the serial number and the program version; skips the last two if the encoder refuses them. If
+/// the type needs it, also reads the description in data field FF.
 author::Procedure read_info(Dialog& dialog, ProcedureResult& found);
-/// Sends the request of `command` about the first argument: an analog channel, or a data field.
+/// Sends the request of `command` for the analog channel or the data field in the first argument.
 author::Procedure ask_about(Dialog& dialog, ProcedureResult& found, CommandCode command, Arguments arguments);
 /// Reads the address of the only encoder of the line.
 author::Procedure read_address(Dialog& dialog, ProcedureResult& found);
-/// Reads the interface setting.
+/// Reads the interface setting (baud rate, parity, timeout) of the encoder.
 author::Procedure read_baud(Dialog& dialog, ProcedureResult& found);
 
-/// Sets the position so that the position within the turn is 0 here, and the turns stay. Errors also: unsupported (the
-/// resolution is unknown), not_still, invalid_argument (the position is not valid), cross_check_failed (the position is
-/// another one afterwards).
+/// Makes the present position within the turn zero; the turns stay. Errors besides those of the exchanges: unsupported
+/// (the resolution is unknown), not_still, invalid_argument (the position is not valid), cross_check_failed (the
+/// position is another one afterwards).
 author::Procedure set_zero(Dialog& dialog, ProcedureResult& found);
 /// Sets the turns to 0; the position within the turn stays. Errors as `set_zero`, and unsupported without turns.
 author::Procedure reset_multiturn(Dialog& dialog, ProcedureResult& found);
-/// Sets the position with its turns to the first argument. Errors as `set_zero`, and invalid_argument (the encoder has
-/// no such position).
+/// Sets the position, which contains the turns, to the first argument. Errors as `set_zero`, and invalid_argument (the
+/// encoder has no such position).
 author::Procedure set_position(Dialog& dialog, ProcedureResult& found, Arguments arguments);
 /// Resets the encoder, and waits some seconds for it to answer again.
 author::Procedure reset(Dialog& dialog, ProcedureResult& found);
 
-/// Increments the counter by one.
+/// Increments the encoder's counter by one.
 author::Procedure count_up(Dialog& dialog, ProcedureResult& found);
-/// Sets the counter to 0.
+/// Sets the encoder's counter to 0.
 author::Procedure clear_counter(Dialog& dialog, ProcedureResult& found);
 
 /// Reads bytes of a data field. Arguments: address, data field, number of bytes.
 author::Procedure read_memory(Dialog& dialog, ProcedureResult& found, Arguments arguments);
-/// Writes a byte of a data field, unless it has the value. Arguments: address, value, data field.
+/// Writes a byte of a data field, unless it has the value already. Arguments: address, value, data field.
 author::Procedure write_memory(Dialog& dialog, ProcedureResult& found, Arguments arguments);
 /// Creates a data field, or changes its status. Arguments: data field, size in bytes, number of its access code, 1 if
-/// it can be written.
+/// it shall be writable.
 author::Procedure create_field(Dialog& dialog, ProcedureResult& found, Arguments arguments);
-/// Changes an access code, and shows by a second change to the same code that the encoder has it. Arguments: number,
-/// old code, new code.
+/// Changes an access code. To verify it, changes the new code to itself, which the encoder refuses if it has another
+/// code. Arguments: number of the access code, old code, new code.
 author::Procedure set_access_code(Dialog& dialog, ProcedureResult& found, Arguments arguments);
 
-/// Gives the encoder another address. Errors also: invalid_argument (something answers at that address),
-/// cross_check_failed (the encoder still has its old address).
+/// Gives the encoder another address. Errors besides those of the exchanges: invalid_argument (an encoder answers at
+/// that address already), cross_check_failed (the encoder still has its old address).
 author::Procedure set_address(Dialog& dialog, ProcedureResult& found, Arguments arguments);
-/// Sets the baud rate of encoder and line; all else of the interface setting stays. After an error the line has its old
-/// rate.
+/// Sets the baud rate of encoder and line; the other bits of the interface setting stay. After an error the line has
+/// its old rate.
 author::Procedure set_baud(Dialog& dialog, ProcedureResult& found, Arguments arguments);
 
 }  // namespace absenc::hiperface

@@ -14,15 +14,15 @@ using author::testing::RunResult;
 using author::testing::Wire;
 using Bench = author::testing::UnitBench<32>;
 
-// Options that state the resolution, so that the host does not ask for it.
+// Options that state the resolution, so that the host does not read the type label first.
 constexpr std::string_view known = "singleturn_bits=12 multiturn_bits=12";
 
 Wire framed(Wire bytes) {
   bytes.push_back(checksum(bytes));
   return bytes;
 }
-// Makes the encoder take requests with this command for unknown ones, and replaces its refusals by `acknowledged`. The
-// encoder receives each byte alone.
+// Makes the encoder refuse requests with this command as unknown, and replaces its refusals by the frame
+// `acknowledged`. The encoder receives a request in pieces of one byte.
 void ignore(Bench& bench, std::uint8_t command, const Wire& acknowledged) {
   bench.tampered.requests([command](unsigned, Wire& received) {
     if (received == Wire{command}) received[0] = 0;
@@ -89,7 +89,7 @@ TEST(HiperfaceProcedures, ReadsStatusUntilACodeComesAgain) {
   Bench bench(unit, known);
   bench.device.raise_alarms(bit_of("led_current") | bit_of("over_speed") | bit_of("multiturn_position_2"));
   const RunResult read = bench.run("position");
-  EXPECT_EQ(read.frames, 5u);  // position, three codes, the first one again
+  EXPECT_EQ(read.frames, 5u);  // frames: the position, three status codes, the first status code again
   EXPECT_EQ(read.reading->alarms, bit_of("led_current") | bit_of("over_speed") | bit_of("multiturn_position_2"));
   EXPECT_EQ(read.reading->alarms_reported, read.reading->alarms);
   EXPECT_EQ(read.reading->singleturn_validity(), Validity::invalid);
@@ -136,7 +136,7 @@ TEST(HiperfaceProcedures, ErrorBitWithoutAlarmIsReadAgain) {
     reply.back() ^= error_bit;
   });
   const RunResult read = bench.run("position");
-  EXPECT_EQ(read.frames, 3u);  // position with the bit, status 00, position
+  EXPECT_EQ(read.frames, 3u);  // frames: a position with the error bit, status 00, a position
   EXPECT_EQ(read.reading->singleturn_validity(), Validity::valid);
   EXPECT_EQ(read.reading->status, 0u);
 }
@@ -235,7 +235,7 @@ TEST(HiperfaceProcedures, ResetWaitsUntilEncoderAnswers) {
   const RunResult reset = bench.run("reset");
   EXPECT_EQ(reset.error, Error::none);
   EXPECT_GT(reset.took, 250ms);
-  EXPECT_EQ(reset.frames, 4u);  // position, reset, type label, position
+  EXPECT_EQ(reset.frames, 4u);  // frames: position, reset, type label, position
   EXPECT_EQ(reset.numbers.at("multiturn"), 3);
   bench.tampered.replies([](unsigned nth, Wire& reply) {
     if (nth > 0) reply.clear();
@@ -320,7 +320,7 @@ TEST(HiperfaceProcedures, ChangedAccessCodeProtectsDataField) {
 TEST(HiperfaceProcedures, AccessCodeThatStaysIsFailure) {
   Bench bench(unit, "");
   bench.tampered.replies([](unsigned nth, Wire& reply) {
-    if (nth == 0) reply = framed({0x40, 0x4F, 1});  // instead of the refusal
+    if (nth == 0) reply = framed({0x40, 0x4F, 1});  // a valid reply replaces the encoder's refusal
   });
   EXPECT_EQ(bench.run("set-access-code", {1, 0x54, 0x11}).error, Error::cross_check_failed);
 }
@@ -364,7 +364,8 @@ TEST(HiperfaceProcedures, SetAddressMovesEncoder) {
 TEST(HiperfaceProcedures, SetAddressThatIsTakenChangesNothing) {
   Bench bench(unit, "");
   bench.tampered.requests([](unsigned, Wire& received) {
-    if (received == Wire{0x47}) received[0] = 0x40;  // the encoder answers for another one
+    // makes the encoder also answer requests to the address 47, as if another encoder had it
+    if (received == Wire{0x47}) received[0] = 0x40;
   });
   const RunResult refused = bench.run("set-address", {0x47});
   EXPECT_EQ(refused.error, Error::invalid_argument);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Requests of the HIPERFACE parameter channel: encoding, decoding, lengths. README.md draws them.
+// Requests of the HIPERFACE parameter channel: encoding, decoding, lengths. README.md draws the requests.
 #pragma once
 
 #include <algorithm>
@@ -14,16 +14,17 @@
 
 namespace absenc::hiperface {
 
-inline constexpr std::size_t shortest_frame = 3;  ///< Length of the shortest frame: address, command, checksum.
-/// Length of the longest request in bytes: it stores a whole data field.
+/// Length in bytes of the shortest frame: address, command, checksum.
+inline constexpr std::size_t shortest_frame = 3;
+/// Length in bytes of the longest request, which stores a whole data field.
 inline constexpr std::size_t request_capacity = 7 + field_capacity;
-/// Length of the longest reply in bytes: it has a whole data field.
+/// Length in bytes of the longest reply, which has a whole data field.
 inline constexpr std::size_t reply_capacity = 6 + field_capacity;
-/// Bytes of a request.
+/// Buffer for the bytes of a request.
 using RequestBytes = ByteBuffer<request_capacity>;
-/// Bytes of a reply.
+/// Buffer for the bytes of a reply.
 using ReplyBytes = ByteBuffer<reply_capacity>;
-/// Bytes of a data field.
+/// Buffer for the bytes of a data field.
 using FieldBytes = ByteBuffer<field_capacity>;
 
 /// Returns the checksum of `bytes`, their exclusive OR; 0 if `bytes` is a frame with its right checksum.
@@ -33,32 +34,35 @@ using FieldBytes = ByteBuffer<field_capacity>;
   return sum;
 }
 
-/// Returns whether a frame can begin with this byte: the address of an encoder, or that of all.
+/// Returns whether a frame can begin with this byte: the address of an encoder, or the address that all encoders
+/// answer.
 [[nodiscard]] constexpr bool is_address(std::uint8_t byte) {
   return (byte >= first_address && byte <= last_address) || byte == broadcast_address;
 }
 
-/// A request. The members behind `address` are those of its command; others are 0.
+/// A request. Members that its command does not carry are 0.
 struct Request {
   CommandCode command = CommandCode::position;  ///< Command of the request.
   std::uint8_t address = first_address;         ///< Address of the encoder, or `broadcast_address`.
-  /// The first byte behind the command: a channel, a data field, the number of an access code, a new address or a new
-  /// interface setting.
+  /// The first byte behind the command: an analog channel, a data field, the number of an access code, a new address or
+  /// a new interface setting.
   std::uint8_t subject = 0;
-  std::uint8_t first = 0;      ///< Read and store data: first address in the data field.
-  std::uint8_t count = 0;      ///< Read and store data: number of bytes, 1 to 128.
-  std::uint8_t code = 0;       ///< Code 0, or the access code; of the command 4F the old one.
-  std::uint8_t new_value = 0;  ///< Create field: its status; command 4F: the new access code.
-  std::uint32_t position = 0;  ///< Set position: the position that the encoder shall have.
-  FieldBytes data{};           ///< Store data: the bytes.
-  /// Read position: number of requests for the status that a capture joins to it; 0 in a request of a host.
+  std::uint8_t first = 0;  ///< If the command reads or stores data: first address in the data field.
+  std::uint8_t count = 0;  ///< If the command reads or stores data: number of bytes, 1 to 128.
+  std::uint8_t code = 0;   ///< Access code that the command needs; for command 4F (change an access code) the old code.
+  /// For command 4D (create a data field): its status; for 4F (change an access code): the new code.
+  std::uint8_t new_value = 0;
+  std::uint32_t position = 0;  ///< For command 43 (set position): the position that the encoder shall have.
+  FieldBytes data{};           ///< For command 4B (store data): the bytes to store.
+  /// For command 42 (read position): number of requests for the status that a capture joins to this request; 0 in a
+  /// request of a host.
   std::uint8_t statuses = 0;
-  /// Type label and description: whether the encoder may report another resolution than the options. No byte of the
-  /// request shows it.
+  /// For type label and description: whether a reply with another resolution than that of the options is accepted. This
+  /// is not sent.
   bool any_resolution = false;
 };
 
-/// Returns whether requests with this code store something in the encoder.
+/// Returns whether requests with this command store something in the encoder.
 [[nodiscard]] constexpr bool stores(CommandCode command) {
   switch (command) {
     case CommandCode::set_position:
@@ -75,15 +79,16 @@ struct Request {
   }
 }
 
-/// Numbers of bytes between command and checksum.
+/// Numbers of bytes that a command has between its code and the checksum.
 struct DataSizes {
-  std::uint8_t request = 0;  ///< Bytes of the request; of the command 4B without the stored bytes.
-  std::uint8_t reply = 0;    ///< Bytes of the reply; of the command 4A without the read bytes.
-  /// Fewest bytes of the reply, for commands whose reply no source shows: it may repeat fewer bytes of the request.
+  std::uint8_t request = 0;  ///< Number of bytes in the request; for command 4B without the bytes to store.
+  std::uint8_t reply = 0;    ///< Number of bytes in the reply; for command 4A without the bytes that were read.
+  /// Least number of bytes in the reply. It is smaller than `reply` for commands whose reply no source shows: the reply
+  /// may repeat bytes of the request or not.
   std::uint8_t least = 0;
 };
 
-/// Returns the numbers of bytes of a command; nothing if there is no such command.
+/// Returns the numbers of bytes of the command with this code; no value if there is no such command.
 [[nodiscard]] constexpr std::optional<DataSizes> data_sizes(const Format& format, std::uint8_t code) {
   switch (static_cast<CommandCode>(code)) {
     case CommandCode::position:
@@ -129,7 +134,7 @@ namespace detail {
 constexpr void append_big_endian(auto& bytes, std::uint32_t value, unsigned size) {
   for (unsigned i = size; i-- > 0;) bytes.push_back(static_cast<std::uint8_t>(value >> 8 * i));
 }
-// Appends the bytes between command and checksum of a request.
+// Appends the bytes that a request has between command and checksum.
 constexpr void append_data(RequestBytes& bytes, const Request& request) {
   switch (request.command) {
     case CommandCode::set_position:
@@ -168,7 +173,7 @@ constexpr void append_data(RequestBytes& bytes, const Request& request) {
 }  // namespace detail
 
 namespace detail {
-// Appends one frame: the request without the requests for the status behind it.
+// Appends the frame of a request. Requests for the status that a capture joins to it are not appended.
 constexpr void append_frame(RequestBytes& bytes, const Request& request) {
   const std::size_t begin = bytes.size();
   bytes.push_back(request.address);
@@ -178,7 +183,7 @@ constexpr void append_frame(RequestBytes& bytes, const Request& request) {
 }
 }  // namespace detail
 
-/// Returns the bytes of a request.
+/// Returns the bytes of a request, with the requests for the status that a capture joins to it.
 [[nodiscard]] constexpr RequestBytes encode_request(const Request& request) {
   RequestBytes bytes;
   detail::append_frame(bytes, request);
@@ -187,8 +192,8 @@ constexpr void append_frame(RequestBytes& bytes, const Request& request) {
   return bytes;
 }
 
-/// Returns the length of the request that begins with `begin`, or how many bytes are needed to know it; 0: no request
-/// begins with these bytes.
+/// Returns the length in bytes of the request that begins with `begin`. Returns the number of bytes needed to know it
+/// if there are fewer, and 0 if no request begins so.
 [[nodiscard]] constexpr std::size_t request_length(const Format& format, Bytes begin) {
   if (!is_address(begin[0])) return 0;
   if (begin.size() < 2) return 2;
@@ -200,18 +205,19 @@ constexpr void append_frame(RequestBytes& bytes, const Request& request) {
   return shortest_frame + sizes->request + begin[4];
 }
 
-/// Returns the request for the position, with the requests for the status behind it; nothing if the bytes are others.
-/// `bytes` has at least 3.
+/// Decodes a request for the position with joined requests for the status; no value if the bytes are anything else.
+/// `bytes` must have at least 3 bytes.
 [[nodiscard]] constexpr std::optional<Request> decode_joined(Bytes bytes) {
   const Request request{.address = bytes[0], .statuses = static_cast<std::uint8_t>(bytes.size() / shortest_frame - 1)};
-  if (request.statuses > alarms.size() + 1) return {};  // the last one may repeat a code
+  // one more than there are alarms, because the last status may repeat a code
+  if (request.statuses > alarms.size() + 1) return {};
   const RequestBytes joined = encode_request(request);
   if (!std::equal(bytes.begin(), bytes.end(), joined.view().begin(), joined.view().end())) return {};
   return request;
 }
 
-/// Decodes a request. Errors: wrong_length; unexpected_reply (no address, or no such command); bad_checksum;
-/// out_of_range (a count of bytes that no data field has).
+/// Decodes a request. Errors: wrong_length; unexpected_reply (the first byte is no address, or there is no such
+/// command); bad_checksum; out_of_range (a number of bytes that no data field has).
 [[nodiscard]] constexpr Result<Request> decode_request(const Format& format, Bytes bytes) {
   if (bytes.size() < shortest_frame) return Error::wrong_length;
   if (!is_address(bytes[0]) || !data_sizes(format, bytes[1])) return Error::unexpected_reply;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The procedures of procedures.hpp that read and change the settings of an encoder: its address, its baud rate.
+// The procedures of procedures.hpp that read and change the address and the baud rate of an encoder.
 #include "absenc/protocol/hiperface/procedures.hpp"
 
 namespace absenc::hiperface {
@@ -53,8 +53,8 @@ void use_rate(Dialog& dialog, std::uint8_t rate) {
   dialog.set_rate(rates[rate], Protocol::host_times(format));
 }
 
-// Switches the line to `rate`, and asks for the type label there. Returns whether the encoder has the interface setting
-// `setting` then; if not, the line has its old rate again.
+// Switches the line to `rate`, and reads the type label at this rate. Returns whether the encoder reports the interface
+// setting `setting`; if not, switches the line back to its old rate.
 Part<bool> answers_at(Dialog& dialog, std::uint8_t rate, std::uint8_t setting) {
   const std::uint8_t old_rate = dialog.format().rate;
   use_rate(dialog, rate);
@@ -85,7 +85,8 @@ Procedure set_baud(Dialog& dialog, ProcedureResult& found, Arguments arguments) 
   if (!changed) co_await dialog.rest(store_limit);
   const bool at_once = co_await answers_at(dialog, *rate, setting);
   if (at_once) co_return done;
-  // No source states when the setting takes effect. An encoder that has it, but answers at its old rate, is reset.
+  // No source states when a new interface setting takes effect. If the encoder reports it but still answers at its old
+  // rate, the host resets the encoder.
   const Result<Reply> still = co_await dialog.attempt(ask_label);
   if (!still) co_return {still.error(), "it was sent, but the encoder answers at neither baud rate"};
   if (still->label[0] != setting) {

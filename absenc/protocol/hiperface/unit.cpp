@@ -35,7 +35,7 @@ void put_nodes(FieldSink& sink, const Format&, const Nodes<addresses>& nodes) {
   }
 }
 
-// Returns the resolution that a type label or a description reports; 0 and 0: the reply reports none.
+// Returns the resolution that a type label or a description reports; 0 and 0 if the reply reports none.
 Resolution reported(Bytes reply) {
   const auto code = static_cast<CommandCode>(reply[1] & ~error_bit);
   if (code == CommandCode::type_label && reply.size() == shortest_frame + 4) return resolution_of_type(reply[3]);
@@ -44,7 +44,7 @@ Resolution reported(Bytes reply) {
   return is_description ? resolution_in(reply.subspan(5, description_size)) : Resolution{};
 }
 
-// Returns cause and advice for some errors; the cause of a refusal is its status code in words.
+// Returns cause and advice for an error; both may be empty. The cause of a refusal is its status code in words.
 Explanation explain(const Format& format, Error error, Bytes request, Bytes reply) {
   if (error == Error::request_rejected && reply.size() == shortest_frame + format.status_bytes) {
     const std::uint8_t code = reply[reply.size() - 2];
@@ -91,7 +91,7 @@ template <CommandCode command>
 constexpr Request plain(const Format& format, Arguments = {}) {
   return plain_request(format, command);
 }
-// Returns a request whose first byte behind the command is an argument, or `subject` without arguments.
+// Returns a request of `command` whose next byte is the first argument, or `subject` if there are no arguments.
 template <CommandCode command, std::uint8_t subject = 0>
 constexpr Request about(const Format& format, Arguments arguments) {
   Request request = plain_request(format, command);
@@ -284,7 +284,8 @@ constexpr std::size_t size_of_reply(const Format& format, Bytes begin) {
   const auto code = static_cast<std::uint8_t>(begin[1] & ~error_bit);
   const std::optional<DataSizes> sizes = data_sizes(format, code);
   if (!sizes || code == static_cast<std::uint8_t>(CommandCode::reset)) return 0;
-  // A reply that repeats fewer bytes of its request ends with the run of characters.
+  // A reply may be shorter than its full length because it repeats fewer bytes of the request. It then ends where the
+  // received characters end, if the checksum is right.
   const bool ends_here = begin.size() >= shortest_frame + sizes->least && checksum(begin) == 0;
   if (sizes->least < sizes->reply && ends_here && begin.size() < shortest_frame + sizes->reply) return begin.size();
   if (code != static_cast<std::uint8_t>(CommandCode::read_data)) return shortest_frame + sizes->reply;
@@ -292,7 +293,8 @@ constexpr std::size_t size_of_reply(const Format& format, Bytes begin) {
   return begin[4] > field_capacity ? 0 : shortest_frame + sizes->reply + begin[4];
 }
 
-/// Returns the request that a reply captured without one is taken to answer, with codes of 0, or an error.
+/// Returns the request that a captured reply probably answers, if the capture does not contain it, or an error. Access
+/// codes in the request are 0.
 constexpr Result<Request> guess_request(const Format& format, Bytes reply) {
   if (reply.size() < shortest_frame) return Error::wrong_length;
   const auto code = static_cast<std::uint8_t>(reply[1] & ~error_bit);
@@ -308,7 +310,7 @@ constexpr Result<Request> guess_request(const Format& format, Bytes reply) {
   return request;
 }
 
-/// Returns request_rejected if the encoder answered an invalid request with its status, otherwise `error`.
+/// Returns request_rejected if the encoder answered an invalid request with its status; otherwise returns `error`.
 constexpr Error answer_to_bad(const Format& format, Bytes request, Error error, Bytes reply) {
   const bool refused = reply.size() == shortest_frame + format.status_bytes && checksum(reply) == 0 &&
                        begins_refusal(CommandCode::position, reply) && !request.empty() &&
@@ -325,8 +327,8 @@ BitRanges bits_in(const Options& values, Frame, Frame reply, const FieldInfo& fi
   return place_of(options.format(values), reply.bytes, field);
 }
 
-// The lengths of three replies are options. Returns why a capture contradicts a reply to `command` of `size` bytes of
-// data; empty if it does not.
+// For the three commands whose reply length is an option: returns a contradiction if `reply` is a reply to `command`
+// whose data has not `size` bytes; otherwise an empty text.
 std::string_view length_contradiction(CommandCode command, std::int64_t size, Bytes reply) {
   if (reply.size() < shortest_frame || checksum(reply) != 0) return {};
   const bool is_of = (reply[1] & ~error_bit) == static_cast<unsigned>(command);
@@ -334,8 +336,8 @@ std::string_view length_contradiction(CommandCode command, std::int64_t size, By
   return "a reply has another length";
 }
 
-// Stores the resolution that a captured type label or description reports in options that leave it open. Returns false
-// if the encoder reports another resolution than the options.
+// Stores the resolution that a captured type label or description reports, if the options leave it open. Returns false
+// if the encoder reports another resolution than the options state.
 bool take_resolution(Options& values, std::span<const Capture> captures, EvidenceSink& sink) {
   const Format said = options.format(values);
   for (std::size_t i = 0; i < captures.size(); ++i) {
@@ -413,7 +415,7 @@ constexpr Declaration<Protocol, VirtualEncoder> declaration{
     .alarms = fields.of<&Values::alarms>(),
     .memory = memory_areas,
     .conditions = conditions,
-    // A pause of 3 characters ends a frame; encoders send frames without pauses.
+    // A pause of 3 characters (33 bits) ends a frame; encoders make no pauses inside frames.
     .timing = {.pause_bits = 33,
                .turnaround = answer_time,
                .turnaround_limit = Protocol::host_times({.rate = 0}).answer_limit},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Test frames of HIPERFACE with their source. Each is decoded when unit.cpp is compiled.
+// Test frames of HIPERFACE with their source; the compiler decodes each of them.
 #pragma once
 
 #include <array>

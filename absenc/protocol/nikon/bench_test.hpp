@@ -15,7 +15,7 @@ using author::testing::Tamper;
 using author::testing::wire;
 using author::testing::Wire;
 
-/// The bench of a unit, with a shaft of 20 bits. `tamper` changes the replies of the encoder.
+/// A virtual encoder and a host on one line, with a shaft of 20 bits. `tamper` changes the replies of the encoder.
 struct Bench : author::testing::UnitBench<20> {
   explicit Bench(std::string_view settings = "") : UnitBench(nikon::unit, settings) {}
   explicit Bench(Tamper tamper) : Bench() { tampered.replies(std::move(tamper)); }

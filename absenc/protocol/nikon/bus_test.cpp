@@ -15,13 +15,13 @@ namespace {
 
 using Wire = std::vector<std::uint8_t>;
 
-// A shaft that stands at a position.
+// A shaft that does not turn.
 struct Standing final : Shaft {
   [[nodiscard]] ShaftState at(Time) const override { return {.position = position}; }
   std::int64_t position = 0;
 };
 
-// A host that sends bytes at given times, and stores those that it receives.
+// A host that sends bytes at given times, and stores the bytes that it receives.
 struct RawHost final : Machine<std::uint8_t> {
   void begin(Wire bytes, Time when) {
     received.clear();
@@ -52,7 +52,7 @@ struct RawHost final : Machine<std::uint8_t> {
   bool sending = false;
 };
 
-// A line with the encoders of these addresses, each at another position.
+// A line with one encoder for each of the given addresses, each encoder at another position.
 struct Bus {
   explicit Bus(const std::vector<unsigned>& addresses, Format format = {})
       : line(LinkKind::half_duplex, format.line()) {
@@ -66,19 +66,19 @@ struct Bus {
     }
     node = line.attach(sim::NodeRole::host, host);
   }
-  // Sends a request and returns the bytes that follow it within 2 ms.
+  // Sends a request and returns the bytes received within 2 ms.
   Wire ask(const Request& request, const Format& format = {}) {
     const RequestBytes bytes = encode_request(format, request);
     return send({bytes.view().begin(), bytes.view().end()});
   }
-  // Sends bytes and returns those that follow within 2 ms.
+  // Sends bytes and returns the bytes received within 2 ms.
   Wire send(Wire bytes) {
     host.begin(std::move(bytes), line.now());
     line.wake(node);
     pass(2ms);
     return host.received;
   }
-  // Sends a request `pause` after the last reply, and waits until it is answered.
+  // Sends a request when the time `pause` has passed since the last reply, and waits for its reply.
   void ask_after_reply(const Request& request, Time pause) {
     const RequestBytes bytes = encode_request({}, request);
     const Time at = host.times.empty() ? line.now() : host.times.back() + pause;
@@ -86,7 +86,7 @@ struct Bus {
     line.wake(node);
     while (host.received.size() < reply_length(request.code)) pass(1us);
   }
-  // Returns the reply of the first encoder that answers, or an empty one after an error.
+  // Sends a request and returns the reply of the first encoder that answers; an empty reply after an error.
   OneReply reply(const Request& request, const Format& format = {}) {
     const Wire bytes = ask(request, format);
     const Result<Reply> decoded = decode_reply(format, request, bytes);
@@ -123,11 +123,12 @@ TEST(NikonBus, AllEncodersOfALineAnswerInTurn) {
   for (unsigned i = 0; i < 8; ++i) {
     EXPECT_EQ(reply->at(i).address, i);
     EXPECT_EQ(singleturn_in({}, Code::all_positions, reply->at(i).data), (i + 1) << 8);
-    // The first byte of each reply ends half a character after the begin of its slot.
+    // Encoders answer in turn, 3 us apart; the first byte of a reply ends half a character (3.6 us) after the reply's
+    // begin.
     if (i == 0) continue;
     EXPECT_EQ(bus.host.times[8 * i] - bus.host.times[8 * i - 1], 3us + 3600ns);
   }
-  // Each of them still answers alone.
+  // Each of the eight encoders also answers a request to its own address.
   for (unsigned i = 0; i < 8; ++i) {
     EXPECT_EQ(bus.ask({.code = Code::position, .address = static_cast<std::uint8_t>(i)}).size(), 8u);
   }
@@ -164,7 +165,7 @@ TEST(NikonBus, FramesOfARequestKeepTheirPause) {
 TEST(NikonBus, EncoderAnswersAfterThreeMicroseconds) {
   Bus bus({0});
   bus.ask({.code = Code::position});
-  // The first byte of the reply has half of a character.
+  // The first byte of the reply is half of its first character, which lasts 7.2 us.
   EXPECT_EQ(bus.host.times[0] - bus.host.sent_at, answer_time + 3600ns);
 }
 
@@ -224,7 +225,7 @@ TEST(NikonBus, EepromAnswersWithTheWordAskedForBefore) {
   bus.pass(memory_write_time);
   EXPECT_EQ(bus.data({.code = Code::alarms}), 0u);
   EXPECT_EQ(word(0xF9), 0x125A3Cu);
-  EXPECT_EQ(word(0xF0), 0xF9008Cu);  // 35 degC in quarters
+  EXPECT_EQ(word(0xF0), 0xF9008Cu);  // the temperature, 35 degC, in quarters of a degree: 8C (hex)
   EXPECT_EQ(word(0xEF), 0xF00000u);
   EXPECT_EQ(bus.data({.code = Code::write_memory, .word = 0xF0, .value = 1}), 0xEF0000u);
   EXPECT_EQ(word(0), 0xF00000u) << "words of the maker cannot be written";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The A-format's demands on encoders and hosts; paragraphs are those of README.md.
+// Requirements of the A-format on encoders and hosts, for conformance tests. Paragraphs are those of README.md.
 #include <array>
 
 #include "absenc/protocol/nikon/format.hpp"
@@ -8,10 +8,10 @@
 namespace absenc::nikon {
 namespace {
 
-/// Bits that clearing the alarms must clear: all but the state of the EEPROM.
+/// Mask of the bits that clearing the alarms must clear: all but the bits about the EEPROM.
 constexpr std::int64_t cleared_alarms = alarm::all & ~alarm::memory_busy;
 
-/// Clauses for encoders.
+/// Requirements on encoders with the A-format.
 constexpr auto clauses = std::array{
     Clause{"answer", "Times", "a request is answered", Demand::answered},
     Clause{"answer-time", "Times", "the reply begins no later than a host waits", Demand::in_time},
@@ -72,7 +72,7 @@ constexpr auto seven_zeros =
     std::array{HostStep{microseconds(100), "zero", {}, 7}, HostStep{microseconds(100), "position"}};
 constexpr auto one_clear =
     std::array{HostStep{microseconds(100), "clear-alarms"}, HostStep{microseconds(100), "reset-multiturn", {}, 8}};
-// The frames of requests that read and write word 0x12 of the EEPROM.
+// Frames of the requests that read and write word 0x12 of the EEPROM.
 constexpr HostStep read_word{milliseconds(40), "020d"};
 constexpr HostStep write_word{milliseconds(40), "022e"};
 constexpr HostStep low_byte{microseconds(15), "8a67"};
@@ -87,7 +87,7 @@ constexpr auto closer_frames = std::array{read_word, HostStep{microseconds(1), "
 constexpr auto apart_frames = std::array{read_word, word_address};
 }  // namespace script
 
-/// Clauses for hosts.
+/// Requirements on hosts of encoders with the A-format.
 constexpr std::array<HostClause, 8> host_clauses{{
     {"asks", "Frames", "requests are as drawn", HostDemand::asks},
     {"silence", "Times", "after no reply it asks again", HostDemand::after_silence},

@@ -15,7 +15,7 @@ namespace absenc::nikon {
 /// Conditions of the virtual encoder's environment that users can set.
 inline constexpr auto conditions = std::array{Condition{"temperature", "degC", "of the encoder", 0, 125, 35}};
 
-/// Returns the demands on the requests of a reset to an encoder of this format.
+/// Returns the rules for the eight requests of a reset to an encoder of this format.
 [[nodiscard]] constexpr author::InARow reset_row(const Format& format) {
   return {.requests = 8,
           .interval = frame_pause,
@@ -34,7 +34,7 @@ class VirtualEncoder final : public author::Responder {
     memory_[address_at] = format.address;
   }
   [[nodiscard]] MutableBytes memory() override { return memory_; }
-  /// Ends the alarms `bits`, which otherwise stay until a reset clears them or the power goes off.
+  /// Ends the alarms `bits`. Without this, an alarm ends when a reset clears it or the power goes off.
   void lower_alarms(std::uint32_t bits) override { latches_ &= static_cast<std::uint16_t>(~bits); }
   /// Raises the alarms `bits`.
   void raise_alarms(std::uint32_t bits) override { latches_ |= static_cast<std::uint16_t>(bits & alarm::all); }
@@ -67,7 +67,8 @@ class VirtualEncoder final : public author::Responder {
       take_turn(one * address(), one * encoder_count);
     }
     if (!is_reset(request->code)) resets_.end();
-    // The replies to requests of a reset, and to CC 20, have the state from before.
+    // The replies to requests of a reset, and to command code 20, have the address and the alarms from before the
+    // change.
     const OneReply before{.address = address(), .status = status(at), .data = data_for(*request, at)};
     reply.append(encode_reply(request->code, before).view());
     if (is_reset(request->code)) count_reset(*request, at);
@@ -82,7 +83,7 @@ class VirtualEncoder final : public author::Responder {
 
   // ---- Data of replies
 
-  // Returns ES, whose bits no source explains.
+  // Returns the status bits (ES): 1 if an alarm is raised. No source explains them.
   [[nodiscard]] std::uint8_t status(Time at) const { return alarms_at(at) != 0 ? 1 : 0; }
   [[nodiscard]] std::uint64_t data_for(const Request& request, Time at) {
     const std::uint64_t counts = position(at);
@@ -114,7 +115,7 @@ class VirtualEncoder final : public author::Responder {
     if (has_identity(request.code)) return in_bit_order(format_, request.code, identity());
     return alarms_at(at);
   }
-  // Returns the temperature in quarters of a degree.
+  // Returns the encoder's temperature in quarters of a degree.
   [[nodiscard]] std::uint64_t quarters() const { return static_cast<std::uint64_t>(4 * temperature_); }
 
   [[nodiscard]] std::uint64_t load(std::size_t at, std::size_t size) const {
@@ -146,12 +147,12 @@ class VirtualEncoder final : public author::Responder {
   // ---- Resets and EEPROM
 
   void count_reset(const Request& request, Time at) {
-    // Requests that set two different addresses are two rows.
+    // Requests that set different addresses do not count as requests of the same reset.
     const unsigned row =
         static_cast<unsigned>(request.code) << 3 | (request.code == Code::set_address ? request.address : 0u);
     if (resets_.count(row, at, at)) reset(request, at);
   }
-  // Executes a reset. No source states whether a zero keeps the turns: this encoder keeps them.
+  // Executes a reset. No source states whether setting the zero changes the turns: this encoder keeps them.
   void reset(const Request& request, Time at) {
     memory_ready_at_ = at + memory_write_time;
     const Code code = request.code;
@@ -168,7 +169,7 @@ class VirtualEncoder final : public author::Responder {
     store(address_at, 1, address);
     memory_ready_at_ = at + memory_write_time;
   }
-  // Records whether the host waited until the EEPROM is no longer busy, and returns it.
+  // Returns whether the EEPROM is ready. If not, records that the host broke a rule.
   bool is_ready(Time at) { return expect(at >= memory_ready_at_, "EEPROM accessed while it is busy", at); }
   void write_identity(std::uint32_t value, Time at) {
     if (!is_ready(at)) return;
@@ -179,7 +180,8 @@ class VirtualEncoder final : public author::Responder {
     if (address == temperature_address) return static_cast<std::uint16_t>(quarters());
     return static_cast<std::uint16_t>(address < user_words ? load(2 * std::size_t{address}, 2) : 0);
   }
-  // Executes a request for the EEPROM unless it is busy. Returns the word fetched before, with its address.
+  // Executes a read or write request for the EEPROM unless it is busy. Returns the word that the request before has
+  // fetched, with its address.
   [[nodiscard]] std::uint64_t access_memory(const Request& request, Time at) {
     const bool ready = is_ready(at);
     if (ready && fetching_) fetched_ = {*fetching_, word(*fetching_)};
@@ -211,8 +213,8 @@ class VirtualEncoder final : public author::Responder {
   std::array<std::uint8_t, memory_size> memory_{};
   std::int64_t temperature_ = conditions[0].normal;
   std::uint16_t latches_ = 0;
-  Word fetched_{};                          // the word that was fetched last
-  std::optional<std::uint8_t> fetching_{};  // address of the word whose access began last
+  Word fetched_{};                          // word that the encoder has fetched for the next reply
+  std::optional<std::uint8_t> fetching_{};  // address of the word that the encoder is fetching
   Time memory_ready_at_{};
   author::InARow row_ = reset_row(format_);
   author::RowCounter resets_{row_, rules()};

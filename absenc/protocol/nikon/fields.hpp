@@ -35,19 +35,20 @@ inline constexpr std::array<FlagInfo, 11> alarm_flags{{
 /// Values of the fields of a frame, or of a procedure's result.
 struct Values {
   std::optional<std::uint8_t> encoder_address{};  ///< Address of the encoder (EA).
-  std::optional<std::uint8_t> command{};          ///< Command code (CC).
+  std::optional<std::uint8_t> command{};          ///< Command code (CC) of the request.
   std::optional<std::uint8_t> status{};           ///< Status bits of the reply (ES).
   std::optional<std::uint32_t> singleturn{};      ///< Position within the turn, in counts (ABS).
-  std::optional<std::uint32_t> low_bits{};        ///< Lower 17 bits of a position that has more.
-  std::optional<std::uint32_t> multiturn{};       ///< Number of turns (ABM).
-  std::optional<std::uint16_t> alarms{};          ///< Alarms (ALM), described by `alarm_flags`.
-  std::optional<double> temperature{};            ///< Temperature of the encoder, in degC.
-  std::optional<std::uint8_t> address{};          ///< Address of a word of the EEPROM.
-  std::optional<std::uint16_t> value{};           ///< Word of the EEPROM.
-  std::optional<Bytes> data{};                    ///< Words of the EEPROM from `address` on, the low byte first.
+  /// Lower 17 bits of the position, from an encoder whose position has more bits.
+  std::optional<std::uint32_t> low_bits{};
+  std::optional<std::uint32_t> multiturn{};  ///< Number of turns (ABM).
+  std::optional<std::uint16_t> alarms{};     ///< Alarms (ALM), described by `alarm_flags`.
+  std::optional<double> temperature{};       ///< Temperature of the encoder, in degC.
+  std::optional<std::uint8_t> address{};     ///< Address of a word of the EEPROM.
+  std::optional<std::uint16_t> value{};      ///< Value of a word of the EEPROM.
+  std::optional<Bytes> data{};               ///< Words of the EEPROM from `address` on, the low byte of each first.
   std::optional<std::uint32_t> identification{};  ///< Identification code of the encoder, 24 bits.
-  std::optional<bool> written{};                  ///< Whether something was written; false: the value was there.
-  std::optional<bool> clash{};                    ///< Scan: whether no answer was valid, and at least one damaged.
+  std::optional<bool> written{};                  ///< True if a value was written; false if the encoder had it already.
+  std::optional<bool> clash{};  ///< Scan: true if no reply of the address was valid and at least one was damaged.
 };
 
 /// Table of the fields of requests, replies and results.
@@ -85,7 +86,7 @@ inline constexpr auto fields = [] {
 /// Converts a temperature, 10 bits in quarters of a degree, to degC.
 [[nodiscard]] constexpr double degrees_of(std::uint64_t quarters) { return static_cast<double>(quarters & 0x3FF) / 4; }
 
-/// Returns the values of the fields of one encoder's reply to a request with this code.
+/// Returns the values of the fields of one encoder's reply to a request with the command code `code`.
 [[nodiscard]] constexpr Values values_of(const Format& format, Code code, const OneReply& reply) {
   Values all{.encoder_address = reply.address, .command = static_cast<std::uint8_t>(code), .status = reply.status};
   if (const auto counts = singleturn_in(format, code, reply.data)) {
@@ -106,7 +107,7 @@ inline constexpr auto fields = [] {
   return all;
 }
 
-/// Returns the bits of a valid reply of one encoder that carry `field`; may be none.
+/// Returns the bits of one encoder's valid reply that carry `field`; no bits if the reply does not carry it.
 [[nodiscard]] constexpr BitRanges place_of(const Format& format, Code code, const FieldInfo& field) {
   using author::bits_of;
   const Code one = single(code);

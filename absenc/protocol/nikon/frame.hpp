@@ -17,44 +17,46 @@ namespace absenc::nikon {
 
 /// A request of the A-format.
 struct Request {
-  Code code = Code::position;  ///< command code (CC)
-  std::uint8_t address = 0;    ///< address of the encoder (EA), 0 to 7; for CC 11 and 20 the new one
-  std::uint8_t word = 0;       ///< CC 13 and 14: address of the word
-  std::uint32_t value = 0;     ///< CC 14: the word; CC 18 to 20: the identification, 24 bits
-  /// Whether a request for the alarms (CC 3) follows: both are one frame that only captures have.
+  Code code = Code::position;  ///< command code (CC) of the request
+  std::uint8_t address = 0;    ///< address of the encoder (EA), 0 to 7; with command codes 11 and 20 its new address
+  std::uint8_t word = 0;       ///< for command codes 13 and 14: address of the EEPROM word
+  std::uint32_t value = 0;     ///< for command code 14: the word to write; for 18 to 20: the identification, 24 bits
+  /// Whether this is a composed request of a capture, in which a request for the alarms (CC 3) follows the first
+  /// request.
   bool with_status = false;
-  std::uint8_t status_address = 0;  ///< `with_status`: address of the request for the alarms
+  std::uint8_t status_address = 0;  ///< if `with_status`: address in the request for the alarms
 };
 
 /// Data of the reply of one encoder.
 struct OneReply {
-  std::uint8_t address = 0;  ///< address of the encoder (EA)
-  std::uint8_t status = 0;   ///< status bits (ES), whose meanings no source states; CC 21 and 22 have one
-  std::uint64_t data = 0;    ///< `data_bits` bits of data, the first bit of the wire lowest
+  std::uint8_t address = 0;  ///< address of the encoder (EA) that sent the reply
+  /// status bits (ES), whose meanings no source states; one bit in replies to command codes 21 and 22, otherwise four
+  std::uint8_t status = 0;
+  std::uint64_t data = 0;  ///< data bits of the reply, `data_bits` in number; the first bit of the wire is the lowest
 };
 /// Replies to a request: one, or those of several encoders in the order of their addresses.
 struct Reply : OneReply {
-  std::uint8_t count = 1;                            ///< number of replies
-  std::array<OneReply, encoder_count - 1> others{};  ///< the replies behind the first
-  /// Alarms of the same encoder that another request (CC 3) has read; nothing: none has.
+  std::uint8_t count = 1;                            ///< number of replies, 1 to 8
+  std::array<OneReply, encoder_count - 1> others{};  ///< the second and later replies
+  /// Alarms of the same encoder, if the host has read them with another request (CC 3); otherwise no value.
   std::optional<std::uint16_t> alarms_read{};
   /// Returns the reply number `index`, below `count`.
   [[nodiscard]] constexpr const OneReply& at(std::size_t index) const { return index == 0 ? *this : others[index - 1]; }
 };
 
-inline constexpr std::size_t frame_bytes = 2;  ///< bytes of a frame: one character of 16 bits
-inline constexpr std::size_t longest_one = 8;  ///< length of the longest reply of one encoder in bytes
-/// Bytes of a request.
+inline constexpr std::size_t frame_bytes = 2;  ///< number of bytes of a frame, which is one character of 16 bits
+inline constexpr std::size_t longest_one = 8;  ///< length in bytes of the longest reply of one encoder
+/// Buffer for the bytes of a request.
 using RequestBytes = ByteBuffer<4 * frame_bytes>;
-/// Bytes of the reply of one encoder.
+/// Buffer for the bytes of one encoder's reply.
 using OneReplyBytes = ByteBuffer<longest_one>;
 
 namespace detail {
 
-inline constexpr unsigned request_sync = 2;  // 010
-inline constexpr unsigned reply_sync = 4;    // 001
+inline constexpr unsigned request_sync = 2;  // sync code of requests, 010 with its first bit on the left
+inline constexpr unsigned reply_sync = 4;    // sync code of replies, 001 with its first bit on the left
 
-// Returns the CRC-3 (x^3 + x + 1, start 0) of the ten bits behind the sync code.
+// Returns the CRC-3 (x^3 + x + 1, start 0) of the ten bits of a request frame that follow its sync code.
 [[nodiscard]] constexpr unsigned crc3(unsigned frame) {
   unsigned crc = 0;
   for (unsigned i = 3; i < 13; ++i) {
@@ -63,7 +65,7 @@ inline constexpr unsigned reply_sync = 4;    // 001
   }
   return crc;
 }
-// Returns a request frame. The highest bit of its CRC is sent first.
+// Returns a request frame with its CRC-3, whose highest bit is sent first.
 [[nodiscard]] constexpr unsigned request_frame(unsigned frame_code, unsigned bits) {
   const unsigned frame = request_sync | frame_code << 3 | bits << 5;
   return frame | static_cast<unsigned>(reflect(crc3(frame), 3)) << 13;
@@ -75,7 +77,7 @@ constexpr void push_frame(auto& bytes, unsigned frame) {
   bytes.push_back(static_cast<std::uint8_t>(frame));
   bytes.push_back(static_cast<std::uint8_t>(frame >> 8));
 }
-// Returns the eight bits of the MDF with this frame code, 1 to 3.
+// Returns the eight data bits of the memory frame (MDF) with the frame code `frame_code`, 1 to 3.
 [[nodiscard]] constexpr unsigned memory_bits(const Request& request, std::uint32_t sent, unsigned frame_code) {
   if (frame_code == 3 && is_memory_access(request.code)) return request.word;
   return sent >> 8 * (frame_code - 1) & 0xFF;
@@ -83,7 +85,7 @@ constexpr void push_frame(auto& bytes, unsigned frame) {
 
 }  // namespace detail
 
-/// Converts a word or an identification to the order of its bits on the wire, or back.
+/// Converts an EEPROM word or an identification to the order of its bits on the wire, or back.
 [[nodiscard]] constexpr std::uint32_t in_bit_order(const Format& format, Code code, std::uint32_t sent) {
   const unsigned bits = is_memory_access(code) ? 16 : 24;
   const auto value = static_cast<std::uint32_t>(sent & low_mask(bits));
@@ -92,7 +94,7 @@ constexpr void push_frame(auto& bytes, unsigned frame) {
 
 /// Parameters of the CRC-8 of replies: x^8 + x^4 + x^3 + x^2 + 1, start 0.
 inline constexpr CrcParameters crc_parameters{8, 0x1D, 0, true, true, 0};
-/// Returns the CRC-8 of the bytes of a reply, as the byte that follows them.
+/// Returns the CRC-8 of the bytes of a reply, in the bit order of the byte that follows them.
 [[nodiscard]] constexpr std::uint8_t checksum(Bytes bytes) { return Crc<crc_parameters, CrcTable::nibble>::of(bytes); }
 
 /// Returns the bytes of a request.
@@ -138,7 +140,8 @@ inline constexpr CrcParameters crc_parameters{8, 0x1D, 0, true, true, 0};
   return request;
 }
 
-/// Decodes a request, also one followed by a request for the alarms. Errors: as `decode_request`.
+/// Decodes a request of a capture, which may be composed of a request and one for the alarms. Errors: as
+/// `decode_request`.
 [[nodiscard]] constexpr Result<Request> decode_captured(const Format& format, Bytes bytes) {
   const Result<Request> whole = decode_request(format, bytes);
   if (whole || bytes.size() != 2 * frame_bytes) return whole;
@@ -150,7 +153,7 @@ inline constexpr CrcParameters crc_parameters{8, 0x1D, 0, true, true, 0};
   return first;
 }
 
-/// Returns the bytes of the reply of one encoder to a request with this code.
+/// Returns the bytes of one encoder's reply to a request with this command code.
 [[nodiscard]] constexpr OneReplyBytes encode_reply(Code code, const OneReply& reply) {
   const unsigned begin = detail::reply_sync | static_cast<unsigned>(reply.address) << 3;
   OneReplyBytes bytes;
@@ -182,7 +185,7 @@ namespace detail {
   for (std::size_t i = 2; i + 1 < bytes.size(); ++i) reply.data |= std::uint64_t{bytes[i]} << 8 * (i - 2);
   return reply;
 }
-// Checks the reply of one encoder, whose length is right, up to its fixed bits.
+// Checks CRC, sync code, command code and the bit that must be 0 in one encoder's reply, whose length must be right.
 [[nodiscard]] constexpr Error check_one(Code code, Bytes bytes) {
   if (checksum(bytes.first(bytes.size() - 1)) != bytes.back()) return Error::bad_checksum;
   const unsigned info = frame_at(bytes, 0);
@@ -207,8 +210,8 @@ namespace detail {
 
 }  // namespace detail
 
-/// Checks and decodes a reply, or those of several encoders. Errors: wrong_length, bad_checksum, bad_framing,
-/// unexpected_reply, out_of_range.
+/// Checks and decodes the reply of one encoder, or the replies of several. Errors: wrong_length, bad_checksum,
+/// bad_framing, unexpected_reply, out_of_range.
 [[nodiscard]] constexpr Result<Reply> decode_replies(const Format& format, const Request& request, Bytes bytes) {
   const std::size_t size = reply_length(request.code);
   const bool all = is_for_all(request.code);
@@ -235,7 +238,8 @@ namespace detail {
   return reply;
 }
 
-/// Checks and decodes the reply to a request, also with `with_status`. Errors: as `decode_replies`.
+/// Checks and decodes the reply to a request, also to a composed request of a capture (`with_status`). Errors: as
+/// `decode_replies`.
 [[nodiscard]] constexpr Result<Reply> decode_reply(const Format& format, const Request& request, Bytes bytes) {
   if (!request.with_status) return decode_replies(format, request, bytes);
   constexpr std::size_t alarms_size = reply_length(Code::alarms);
@@ -250,8 +254,8 @@ namespace detail {
   return reply;
 }
 
-/// Returns the likely length of the reply that begins with `begin`, or the number of bytes needed to tell; 0: no reply
-/// does.
+/// Returns the likely length in bytes of the reply that begins with `begin`. Returns the number of bytes needed to know
+/// it if there are fewer, and 0 if no reply begins so.
 [[nodiscard]] constexpr std::size_t reply_size(Bytes begin) {
   if (begin.size() < frame_bytes) return frame_bytes;
   const unsigned info = detail::frame_at(begin, 0);
@@ -260,7 +264,7 @@ namespace detail {
   const bool is_short = !code || (info >> 11 & 1) != 0;
   return reply_length(is_short ? Code::short_position : *code);
 }
-/// Returns the request that a reply of one encoder suggests. Errors: wrong_length, unexpected_reply.
+/// Returns the request that a reply of one encoder probably answers. Errors: wrong_length, unexpected_reply.
 [[nodiscard]] constexpr Result<Request> request_of_reply(Bytes reply) {
   if (reply.size() < reply_length(Code::short_position)) return Error::wrong_length;
   Request request{.code = Code::short_position, .address = detail::address_in(reply)};

@@ -16,7 +16,7 @@ using Wire = std::vector<std::uint8_t>;
 
 Wire wire(const auto& bytes) { return {bytes.view().begin(), bytes.view().end()}; }
 
-// All codes that a source lists.
+// Returns all command codes that a source lists.
 std::vector<Code> all_codes() {
   std::vector<Code> codes;
   for (unsigned number = 0; number < 64; ++number) {
@@ -30,7 +30,7 @@ TEST(NikonFrame, CodesAreThoseThatSourcesList) {
   for (const unsigned number : {23u, 26u, 31u, 32u, 63u}) EXPECT_FALSE(code_of(number)) << number;
 }
 
-// Checksums that hpm_sdk's README prints; the highest bit is sent first.
+// Positions with the checksums that the README of HPMicro's hpm_sdk prints; the highest bit is sent first.
 TEST(NikonFrame, ChecksumsAreThoseThatAnotherVendorPrints) {
   for (const auto& [singleturn, printed] :
        {std::pair{0xFFFA6u, 0x7Au}, std::pair{0xFFFA7u, 0x59u}, std::pair{0xFFFA8u, 0xCAu}, std::pair{0xFFFA9u, 0xE9u},
@@ -43,7 +43,7 @@ TEST(NikonFrame, ChecksumsAreThoseThatAnotherVendorPrints) {
     EXPECT_EQ(singleturn_in({}, Code::position, decoded->data), singleturn);
     EXPECT_EQ(multiturn_in({}, Code::position, decoded->data), 0x8888u);
   }
-  // The first printed line: the encoder's first frame is still 0.
+  // The checksum in the README's first line fits a reply whose first frame is still 0.
   const Wire first{0x00, 0x00, 0xA5, 0xFF, 0x8F, 0x88, 0x08};
   EXPECT_EQ(reflect(checksum(first), 8), 0xA9u);
 }
@@ -100,7 +100,8 @@ TEST(NikonFrame, RepliesDecodeToWhatWasEncoded) {
     EXPECT_EQ(decoded->status, reply.status);
     EXPECT_EQ(decoded->data, reply.data);
     EXPECT_EQ(decode_reply({}, {.code = code, .address = 5}, bytes.view().first(1)).error(), Error::wrong_length);
-    // A reply alone shows its code, and short replies are recognized by their length.
+    // A reply without its request shows its command code; the replies that do not (codes 21 and 22) are recognized by
+    // their length.
     const Result<Request> shown = request_of_reply(bytes);
     ASSERT_EQ(shown.error(), Error::none);
     EXPECT_EQ(shown->code, is_short ? Code::short_position : code);

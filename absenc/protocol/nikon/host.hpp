@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads the position of an encoder with Nikon's A-format, without port, clock, heap or texts.
+// A conversation that reads the position of an encoder with Nikon's A-format; it uses no port, clock, heap or texts.
 #pragma once
 
 #include <new>
@@ -8,22 +8,23 @@
 
 namespace absenc::nikon {
 
-/// Conversation that sends a request, and then may send one for the alarms (CC 3).
+/// Conversation that sends a request for a position, and if the reply's status is not 0, a request for the alarms (CC
+/// 3).
 class ReadPosition : public author::HostOf<Protocol> {
  public:
-  /// Reads from an encoder of this format with `request`.
+  /// Creates a conversation that reads from an encoder of this format with `request`.
   explicit ReadPosition(const Format& format, const Request& request) : HostOf(format), position_request_(request) {
     author::Manner manner = Protocol::manner(format, request);
     manner.repeats = 0;
     ask(request, manner);
   }
-  /// Reads position and turns of the encoder with the address of this format.
+  /// Creates a conversation that reads position and turns of the encoder with the address of this format.
   explicit ReadPosition(const Format& format) : ReadPosition(format, {.address = format.address}) {}
 
   [[nodiscard]] const Reading* reading() const final { return has_reading_ ? &reading_ : nullptr; }
-  /// Returns the first request, also after the one for the alarms.
+  /// Returns the request for the position, even if the conversation sent a request for the alarms after it.
   [[nodiscard]] const Request& request() const { return position_request_; }
-  /// Returns the valid reply to `request`; an empty one if there was none.
+  /// Returns the valid reply to the request for the position; an empty reply if there was none.
   [[nodiscard]] const Reply& last() const { return reply_; }
 
  private:
@@ -34,7 +35,7 @@ class ReadPosition : public author::HostOf<Protocol> {
       judge(reading_, *reply_.alarms_read);
     } else {
       reply_ = HostOf::last();
-      new (&reading_) Reading(last_reading());  // constructed in place, because a copy costs time
+      new (&reading_) Reading(last_reading());  // the reading is constructed in place, because a copy costs time
       asks_for_alarms_ = has_position() && reading_.alarms_reported == 0 && reply_.count == 1;
       if (asks_for_alarms_) return ask({.code = Code::alarms, .address = reply_.address}, author::Manner{});
     }

@@ -130,7 +130,7 @@ struct Evidence final : EvidenceSink {
   std::vector<OptionEvidence> all;
 };
 
-// Returns the order after a probe of these exchanges, 0 or 1; -1: they contradict both orders.
+// Returns the bit order that a probe of these captures finds, 0 or 1; -1 if they contradict both orders.
 std::int64_t probed(std::span<const Capture> captures, Evidence& evidence, std::string_view settings = "") {
   Options options = author::testing::options_of(unit, settings);
   const auto is_order = [](const Option& option) { return option.name == "bit_order"; };
@@ -150,7 +150,7 @@ TEST(NikonProbe, WordOfTheTemperatureShowsTheOrderOfBits) {
     std::int64_t order;
     bool low, high;
   };
-  // 35.25 degC are 141 quarters, 8D.
+  // A temperature of 35.25 degC is sent as 141 quarters of a degree, 8D (hex).
   for (const Row& row :
        {Row{0x008D, 0xF9, 0, true, false}, Row{0xB100, 0xF9, 1, false, true}, Row{0, 0xF9, 1, true, true},
         Row{0xFFFF, 0xF9, -1, false, false}, Row{0x03C0, 0xF9, 1, true, true}, Row{0x0400, 0xF9, 1, false, true},

@@ -14,7 +14,7 @@ namespace {
 
 Request request_of(const Format& format, Code code) { return {.code = code, .address = format.address}; }
 
-// Reads position and alarms, stores both, and returns the reading.
+// Reads position and alarms, stores both in `found`, and returns the reading.
 Part<Reading> look(Dialog& dialog, ProcedureResult& found) {
   const Reply position = co_await dialog.ask(request_of(dialog.format(), Code::position));
   found.reading = dialog.last_reading();
@@ -26,7 +26,7 @@ Part<Reading> look(Dialog& dialog, ProcedureResult& found) {
   co_return found.reading;
 }
 
-// Returns what the reset failed to do; empty if it did everything.
+// Returns an explanation if the reading `now`, after a reset, shows that the reset failed; otherwise an empty one.
 Explanation failed_part(Code code, const Reading& now) {
   if (code == Code::zero) {
     if (is_near(now.singleturn, 0, now.singleturn_bits, zero_millidegrees)) return {};
@@ -64,7 +64,7 @@ Procedure reset(Dialog& dialog, ProcedureResult& found, Code code) {
 
 namespace {
 
-// Returns a word of the EEPROM: the second reply has the word that the first request fetched.
+// Reads a word of the EEPROM with two requests: the first makes the encoder fetch the word, the second gets it.
 Part<std::uint16_t> fetch(Dialog& dialog, std::uint8_t word, std::string_view step) {
   const Request request{.code = Code::read_memory, .address = dialog.format().address, .word = word};
   co_await dialog.ask(request).or_say(step);
@@ -108,7 +108,7 @@ Procedure write_memory(Dialog& dialog, ProcedureResult& found, Arguments argumen
   if (before == value) co_return done;
   const Request request{
       .code = Code::write_memory, .address = dialog.format().address, .word = address, .value = value};
-  // A lost reply does not show whether the word was written, but reading it back does.
+  // If the reply to the write is lost, reading the word back shows whether it was written.
   static_cast<void>(co_await dialog.attempt(request).changes());
   co_await dialog.rest(memory_write_time);
   const std::uint16_t now = co_await fetch(dialog, address, "the word was written, but could not be read back");
@@ -122,7 +122,7 @@ Procedure write_memory(Dialog& dialog, ProcedureResult& found, Arguments argumen
 
 namespace {
 
-// Returns the identification in a reply.
+// Returns the identification code that a reply carries.
 std::uint32_t identity_in(const Format& format, const Reply& reply) {
   return *values_of(format, Code::read_identity, reply).identification;
 }
@@ -139,7 +139,7 @@ Procedure write_identity(Dialog& dialog, ProcedureResult& found, Arguments argum
   found.written = before != value;
   if (before == value) co_return done;
   const Request request{.code = Code::write_identity, .address = format.address, .value = value};
-  // A lost reply does not show whether the identification was written, but reading it back does.
+  // If the reply to the write is lost, reading the identification back shows whether it was written.
   static_cast<void>(co_await dialog.attempt(request).changes());
   co_await dialog.rest(memory_write_time);
   const Reply again = co_await dialog.ask(identity_request(format.address))
@@ -155,7 +155,7 @@ namespace {
 
 constexpr std::string_view other_there = "another encoder has the new address";
 
-// Reads the identification at `wanted`; ends the procedure if it is not `identity`.
+// Reads the identification of the encoder at the address `wanted`; ends the procedure if it is not `identity`.
 Part<bool> find_at(Dialog& dialog, ProcedureResult& found, std::uint8_t wanted, std::uint32_t identity) {
   co_await dialog.rest(memory_write_time);
   const Reply reply =
@@ -203,7 +203,7 @@ Procedure assign_address(Dialog& dialog, ProcedureResult& found, Arguments argum
     co_return done;
   }
   if (!*found.written) co_return {Error::invalid_argument, other_there, "choose a free one: `absenc scan` lists them"};
-  // A lost reply does not show whether the encoder took the address, but an answer at it does.
+  // If the reply is lost, an answer at the new address shows whether the encoder took it.
   static_cast<void>(
       co_await dialog.attempt({.code = Code::assign_address, .address = wanted, .value = identity}).changes());
   co_await find_at(dialog, found, wanted, identity);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Commands of several requests for the A-format; README.md describes them.
+// Commands of the A-format that need several requests; README.md describes them.
 #pragma once
 
 #include "absenc/protocol/nikon/fields.hpp"
@@ -9,18 +9,18 @@ namespace absenc::nikon {
 /// The conversation through which procedures send requests.
 using Dialog = author::DialogOf<Protocol>;
 
-/// Result of a procedure: values of its fields, a reading, and words of the EEPROM.
+/// Result of a procedure: the values of its fields, a reading, and words of the EEPROM.
 struct ProcedureResult : Values {
-  Reading reading{};                   ///< Position and turns with their alarms; empty if none were read.
-  ByteBuffer<2 * word_count> words{};  ///< words to which the field `data` refers, the low byte of each first
+  Reading reading{};                   ///< Position and turns with their alarms; empty if the procedure read none.
+  ByteBuffer<2 * word_count> words{};  ///< words of the EEPROM that the field `data` shows, the low byte of each first
 };
 
-/// Sends the eight requests of a reset (CC 8, 9, 10 or 12), and verifies the result. Errors: invalid_argument,
-/// not_still, cross_check_failed, or that of an exchange.
+/// Sends the eight requests of a reset (command code 8, 9, 10 or 12), and verifies the result. Errors:
+/// invalid_argument, not_still, cross_check_failed, or that of an exchange.
 author::Procedure reset(Dialog& dialog, ProcedureResult& found, Code code);
 
-/// Reads words of the EEPROM. Arguments: address, count. Errors: invalid_argument, unexpected_reply, or that of an
-/// exchange.
+/// Reads words of the EEPROM. Arguments: address of the first word, number of words. Errors: invalid_argument,
+/// unexpected_reply, or that of an exchange.
 author::Procedure read_memory(Dialog& dialog, ProcedureResult& found, Arguments arguments);
 
 /// Writes a word of the user's EEPROM if it differs, and verifies it. Arguments: address, value. Errors:
@@ -31,11 +31,11 @@ author::Procedure write_memory(Dialog& dialog, ProcedureResult& found, Arguments
 /// that of an exchange.
 author::Procedure write_identity(Dialog& dialog, ProcedureResult& found, Arguments arguments);
 
-/// Gives another address to the only encoder of the line. Arguments: address. Errors: invalid_argument,
+/// Gives a new address to the only encoder of the line. Argument: address. Errors: invalid_argument,
 /// cross_check_failed, or that of an exchange.
 author::Procedure set_address(Dialog& dialog, ProcedureResult& found, Arguments arguments);
 
-/// Gives an address to the encoder with an identification. Arguments: address, identification. Errors:
+/// Gives a new address to the encoder that has an identification. Arguments: address, identification. Errors:
 /// invalid_argument, cross_check_failed, or that of an exchange.
 author::Procedure assign_address(Dialog& dialog, ProcedureResult& found, Arguments arguments);
 

@@ -15,7 +15,7 @@ using testing::Numbers;
 using testing::wire;
 using testing::Wire;
 
-// Returns a function that replaces the replies `from` to `to` - 1 by `reply`.
+// Returns a function that replaces the encoder's replies with the numbers `from` to `to` - 1 by `reply`.
 testing::Tamper replace(unsigned from, unsigned to, Wire reply) {
   return [=](unsigned index, Wire& bytes) {
     if (index >= from && index < to) bytes = reply;
@@ -72,7 +72,7 @@ TEST(NikonProcedures, ResetsThatFailSayWhy) {
     std::uint16_t alarms;
     std::string_view detail;
   };
-  // A position of 0x3FB counts is just below 0.35 degrees from 0, 0x400 is above.
+  // A position of 0x3FB counts is just below the tolerance of 0.35 degrees, 0x400 is above it.
   for (const Row& row :
        {Row{"zero", {.data = 0x400}, 0, "the position is still not zero"},
         Row{"zero", {.data = 0x3FB}, alarm::battery, ""},
@@ -91,7 +91,7 @@ TEST(NikonProcedures, ResetsThatFailSayWhy) {
   }
 }
 
-// A reset waits until the encoder has stored it; after a lost reply no further request is sent.
+// The command ends only when the encoder has stored the reset; if a reply is lost, the host sends no further request.
 TEST(NikonProcedures, ResetEndsWithItsRow) {
   Bench bench;
   const auto good = bench.run("clear-alarms");

@@ -13,14 +13,14 @@
 
 namespace absenc::nikon {
 
-/// Returns the alarms in the data of a reply to this code; nothing if it carries none.
+/// Returns the alarms in the data of a reply to the command code `code`; no value if the reply carries none.
 [[nodiscard]] constexpr std::optional<std::uint16_t> alarms_in(Code code, std::uint64_t data) {
   const Code one = single(code);
   if (one == Code::alarms || is_reset(one)) return static_cast<std::uint16_t>(data & alarm::all);
   if (one == Code::with_alarms) return static_cast<std::uint16_t>(data >> 24 & alarm::all);
   return std::nullopt;
 }
-/// Returns the position within the turn in the data of a reply; nothing if bits are missing.
+/// Returns the position within the turn in the data of a reply; no value if the reply does not have all its bits.
 [[nodiscard]] constexpr std::optional<std::uint64_t> singleturn_in(const Format& format, Code code,
                                                                    std::uint64_t data) {
   const Code one = single(code);
@@ -29,14 +29,14 @@ namespace absenc::nikon {
   if (one != Code::position && !is_part && !is_whole_short) return std::nullopt;
   return data & low_mask(format.singleturn_bits);
 }
-/// Returns the turns in the data of a reply to this code, or nothing.
+/// Returns the turns in the data of a reply to the command code `code`; no value if the reply carries none.
 [[nodiscard]] constexpr std::optional<std::uint64_t> multiturn_in(const Format& format, Code code, std::uint64_t data) {
   const Code one = single(code);
   if (format.multiturn_bits == 0 || (one != Code::position && one != Code::upper)) return std::nullopt;
   return data >> (one == Code::position ? format.singleturn_bits : format.singleturn_bits - 16);
 }
 
-/// Sets all alarms of a reading, and which parts of it they make invalid.
+/// Sets the alarms of a reading, and makes the parts invalid that these alarms affect.
 constexpr void judge(Reading& reading, std::uint32_t alarms) {
   reading.alarms = alarms;
   reading.alarms_reported = alarm::all;
@@ -45,7 +45,8 @@ constexpr void judge(Reading& reading, std::uint32_t alarms) {
   reading.multiturn_valid = reading.multiturn_bits != 0 && (alarms & alarm::turns_lost) == 0;
 }
 
-/// Returns the reading of one encoder's reply; without alarms in it, status 0 is taken to mean none.
+/// Returns the reading of one encoder's reply. If the reply has no alarms, status 0 is taken to mean that none is
+/// raised.
 [[nodiscard]] constexpr Reading to_reading(const Format& format, Code code, const OneReply& reply) {
   Reading reading;
   if (const auto singleturn = singleturn_in(format, code, reply.data)) {
@@ -66,7 +67,8 @@ constexpr void judge(Reading& reading, std::uint32_t alarms) {
   return reading;
 }
 
-/// Returns `now` completed by alarms that `before` knew, as Unit::remembered.
+/// Returns the reading `now`, completed by alarms that the earlier reading `before` knew, as Unit::remembered
+/// describes.
 [[nodiscard]] constexpr Reading remembered(const Reading& before, Reading now) {
   if (now.alarms_reported == 0 && before.alarms != 0) judge(now, before.alarms);
   return now;
@@ -80,10 +82,11 @@ struct Protocol {
   using Request = nikon::Request;
   /// Type of the protocol's replies.
   using Reply = nikon::Reply;
-  /// Greatest length of the replies to one request in bytes.
+  /// Greatest length in bytes of all replies to one request together.
   static constexpr std::size_t longest_reply = encoder_count * longest_one;
 
-  /// Returns the time limits of a host. The gap limit covers encoders that are missing between others.
+  /// Returns the timeouts of a host. Its timeout inside a reply is so long that encoders may be missing between others
+  /// that answer in turn.
   static constexpr author::HostTimes host_times(const Format& format) {
     return {.answer_limit = answer_limit, .gap_limit = 8 * slot(format, Code::position), .silence = frame_pause};
   }
@@ -104,7 +107,8 @@ struct Protocol {
   static constexpr RequestBytes encode(const Format& format, const Request& request) {
     return encode_request(format, request);
   }
-  /// Returns the length of the request that begins with `begin`, or how many bytes tell it; 0: none does.
+  /// Returns the length in bytes of the request that begins with `begin`. Returns the number of bytes needed to know it
+  /// if there are fewer, and 0 if no request begins so.
   static constexpr std::size_t request_size(const Format&, Bytes begin) {
     if (begin.size() < frame_bytes) return frame_bytes;
     const unsigned first = detail::frame_at(begin, 0);
@@ -112,27 +116,27 @@ struct Protocol {
     if (!code || first != detail::request_frame(0, first >> 5 & 0xFF)) return 0;
     return frames_of(*code) * frame_bytes;
   }
-  /// Returns the length in bytes of the reply to `request`; 0: only silence ends it.
+  /// Returns the length in bytes of the reply to `request`; 0 if only silence shows its end.
   static constexpr std::size_t expected(const Format&, const Request& request, Bytes) {
     return is_for_all(request.code) ? 0 : reply_length(request.code);
   }
-  /// Decodes a request. Returns it, or the error of the first failed check.
+  /// Decodes a request. Returns the request, or the error of the first failed check.
   static constexpr Result<Request> decode_request(const Format& format, Bytes bytes) {
     return decode_captured(format, bytes);
   }
-  /// Checks and decodes the bytes of a reply.
+  /// Checks and decodes the bytes of one or several replies.
   static constexpr auto decode = decode_reply;
-  /// Returns false: after an error more bytes may follow, so the host waits for silence.
+  /// Returns false: a reply with any error may be incomplete, so the host waits for silence.
   static constexpr bool is_whole(const Format&, Error) { return false; }
-  /// Returns position and turns of a valid reply; of several replies, those of the first.
+  /// Returns position and turns of a valid reply; if several encoders replied, those of the first one.
   static constexpr Reading reading(const Format& format, const Request& request, const Reply& reply) {
     Reading reading = to_reading(format, request.code, reply);
     if (reply.alarms_read) judge(reading, *reply.alarms_read);
     return reading;
   }
-  /// Returns the end of the request: no source states when the encoder latches.
+  /// Returns the end of the request: no source states when the encoder latches the position.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
-  /// Returns the times of a virtual encoder, and the rule on pauses within a request.
+  /// Returns the times of a virtual encoder, and the shortest pause that it accepts between the frames of a request.
   static constexpr author::DeviceTimes device_times(const Format& format) {
     return {.character = format.line().byte_time(),
             .answer_time = answer_time,

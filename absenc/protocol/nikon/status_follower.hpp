@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Combines, in a capture, a position whose status is not 0 with the alarms read after it.
+// Combines, in a capture, a reply whose status is not 0 with the alarms that the host read directly after it.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace absenc::nikon {
 
-/// Composes the exchanges of a host that reads the alarms after a status other than 0.
+/// Composes two exchanges of a capture: a position with a status other than 0, and the alarms that the host then reads.
 class StatusFollower final : public Follower {
  public:
   /// Creates a follower for encoders with this format.
@@ -37,7 +37,7 @@ class StatusFollower final : public Follower {
   }
 
  private:
-  // Returns whether the exchange has a position or turns, and does not report the alarms.
+  // Returns whether the exchange has a position or turns, but leaves open which alarms are raised.
   [[nodiscard]] bool is_open(Bytes request, Bytes reply) const {
     const Result<Request> asked = decode_request(format_, request);
     if (!asked) return false;
@@ -46,7 +46,7 @@ class StatusFollower final : public Follower {
     const Reading reading = to_reading(format_, asked->code, *answered);
     return reading.singleturn_bits + reading.multiturn_bits != 0 && reading.alarms_reported == 0;
   }
-  // Adds an exchange that reads the alarms of the same encoder; returns false for any other.
+  // Adds an exchange to the stored one. Returns true if it reads the alarms of the same encoder, false for any other.
   bool add_alarms(Bytes request, Bytes reply) {
     if (!request_.append(request) || !reply_.append(reply)) return false;
     const Result<Request> both = decode_captured(format_, request_);
@@ -56,8 +56,8 @@ class StatusFollower final : public Follower {
   Format format_;
   ByteBuffer<2 * frame_bytes> request_;
   ByteBuffer<longest_one + reply_length(Code::alarms)> reply_;
-  std::uint64_t first_ = 0;  // number of the first exchange
-  bool complete_ = false;    // whether both exchanges are there
+  std::uint64_t first_ = 0;  // number of the exchange with the position
+  bool complete_ = false;    // whether both the position and the alarms were found
 };
 
 }  // namespace absenc::nikon

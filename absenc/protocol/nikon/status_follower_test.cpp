@@ -34,7 +34,7 @@ struct Conversation {
 
   StatusFollower follower{Format{}};
   std::uint64_t number = 5;
-  std::optional<Wire> composed;  // the request
+  std::optional<Wire> composed;  // request of the last composed frame; no value if there is none
   Wire composed_reply;
   std::uint64_t first = 0;
 };

@@ -29,7 +29,7 @@ constexpr void put_reply(FieldSink& sink, const Format& format, const Request& r
     Values values = values_of(format, request.code, reply.at(i));
     if (reply.alarms_read) {
       values.alarms = reply.alarms_read;
-      values.command.reset();  // two requests have two codes
+      values.command.reset();  // a composed frame has two requests with different codes, so no code is shown
     }
     fields.put(sink, values);
   }
@@ -59,7 +59,7 @@ constexpr std::array<Argument, 1> address_arguments{{encoder_address}};
 constexpr std::array<Argument, 1> identity_arguments{{identification}};
 constexpr std::array<Argument, 2> assign_arguments{{encoder_address, identification}};
 
-// Requests to all encoders have the highest address, as in TI's driver.
+// Returns the request for a command. Requests to all encoders have the highest address, as in TI's driver.
 template <Code code>
 constexpr Request ask_for(const Format& format, Arguments = {}) {
   return {.code = code, .address = is_for_all(code) ? std::uint8_t{encoder_count - 1} : format.address};
@@ -170,12 +170,13 @@ BitRanges bits_in(const Options& values, Frame request, Frame reply, const Field
   const Format format = options.format(values);
   const Result<Request> asked =
       request.bytes.empty() ? request_of_reply(reply.bytes) : decode_request(format, request.bytes);
-  // Several replies have each field several times.
+  // With several replies a field occurs several times, so no bits are returned.
   if (!asked || reply.bytes.size() != reply_length(asked->code)) return {};
   return place_of(format, asked->code, field);
 }
 
-// Returns the bits that an exchange reports as the word 0xF9, the first bit of the wire lowest; nothing: it has none.
+// Returns the EEPROM word 0xF9 that the reply of a capture carries, its first bit on the wire as the lowest; no value
+// if the reply carries another word or none.
 std::optional<std::uint64_t> temperature_word(const Capture& capture) {
   const Result<Request> request =
       capture.request.empty() ? request_of_reply(capture.reply) : decode_request({}, capture.request);
@@ -185,10 +186,10 @@ std::optional<std::uint64_t> temperature_word(const Capture& capture) {
   if (!reply || reply->data >> 16 != temperature_address) return std::nullopt;
   return reply->data & 0xFFFF;
 }
-// The word 0xF9, a temperature of 10 bits, can show the order of the bits.
+// Finds the order of the bits. The EEPROM word 0xF9, a temperature, has only 10 bits, so its zeros can show the order.
 bool probe(Options& values, std::span<const Capture> captures, EvidenceSink& sink) {
   const std::size_t option = options.find("bit_order");
-  // For each order the first capture that contradicts it.
+  // For each bit order the index of the first capture that contradicts it.
   std::array<std::optional<std::size_t>, order_names.size()> against{};
   for (std::size_t i = 0; i < captures.size(); ++i) {
     const std::optional<std::uint64_t> word = temperature_word(captures[i]);

@@ -4,10 +4,11 @@
 
 #include "absenc/protocol/clause.hpp"
 
-/// Nikon's A-format: one to eight encoders on an RS-485 line.
+/// Protocol unit of Nikon's A-format: one to eight encoders on an RS-485 line.
 namespace absenc::nikon {
 
-extern constinit const Unit unit;   ///< Descriptor of the A-format.
-extern const Clauses unit_clauses;  ///< Demands of the A-format's sources on encoder and host.
+extern constinit const Unit unit;  ///< Protocol unit of the A-format.
+/// Clauses of the A-format's sources for encoders and hosts, for conformance tests.
+extern const Clauses unit_clauses;
 
 }  // namespace absenc::nikon

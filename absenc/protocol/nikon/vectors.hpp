@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Test vectors of Nikon's A-format: vendors' examples, and frames made from README.md.
+// Test frames of Nikon's A-format: vendors' examples, and frames made from README.md.
 #pragma once
 
 #include <array>
@@ -11,12 +11,12 @@ namespace absenc::nikon {
 
 using author::VectorText;
 
-/// Source of replies that HPMicro's two boards exchange.
+/// Source of the replies that HPMicro's two sample boards exchange.
 inline constexpr std::string_view sei_sample = "hpm_sdk, samples/drivers/sei/master/nikon/README_en.md";
-/// Source of a reply of an encoder of 17 bits; the picture shows its four fields and the CRC.
+/// Source of a reply of an encoder with 17 bits; the picture shows the reply's four fields and its CRC.
 inline constexpr std::string_view ti_sample = "motor-control-sdk, nikon_sample_output.png";
 
-/// Frames with their decoded fields, or the error that decoding gives.
+/// Test frames of the A-format, each with its decoded fields or with the error that decoding gives.
 inline constexpr auto vectors = std::array{
     VectorText{"nikon-1", "ST FFFA6, MT 8888, CRC 7A", sei_sample, "", "0200", "0400a6ff8f88085e",
                "encoder_address=0 command=0 encoder_status=0 singleturn=1048486 multiturn=34952"},

@@ -107,7 +107,7 @@ constexpr auto can_clauses = std::array{
            .demand = Demand::as_drawn,
            .errors = any_of(Error::out_of_range)},
     Clause{"node", "3.4.1 (3)", "a request to another node is not answered", Demand::foreign_silent},
-    // No requirement on encoders covers setting node number and bit rate; README.md gives the reason.
+    // The encoder's clauses do not set node number and bit rate; README.md gives the reason.
     Clause{.id = "cyclic",
            .paragraph = "3.4.1 (3) 7, 8",
            .words = "after command 31 the node sends as many readings a second as it was told",
@@ -139,7 +139,7 @@ constexpr auto direction_often = std::array{HostStep{milliseconds(20), "set-dire
 constexpr auto zero_often = std::array{HostStep{milliseconds(20), "zero", {}, 12}};
 
 constexpr auto two_at_once = std::array{HostStep{{}, "bc aa b1 bc aa b1"}};
-// The reply begins 20 ms after the request (`acquisition_us`).
+// The second command begins 5 ms after the first, whose reply comes only after 20 ms (`acquisition_us`).
 constexpr auto soon_again = std::array{HostStep{{}, "position"}, HostStep{milliseconds(5), "position"}};
 
 constexpr HostStep enter{milliseconds(1), "7e5:0401000000000000"};

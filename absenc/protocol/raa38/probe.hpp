@@ -10,8 +10,8 @@
 namespace absenc::raa38 {
 
 /// Puts each value of an option from `first` to `last` with its evidence into `sink`. `contradiction(value, i)` returns
-/// why capture i contradicts the value, or an empty text. Sets `value` to the first possible one unless it is possible
-/// itself; returns false if none is.
+/// why capture i contradicts the value, or an empty text. If the present `value` is contradicted, sets it to the first
+/// value that is not; returns false if all are contradicted.
 template <class Contradiction>
 bool judge_option(EvidenceSink& sink, std::size_t option, std::int64_t first, std::int64_t last, std::size_t captures,
                   std::int64_t& value, std::string_view agrees, Contradiction&& contradiction) {

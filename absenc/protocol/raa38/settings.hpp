@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Settings that a virtual RAA38S6 stores over power off, and the number of their writes.
+// Settings that a virtual RAA38S6 keeps during power off, and the number of writes to them.
 #pragma once
 
 #include <algorithm>
@@ -15,15 +15,17 @@ namespace absenc::raa38 {
 /// Settings of a virtual encoder, stored in a memory of a few bytes.
 class Settings {
  public:
-  /// Index in the memory of the encoder's number on the line, 1 byte.
+  /// Index in the memory of the encoder's number on its line, 1 byte.
   static constexpr std::size_t number_at = 0;
-  static constexpr std::size_t rate_at = 1;       ///< Index of the bit rate's index, 1 byte.
-  static constexpr std::size_t direction_at = 2;  ///< Index of the direction, 1 byte: 1 if the encoder counts down.
-  /// Index of the shaft position at the encoder's zero, 4 bytes in counts.
+  /// Index in the memory of the bit rate, 1 byte: an index in the table of rates.
+  static constexpr std::size_t rate_at = 1;
+  /// Index in the memory of the direction, 1 byte: 1 if the encoder counts down.
+  static constexpr std::size_t direction_at = 2;
+  /// Index in the memory of the shaft position that is the encoder's zero, 4 bytes in counts.
   static constexpr std::size_t zero_at = 3;
-  static constexpr std::size_t writes_at = 7;  ///< Index of the number of writes, 4 bytes.
+  static constexpr std::size_t writes_at = 7;  ///< Index in the memory of the number of writes, 4 bytes.
 
-  /// Creates settings with this number and rate; `shaft` must outlive them.
+  /// Creates settings with this address or node number and this index of the bit rate; `shaft` must outlive them.
   Settings(std::uint8_t number, std::uint8_t rate, unsigned bits, const Shaft& shaft) : bits_(bits), shaft_(&shaft) {
     memory_[number_at] = number;
     memory_[rate_at] = rate;
@@ -31,11 +33,11 @@ class Settings {
 
   /// Returns the bytes of the memory.
   [[nodiscard]] MutableBytes memory() { return memory_; }
-  /// Returns a number that each `write` increments.
+  /// Returns the version of the memory, which each `write` increments.
   [[nodiscard]] std::uint32_t version() const { return version_; }
   /// Returns the number of the encoder on its line: address or node number.
   [[nodiscard]] std::uint8_t number() const { return memory_[number_at]; }
-  /// Returns the index of the bit rate.
+  /// Returns the index of the bit rate in the protocol's table of rates.
   [[nodiscard]] std::uint8_t rate() const { return memory_[rate_at]; }
   /// Returns whether the encoder counts down.
   [[nodiscard]] bool counts_down() const { return memory_[direction_at] != 0; }
@@ -47,7 +49,7 @@ class Settings {
     const std::uint32_t up = counts(at) - load(zero_at);
     return static_cast<std::uint32_t>((counts_down() ? 0u - up : up) & low_mask(bits_));
   }
-  /// Writes a setting at index `at`. Returns false if the memory had this value already.
+  /// Writes a setting at index `at` of the memory. Returns false if the memory had this value already.
   bool write(std::size_t at, Bytes value) {
     const MutableBytes kept = MutableBytes(memory_).subspan(at, value.size());
     const bool changes = !std::equal(value.begin(), value.end(), kept.begin());

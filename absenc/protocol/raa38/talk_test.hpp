@@ -34,12 +34,12 @@ struct Collector final : FieldSink {
   return text.find(words) != std::string_view::npos;
 }
 
-/// Result of a conversation, as a test compares it.
+/// Result of a conversation, in the form in which tests compare it.
 struct CommandResult {
   Error error = Error::none;
   std::string words{};   // detail and advice of the error
   std::string fields{};  // "name=value name=value ", without real numbers
-  std::string left{};    // like `fields`, for the fields that report_left reports
+  std::string left{};    // fields that `report_left` reports, as text like `fields`
   std::optional<Reading> reading{};
   Time took{};
 
@@ -58,7 +58,8 @@ template <class Item>
   return end;
 }
 
-/// Checks the error and its texts. If the conversation failed, fields and reading must be empty.
+/// Checks that a conversation ended with this error and these texts; after an error it must have no fields and no
+/// reading.
 [[nodiscard]] inline ::testing::AssertionResult ended(const CommandResult& end, Error error,
                                                       std::string_view words = {}) {
   const bool good = end.error == error && says(end.words, words);
@@ -72,7 +73,7 @@ template <class Item, class Encoder, class Format, const Unit& unit>
 struct Bench {
   Bench(const Format& own, LinkKind kind, const LineSettings& settings) : format(own), line(kind, settings) {}
 
-  /// Adds an encoder to the line, on the shaft of the others.
+  /// Adds an encoder to the line; all encoders share one shaft.
   Encoder& add(const Format& of_it) {
     encoders.emplace_back(of_it, shaft);
     encoders.back().power_on(line.now(), Device<Item>::PowerOn::skip);
@@ -123,7 +124,7 @@ struct Bench {
   Time took{};
 };
 
-/// Returns how long a conversation lasts from its first request on if noise never stops.
+/// Returns the time from a conversation's first request to its end on a line with endless noise.
 inline Time time_with_noise(Conversation<std::uint8_t>& conversation) {
   using Kind = Step<std::uint8_t>::Kind;
   constexpr std::uint8_t noise = 0x55;

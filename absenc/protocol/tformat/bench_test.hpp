@@ -29,7 +29,7 @@ struct RawHost final : sim::testing::RawHost {
   explicit RawHost(Wire request, Time at = {}) : sim::testing::RawHost(std::move(request), 100us, 12us, at) {}
 };
 
-/// Returns a fault that replaces the replies `from` to `to` - 1 by refusals.
+/// Returns a fault that replaces the encoder's replies with the numbers `from` to `to` - 1 by refusals.
 inline Tamper refuse(unsigned from, unsigned to, std::uint8_t alarm) {
   return [=](unsigned index, Wire& reply) {
     if (index >= from && index < to) reply = wire(Reply{.status = alarm, .encoder_id = 0x11});
@@ -38,7 +38,7 @@ inline Tamper refuse(unsigned from, unsigned to, std::uint8_t alarm) {
 
 struct Bench : author::testing::UnitBench<17> {
   explicit Bench(Tamper tamper = {}) : UnitBench(tformat::unit, "") { tampered.replies(std::move(tamper)); }
-  /// Runs `host` to its end and returns it.
+  /// Runs the conversation `host` to its end and returns it.
   template <std::derived_from<Machine<std::uint8_t>> Host>
   Host& run(Host& host) {
     EXPECT_TRUE(line.converse(host));

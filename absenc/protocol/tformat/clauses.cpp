@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The clauses of the T-format document for encoders and hosts, with their paragraphs.
+// The clauses of the T-format document for encoders and hosts, with their paragraphs, for conformance tests.
 #include <array>
 
 #include "absenc/protocol/tformat/frame.hpp"
@@ -8,11 +8,11 @@
 namespace absenc::tformat {
 namespace {
 
-/// Alarms that a reset must clear; over-heat returns as long as the encoder is hot.
+/// Alarms that a reset must clear; over_heat is left out, because it returns as long as the encoder is hot.
 constexpr std::int64_t latched_alarms = alarms::latched & ~alarms::over_heat;
 
-constexpr std::array<std::int64_t, 1> first_byte{0};   // address of the user's EEPROM
-constexpr std::array<std::int64_t, 1> closed_byte{6};  // address of page 7 behind those that are open for the user
+constexpr std::array<std::int64_t, 1> first_byte{0};   // address of the first byte of the user's EEPROM
+constexpr std::array<std::int64_t, 1> closed_byte{6};  // an address of page 7 that users cannot access
 
 /// Clauses of the T-format document for encoders.
 constexpr auto clauses = std::array{

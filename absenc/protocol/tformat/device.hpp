@@ -45,13 +45,13 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   }
   [[nodiscard]] MutableBytes memory() override { return memory_; }
 
-  /// Returns the number of EEPROM writes so far; the document permits 100 000 in total (6.1.1).
+  /// Returns the number of EEPROM writes so far. The document permits 100 000 writes in total (6.1.1).
   [[nodiscard]] std::uint32_t writes() const { return writes_; }
   void raise_alarms(std::uint32_t bits) override {
     latches_ |= static_cast<std::uint8_t>(bits & (alarms::latched | alarms::counting_error));
     forced_ |= static_cast<std::uint8_t>(bits & (alarms::full_absolute_status | alarms::battery_alarm));
   }
-  /// Ends the alarms `bits` that `raise_alarms` raised or that are latched.
+  /// Ends those of the alarms `bits` that `raise_alarms` raised or that are latched.
   void lower_alarms(std::uint32_t bits) override {
     latches_ &= static_cast<std::uint8_t>(~bits);
     forced_ &= static_cast<std::uint8_t>(~bits);
@@ -62,7 +62,8 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     if (is_on(now)) update(now);
     if (off_) watch_battery();
   }
-  /// Returns the reply to data ID 3 at `now`; does not update the alarms that change with time.
+  /// Returns the reply to data ID 3 at the time `now`. It does not update alarms that depend on time, such as
+  /// counter_overflow.
   [[nodiscard]] Reply everything(Time now) const {
     const std::uint64_t mask = low_mask(format_.singleturn_bits);
     const std::uint8_t almc = alarms_now();
@@ -85,7 +86,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     } else {
       counter_lap_ = lap(now);
     }
-    // If the battery failed while the power was off, nothing counted the turns (6.5).
+    // If the battery failed while the power was off, the encoder did not count turns (6.5).
     if (battery_lost_) {
       latches_ = static_cast<std::uint8_t>((latches_ & alarms::over_heat) | alarms::battery_error);
       set_turns(0, now);
@@ -110,16 +111,17 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   }
 
  private:
-  // Typical voltages in mV of battery_error and battery_alarm (5.4, 6.5).
+  // Typical voltages in mV at and below which battery_error and battery_alarm are raised (5.4, 6.5).
   static constexpr std::int32_t battery_error_voltage = 2750;
   static constexpr std::int32_t battery_alarm_voltage = 3100;
-  // Speed in 1/1000 rpm at or above which switching on sets full_absolute_status (5.4.1).
+  // Speed in 1/1000 rpm from which on the shaft raises full_absolute_status when the encoder is switched on (5.4.1).
   static constexpr std::int32_t full_absolute_speed = 100'000;
   // Greatest speed in 1/1000 rpm of a shaft that counts as standing still.
   static constexpr std::int32_t standing_still = 1'000;
   // Greatest speed in 1/1000 rpm that the turn counter follows without power (5.4.2).
   static constexpr std::int32_t power_off_speed = 6'000'000;
-  // Accelerations in rad/s^2 that the turn counter follows without power, later and at first.
+  // Accelerations in rad/s^2 that the turn counter follows without power: the first in general, the second during the
+  // first seconds (`power_off_timer`) after power off.
   static constexpr std::int32_t power_off_acceleration = 4'000;
   static constexpr std::int32_t power_off_timer_acceleration = 80'000;
   static constexpr Time power_off_timer = 5s;
@@ -142,7 +144,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     reply.append(encode_reply(*made).view());
     return Answer::sent;
   }
-  // Returns whether a flawed request gets a refusal, and notes its communication alarms.
+  // Returns whether a flawed request gets a refusal, and notes the communication alarms that the refusal reports.
   bool is_refused(Flaw flaw, Bytes heard) override {
     if (flaw == Flaw::unknown && !has_sync_code(heard[0])) return false;
     if (flaw == Flaw::unknown && heard[0] != control_field(heard[0] >> 3)) refused_status_ |= status::parity_error;
@@ -161,8 +163,9 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     if (!is_reset(request.id)) resets_.end();
     if (is_memory_access(request.id)) return access_memory(request, at);
     Reply reply = everything(at);
-    reply.id = request.id;                                  // encode_reply uses only the fields that this id carries
-    if (is_reset(request.id)) count_reset(request.id, at);  // the tenth reply still shows the old alarms
+    // the reply has more values than its data ID carries; encode_reply uses only those that it carries
+    reply.id = request.id;
+    if (is_reset(request.id)) count_reset(request.id, at);  // the tenth reply of a reset still shows the old alarms
     return reply;
   }
 
@@ -214,11 +217,11 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
   [[nodiscard]] std::uint32_t zero() const {
     return static_cast<std::uint32_t>(load_little_endian(Bytes(memory_).subspan(zero_at, 4)));
   }
-  // Returns the position in counts since the zero of the shaft, minus the programmed zero.
+  // Returns the angle of the shaft in counts, over all turns, from the zero that the host has set.
   [[nodiscard]] std::int64_t counts(Time now) const {
     return (shaft_->at(now).position >> (32 - format_.singleturn_bits)) - zero();
   }
-  // Returns the turns as if the counter had no end.
+  // Returns the number of turns as if the turn counter had no end.
   [[nodiscard]] std::int64_t turns(Time now) const { return (counts(now) >> format_.singleturn_bits) - turn_offset_; }
   [[nodiscard]] bool counts_turns() const { return format_.multiturn_bits != 0; }
   // Returns how often the turn counter has overflowed.
@@ -237,7 +240,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     if (zero_pending_ && now >= written_at()) write_zero();
     if (magnitude(shaft_->at(now).speed_millirpm) < full_absolute_speed) full_absolute_ = false;
 
-    // A lap that is undone before the next update is not detected.
+    // If the turn counter overflows and turns back before the next update, the overflow is not detected.
     const std::int64_t lap_now = lap(now);
     if (lap_now != counter_lap_ && counts_turns()) latches_ |= alarms::counter_overflow;
     counter_lap_ = lap_now;
@@ -245,7 +248,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
     const std::uint8_t threshold = memory_[threshold_at];
     if ((threshold & 0x80) != 0 && conditions_[temperature] > (threshold & 0x7F)) latches_ |= alarms::over_heat;
   }
-  // Stores the zero that was requested, and leaves the turns unchanged.
+  // Stores the zero position that a reset has requested; the turns stay.
   void write_zero() {
     zero_pending_ = false;
     const std::uint64_t zeroed = static_cast<std::uint64_t>(zero_request_) & low_mask(format_.singleturn_bits);
@@ -258,11 +261,12 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
 
   [[nodiscard]] std::int64_t battery_now() const { return format_.battery ? conditions_[battery_voltage] : 0; }
   [[nodiscard]] bool has_battery() const { return battery_now() > battery_error_voltage; }
-  // Even a short failure while the power is off is reported afterwards (6.5).
+  // If the battery fails while the power is off, even for a short time, the encoder reports it after power on (6.5).
   void watch_battery() { battery_lost_ = battery_lost_ || !has_battery(); }
 
   void started(Time at) override { full_absolute_ = magnitude(shaft_->at(at).speed_millirpm) >= full_absolute_speed; }
-  // Raises over_speed if a sample of the shaft exceeded a limit without power (5.4.2).
+  // Raises over_speed if the shaft exceeded a limit of speed or acceleration at a sampled time while the power was off
+  // (5.4.2).
   void count_on_battery(Time from, Time now) {
     if (!counts_turns()) return;
     const Time step = std::max(Time(10ms), (now - from) / 10'000);
@@ -271,7 +275,7 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
       const std::int32_t limit = at - from < power_off_timer ? power_off_timer_acceleration : power_off_acceleration;
       if (magnitude(state.speed_millirpm) <= power_off_speed && magnitude(state.acceleration) <= limit) continue;
       latches_ |= alarms::over_speed;
-      ++turn_offset_;  // the counter misses one turn, because over_speed means that the count is wrong
+      ++turn_offset_;  // over_speed means that the turns are wrong, so the counter misses one turn
       return;
     }
   }
@@ -287,17 +291,17 @@ class VirtualEncoder final : public author::PagedMemoryDevice {
 
   std::optional<Time> off_since_{};  // time of the last power off; empty before the first one
   bool off_ = true;
-  bool battery_lost_ = false;  // whether the battery failed while the power is off
+  bool battery_lost_ = false;  // whether the battery has failed since power off
 
-  std::int64_t turn_offset_ = 0;  // subtracted from the turns of the shaft
-  std::int64_t counter_lap_ = 0;  // how often the turn counter had overflowed at the last update
+  std::int64_t turn_offset_ = 0;  // number that is subtracted from the turns of the shaft
+  std::int64_t counter_lap_ = 0;  // number of overflows of the turn counter until the last update
   std::uint8_t latches_ = 0;
-  std::uint8_t forced_ = 0;  // alarms without latch that `raise_alarms` raised
+  std::uint8_t forced_ = 0;  // alarms that are not latched and that `raise_alarms` raised
   bool full_absolute_ = false;
 
   bool zero_pending_ = false;
-  std::int64_t zero_request_ = 0;  // counts that become zero when the EEPROM is written
-  std::int64_t zero_turns_ = 0;    // number of turns that must be the same after the EEPROM is written
+  std::int64_t zero_request_ = 0;  // angle in counts that becomes the zero when the EEPROM is written
+  std::int64_t zero_turns_ = 0;    // number of turns that must be the same after the zero was written to the EEPROM
 
   author::RowCounter resets_{reset_row, rules()};
   std::uint8_t refused_status_ = 0;

@@ -36,7 +36,7 @@ TEST(TformatDevice, CounterContinuesAfterOverflow) {
   bench.shaft.put(65536, 5);
   EXPECT_EQ(bench.everything().alarms, alarms::counter_overflow);
   EXPECT_EQ(bench.everything().multiturn, 0u);
-  EXPECT_EQ(bench.everything().status, 0);  // SF does not show counter_overflow
+  EXPECT_EQ(bench.everything().status, 0);  // the status field (SF) does not show the alarm counter_overflow
   bench.restart();
   EXPECT_EQ(bench.everything().alarms, alarms::counter_overflow);
 }
@@ -62,10 +62,11 @@ TEST(TformatDevice, BatteryFlags) {
   bench.condition(battery_voltage, 3050);
   EXPECT_EQ(bench.everything().alarms, alarms::battery_alarm);
   bench.condition(battery_voltage, 3600);
-  EXPECT_EQ(bench.everything().alarms, 0);  // battery_alarm is not latched
+  EXPECT_EQ(bench.everything().alarms, 0);  // the alarm battery_alarm is not latched
   bench.condition(battery_voltage, 2600);
-  bench.encoder.power_on(bench.line.now(), PowerOn::skip);  // without effect: the encoder is on already
-  // Battery_error is raised only for a failure while the power is off.
+  // a second power on has no effect, because the encoder is on already
+  bench.encoder.power_on(bench.line.now(), PowerOn::skip);
+  // The alarm battery_error is raised only if the battery fails while the power is off.
   EXPECT_EQ(bench.everything().alarms, alarms::battery_alarm);
   bench.restart();
   const Reply lost = bench.everything();
@@ -77,7 +78,7 @@ TEST(TformatDevice, BatteryFlags) {
   EXPECT_EQ(bench.everything().alarms, 0);
 }
 
-// Limits in 6.5: "3.1 V or less", "2.75 V or less".
+// Limits of battery_alarm and battery_error in paragraph 6.5: "3.1 V or less", "2.75 V or less".
 TEST(TformatDevice, BatteryLimitsBelongToTheFlags) {
   for (const auto& [millivolts, alarm, error] : {std::tuple(3101, false, false),
                                                  {3100, true, false},
@@ -105,7 +106,8 @@ TEST(TformatDevice, ReportsBatteryFailureWhileOff) {
   EXPECT_EQ(bench.everything().multiturn, 0u);
   reset(bench, DataId::reset_multiturn);
   bench.restart();
-  EXPECT_EQ(bench.everything().alarms, 0);  // the battery has been connected since power on
+  // no battery alarm is raised, because the battery was connected during the restart
+  EXPECT_EQ(bench.everything().alarms, 0);
   // The battery fails while the power is on, so no turns are lost.
   bench.condition(battery_voltage, 0);
   bench.condition(battery_voltage, 3600);
@@ -113,7 +115,7 @@ TEST(TformatDevice, ReportsBatteryFailureWhileOff) {
   EXPECT_EQ(bench.everything().alarms, 0);
 }
 
-// For over_heat 6.5 states the same with and without a battery.
+// Paragraph 6.5 says the same of the alarm over_heat with a battery and without one.
 TEST(TformatDevice, OverHeatIsLatchedWithoutABattery) {
   Bench bench;
   bench.condition(battery_voltage, 0);
@@ -161,10 +163,11 @@ TEST(TformatDevice, OverSpeedArisesWhileTheBatteryCounts) {
   bench.encoder.power_on(bench.line.now(), PowerOn::skip);
   const Reply reply = bench.encoder.everything(bench.line.now());
   EXPECT_EQ(reply.alarms & alarms::over_speed, alarms::over_speed);
-  EXPECT_EQ(reply.multiturn, (bench.shaft.at(bench.line.now()).position >> 32) - 1);  // the counter misses one turn
+  // over_speed made the turn counter miss one turn
+  EXPECT_EQ(reply.multiturn, (bench.shaft.at(bench.line.now()).position >> 32) - 1);
 }
 
-// For the first five seconds after power off the counter follows a faster jolt (5.4.2).
+// For the first five seconds after power off the turn counter follows a higher acceleration (5.4.2).
 TEST(TformatDevice, AccelerationLimitFallsFiveSecondsAfterPowerOff) {
   struct Jolt final : Shaft {
     [[nodiscard]] ShaftState at(Time time) const override {
@@ -195,7 +198,7 @@ TEST(TformatDevice, IsSilentWhileItStarts) {
     Bench bench;
     bench.condition(battery_voltage, battery ? 3600 : 0);
     bench.restart(PowerOn::real);
-    const Time start = battery ? 1s : 1500ms;  // start-up time (5.4)
+    const Time start = battery ? 1s : 1500ms;  // time after power on until the encoder answers (5.4)
     testing::RawHost early({0x1A}, start - 1ms);
     EXPECT_TRUE(bench.run(early).reply.empty());
     testing::RawHost late({0x1A}, start);

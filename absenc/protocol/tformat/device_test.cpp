@@ -35,7 +35,7 @@ TEST(TformatDevice, CountsRoundTheTurnAndBelowZero) {
   const Reply reply = bench.everything();
   EXPECT_EQ(reply.singleturn, 0x1FFFFu);
   EXPECT_EQ(reply.multiturn, 0xFFFFu);
-  // Counter_overflow: the turn counter started at 0 and went below it.
+  // The alarm counter_overflow is raised, because the turn counter started at 0 and went below it.
   EXPECT_EQ(reply.alarms, alarms::counter_overflow);
 
   testing::TestShaft below_zero;
@@ -43,7 +43,8 @@ TEST(TformatDevice, CountsRoundTheTurnAndBelowZero) {
   VirtualEncoder encoder({}, below_zero);
   encoder.power_on(Time{}, PowerOn::skip);
   EXPECT_EQ(encoder.everything(Time{}).multiturn, 0xFFFFu);
-  EXPECT_EQ(encoder.everything(Time{}).alarms, 0);  // no counter_overflow: the turn counter started at this value
+  // the alarm counter_overflow is not raised, because the turn counter started at this value
+  EXPECT_EQ(encoder.everything(Time{}).alarms, 0);
 }
 
 // ---- Abnormal requests (8.4, 9.4)
@@ -52,17 +53,18 @@ TEST(TformatDevice, AnswersAbnormalRequestsLikeId3) {
   Bench bench;
   const Wire plain = wire(Reply{.encoder_id = 0x11});
   const Wire parity = wire(Reply{.status = status::parity_error, .encoder_id = 0x11});
-  EXPECT_EQ(bench.raw({0x9A}), parity);                          // request with ID 3 and a wrong parity bit
-  EXPECT_EQ(bench.raw({control_field(0x4)}), plain);             // request with an unknown ID
-  EXPECT_EQ(bench.raw({0xEA, 0x01, 0xEC}), plain);               // request with a wrong CRC
-  EXPECT_EQ(bench.raw({0xEA, 0x01}), plain);                     // incomplete request
-  EXPECT_EQ(bench.raw({0x32, 0x81, 0x00, 0x32 ^ 0x81}), plain);  // request with the busy bit
+  EXPECT_EQ(bench.raw({0x9A}), parity);               // request with ID 3 and a wrong parity bit
+  EXPECT_EQ(bench.raw({control_field(0x4)}), plain);  // request with an unknown ID
+  EXPECT_EQ(bench.raw({0xEA, 0x01, 0xEC}), plain);    // request with a wrong CRC
+  EXPECT_EQ(bench.raw({0xEA, 0x01}), plain);          // incomplete request
+  // request with the busy bit, which only replies may have
+  EXPECT_EQ(bench.raw({0x32, 0x81, 0x00, 0x32 ^ 0x81}), plain);
   EXPECT_EQ(bench.raw({0x00}), Wire{});           // request with a wrong sync code, which is not answered
   EXPECT_EQ(bench.raw({0x00, 0x1A}), plain);      // a wrong byte, then the request 1A, which is answered
-  EXPECT_EQ(memory_write(bench, 127, 6), plain);  // page 6 is closed
+  EXPECT_EQ(memory_write(bench, 127, 6), plain);  // request to select page 6, which users cannot access
   EXPECT_EQ(memory_write(bench, 127, 7), wire(hex<"327F074A">));
   bench.pass(memory_time);
-  EXPECT_EQ(memory_read(bench, 3), plain);  // address 3 of page 7 is closed
+  EXPECT_EQ(memory_read(bench, 3), plain);  // request to read address 3 of page 7, which users cannot access
   EXPECT_EQ(memory_write(bench, 5, 1), plain);
   EXPECT_EQ(memory_read(bench, 4), wire(hex<"EA04DA34">));
   EXPECT_EQ(memory_read(bench, 5), wire(Reply{.id = DataId::read_memory, .address = 5, .value = 35}));
@@ -118,10 +120,10 @@ TEST(TformatDevice, IsBusyFor18MillisecondsAfterAWrite) {
   EXPECT_EQ(memory_write(bench, 6, 1), wire(hex<"328600B4">));
   bench.line.run_until(written + memory_time);
   EXPECT_EQ(memory_read(bench, 5), wire(Reply{.id = DataId::read_memory, .address = 5, .value = 0x77}));
-  // The write during the busy time was not executed.
+  // The encoder did not execute the write that came during its busy time.
   EXPECT_EQ(memory_read(bench, 6), wire(Reply{.id = DataId::read_memory, .address = 6}));
   EXPECT_EQ(bench.encoder.writes(), 1u);
-  EXPECT_EQ(bench.violations(), 0u);  // an access while the encoder writes is no violation
+  EXPECT_EQ(bench.violations(), 0u);  // an access while the encoder writes does not count as a violation
 }
 
 TEST(TformatDevice, PagesAreSeparateAndChangingThemTakesTime) {
@@ -139,7 +141,7 @@ TEST(TformatDevice, PagesAreSeparateAndChangingThemTakesTime) {
   EXPECT_EQ(bench.encoder.violations()[0].rule, "memory access before the page is ready");
   bench.pass(memory_time);
   EXPECT_EQ(memory_read(bench, 126)[2], 0xA2);
-  // After power on page 0 is selected, without a delay.
+  // After power on the encoder has page 0 selected at once.
   memory_write(bench, 126, 1);
   bench.restart();
   EXPECT_EQ(memory_read(bench, 126)[2], 0xA0);
@@ -152,9 +154,9 @@ TEST(TformatDevice, TenRequestsMakeAReset) {
   bench.shaft.put(7, 1000);
   bench.encoder.raise_alarms(alarms::over_heat | alarms::counter_overflow);
   reset(bench, DataId::clear_alarms, 9);
-  EXPECT_NE(bench.everything().alarms, 0);  // a read restarts the count of reset requests
+  EXPECT_NE(bench.everything().alarms, 0);  // a read of the position restarts the encoder's count of reset requests
   reset(bench, DataId::clear_alarms, 9);
-  EXPECT_NE(bench.raw({0xBA})[1] & status::alarm, 0);  // the tenth reply still shows the old alarms
+  EXPECT_NE(bench.raw({0xBA})[1] & status::alarm, 0);  // the tenth reply of a reset still shows the old alarms
   bench.pass(40us);
   EXPECT_EQ(bench.everything().alarms, 0);
   EXPECT_EQ(bench.everything().multiturn, 7u);
@@ -168,7 +170,7 @@ TEST(TformatDevice, OtherRequestRestartsTheCount) {
   Bench bench;
   bench.shaft.put(7, 0);
   reset(bench, DataId::reset_multiturn, 9);
-  bench.raw({0xEA, 0x01, 0xEC});  // an abnormal request (wrong CRC) restarts the count of reset requests
+  bench.raw({0xEA, 0x01, 0xEC});  // a request with a wrong CRC restarts the encoder's count of reset requests
   reset(bench, DataId::reset_multiturn, 9);
   EXPECT_EQ(bench.everything().multiturn, 7u);
   reset(bench, DataId::clear_alarms, 9);
@@ -217,7 +219,8 @@ TEST(TformatDevice, ZeroTakes18MillisecondsAndSurvivesPowerOff) {
 TEST(TformatDevice, ResetsSentTooFastOrOnATurningShaftDoNothing) {
   Bench bench;
   bench.shaft.put(3, 0);
-  for (unsigned i = 0; i < 20; ++i) {  // each request follows the reply at once: 31 us apart
+  // each request follows the reply before it at once, so the requests are 31 us apart
+  for (unsigned i = 0; i < 20; ++i) {
     testing::RawHost host({0x62}, bench.line.now());
     bench.line.put_on(host);
     while (host.reply.size() < 6) bench.line.step();
@@ -254,14 +257,15 @@ TEST(TformatDevice, RequestDuringTransmissionIsAViolation) {
   Bench longer;
   longer.raw({0x1A, 0xEA, 0x05, 0xEF});
   EXPECT_EQ(longer.violations(), 1u);
-  // The bytes behind the first request count as two requests, not as four bytes.
+  // The four bytes behind the first request are two further requests, so they count as two violations.
   testing::TestShaft shaft;
   VirtualEncoder encoder({}, shaft);
   encoder.power_on(Time{}, PowerOn::skip);
   const Wire all{0x1A, 0xEA, 0x05, 0xEF, 0x1A};
   encoder.feed({.kind = Event<std::uint8_t>::Kind::received, .at = 1us, .items = all});
   EXPECT_EQ(encoder.violation_count(), 2u);
-  // After a delay the reply might have been sent before the other requests arrived.
+  // If the bytes were delivered late, the reply may have ended before the other requests arrived, so these are no
+  // violations.
   for (const auto& [late, rules] : {std::pair(20us, 2u), {900us, 2u}, {1500us, 1u}, {3ms, 0u}}) {
     VirtualEncoder delayed({}, shaft);
     delayed.power_on(Time{}, PowerOn::skip);
@@ -305,12 +309,12 @@ TEST(TformatDevice, HostThatNeverWaitsIsNotExcused) {
   EXPECT_EQ(ask(thrice), 0u);
   EXPECT_EQ(ask(thrice), 2u);
   EXPECT_EQ(ask(thrice), 4u);
-  // A host that waited between its requests is excused again.
+  // After one request alone, the encoder excuses three that are delivered late and together: the host may have waited.
   EXPECT_EQ(ask(once), 4u);
   EXPECT_EQ(ask(thrice), 4u);
 }
 
-// Some broken rules are no violations, but the watcher of rules hears of them (9.1, 10).
+// Some broken rules do not count as violations of the host; the encoder reports them to its RuleWatch only (9.1, 10).
 TEST(TformatDevice, ReportsRulesThatAreNoViolations) {
   using Rules = std::vector<std::string>;
   const std::string again = "what was refused as busy was not asked for again";
@@ -318,7 +322,7 @@ TEST(TformatDevice, ReportsRulesThatAreNoViolations) {
   author::testing::BrokenRules broken;
   bench.encoder.watch_rules(&broken);
   memory_write(bench, 5, 1);
-  memory_read(bench, 5);  // answered as busy
+  memory_read(bench, 5);  // the encoder replies that it is busy
   memory_read(bench, 5);
   EXPECT_EQ(broken.rules, Rules{});
   memory_read(bench, 6);

@@ -11,7 +11,7 @@
 
 namespace absenc::tformat {
 
-/// Descriptions of the bits of SF, the status field of replies (6.3.2), from bit 0 on.
+/// Descriptions of the bits of the status field (SF) of replies (6.3.2), from bit 0 on.
 inline constexpr std::array<FlagInfo, 8> status_flags{{
     {"", "", ""},
     {"", "", ""},
@@ -24,7 +24,7 @@ inline constexpr std::array<FlagInfo, 8> status_flags{{
     {"delimiter_error", "the encoder received the request with a wrong stop bit", "send the same request again"},
 }};
 
-/// Descriptions of the bits of ALMC, the alarms in a reply to data ID 3 (6.5), from bit 0 on.
+/// Descriptions of the bits of the alarms (ALMC) in a reply to data ID 3 (6.5), from bit 0 on.
 inline constexpr std::array<FlagInfo, 8> alarm_flags{{
     {"over_speed", "the shaft turned faster than the counter follows while the power was off: turns may be wrong",
      "return to the origin, then `absenc reset-multiturn` or `absenc clear-alarms`"},
@@ -46,23 +46,25 @@ inline constexpr std::array<FlagInfo, 8> alarm_flags{{
 
 /// Values of the fields of a frame, or of a procedure's result.
 struct Values {
-  std::optional<DataId> data_id{};                   ///< Data ID of the request or reply.
-  std::optional<std::uint8_t> control_field{};       ///< First byte of the request (CF): sync code, data ID, parity.
-  std::optional<std::uint8_t> status{};              ///< Status of the reply (SF), described by `status_flags`.
-  std::optional<std::uint32_t> singleturn{};         ///< Position within the turn, in counts (ABS).
-  std::optional<std::uint8_t> encoder_id{};          ///< ENID: the kind of encoder.
-  std::optional<std::uint32_t> multiturn{};          ///< Number of turns (ABM).
-  std::optional<std::uint8_t> alarms{};              ///< Alarms (ALMC), described by `alarm_flags`.
-  std::optional<std::uint8_t> page{};                ///< Page of a memory access.
-  std::optional<std::uint8_t> address{};             ///< Address of a memory access (ADF).
-  std::optional<std::uint8_t> busy{};                ///< 1: the encoder is busy and did not execute the request.
-  std::optional<std::uint8_t> value{};               ///< Value of the memory byte (EDF).
-  std::optional<Bytes> data{};                       ///< Values of several memory bytes, from `address` on.
+  std::optional<DataId> data_id{};  ///< Data ID of the request or reply.
+  /// First byte of the request, the control field (CF): sync code, data ID, parity.
+  std::optional<std::uint8_t> control_field{};
+  std::optional<std::uint8_t> status{};       ///< Status of the reply (SF), described by `status_flags`.
+  std::optional<std::uint32_t> singleturn{};  ///< Position within the turn, in counts (ABS).
+  std::optional<std::uint8_t> encoder_id{};   ///< Encoder id (ENID): the kind of encoder.
+  std::optional<std::uint32_t> multiturn{};   ///< Number of turns (ABM).
+  std::optional<std::uint8_t> alarms{};       ///< Alarms (ALMC), described by `alarm_flags`.
+  std::optional<std::uint8_t> page{};         ///< Page of the memory byte that is accessed.
+  std::optional<std::uint8_t> address{};      ///< Address of the memory byte that is accessed (ADF).
+  std::optional<std::uint8_t> busy{};         ///< 1: the encoder is busy and did not execute the request.
+  std::optional<std::uint8_t> value{};        ///< Value of the memory byte (EDF).
+  std::optional<Bytes> data{};  ///< Values of several memory bytes, from `address` on, low addresses first.
   std::optional<std::int8_t> temperature{};          ///< Temperature of the board, in degC.
-  std::optional<bool> overheat_enabled{};            ///< Whether the encoder raises over_heat.
+  std::optional<bool> overheat_enabled{};            ///< Whether the encoder raises over_heat above its threshold.
   std::optional<std::uint8_t> overheat_threshold{};  ///< Temperature above which over_heat is raised, in degC.
-  std::optional<bool> written{};                     ///< Whether the byte was written; false: it had the value already.
-  /// Page that a procedure leaves, or may leave, selected; another may have been selected before.
+  std::optional<bool> written{};  ///< True if the memory byte was written; false if it had the value already.
+  /// Memory page that a procedure has, or may have, left selected, although another page may have been selected before
+  /// it.
   std::optional<std::uint8_t> page_left{};
 };
 
@@ -115,7 +117,7 @@ inline constexpr auto fields = [] {
   return all;
 }
 
-/// Returns the bits of a valid reply that carry `field` (figures of 6.3); may be none.
+/// Returns the bits of a valid reply that carry `field` (figures of 6.3); no bits if the reply does not carry it.
 [[nodiscard]] constexpr BitRanges place_of(const Format& format, Bytes reply, const FieldInfo& field) {
   const DataId id = data_id(reply[0]).value_or(DataId::everything);
   const bool everything = id == DataId::everything;

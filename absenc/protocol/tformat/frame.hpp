@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames and readings of the T-format; README.md draws the frames. Paragraphs: TS5700N8500 specification.
+// Frames and readings of the T-format; README.md draws the frames. Numbers of paragraphs are those of the TS5700N8500
+// specification.
 #pragma once
 
 #include <algorithm>
@@ -21,14 +22,14 @@
 
 namespace absenc::tformat {
 
-inline constexpr std::uint8_t busy_bit = 0x80;  ///< busy bit in ADF, the address field of replies
-/// Number of valid bits of the position with the alarm full_absolute_status (5.4.1).
+inline constexpr std::uint8_t busy_bit = 0x80;  ///< busy bit in the address field (ADF) of replies
+/// Number of valid bits of the position while the alarm full_absolute_status is raised (5.4.1).
 inline constexpr unsigned full_absolute_bits = 5;
 inline constexpr std::size_t request_capacity = 4;  ///< Length of the longest request in bytes.
 inline constexpr std::size_t reply_capacity = 11;   ///< Length of the longest reply in bytes.
-/// Bytes of a request.
+/// Buffer for the bytes of a request.
 using RequestBytes = ByteBuffer<request_capacity>;
-/// Bytes of a reply.
+/// Buffer for the bytes of a reply.
 using ReplyBytes = ByteBuffer<reply_capacity>;
 
 /// Parameters of the CRC (6.3.4), which is the exclusive OR of all bytes.
@@ -40,13 +41,13 @@ inline constexpr CrcParameters crc_parameters{8, 0x01, 0, true, true, 0};
                      [](std::uint8_t one, std::uint8_t other) -> std::uint8_t { return one ^ other; });
 }
 
-/// Returns CF, the control field: sync code 010, the data ID, and its even parity (6.3.1).
+/// Returns the control field (CF) of a request: sync code 010, the data ID, and its even parity (6.3.1).
 [[nodiscard]] constexpr std::uint8_t control_field(std::uint8_t id) {
-  // Bit N is set if the data ID N has an odd number of ones.
+  // Bit N of this constant is set if the data ID N has an odd number of ones.
   constexpr unsigned odd_parities = 0x6996;
   return static_cast<std::uint8_t>(0x02u | (id & 0xFu) << 3 | (odd_parities >> (id & 0xF) & 1) << 7);
 }
-/// Returns CF, the control field of a request with this data ID.
+/// Returns the control field (CF) of a request with this data ID.
 [[nodiscard]] constexpr std::uint8_t control_field(DataId id) { return control_field(static_cast<std::uint8_t>(id)); }
 
 /// Returns whether a control field has the right sync code.
@@ -56,7 +57,7 @@ inline constexpr CrcParameters crc_parameters{8, 0x01, 0, true, true, 0};
 [[nodiscard]] constexpr bool is_memory_access(DataId id) {
   return id == DataId::read_memory || id == DataId::write_memory;
 }
-/// The requests of a reset (10); where the 40 us begin and end is not stated.
+/// Rules for the requests of a reset (paragraph 10); it does not state where the 40 us between them begin and end.
 inline constexpr author::InARow reset_row{
     .requests = reset_requests,
     .interval = reset_interval,
@@ -64,7 +65,7 @@ inline constexpr author::InARow reset_row{
     .number_rule = "reset not sent ten times in a row",
     .interval_rule = "reset sent too fast: less than 40 us after the one before",
 };
-/// Returns whether ten requests with this data ID are a reset (10).
+/// Returns whether ten consecutive requests with this data ID are a reset (10).
 [[nodiscard]] constexpr bool is_reset(DataId id) {
   return id == DataId::clear_alarms || id == DataId::zero || id == DataId::reset_multiturn;
 }
@@ -95,7 +96,8 @@ inline constexpr std::array<Lengths, 16> lengths = [] {
   return detail::lengths[static_cast<std::size_t>(id)].reply;
 }
 
-/// Returns the data ID in an unchecked control field; nothing for an ID that Table 1 lacks.
+/// Returns the data ID in the control field `field`, whose parity is not checked. No value for an ID that Table 1 does
+/// not list.
 [[nodiscard]] constexpr std::optional<DataId> data_id(std::uint8_t field) {
   const auto id = static_cast<DataId>((field >> 3) & 0xF);
   return request_length(id) != 0 ? std::optional(id) : std::nullopt;
@@ -104,8 +106,8 @@ inline constexpr std::array<Lengths, 16> lengths = [] {
 /// A request of the T-format.
 struct Request {
   DataId id = DataId::everything;  ///< Data ID of the request.
-  std::uint8_t address = 0;        ///< data IDs of memory access: address of the byte, 0 to 127
-  std::uint8_t value = 0;          ///< data ID write_memory: byte to be written
+  std::uint8_t address = 0;        ///< for data IDs that access the memory: address of the byte, 0 to 127
+  std::uint8_t value = 0;          ///< for data ID write_memory: byte to be written
 };
 
 /// Returns whether a request selects a page of the memory.
@@ -113,7 +115,7 @@ struct Request {
   return request.id == DataId::write_memory && request.address == page_select_address;
 }
 
-/// A reply; `decode_reply` leaves members 0 that its data ID does not carry.
+/// A reply of an encoder. In a decoded reply, members that its data ID does not carry are 0.
 struct Reply {
   DataId id = DataId::everything;  ///< Data ID of the reply.
   std::uint8_t status = 0;         ///< Status field (SF): bits of the namespace `status`.
@@ -121,7 +123,7 @@ struct Reply {
   bool busy = false;               ///< Whether the memory is busy, so that the request was not executed.
   std::uint32_t singleturn = 0;    ///< Position within the turn, in counts (ABS).
   std::uint32_t multiturn = 0;     ///< Number of turns (ABM).
-  std::uint8_t encoder_id = 0;     ///< Kind of the encoder (ENID).
+  std::uint8_t encoder_id = 0;     ///< Kind of the encoder, its encoder id (ENID).
   std::uint8_t alarms = 0;         ///< Alarms (ALMC): bits of the namespace `alarms`.
   std::uint8_t value = 0;          ///< Value of the memory byte (EDF).
 };
@@ -178,7 +180,7 @@ struct Reply {
   return bytes;
 }
 
-/// Returns the bits of SF that the alarms `almc` set (6.3.2).
+/// Returns the bits of the status field (SF) that the alarms `almc` set (6.3.2).
 [[nodiscard]] constexpr std::uint8_t status_for(std::uint8_t almc) {
   return static_cast<std::uint8_t>(((almc & alarms::counting_error) != 0 ? status::counting_error : 0) |
                                    ((almc & alarms::shown_in_status) != 0 ? status::alarm : 0));
@@ -186,7 +188,7 @@ struct Reply {
 
 namespace detail {
 
-// Returns the fields of a reply, whose length must be right; their values are not checked.
+// Returns the fields of a reply, whose length must be right; does not check their values.
 [[nodiscard]] constexpr Reply split_reply(DataId id, Bytes bytes) {
   if (is_memory_access(id)) {
     return {.id = id,
@@ -210,7 +212,7 @@ namespace detail {
 
 [[nodiscard]] constexpr Error check_memory_reply(const Format& format, const Request& request, const Reply& reply) {
   if (reply.address != request.address) return Error::unexpected_reply;
-  // A busy encoder replies with the value 00; an accepted write echoes its value (Table 5).
+  // A busy encoder replies with the value 00; the reply to an accepted write echoes the written value (Table 5).
   if (reply.busy) return format.strict && reply.value != 0 ? Error::unexpected_reply : Error::none;
   if (request.id == DataId::write_memory && reply.value != request.value) return Error::unexpected_reply;
   return Error::none;
@@ -232,7 +234,7 @@ namespace detail {
 
 }  // namespace detail
 
-/// Returns whether a reply to another ID than 3 begins like a refusal (8.4, 9.4).
+/// Returns whether a reply begins like a refusal (8.4, 9.4): it has data ID 3, but another ID was requested.
 [[nodiscard]] constexpr bool begins_rejection(DataId asked, Bytes reply) {
   return asked != DataId::everything && !reply.empty() && reply[0] == control_field(DataId::everything);
 }
@@ -254,7 +256,7 @@ constexpr Error check_reply(const Format& format, const Request& request, const 
 }  // namespace detail
 
 /// Checks and decodes a reply to `request`. Errors: wrong_length, bad_checksum, request_rejected, unexpected_reply,
-/// out_of_range, cross_check_failed. A busy memory is no error.
+/// out_of_range, cross_check_failed. A busy memory gives no error.
 [[nodiscard]] constexpr Result<Reply> decode_reply(const Format& format, const Request& request, Bytes bytes) {
   Error error = detail::check_frame(request, bytes);
   if (error != Error::none) return error;
@@ -264,28 +266,29 @@ constexpr Error check_reply(const Format& format, const Request& request, const 
   return reply;
 }
 
-/// Returns the bits of ALMC that are no faults of this encoder.
+/// Returns the mask of the alarms that are no faults: the battery's alarms if the format has no battery.
 [[nodiscard]] constexpr unsigned expected_alarms(const Format& format) {
   return format.battery ? 0u : alarms::without_battery;
 }
 
-/// Alarms (bits of ALMC) whose state is known from earlier replies.
+/// Alarms (bits of ALMC) whose state the host knows from earlier replies.
 struct KnownAlarms {
   std::uint8_t reported = 0;  ///< Mask of the alarms whose state is known.
-  std::uint8_t raised = 0;    ///< Alarms that are known to be raised.
+  std::uint8_t raised = 0;    ///< Mask of the alarms that are known to be raised.
 
-  /// Returns the known alarms after a reply to data ID 3, whose ALMC reports all.
+  /// Returns the known alarms after a reply to data ID 3, whose alarm field `almc` reports all alarms.
   [[nodiscard]] static constexpr KnownAlarms all(std::uint8_t almc) { return {0xFF, almc}; }
 };
 
-/// Returns the known alarms after a reply that carries SF and no ALMC. `sf_reported`: valid bits of SF.
+/// Returns the known alarms after a reply with a status field (`sf`) and no alarm field. `sf_reported`: mask of the
+/// bits of `sf` that are valid.
 [[nodiscard]] constexpr KnownAlarms known_after(KnownAlarms before, std::uint8_t sf, unsigned sf_reported) {
   constexpr unsigned together = alarms::shown_in_status;
   unsigned reported = before.reported | alarms::counting_error;
   unsigned raised = before.raised & ~unsigned{alarms::counting_error};
   if ((sf & status::counting_error) != 0) raised |= alarms::counting_error;
   if ((sf_reported & status::alarm) == 0) {
-    // the known state of the four alarms stays
+    // the status bit is not valid, so the known state of the four alarms behind it stays
   } else if ((sf & status::alarm) == 0) {
     reported |= together;
     raised &= ~together;
@@ -314,7 +317,8 @@ constexpr void judge(Reading& reading, const KnownAlarms& known) {
   reading.multiturn_known = reading.multiturn_bits == 0 || all_reported || lost;
 }
 
-// Returns SF as a reading shows it. Without a battery the encoder always sets the bit `alarm`.
+// Returns the status field as a reading shows it. Without a battery the encoder always sets the bit `alarm`, so it is
+// then shown only if another alarm is raised.
 [[nodiscard]] constexpr std::uint8_t status_of(const Format& format, bool has_alarms, const Reply& reply) {
   if (format.battery) return reply.status;
   const bool other = has_alarms && (reply.alarms & alarms::shown_in_status & ~expected_alarms(format)) != 0;
@@ -326,8 +330,8 @@ constexpr unsigned reported_status(const Format& format, bool has_alarms) {
 
 }  // namespace detail
 
-/// Returns the position and turns of a valid reply to `id`, with their validity. `known_alarms`: the last ALMC since
-/// power on.
+/// Returns the position and turns of a valid reply to data ID `id`, with their validity. `known_alarms`: alarms (ALMC)
+/// of the last reply to data ID 3 since power on.
 [[nodiscard]] constexpr Reading to_reading(const Format& format, DataId id, const Reply& reply,
                                            std::optional<std::uint8_t> known_alarms = std::nullopt) {
   const bool has_all = id == DataId::everything;
@@ -348,15 +352,17 @@ constexpr unsigned reported_status(const Format& format, bool has_alarms) {
   reading.alarms_reported &= ~expected_alarms(format);
   return reading;
 }
-/// Returns the position and turns of a valid reply, with their validity.
+/// Returns the position and turns of a valid reply, with their validity; the reply's own data ID decides which it has.
 [[nodiscard]] constexpr Reading to_reading(const Format& format, const Reply& reply,
                                            std::optional<std::uint8_t> known_alarms = std::nullopt) {
   return to_reading(format, reply.id, reply, known_alarms);
 }
 
-/// Returns the reading `now` completed by alarms that `before` knew, as Unit::remembered.
+/// Returns the reading `now`, completed by alarms that the earlier reading `before` knew, as Unit::remembered
+/// describes.
 [[nodiscard]] constexpr Reading remembered(const Reading& before, Reading now) {
-  if ((now.alarms_reported & alarms::full_absolute_status) != 0) return now;  // a reply to data ID 3 reports all alarms
+  // this reading is of a reply to data ID 3, which reports all alarms
+  if ((now.alarms_reported & alarms::full_absolute_status) != 0) return now;
   const KnownAlarms known{static_cast<std::uint8_t>(before.alarms_reported), static_cast<std::uint8_t>(before.alarms)};
   detail::judge(now, known_after(known, static_cast<std::uint8_t>(now.status), now.status_reported));
   return now;
@@ -374,37 +380,38 @@ struct Protocol {
   using Reply = tformat::Reply;
   static constexpr std::size_t longest_reply = reply_capacity;  ///< Greatest length of a reply in bytes.
 
-  /// Returns the time limits of a host.
+  /// Returns the timeouts of a host.
   static constexpr author::HostTimes host_times(const Format&) {
     return {.answer_limit = answer_limit, .gap_limit = gap_limit};
   }
-  /// Returns how a request is repeated. A page change without a valid reply may still be in progress.
+  /// Returns how often and when a request is repeated. After a page change without a valid reply it waits, because the
+  /// change may still be in progress.
   static constexpr author::Manner manner(const Format&, const Request& request) {
     if (selects_page(request)) return {.repeats = 2, .pause = memory_time, .hold = memory_time};
     return {.repeats = request.id == DataId::write_memory || is_reset(request.id) ? 0u : 2u};
   }
   /// Returns the bytes of a request.
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
-  /// Returns the length of the reply in bytes, as far as its first bytes `so_far` show it.
+  /// Returns the length in bytes of the reply to `request`; its first bytes `so_far` show whether it is a refusal.
   static constexpr std::size_t expected(const Format&, const Request& request, Bytes so_far) {
     return reply_length(begins_rejection(request.id, so_far) ? DataId::everything : request.id);
   }
   /// Checks and decodes the bytes of a reply.
   static constexpr auto decode = decode_reply;
-  /// Returns whether no bytes can follow a reply with this error. Sending while the encoder sends can destroy its
-  /// driver (11).
+  /// Returns whether a reply with this error is complete. If it may be incomplete, the host must not send yet: sending
+  /// while the encoder sends can destroy the encoder's driver (11).
   static constexpr bool is_whole(const Format&, Error error) { return error == Error::request_rejected; }
   /// Returns the position and turns of a valid reply.
   static constexpr Reading reading(const Format& format, const Request& request, const Reply& reply) {
-    // The ID of the request is used, because it may be known at compile time.
+    // The data ID is taken from the request, where the compiler may know it.
     return to_reading(format, request.id, reply);
   }
-  /// Returns the end of the request: the document does not say when the encoder latches.
+  /// Returns the end of the request: the document does not say when the encoder latches the position.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
 
-  /// Decodes a request. Returns it, or the error of the first failed check.
+  /// Decodes a request. Returns the request, or the error of the first failed check.
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return tformat::decode_request(bytes); }
-  /// Returns the length in bytes of the request that begins with `begin[0]`; 0 if none does.
+  /// Returns the length in bytes of the request that begins with `begin[0]`; 0 if no request begins with this byte.
   static constexpr std::size_t request_size(const Format&, Bytes begin) {
     const std::optional<DataId> id = data_id(begin[0]);
     return id && begin[0] == control_field(*id) ? request_length(*id) : 0;
@@ -414,7 +421,8 @@ struct Protocol {
   /// Returns the times of a virtual encoder.
   static constexpr author::DeviceTimes device_times(const Format&) {
     const Time character = line_settings.character();
-    return {character, answer_time, start_up_with_battery, character};  // a missing start bit ends a frame (9.2)
+    // the silence that ends a frame is one character: the frame ends where a start bit is missing (9.2)
+    return {character, answer_time, start_up_with_battery, character};
   }
 };
 

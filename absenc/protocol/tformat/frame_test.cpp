@@ -62,7 +62,7 @@ TEST(TformatFrame, TwoBitErrorsThatPassEachLevelOfChecks) {
       const Error error = decode_reply(format, {DataId::everything}, bad).error();
       if (error != Error::bad_checksum) ++crc_passes;
       if (error == Error::none) ++strict_passes;
-      // The second level allows any value in bits 4 to 7 of SF.
+      // The second count allows any value of the upper four bits of the status field (SF).
       bad[1] &= 0x0F;
       bad[10] = checksum(bad.view().first(10));
       const Error fixed_bits = decode_reply(format, {DataId::everything}, bad).error();
@@ -86,7 +86,7 @@ TEST(TformatFrame, RefusalDiffersFromWrongLength) {
   EXPECT_EQ(decode_reply({}, {DataId::singleturn}, damaged).error(), Error::bad_checksum);
 }
 
-// Replies to a write request (Table 5, 9.1).
+// Replies to a request that writes a memory byte (Table 5, 9.1).
 TEST(TformatFrame, MemoryReplyMatchesItsRequest) {
   const Request write{DataId::write_memory, 5, 7};
   const auto answered = [&write](std::uint8_t address, bool busy, std::uint8_t value, bool strict = true) {
@@ -103,7 +103,8 @@ TEST(TformatFrame, MemoryReplyMatchesItsRequest) {
 
 TEST(TformatFrame, RefusesInvalidRequests) {
   EXPECT_EQ(decode_request({}).error(), Error::wrong_length);
-  EXPECT_EQ(decode_request(hex<"328100B3">).error(), Error::out_of_range);  // request with the busy bit
+  // request with the busy bit, which only replies may have
+  EXPECT_EQ(decode_request(hex<"328100B3">).error(), Error::out_of_range);
   EXPECT_TRUE(decode_request(hex<"32010033">));
 }
 
@@ -145,7 +146,7 @@ TEST(TformatFrame, PartialRepliesLeaveValidityUnknown) {
   EXPECT_EQ(to_reading({}, alarmed, 0).multiturn_validity(), Validity::unknown);
 }
 
-// A known alarm explains the bit of SF that stands for it and three others.
+// The status bit `alarm` stands for four alarms; if one of them is known to be raised, it explains the bit.
 TEST(TformatFrame, KnownAlarmExplainsStatus) {
   const Reply turns{.id = DataId::multiturn, .status = status::alarm, .multiturn = 5};
   for (const std::uint8_t harmless : {alarms::over_heat, alarms::battery_alarm}) {
@@ -156,7 +157,7 @@ TEST(TformatFrame, KnownAlarmExplainsStatus) {
   EXPECT_EQ(to_reading({}, turns, alarms::battery_error).multiturn_validity(), Validity::invalid);
 }
 
-// SF has a bit for counting_error, and one bit for four other alarms (6.3.2).
+// The status field (SF) has one bit for counting_error, and one common bit for four other alarms (6.3.2).
 TEST(TformatFrame, StatusReportsPartOfTheAlarms) {
   constexpr std::uint8_t in_status = alarms::counting_error | alarms::shown_in_status;
   struct Row {
@@ -180,7 +181,7 @@ TEST(TformatFrame, StatusReportsPartOfTheAlarms) {
   EXPECT_EQ(to_reading({}, {.id = DataId::read_memory}).status_reported, 0u);
 }
 
-// Without a battery the bit `alarm` of SF is always set (2 (1)).
+// Without a battery the bit `alarm` of the status field is always set (paragraph 2 (1)).
 TEST(TformatFrame, WithoutBatteryStatusLeavesFourAlarmsUnknown) {
   constexpr Format format{.battery = false};
   const auto whole = [&](std::uint8_t more) {
@@ -200,7 +201,7 @@ TEST(TformatFrame, WithoutBatteryStatusLeavesFourAlarmsUnknown) {
   EXPECT_EQ(remembered(part, whole(0)).alarms_reported, whole(0).alarms_reported);
 }
 
-// Checks the alarms that are known after each of several replies, as in a capture.
+// Checks the alarms that a reader of captures knows after each of several replies.
 TEST(TformatFrame, LaterRepliesCompleteWhatEarlierOnesReported) {
   const auto part = [](std::uint8_t sf) { return to_reading({}, {.id = DataId::singleturn, .status = sf}); };
   const auto whole = [](std::uint8_t almc) {

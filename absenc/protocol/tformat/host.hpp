@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Conversations that read positions of T-format encoders, without port, clock, heap or texts.
+// Conversations that read positions of T-format encoders; they use no port, clock, heap or texts.
 #pragma once
 
 #include <optional>
@@ -9,22 +9,22 @@
 
 namespace absenc::tformat {
 
-/// Conversation that reads with one of the data IDs 0 to 3; IDs 0 and 1 may need a request with ID 3 too.
-/// `known_alarms`: ALMC of a reply to ID 3 since power on.
+/// Conversation that reads with one of the data IDs 0 to 3. With ID 0 or 1 it also sends a request with ID 3 if it
+/// needs alarms that the reply does not report. `known_alarms`: alarms (ALMC) of a reply to ID 3 since power on.
 class ReadPosition : public author::HostOf<Protocol> {
  public:
-  /// Reads from an encoder of this format with a request of data ID `id`.
+  /// Creates a conversation that reads from an encoder of this format with data ID `id`.
   explicit ReadPosition(const Format& format, DataId id = DataId::everything,
                         std::optional<std::uint8_t> known_alarms = std::nullopt)
       : HostOf(format), id_(id), known_alarms_(known_alarms) {
     const bool alarms_first = (id == DataId::singleturn || id == DataId::multiturn) && !known_alarms;
     ask_for(alarms_first ? DataId::everything : id);
   }
-  /// Reads from an encoder of this format with the data ID of `request`.
+  /// Creates a conversation that reads from an encoder of this format with the data ID of `request`.
   ReadPosition(const Format& format, const Request& request) : ReadPosition(format, request.id) {}
 
   [[nodiscard]] const Reading* reading() const final {
-    // There is a position only after a successful end.
+    // The reading is empty until the conversation has ended successfully.
     return reading_.singleturn_bits != 0 || reading_.multiturn_bits != 0 ? &reading_ : nullptr;
   }
   /// Returns the last valid reply.
@@ -41,8 +41,9 @@ class ReadPosition : public author::HostOf<Protocol> {
       const int unknown = reply().status & ~status_for(known_alarms_.value_or(0));
       if (unknown != 0) return ask_for(DataId::everything);
     }
-    new (&reading_) Reading(to_reading(format(), reply(), known_alarms_));  // constructed in place, not copied
-    // The document does not state when the position is latched: the end of the request is assumed.
+    // the reading is constructed in place, because a copy costs time
+    new (&reading_) Reading(to_reading(format(), reply(), known_alarms_));
+    // The end of the request is taken as the time of the position: the document does not state when it is latched.
     reading_.latched = sent_at();
     reading_.received = received_at();
     finish(Error::none);
@@ -50,7 +51,7 @@ class ReadPosition : public author::HostOf<Protocol> {
   void ask_for(DataId id) { ask({id}, author::Manner{}); }
 
   DataId id_;
-  bool part_read_ = false;  // whether a request with ID 0 or 1 was answered
+  bool part_read_ = false;  // whether the encoder has answered a request with ID 0 or 1
   std::optional<std::uint8_t> known_alarms_;
   Reading reading_{};
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of readings and of refusals.
+// Tests of conversations that read the position, and of refused requests.
 #include "absenc/protocol/tformat/host.hpp"
 
 #include <gtest/gtest.h>
@@ -63,14 +63,14 @@ TEST(TformatHost, ReadsPartsWithTheirAlarms) {
   ReadPosition first({}, DataId::singleturn);
   EXPECT_EQ(bench.run(first).reading()->singleturn, 0x12345u);
   EXPECT_TRUE(first.reading()->singleturn_valid());
-  EXPECT_EQ(bench.encoder.answer_count(), 2u);  // a request with ID 3 precedes the request with ID 0
+  EXPECT_EQ(bench.encoder.answer_count(), 2u);  // the host sent two requests: one with data ID 3, then one with ID 0
   ReadPosition turns({}, DataId::multiturn, 0);
   EXPECT_EQ(bench.run(turns).reading()->multiturn, 4660u);
   EXPECT_EQ(bench.encoder.answer_count(), 3u);
   bench.encoder.raise_alarms(alarms::multiturn_error);
   ReadPosition alarmed({}, DataId::multiturn, 0);
   bench.run(alarmed);
-  EXPECT_EQ(bench.encoder.answer_count(), 5u);  // a request with ID 3 follows the request with ID 1
+  EXPECT_EQ(bench.encoder.answer_count(), 5u);  // the host sent two requests: one with data ID 1, then one with ID 3
   EXPECT_FALSE(alarmed.reading()->multiturn_valid);
   EXPECT_EQ(alarmed.reading()->alarms, alarms::multiturn_error);
   const auto id = bench.run("encoder-id");
@@ -127,7 +127,7 @@ TEST(TformatHost, ExplainsRefusals) {
   EXPECT_TRUE(reset.says("; one of the requests in a row")) << reset.detail;
 }
 
-// Captures have replies without a request, and replies to invalid requests (8.4, 9.4).
+// A capture may have a reply without its request, or a reply to an invalid request (8.4, 9.4).
 TEST(TformatHost, GuessesRequestsAndRefusesInvalidOnes) {
   const Bench bench;
   const auto error = [&bench](const Wire& request, const Wire& reply) {
@@ -136,14 +136,15 @@ TEST(TformatHost, GuessesRequestsAndRefusesInvalidOnes) {
   };
   const Wire good = testing::wire(Reply{.id = DataId::everything, .encoder_id = 0x11});
   EXPECT_EQ(error({}, good), Error::none);
-  // Reply with an ID that Table 1 does not list.
+  // This reply has a data ID that Table 1 does not list.
   EXPECT_EQ(error({}, {0x22, 0, 0, 0, 0, 0x22}), Error::unexpected_reply);
   EXPECT_EQ(error({0x9A}, good), Error::request_rejected);
   EXPECT_EQ(error({0x9A}, Wire(good.begin(), good.end() - 1)), Error::bad_checksum);
 }
 
 TEST(TformatHost, ProceduresRepeatRefusedRequests) {
-  Bench bench(refuse(2, 3, status::parity_error));  // reply 2, to the memory read after the page select, is a refusal
+  // a refusal replaces reply 2, to the memory read after the page select
+  Bench bench(refuse(2, 3, status::parity_error));
   const auto read = bench.run("temperature");
   EXPECT_EQ(read.error, Error::none);
   EXPECT_EQ(read.numbers, (Numbers{{"temperature_c", 35}}));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of commands with several steps, with the virtual Smart-Abs in virtual time.
+// Tests of commands with several requests, with the virtual Smart-Abs in virtual time.
 #include <gtest/gtest.h>
 
 #include "absenc/protocol/tformat/bench_test.hpp"
@@ -35,22 +35,23 @@ TEST(TformatProcedures, RestoresThePageBefore) {
 }
 
 TEST(TformatProcedures, ReportsPageThatStaysSelected) {
-  // The encoder refuses to report the selected page, as it does for a closed address (9.4).
+  // The encoder refuses to report which page is selected, as it refuses to read a closed address (9.4).
   Bench refusing(refuse(0, 3, 0));
   EXPECT_EQ(refusing.run("temperature").numbers, (Numbers{{"temperature_c", 35}, {"page_left", 7}}));
-  // The encoder reports a page that does not exist.
+  // The encoder reports as selected a page that does not exist.
   Bench odd([](unsigned index, Wire& reply) {
     if (index == 0) reply = wire(Reply{.id = DataId::read_memory, .address = page_select_address, .value = 9});
   });
   EXPECT_EQ(odd.run("temperature").numbers, (Numbers{{"temperature_c", 35}, {"page_left", 7}}));
   EXPECT_EQ(odd.encoder.answer_count(), 3u);
-  // The encoder reports another page at the end than the one that was selected again.
+  // At the end the encoder reports another page than the one that the host selected again.
   Bench other([](unsigned index, Wire& reply) {
     if (index == 4) reply = wire(Reply{.id = DataId::read_memory, .address = page_select_address, .value = 3});
   });
   EXPECT_EQ(other.run("temperature").numbers, (Numbers{{"temperature_c", 35}, {"page_left", 7}}));
   struct Row {
-    unsigned lost;  // number of the first lost reply: page, page select, temperature, page select, page
+    // number of the first lost reply, of the five replies to: page, page select, temperature, page select, page
+    unsigned lost;
     Error error;
     bool left;
   };
@@ -63,7 +64,7 @@ TEST(TformatProcedures, ReportsPageThatStaysSelected) {
     EXPECT_EQ(lost.error, row.error) << row.lost;
     EXPECT_EQ(lost.says("page 7 may be left selected"), row.error != Error::none) << lost.detail;
     EXPECT_EQ(lost.numbers.contains("page_left"), row.left && row.error == Error::none) << row.lost;
-    // A page change that may still be in progress is over when the next request is sent.
+    // The host has waited for the end of a page change that may have been in progress, so this request breaks no rule.
     const Wire answer = bench.raw({0xEA, 0x7F, 0x95});
     EXPECT_EQ(bench.violations(), 0u) << row.lost;
   }
@@ -120,7 +121,7 @@ TEST(TformatProcedures, RefusesOverHeatThresholdOfZeroDegrees) {
   for (const std::int64_t value : {0x81, 0xFF, 0x00, 0x7F}) {
     EXPECT_EQ(bench.run("memory-write", {overheat_address, value, service_page}).error, Error::none) << value;
   }
-  // 0x80 is valid on a page of the user.
+  // The byte 0x80 is invalid as an over-heat threshold, but valid on a page for users.
   EXPECT_EQ(bench.run("memory-write", {overheat_address, 0x80, 0}).error, Error::none);
 }
 
@@ -206,7 +207,7 @@ TEST(TformatProcedures, WaitsForABusyEncoder) {
     EXPECT_EQ(read.says("stays busy"), row.error == Error::busy);
     EXPECT_GE(bench.line.now(), row.least) << row.from << row.to;
     EXPECT_LE(bench.line.now(), row.most) << row.from << row.to;
-    EXPECT_EQ(bench.violations(), 0u);  // a page change is not disturbed
+    EXPECT_EQ(bench.violations(), 0u);  // the host sends nothing during a page change
   }
   Bench writing(busy(2, 99));
   EXPECT_EQ(writing.run("memory-write", {1, 1, 0}).error, Error::busy);
@@ -256,9 +257,9 @@ TEST(TformatProcedures, SendsNoForbiddenReset) {
     const auto reset = bench.run(row.name);
     EXPECT_EQ(reset.error, row.rpm != 0 ? Error::not_still : Error::invalid_argument) << row.detail;
     EXPECT_TRUE(reset.says(row.detail)) << reset.detail;
-    // The error not_still has its own advice, so the command adds none.
+    // The error not_still has general advice, so the command adds no advice of its own.
     EXPECT_EQ(reset.advice.empty(), row.rpm != 0) << row.detail;
-    // Only two positions were requested, and no reset was sent.
+    // The host requested two positions and sent no reset.
     EXPECT_EQ(bench.encoder.answer_count(), 2u);
     EXPECT_EQ(bench.violations(), 0u);
   }
@@ -289,7 +290,7 @@ TEST(TformatProcedures, EncoderWithoutBatteryIsDeclared) {
   EXPECT_EQ(bench.everything().alarms, alarms::battery_alarm);
 }
 
-// Replies 0 and 1 are positions, 2 to 11 answer the reset, 12 is the verification.
+// The sequence of replies: 0 and 1 are positions, 2 to 11 answer the reset, 12 is the verification.
 TEST(TformatProcedures, DetectsResetThatFailed) {
   struct Row {
     std::string_view name;

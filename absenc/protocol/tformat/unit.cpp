@@ -21,20 +21,20 @@ using namespace author;
 
 using Dialog = DialogOf<Protocol>;
 
-// Result of a T-format procedure: the values of its fields, and the data to which they refer.
+// Result of a T-format procedure: the values of its fields, its reading, and the bytes that a field shows.
 struct ProcedureResult : Values {
   Reading reading{};
-  ByteBuffer<page_addresses> bytes{};  // memory bytes to which the field `data` refers
+  ByteBuffer<page_addresses> bytes{};  // memory bytes that the field `data` shows
   std::optional<std::uint8_t> selected{};
 };
 
 // ---- Resets (10)
 
-// Returns why a reset must not be sent after these replies; no error: it may be sent.
+// Returns an error if the positions in these two replies forbid a reset; otherwise no error.
 Outcome objection(const Format& format, DataId id, const Reply& first, const Reply& second) {
   const Reading before = to_reading(format, first);
   const Reading now = to_reading(format, second);
-  // With full_absolute_status the position is too coarse to show a movement.
+  // While full_absolute_status is raised, the position is too coarse to show whether the shaft moves.
   if ((second.alarms & alarms::full_absolute_status) != 0) {
     return {Error::invalid_argument,
             "full_absolute_status: the encoder was switched on while the shaft turned, and has not seen it stand still "
@@ -52,7 +52,7 @@ Outcome objection(const Format& format, DataId id, const Reply& first, const Rep
   return {};
 }
 
-// Returns what the reset failed to do, as the reply `now` shows; empty if nothing.
+// Returns an explanation if the reply `now`, after a reset, shows that the reset failed; otherwise an empty one.
 Explanation failed_part(DataId id, const Reply& now, unsigned bits) {
   if (id == DataId::zero) {
     if (is_near(now.singleturn, 0, bits, zero_tolerance_millidegrees)) return {};
@@ -70,7 +70,7 @@ Explanation failed_part(DataId id, const Reply& now, unsigned bits) {
   return {};
 }
 
-// Resets by data ID 7 (latched alarms), 8 (single-turn zero) or C (turns and latched alarms).
+// Resets with data ID 7 (latched alarms), 8 (zero of the position) or C (turns and latched alarms).
 Procedure reset(Dialog& dialog, ProcedureResult& found, DataId id) {
   const Reply first = co_await dialog.ask({DataId::everything});
   const Reply second = co_await dialog.ask({DataId::everything}).after(between_looks);
@@ -78,7 +78,7 @@ Procedure reset(Dialog& dialog, ProcedureResult& found, DataId id) {
   if (why_not.error != Error::none) co_return why_not;
 
   co_await send_in_a_row(dialog, {id}, reset_row);
-  // The tenth reply still shows the old alarms, so the result is read again.
+  // The tenth reply of the reset still shows the old alarms, so the result is read with a request of its own.
   const Reply now = co_await dialog.ask({DataId::everything})
                         .after(id == DataId::zero ? memory_time : reset_interval)
                         .or_say("all ten requests were sent, but whether the encoder obeyed could not be read");
@@ -92,11 +92,11 @@ Procedure reset(Dialog& dialog, ProcedureResult& found, DataId id) {
 // ---- Memory (6.3.5, 9.1)
 
 constexpr Time busy_limit = 2 * memory_time;  // longest wait for a busy memory: twice the document's maximum
-constexpr Time busy_pause = 1ms;              // pause between two requests to a busy encoder, except page selects
+constexpr Time busy_pause = 1ms;  // pause between two requests to a busy encoder; a page select has its own pause
 
 constexpr std::uint8_t byte(std::int64_t argument) { return static_cast<std::uint8_t>(argument); }
 
-// Repeats a memory request while the encoder is busy, up to `busy_limit`.
+// Repeats a memory request while the encoder is busy, for at most `busy_limit`.
 Part<Result<Reply>> when_ready(Dialog& dialog, const Request& request) {
   return until_ready<Protocol>(dialog, request,
                                {.limit = busy_limit,
@@ -111,7 +111,7 @@ Outcome failure(const Dialog& dialog, Error error, std::string_view step) {
           Protocol::manner(dialog.format(), dialog.request()).hold};
 }
 
-// Executes a memory request and returns the value in the reply; ends the procedure on an error.
+// Executes a memory request and returns the value in its reply; ends the procedure on an error.
 Part<std::uint8_t> execute(Dialog& dialog, Request request, std::string_view step) {
   const Result<Reply> reply = co_await when_ready(dialog, request);
   if (!reply) co_await dialog.stop(failure(dialog, reply.error(), step));
@@ -146,7 +146,7 @@ Procedure read_memory(Dialog& dialog, ProcedureResult& found, Arguments argument
   co_return done;
 }
 
-// Writes a byte on the selected page if it differs, and verifies it in the EEPROM.
+// Writes a byte on the selected page if it differs, and reads it back from the EEPROM.
 Part<bool> write_byte(Dialog& dialog, ProcedureResult& found, std::uint8_t address, std::uint8_t value) {
   const Request look{DataId::read_memory, address};
   const std::uint8_t before = co_await execute(dialog, look, "nothing was written");
@@ -158,7 +158,7 @@ Part<bool> write_byte(Dialog& dialog, ProcedureResult& found, std::uint8_t addre
     dialog.refused();
     co_await dialog.stop(failure(dialog, Error::busy, ""));
   }
-  // A lost reply does not show whether the byte was written, but reading it back does.
+  // If the reply to the write is lost, reading the byte back shows whether it was written.
   co_await dialog.rest(memory_time);
   constexpr std::string_view lost = "the byte was written, but could not be read back";
   co_await select_page(dialog, found, *found.selected, lost);
@@ -196,7 +196,7 @@ Procedure write_memory(Dialog& dialog, ProcedureResult& found, Arguments argumen
 
 // ---- The service page (7.2, 7.3); the page before it is selected again if it is known
 
-// Selects the service page, and returns the page that was selected before, if it is known.
+// Selects the service page. Returns the page that was selected before; no value if it is unknown.
 Part<std::optional<std::uint8_t>> open_service_page(Dialog& dialog, ProcedureResult& found, std::string_view step) {
   const Result<Reply> before = co_await when_ready(dialog, {DataId::read_memory, page_select_address});
   found.page_left = service_page;
@@ -204,7 +204,7 @@ Part<std::optional<std::uint8_t>> open_service_page(Dialog& dialog, ProcedureRes
   co_return before&& is_page(before->value) ? std::optional(before->value) : std::nullopt;
 }
 
-// Selects the page `before` again, and returns whether that is known to have succeeded.
+// Selects the page `before` again. Returns whether the encoder has confirmed it.
 Part<bool> restore(Dialog& dialog, ProcedureResult& found, std::optional<std::uint8_t> before) {
   if (!before) co_return false;
   if (*before != service_page) {
@@ -226,7 +226,7 @@ Procedure read_temperature(Dialog& dialog, ProcedureResult& found) {
   co_return done;
 }
 
-// Returns the memory byte for an over-heat threshold in degC; 0: off.
+// Returns the memory byte for an over-heat threshold in degC; 0 switches the threshold off.
 constexpr std::uint8_t threshold_of(std::int64_t degrees) { return degrees == 0 ? 0 : byte(0x80 | degrees); }
 
 void show_threshold(ProcedureResult& found, std::uint8_t value) {
@@ -254,7 +254,7 @@ Procedure write_threshold(Dialog& dialog, ProcedureResult& found, Arguments argu
 
 constexpr Explanation explain_refusal(Bytes reply) {
   constexpr std::array<std::string_view, 4> found{
-      // The index is the value of the bits ca1 and ca0 of SF.
+      // The index of a text is the value of the bits ca1 and ca0 of the status field (SF).
       "it answered as to data ID 3, without a communication alarm: a data ID that it does not have, a CRC that is "
       "wrong, or an address that is closed",
       "ca0: it received the request with a parity error of the data ID",
@@ -380,7 +380,8 @@ constexpr std::size_t size_of_reply(const Format&, Bytes begin) {
   const std::optional<DataId> of = data_id(begin[0]);
   return of && begin[0] == control_field(*of) ? reply_length(*of) : 0;
 }
-/// Returns the request that a reply captured without one is taken to answer. Error: unexpected_reply.
+/// Returns the request that a captured reply probably answers, if the capture does not contain it. Error:
+/// unexpected_reply.
 constexpr Result<Request> guess_request(const Format&, Bytes reply) {
   const std::optional<DataId> asked = data_id(reply[0]);
   if (!asked) return Error::unexpected_reply;
@@ -391,7 +392,7 @@ constexpr Result<Request> guess_request(const Format&, Bytes reply) {
   }
   return request;
 }
-/// Returns request_rejected if the reply is a refusal (8.4, 9.4), otherwise `error`.
+/// Returns request_rejected if the reply is a refusal (8.4, 9.4); otherwise returns `error`.
 constexpr Error answer_to_bad(const Format&, Bytes, Error error, Bytes reply) {
   const bool refused = reply.size() == reply_length(DataId::everything) && checksum(reply) == 0 &&
                        reply[0] == control_field(DataId::everything);
@@ -423,7 +424,8 @@ constexpr Declaration<Protocol, VirtualEncoder> declaration{
     .alarms = fields.of<&Values::alarms>(),
     .memory = memory_areas,
     .conditions = conditions,
-    // In the document a pause of any length ends a frame; some encoders tolerate a short one.
+    // In the document a pause of any length ends a frame; a few bits are allowed here, because some encoders tolerate a
+    // short pause.
     .timing = {.pause_bits = 5, .turnaround = answer_time, .turnaround_limit = answer_limit},
 };
 

@@ -6,7 +6,7 @@
 
 namespace absenc::tformat {
 
-extern constinit const Unit unit;   ///< Descriptor of the T-format.
-extern const Clauses unit_clauses;  ///< Demands of the T-format's document on encoder and host.
+extern constinit const Unit unit;   ///< Protocol unit of the T-format.
+extern const Clauses unit_clauses;  ///< Clauses of the T-format document for encoders and hosts, for conformance tests.
 
 }  // namespace absenc::tformat

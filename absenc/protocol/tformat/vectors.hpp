@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Test vectors of the T-format; each is decoded at compile time.
+// Test frames of the T-format; the compiler decodes each of them.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@ namespace absenc::tformat {
 
 using author::VectorText;
 
-/// Test vectors of the T-format.
+/// Test frames of the T-format, each with its source and with the fields or the error that decoding must give.
 inline constexpr std::array vectors{
     VectorText{"tformat-001", "request byte Data ID 0", "seed Table 1; public", "", "02", "",
                "data_id=0 control_field=2"},

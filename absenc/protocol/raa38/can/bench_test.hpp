@@ -58,7 +58,7 @@ struct Bench : raa38::testing::Bench<CanFrame, VirtualNode, Format, can_unit> {
       : raa38::testing::Bench<CanFrame, VirtualNode, Format, can_unit>(own, LinkKind::can, {.rate = own.bit_rate()}) {
     add(own);
   }
-  /// Adds a node that has the default number and counts down.
+  /// Adds a node that has the same number as the default node, 20 (hex), and counts down.
   void add_twin() {
     add({.positive = 1, .negative = 0, .cyclic = 0});
     static_cast<void>(raw(encode(Order::direction, 0x20, 0)));
@@ -78,7 +78,8 @@ struct Bench : raa38::testing::Bench<CanFrame, VirtualNode, Format, can_unit> {
   }
 };
 
-/// A node that answers received frames as a function says, and may send cyclic frames.
+/// A test node that answers each received frame with the frames that its function returns; it may also send cyclic
+/// frames.
 struct Scripted final : Machine<CanFrame> {
   using Script = std::function<Frames(const CanFrame& received_frames)>;
   explicit Scripted(Script script_) : script(std::move(script_)) {}
@@ -105,8 +106,8 @@ struct Scripted final : Machine<CanFrame> {
 
   Script script;
   CanFrame unsolicited = encode_position(0x20, 49);
-  Time period{};             // period of cyclic frames; 0: none
-  Time wobble{};             // cyclic frames are alternately early and late by this time
+  Time period{};             // period of cyclic frames; 0: no cyclic frames
+  Time wobble{};             // time by which cyclic frames are early and late in turn
   unsigned* left = nullptr;  // number of cyclic frames left to send; null: no limit
   std::uint32_t rate = 250'000;
   bool rate_changed = true;
@@ -127,7 +128,7 @@ inline CommandResult with(Scripted node, std::string_view command, std::vector<s
   return raa38::testing::result_of<CanFrame>(*talk);
 }
 
-/// Returns the answer of a correct node 0x20 at `counts` to an order for one node.
+/// Returns the frames with which a correct node 20 (hex) at position `counts` answers an order for one node.
 [[nodiscard]] inline Frames correct_answer(const CanFrame& received_frames, std::uint64_t counts) {
   const OrderInfo& info = *order_of(received_frames);
   if (info.answer == Answer::position) return {encode_position(0x20, counts)};

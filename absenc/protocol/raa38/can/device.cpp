@@ -11,11 +11,11 @@ using namespace std::chrono_literals;
 using FrameStep = Step<CanFrame>;
 using FrameEvent = Event<CanFrame>;
 
-// The document gives neither of these times.
+// These two times are assumed; the document gives none.
 constexpr Time answer_time = 200us;
 constexpr Time start_up_time = 100ms;
 
-constexpr std::uint8_t refused = 1;  // error code of CiA 305: value not supported
+constexpr std::uint8_t refused = 1;  // error code "value not supported" of CiA 305
 
 }  // namespace
 
@@ -27,7 +27,7 @@ void VirtualNode::start_cyclic(std::uint8_t readings_per_s, Time from) {
 }
 
 void VirtualNode::power_on(Time now, PowerOn kind) {
-  // The memory may hold values that this encoder cannot use; the format's replace them.
+  // The stored node number or bit rate may be one that this encoder cannot use; the format's value then replaces it.
   if (node() == 0) memory()[Settings::number_at] = format_.node;
   if (rate_of_index(settings_.rate()) == nullptr) memory()[Settings::rate_at] = rates[format_.rate].index;
   powered_ = true;
@@ -56,7 +56,7 @@ FrameStep VirtualNode::next(Time now) {
     pending_.clear();
     pending_.append(rest.view().subspan(1));
   } else if (now >= next_cyclic_) {
-    // A node that was delayed skips frames instead of sending two at once.
+    // If the node was delayed by more than one period, it skips cyclic frames instead of sending two at once.
     next_cyclic_ += period() * (1 + (now - next_cyclic_) / period());
     out_ = encode_position(node(), settings_.position(now));
     step.at = now;
@@ -88,7 +88,8 @@ void VirtualNode::receive(const CanFrame& frame, Time at) {
   const bool for_all = function == Function::configuration;
   if (!for_all && (function != Function::command || node_of(frame) != node())) return;
   const bool sets = for_all && info != nullptr && info->answer == Answer::error;
-  // Other nodes also answer on 7E5; outside configuration mode, answers without an error are ignored.
+  // Answers of other nodes also have identifier 7E5. An answer without an error equals a setting with value 0, so
+  // outside configuration mode such a frame is ignored.
   if (sets && is_zero_from(frame, 1) && !configuring_) return;
   if (!rules_.expect(!frame.remote && frame.size == frame_size, "a frame without its 8 bytes of data", at)) return;
   if (!for_all && !rules_.expect(frame.data[1] == node(), "the second byte is not the node's number", at)) return;
@@ -98,7 +99,7 @@ void VirtualNode::receive(const CanFrame& frame, Time at) {
   }
   const std::string_view unknown = for_all ? "an unknown configuration command" : "an unknown command";
   if (!rules_.expect(info != nullptr, unknown, at)) return;
-  // Byte 1 of the order `rate` selects a table of bit rates; the document only has table 0.
+  // Byte 1 of the order that sets the bit rate selects a table of rates; the document only has table 0.
   const bool is_other_table = info->order == Order::rate && frame.data[1] != 0;
   const std::uint8_t value = frame.data[info->value_at];
   if (sets) return configure(*info, is_other_table ? std::uint8_t{0xFF} : value, at);
@@ -112,7 +113,7 @@ void VirtualNode::answer(const CanFrame& frame, Time at) {
 
 void VirtualNode::execute(const OrderInfo& info, std::uint8_t value, Time at) {
   const bool changes = info.order == Order::zero || info.order == Order::direction;
-  // A host cannot distinguish the answer to these orders from a cyclic position.
+  // The answers to the orders zero and direction look like a cyclic position to the host.
   if (changes) rules_.expect(readings_per_s_ == 0, "a setting changed while the node sends by itself", at);
   if (info.order == Order::enter) configuring_ = value == 1;
   if (info.order == Order::start && readings_per_s_ == 0) start_cyclic(format_.cyclic, at);

@@ -64,7 +64,7 @@ class VirtualNode final : public Device<CanFrame> {
   bool configuring_ = false;  // whether the node is in configuration mode
   bool sending_ = false;
   bool switch_rate_ = false;   // whether the bit rate changes after the last pending answer
-  bool rate_changed_ = false;  // whether the port must be set to the new bit rate
+  bool rate_changed_ = false;  // whether the next step must set the port to the new bit rate
   std::uint8_t readings_per_s_ = 0;
   Time next_cyclic_ = never;
   Buffer<Pending, 8> pending_;  // answers that are not sent yet, the earliest first

@@ -19,19 +19,19 @@ inline constexpr std::uint8_t frame_size = 8;  ///< Number of data bytes of a fr
 
 /// Purpose of a frame, which its identifier decides (table of COB-IDs).
 enum class Function : std::uint8_t {
-  nmt,                  ///< Identifier 000.
-  sync,                 ///< Identifier 080.
-  emergency,            ///< Identifiers 081 to 0FF.
-  reply,                ///< Identifiers 101 to 1FF: from a node.
-  command,              ///< Identifiers 201 to 2FF: to a node.
-  sdo_reply,            ///< Identifiers 581 to 5FF: from a node.
-  sdo_request,          ///< Identifiers 601 to 67F: to a node.
-  configuration_reply,  ///< Identifier 7E4, on which slaves of CiA 305 answer.
-  configuration,        ///< Identifier 7E5: to all nodes; RAA38S6 also answer on it.
+  nmt,                  ///< Network management of CANopen: identifier 000 (hex).
+  sync,                 ///< SYNC of CANopen: identifier 080 (hex).
+  emergency,            ///< Emergency message of CANopen: identifiers 081 to 0FF (hex).
+  reply,                ///< Reply or position from a node: identifiers 101 to 1FF (hex).
+  command,              ///< Order to a node: identifiers 201 to 2FF (hex).
+  sdo_reply,            ///< SDO of CANopen from a node: identifiers 581 to 5FF (hex).
+  sdo_request,          ///< SDO of CANopen to a node: identifiers 601 to 67F (hex).
+  configuration_reply,  ///< Answer to a setting on the identifier that CiA 305 gives, 7E4 (hex).
+  configuration,        ///< Setting for all nodes, or an RAA38S6's answer to a setting: identifier 7E5 (hex).
   unknown,
 };
 
-/// Returns the purpose of a frame with this identifier.
+/// Returns the purpose of a frame with the 11-bit identifier `id`.
 [[nodiscard]] constexpr Function function_of(std::uint32_t id) {
   if (id == 0) return Function::nmt;
   if (id == 0x80) return Function::sync;
@@ -56,9 +56,9 @@ enum class Function : std::uint8_t {
   return static_cast<std::uint8_t>(frame.id & (has_eight_bits ? 0xFF : 0x7F));
 }
 
-/// Names of the CANopen functions that this encoder does not use; empty for the others.
+/// Names of the CANopen functions that this encoder does not use; empty for the functions that it uses.
 inline constexpr std::array<std::string_view, 10> function_names{"NMT", "SYNC", "EMCY", "", "", "SDO RX", "SDO TX"};
-/// Returns whether the document only names a function, without describing its frames.
+/// Returns whether the document names a function of CANopen without describing its frames.
 [[nodiscard]] constexpr bool is_only_named(Function function) {
   return !function_names[static_cast<std::size_t>(function)].empty();
 }
@@ -93,15 +93,17 @@ inline constexpr std::array<Rate, 3> rates{{{0, 1'000'000}, {2, 500'000}, {3, 25
 
 /// Frame layout and settings of one encoder, as the unit's options select them.
 struct Format {
-  unsigned bits = 14;         ///< Number of bits of the position, 10 to 21.
-  std::uint8_t node = 0x20;   ///< Number of the node, 1 to 255.
-  std::uint8_t rate = 2;      ///< Index of the bit rate in `rates`.
-  bool listens = false;       ///< Host: whether to read the positions that the node sends without a request.
-  std::uint8_t positive = 0;  ///< Value of order 22 for counting up; the document does not state it.
-  std::uint8_t negative = 1;  ///< Value of order 22 for counting down; the document does not state it.
-  /// Virtual encoder: initial number of positions per second without a request; 0: none.
+  unsigned bits = 14;        ///< Number of bits of the position, 10 to 21.
+  std::uint8_t node = 0x20;  ///< Number of the node, 1 to 255.
+  std::uint8_t rate = 2;     ///< Index of the bit rate in `rates`.
+  bool listens = false;      ///< Host: whether to read the positions that the node sends without a request.
+  /// Value in order 22 that makes the encoder count up; the document does not state the value.
+  std::uint8_t positive = 0;
+  /// Value in order 22 that makes the encoder count down; the document does not state the value.
+  std::uint8_t negative = 1;
+  /// Virtual encoder: number of positions per second that it sends without a request after power on; 0: it sends none.
   std::uint8_t cyclic = 10;
-  bool answers_on_7e4 = false;  ///< Virtual encoder: whether it answers settings on 7E4 instead of 7E5.
+  bool answers_on_7e4 = false;  ///< Whether the virtual encoder answers settings on identifier 7E4 instead of 7E5.
 
   /// Returns the bit rate in bits per second.
   [[nodiscard]] constexpr std::uint32_t bit_rate() const { return rates[rate].bits_per_second; }
@@ -118,16 +120,16 @@ struct Values {
   std::optional<std::string_view> function{};
   std::optional<Bytes> data{};                ///< Data bytes of a frame that this encoder does not use.
   std::optional<std::string_view> command{};  ///< Name of the order that is requested or answered.
-  Number value{};                             ///< Counting direction, as order 22 carries it.
+  Number value{};                             ///< Counting direction: the value that order 22 carries.
   Number new_node{};                          ///< Node number that a setting gives to the node.
   Number bit_rate{};                          ///< Bit rate that a setting gives to the node, in bits per second.
-  std::optional<bool> clash{};                ///< Whether two nodes seem to share this number, or the line is bad.
-  Number readings_per_s{};                    ///< Positions per second that the node sends without a request.
+  std::optional<bool> clash{};  ///< Scan: true if two nodes seem to share the number `node`, or the line is bad.
+  Number readings_per_s{};      ///< Positions per second that the node sends without a request.
   std::optional<std::uint64_t> singleturn{};  ///< Position within one revolution, in counts.
   std::optional<double> angle{};              ///< Position within one revolution, in degrees.
-  std::optional<bool> written{};              ///< Whether a setting was written; false if the encoder has it already.
-  std::optional<bool> answered{};             ///< Whether the node answered the order.
-  /// Whether the position is mirrored since the order: the counting direction has changed.
+  std::optional<bool> written{};   ///< True if a setting was written; false if the encoder had this value already.
+  std::optional<bool> answered{};  ///< Whether the node answered the order.
+  /// Whether the order has mirrored the position, because the counting direction has changed.
   std::optional<bool> mirrored{};
   std::optional<std::uint64_t> before{};  ///< Position before the order, in counts.
   std::optional<std::uint64_t> after{};   ///< Position after the order, in counts.
@@ -143,16 +145,17 @@ enum class Answer : std::uint8_t { none, position, code, error };
 
 /// Description of an order, from the document's command tables.
 struct OrderInfo {
-  Order order;            ///< The order that is described.
+  Order order;            ///< Order that this description is for.
   std::uint8_t code;      ///< Value of byte 0, which identifies the order.
-  std::string_view name;  ///< Name of the order in fields.
-  /// True: sent on 7E5 to all nodes; false: sent on 2NN with the node number in byte 1.
+  std::string_view name;  ///< Name of the order, as the field `command` reports it.
+  /// True: the order is sent on 7E5 to all nodes; false: it is sent on 2NN to node NN, with NN also in byte 1.
   bool for_all;
-  Answer answer;                            ///< Kind of the answer to the order.
-  std::uint8_t value_at = 0;                ///< Index of the byte with the order's value; 0: the order has no value.
-  std::uint8_t least = 0;                   ///< Lowest value of the order.
-  std::uint8_t most = 255;                  ///< Highest value of the order.
-  Values::Number Values::*shown = nullptr;  ///< Member in which the order's value is reported; null: none.
+  Answer answer;              ///< Kind of the answer to the order.
+  std::uint8_t value_at = 0;  ///< Index of the data byte that carries the order's value; 0: the order has no value.
+  std::uint8_t least = 0;     ///< Lowest value that the order may carry.
+  std::uint8_t most = 255;    ///< Highest value that the order may carry.
+  /// Member of Values in which the order's value is reported; null: the value is not reported.
+  Values::Number Values::*shown = nullptr;
 };
 /// Descriptions of all orders, in the order of the enum.
 inline constexpr std::array<OrderInfo, 8> orders{{
@@ -168,7 +171,7 @@ inline constexpr std::array<OrderInfo, 8> orders{{
 /// Returns the description of an order.
 [[nodiscard]] constexpr const OrderInfo& info_of(Order order) { return orders[static_cast<std::size_t>(order)]; }
 
-/// Returns the order of a frame, by its byte 0 and identifier; null if there is none.
+/// Returns the order that byte 0 and the identifier of a frame give; null if they give no order.
 [[nodiscard]] constexpr const OrderInfo* order_of(const CanFrame& frame) {
   const bool for_all = is_setting(function_of(frame));
   for (const OrderInfo& info : orders) {
@@ -177,14 +180,14 @@ inline constexpr std::array<OrderInfo, 8> orders{{
   return nullptr;
 }
 
-/// Returns the meaning of an order's value byte; none if the document does not define it.
+/// Returns the value that an order's value byte stands for; no value if the document does not define the byte.
 [[nodiscard]] constexpr Values::Number meaning_of(const OrderInfo& info, std::uint8_t value) {
   if (info.order != Order::rate) return value < info.least || value > info.most ? Values::Number{} : value;
   const Rate* const rate = rate_of_index(value);
   return rate != nullptr ? Values::Number(rate->bits_per_second) : Values::Number{};
 }
 
-/// Converts the argument of a command to the value byte of an order; none for an unknown rate.
+/// Converts the argument of a command to the value byte of an order; returns no value for an unknown bit rate.
 [[nodiscard]] constexpr std::optional<std::uint8_t> value_of(const Format& format, Order order, std::int64_t argument) {
   if (order == Order::direction) return argument == 0 ? format.positive : format.negative;
   if (order != Order::rate) return static_cast<std::uint8_t>(argument);
@@ -215,12 +218,13 @@ inline constexpr std::array<OrderInfo, 8> orders{{
   return encode_position(node, info_of(order).code);
 }
 
-/// Returns the answer to a setting, sent with identifier `id`. `error`: 0 for success.
+/// Returns the answer to the setting `order`, sent with identifier `id`. `error`: error code; 0 for success.
 [[nodiscard]] constexpr CanFrame encode_configuration_answer(std::uint32_t id, Order order, std::uint8_t error) {
   return {.id = id, .size = frame_size, .data = {info_of(order).code, error}};
 }
 
-/// Checks what all frames have in common. Errors: bad_framing, wrong_length, unexpected_reply.
+/// Checks that a frame is a data frame of 8 bytes with an 11-bit identifier. Errors: bad_framing, wrong_length,
+/// unexpected_reply.
 [[nodiscard]] constexpr Error check_shape(const CanFrame& frame) {
   if (frame.remote) return Error::bad_framing;
   if (frame.size != frame_size) return Error::wrong_length;
@@ -321,7 +325,7 @@ constexpr Result<Values> decode_answer(const Format& format, const OrderInfo& in
 
 }  // namespace detail
 
-/// Decodes a reply to `request`, or only `request` if `reply` is null. Either may be null.
+/// Decodes `reply` as the reply to `request`; if `reply` is null, decodes `request`. Either of them may be null.
 [[nodiscard]] constexpr Result<Values> decode(const Format& format, const CanFrame* request, const CanFrame* reply) {
   if (reply == nullptr) return request == nullptr ? Error::wrong_length : detail::decode_request(*request);
   if (reply->remote) return Error::bad_framing;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of invalid, unexpected and too many frames.
+// Tests of invalid and unexpected frames, and of more requests than the virtual node can answer.
 #include "absenc/protocol/raa38/can/frame.hpp"
 
 #include <gtest/gtest.h>

@@ -14,12 +14,13 @@ Read::Read(const Format& format, Mode mode) : format_(format) {
 }
 
 void Read::heard(const CanFrame& frame, Time at) {
-  // A 29-bit identifier with the number of a reply may be another device's, but is evidence for the user.
+  // A 29-bit identifier with the number of the reply's identifier may be another device's, but is evidence for the
+  // user.
   if (frame.extended && frame.id == encode_position(format_.node, 0).id) keep(frame, at);
   if (!is_from(frame, format_.node)) return;
   keep(frame, at);
   const Result<std::uint32_t> counts = decode_position(format_, frame);
-  // The document does not state when the node takes the position.
+  // The document does not state when the node latches the position; the end of the request is taken.
   if (counts) {
     reading_ = {.singleturn = *counts,
                 .singleturn_bits = format_.bits,

@@ -13,7 +13,7 @@ namespace absenc::raa38::can {
 
 using namespace std::chrono_literals;
 
-// Assumed: the document gives no reply times.
+// These times are assumed: the document gives no reply times.
 inline constexpr Time answer_limit = 50ms;  ///< Timeout of a reply on a bus without other frames.
 inline constexpr Time busy_limit = 250ms;   ///< Timeout of a reply on a bus that other nodes keep busy.
 /// Time for which the host listens for unsolicited frames whose rate it does not know.
@@ -34,7 +34,7 @@ struct Protocol {
   static constexpr author::Manner manner(const Format&, const CanFrame&) { return {}; }
   /// Returns the timeouts of a reply on a quiet and on a busy bus.
   static constexpr author::CanHostTimes host_times(const Format&) { return {answer_limit, busy_limit}; }
-  /// Returns a frame with an 11-bit identifier as text, such as "220:8020000000000000".
+  /// Returns a frame with an 11-bit identifier as hexadecimal text, such as "220:8020000000000000".
   static constexpr ByteBuffer<4 + 2 * frame_size> encode(const Format&, const CanFrame& frame) {
     constexpr std::string_view digits = "0123456789abcdef";
     ByteBuffer<4 + 2 * frame_size> text;
@@ -56,7 +56,7 @@ struct Protocol {
 /// Reads one position: requests it, or waits for one that the node sends by itself.
 class Read : public author::CanEngine {
  public:
-  /// How the position is obtained: read request, start request, or listening.
+  /// How the position is obtained: by the read request, by the start request, or by listening.
   enum class Mode : std::uint8_t { ask, start, listen };
   /// Creates a conversation that reads one position in this mode.
   Read(const Format& format, Mode mode);
@@ -66,7 +66,7 @@ class Read : public author::CanEngine {
   /// Returns the position that was read; its `singleturn_bits` is 0 as long as none was read.
   [[nodiscard]] const Reading& found() const { return reading_; }
   [[nodiscard]] const Reading* reading() const final {
-    // `singleturn_bits` is 0 until a valid position was received.
+    // The member `singleturn_bits` is 0 until a valid position was received.
     return reading_.singleturn_bits != 0 ? &reading_ : nullptr;
   }
 
@@ -80,7 +80,7 @@ class Read : public author::CanEngine {
 
 /// Returns the frame that requests a position: order 01 in the mode `start`, otherwise order 80.
 [[nodiscard]] constexpr CanFrame position_request(const Format& format, Read::Mode mode) {
-  // Each call has a constant order, so that firmware does not link the table of orders.
+  // The order is a constant in each call, so that firmware does not link the table of orders.
   return mode == Read::Mode::start ? encode(Order::start, format.node) : encode(Order::read, format.node);
 }
 
@@ -97,21 +97,22 @@ author::Procedure set_cyclic(Dialog& dialog, Values& found, Arguments arguments)
 /// cross_check_failed, timeout, or those of reading the position.
 author::Procedure change(Dialog& dialog, Values& found, Order order, Arguments arguments);
 
-/// Reports the node's number if a frame from it follows a request. Errors: timeout, bad_framing.
+/// Requests the position of the node and reports its number if a frame from it follows. Errors: timeout, bad_framing.
 author::Procedure find_node(Dialog& dialog, Values& found);
 
 // ---- All nodes on the bus
 
-/// Result of a scan for one node number.
+/// Result of a scan for one node number: the frames received from it.
 struct NodeFrames {
-  std::uint16_t unsolicited = 0;  ///< Number of frames that count as sent without a request.
-  std::uint16_t per_second = 0;   ///< Those of `unsolicited` within one second after the first frame of any node.
-  std::uint8_t answers = 0;       ///< Number of frames that count as answers, at most 255.
-  std::uint8_t damaged = 0;       ///< Number of requests during which frames were destroyed.
-  bool readable = false;          ///< Whether the last frame is a position that fits the format.
-  std::uint32_t counts = 0;       ///< Position in the last frame, in counts; 0 if it is not `readable`.
+  std::uint16_t unsolicited = 0;  ///< Number of the node's frames that count as sent without a request.
+  /// Number of unsolicited frames of the node within one second after the first frame of any node.
+  std::uint16_t per_second = 0;
+  std::uint8_t answers = 0;  ///< Number of the node's frames that count as answers, at most 255.
+  std::uint8_t damaged = 0;  ///< Number of requests to the node during which frames were destroyed.
+  bool readable = false;     ///< Whether the node's last frame is a position that fits the format.
+  std::uint32_t counts = 0;  ///< Position in the node's last frame, in counts; 0 if it is not `readable`.
 
-  /// Returns whether the number seems to be in use.
+  /// Returns whether a node seems to have this number.
   [[nodiscard]] constexpr bool is_there() const { return unsolicited != 0 || answers != 0 || damaged > 1; }
   /// Returns whether two nodes seem to share the number.
   [[nodiscard]] constexpr bool clash() const {
@@ -119,9 +120,9 @@ struct NodeFrames {
   }
 };
 
-/// Result of a scan: what was received from each node number.
+/// Result of a scan: the frames that were received from each node number.
 struct Nodes {
-  std::array<NodeFrames, 256> at{};  ///< Result of each node number, which is the index; 0 is unused.
+  std::array<NodeFrames, 256> at{};  ///< Frames of each node number, which is the index; 0 is unused.
 
   /// Returns how many node numbers were found on the bus.
   [[nodiscard]] unsigned count() const;
@@ -130,10 +131,10 @@ struct Nodes {
 /// Finds the nodes on the bus by requesting every number from 1 to 255. Errors: timeout, bad_framing.
 author::Procedure scan(Dialog& dialog, Nodes& nodes);
 
-/// Result of `configure`: the setting, and the nodes that were found on the bus before it.
+/// Result of `configure`: the result of the setting, and the nodes that were found on the bus before the setting.
 struct ConfigureResult : Values {
-  Nodes nodes{};          ///< Nodes that were found on the bus.
-  bool verified = false;  ///< Whether the written setting was verified.
+  Nodes nodes{};          ///< Nodes that were found on the bus before the setting.
+  bool verified = false;  ///< Whether the host has verified that the node obeys the setting.
 };
 
 /// Changes the node number (order 11) or the bit rate (order 13) of the only node on the bus. Errors: invalid_argument,

@@ -45,7 +45,8 @@ TEST(Raa38CanRead, TimesOutWithoutNode) {
   Bench bench({.node = 0x21, .cyclic = 0});
   EXPECT_TRUE(ended(bench.run_command(Format{}, "position"), Error::timeout, "scan"));
   EXPECT_TRUE(ended(bench.run_command(Format{}, "listen"), Error::timeout, "by itself"));
-  // Another node sends 255 positions per second, so the bus is never silent for 50 ms.
+  // The bus is busy: node 21 (hex), which the host does not ask, sends 255 positions per second, so there is never a
+  // silence of 50 ms.
   Bench busy({.node = 0x21, .cyclic = 255});
   const CommandResult read = busy.run_command(Format{}, "position");
   EXPECT_TRUE(ended(read, Error::timeout));
@@ -60,7 +61,7 @@ TEST(Raa38CanRead, IgnoresFramesFromBeforeTheRequest) {
       by_hand.receive(encode_position(0x20, 1));  // a position that is received before the request is sent
       by_hand.sent();
     }
-    // This position was received before the request, or before the host began to listen.
+    // This position arrives now, but was received 1 ms before the request was sent, or before the host began to listen.
     by_hand.receive(encode_position(0x20, 2), -1ms);
     EXPECT_EQ(by_hand.next(), Kind::wait);
     by_hand.receive(encode_position(0x20, 3), 1ms);
@@ -78,7 +79,7 @@ TEST(Raa38CanRead, IgnoresFramesOfOtherNodes) {
     by_hand.receive(other);
     EXPECT_EQ(by_hand.next(), Kind::wait);
     by_hand.tell(Event<CanFrame>::Kind::silence, by_hand.now + 50ms);
-    // Without a reply, the host reports the 29-bit frame.
+    // If only a frame with a 29-bit identifier came, the host reports this frame instead of a timeout.
     const bool is_long = other.extended;
     EXPECT_EQ(by_hand.talk->error(), is_long ? Error::unexpected_reply : Error::timeout);
     EXPECT_EQ(says(by_hand.talk->detail(), "29 bits"), is_long);
@@ -124,7 +125,7 @@ TEST(Raa38CanCyclic, StartsAndStopsCyclicFrames) {
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
 }
 
-// The positions of 49 equal the answer to order 31.
+// Each cyclic position of the node is 49 (31 hex), so that it equals the answer to order 31.
 TEST(Raa38CanCyclic, FailsWhenSendRateDoesNotChange) {
   for (const std::int64_t rate : {0, 10}) {
     Scripted disobedient([](const CanFrame&) { return Frames{}; });
@@ -169,7 +170,7 @@ TEST(Raa38CanZero, RefusesWhileShaftTurns) {
 }
 
 TEST(Raa38CanZero, FailsWhenPositionDoesNotBecomeZero) {
-  // The answer to order 20 is 32 if it is read as a position; at 21 bits that is near 0.
+  // The node's answer to order 20 (hex) equals a frame with the position 32, which at 21 bits is near 0.
   for (const std::uint32_t counts : {32u << 10, 1'000'000u}) {
     Scripted stubborn([&](const CanFrame& request) { return correct_answer(request, counts); });
     const CommandResult zero = with(stubborn, "zero", {}, {.bits = 21});
@@ -183,7 +184,7 @@ TEST(Raa38CanZero, FailsWhenPositionDoesNotBecomeZero) {
   EXPECT_TRUE(ended(with(silent, "direction", {1}), Error::timeout, "is the same"));
 }
 
-// A late answer to order 20 looks like the position 32, which is near 0 at 21 bits.
+// A late answer to order 20 (hex) equals a frame with the position 32, which at 21 bits is near 0.
 TEST(Raa38CanZero, RejectsLateAnswerAsZeroPosition) {
   bool answer_pending = false;
   Scripted late([&](const CanFrame& request) {
@@ -194,7 +195,7 @@ TEST(Raa38CanZero, RejectsLateAnswerAsZeroPosition) {
   EXPECT_TRUE(ended(with(late, "zero", {}, {.bits = 21}), Error::cross_check_failed));
 }
 
-// The adapter delivers frames up to 4 ms early or late.
+// The cyclic frames arrive up to 4 ms early or late, as through a slow adapter.
 TEST(Raa38CanZero, RestoresSendRateThroughSlowCarrier) {
   unsigned left = 1000;
   unsigned rate = 0;
@@ -224,7 +225,7 @@ TEST(Raa38CanZero, ReportsNodeThatDoesNotResumeSending) {
   EXPECT_TRUE(ended(with(exhausted, "zero"), Error::cross_check_failed, "no longer sends"));
 }
 
-// A cyclic position of 32 equals the answer to order 20.
+// A cyclic position of 32 equals the answer to order 20 (hex).
 TEST(Raa38CanZero, RejectsCyclicPositionThatLooksLikeAnswer) {
   for (const Time period : {80ms, 100ms}) {
     unsigned left = 1000;
@@ -268,7 +269,7 @@ TEST(Raa38CanDirection, FailsWhenPositionIsNeitherSameNorMirrored) {
   EXPECT_TRUE(ended(with(jumping, "direction", {1}), Error::cross_check_failed, "mirror image"));
 }
 
-// A position that is not repeated may be a late answer to an order.
+// A position that the node sends only once may be a late answer to an order.
 TEST(Raa38CanDirection, RejectsPositionThatIsNotRepeated) {
   unsigned measurements = 0;
   Scripted late([&](const CanFrame& request) {

@@ -13,12 +13,12 @@ namespace {
 using namespace author;
 using MaybeFrame = std::optional<CanFrame>;
 
-// A measurement may end early after this number of frames and this time.
+// A measurement of the send rate may end early if it has this number of frames over at least this time.
 constexpr unsigned enough_frames = 4;
 constexpr Time enough_time = 500ms;
-constexpr unsigned most_measurements = 3;  // greatest number of attempts to measure the send rate
-constexpr Time slowest_period = 1s;        // longest period of a node that sends cyclically: TT = 1
-// Time for answers to order 20, 22 or 31; a cyclic position may equal such an answer.
+constexpr unsigned most_measurements = 3;  // greatest number of measurements of the send rate after order 31
+constexpr Time slowest_period = 1s;        // longest period of a node that sends cyclically: one frame per second
+// Time for which the host waits for an answer to order 20, 22 or 31; a cyclic position may equal such an answer.
 constexpr Time command_window = answer_limit;
 
 /// Measures the rate at which a node sends frames without a request.
@@ -33,7 +33,7 @@ struct SendRate {
   }
   /// Returns the mean time between frames; 0 with fewer than two frames.
   [[nodiscard]] Time period() const { return count < 2 ? Time{} : (last - first) / (count - 1); }
-  /// Returns the frames per second, rounded, 1 to 255; 0 without a frame.
+  /// Returns the mean number of frames per second, rounded, 1 to 255; 0 if no frame was counted.
   [[nodiscard]] unsigned per_second() const {
     if (count == 0) return 0;
     const Time mean = period();
@@ -46,7 +46,8 @@ struct SendRate {
 
 // ---- Receiving until a time is over
 
-// Measures the send rate until the time of listening is over; with `until_enough` possibly for less.
+// Measures the node's send rate until the time set by `listen` is over; `until_enough` ends it as soon as
+// `enough_frames` and `enough_time` are reached.
 Part<SendRate> count_frames(Dialog& dialog, bool until_enough = false) {
   SendRate cadence;
   for (;;) {
@@ -83,7 +84,7 @@ Part<MaybeFrame> read(Dialog& dialog, std::uint8_t node, Time pause = {}) {
   co_return frame;
 }
 
-// A position, or the error because of which it is missing.
+// A position, or the error that prevented its reading.
 struct PositionResult {
   Outcome outcome{};
   std::uint32_t counts = 0;
@@ -92,7 +93,7 @@ struct PositionResult {
 Part<PositionResult> read_position(Dialog& dialog, Time pause = {}) {
   const MaybeFrame frame = co_await read(dialog, dialog.format().node, pause);
   const Result<std::uint32_t> counts = frame ? decode_position(dialog.format(), *frame) : dialog.missing();
-  // The error is explained now, because a later request replaces the exchange.
+  // The words of the error are made here, because the next request replaces the exchange that they quote.
   const Exchange<CanFrame> exchange = dialog.exchange();
   const Explanation words = explain(dialog.format(), counts.error(), exchange.sent, exchange.received);
   co_return PositionResult{counts ? done : only(counts.error(), words.detail, words.advice), *counts};
@@ -106,7 +107,7 @@ Part<SendRate> stop_cyclic_frames(Dialog& dialog) {
   if (before.count != 0) {
     co_await is_answered(dialog, Order::cyclic, 0);
     dialog.listen(before.pause());
-    // If the node does not stop, the procedure continues nevertheless.
+    // The procedure continues even if the node still sends cyclic frames.
     co_await count_frames(dialog);
   }
   co_return before;
@@ -138,7 +139,7 @@ Part<PositionResult> read_at_rest(Dialog& dialog) {
   co_return second;
 }
 
-// Both positions must be near 0: the first may be a late answer, which equals position 32.
+// Both positions after the order must be near 0: the first may be the order's late answer, which equals position 32.
 Outcome check_zero(const Format& format, const Values& found, std::uint32_t first, std::uint32_t second) {
   if (is_near(first, 0, format.bits, zero_millidegrees) && is_near(second, 0, format.bits, zero_millidegrees)) {
     return done;
@@ -150,7 +151,7 @@ Outcome check_zero(const Format& format, const Values& found, std::uint32_t firs
 }
 
 Outcome check_direction(const Format& format, Values& found, std::uint32_t first, std::uint32_t second) {
-  // Twice the usual tolerance: the shaft may have vibrated before and after the order.
+  // The tolerance is twice the usual one, because the shaft may have vibrated before and after the order.
   const auto is_at = [&](std::uint64_t place) {
     return is_near(second, place, format.bits, 2 * standstill_millidegrees);
   };
@@ -209,7 +210,7 @@ Procedure set_cyclic(Dialog& dialog, Values& found, Arguments arguments) {
   dialog.changes();
   found.answered = co_await is_answered(dialog, Order::cyclic, static_cast<std::uint8_t>(wanted));
   Outcome outcome = done;
-  // If the adapter delivers frames late, a repeated measurement may correct the result.
+  // If the adapter delivers frames late, the first measurement may be wrong and a repeated one right.
   for (unsigned measurements = 0; measurements < most_measurements; ++measurements) {
     dialog.listen(wanted == 0 ? listening_time : std::max(5 * slowest_period / wanted / 2, enough_time) + answer_limit);
     const SendRate heard = co_await count_frames(dialog);
@@ -242,7 +243,7 @@ Procedure change(Dialog& dialog, Values& found, Order order, Arguments arguments
 namespace {
 
 constexpr Time between_requests = 2ms;  // time between two requests; one request and one answer take 1 ms at 250 kbit/s
-// While requests are sent, a frame of a node this many requests after that to the node is no answer.
+// If a node's frame arrives more than this number of requests after the request to the node, it is no answer.
 constexpr unsigned answering = 10;
 constexpr Time last_answers = 100ms;
 constexpr Time entering_time = 20ms;  // time after "enter configuration", which is not answered
@@ -250,17 +251,18 @@ constexpr Time answer_window = 100ms;
 // Assumed time that a controller needs to rejoin the bus after a change of its bit rate.
 constexpr Time switching_time = 50ms;
 constexpr int rate_attempts = 3;
-constexpr auto most_clashes = 16;  // more numbers with destroyed frames indicate a bad line
+constexpr auto most_clashes = 16;  // If frames were destroyed at more node numbers than this, the line is bad.
 
 constexpr std::string_view connect_alone = "connect this one alone: 7E5 reaches every node on the bus";
 constexpr std::string_view number_shared = "two nodes share the number, or the line is bad";
 constexpr std::string_view scan_hint = "`absenc scan` shows which: set node=";
 
-// Values of `asked` that are no node numbers: before the first request, and after the last.
+// Values of `asked` that are no node numbers: before the first request of a scan, and after the last one.
 constexpr unsigned before_requests = 0;
 constexpr unsigned after_requests = 256;
 
-// Counts frames until the time is over. `asked`: last requested number, `before_requests` or `after_requests`.
+// Counts the frames of all nodes until the time is over. `asked`: last requested node number, `before_requests` or
+// `after_requests`.
 Part<bool> count_node_frames(Dialog& dialog, Nodes& nodes, unsigned asked) {
   Time from = never;
   while (const MaybeFrame frame = co_await dialog.heard()) {
@@ -270,7 +272,7 @@ Part<bool> count_node_frames(Dialog& dialog, Nodes& nodes, unsigned asked) {
     NodeFrames& node = nodes.at[number];
     if (from == never) from = dialog.heard_at();
     if (asked == before_requests && dialog.heard_at() - from < 1s) ++node.per_second;
-    // Late answers arrive while later numbers are requested.
+    // The answer to an earlier request may arrive while later node numbers are requested.
     const unsigned early = dialog.came_early() && node.damaged == 0 ? 1 : 0;
     const bool was_asked = asked == after_requests || (number + early <= asked && number + answering > asked);
     if (!was_asked) {
@@ -325,7 +327,7 @@ Part<bool> wait_until_over(Dialog& dialog) {
   co_return true;
 }
 
-// Writes a setting. The node may obey even if its answer is lost.
+// Writes a setting to the node. If its answer is lost, the node may nevertheless have obeyed.
 Part<bool> write(Dialog& dialog, ConfigureResult& found, Order order, std::uint8_t value) {
   dialog.ask_for(encode(Order::enter, 0, 1), entering_time);
   co_await wait_until_over(dialog);
@@ -358,7 +360,7 @@ Part<Outcome> verify_node(Dialog& dialog, std::uint8_t before, std::uint8_t node
   co_return only(Error::timeout, "it answers neither under its old number nor under the new one", supply);
 }
 
-// Sets the host to the new rate; if the node does not answer there, back to the old one.
+// Sets the host to the new bit rate; if the node does not answer at it, sets the host back to the old one.
 Part<Outcome> verify_rate(Dialog& dialog, std::uint32_t bits_per_second) {
   const Format& format = dialog.format();
   dialog.configure(bits_per_second, switching_time);

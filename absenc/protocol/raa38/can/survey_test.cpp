@@ -46,12 +46,13 @@ TEST(Raa38CanScan, ReportsWrongBitRateInsteadOfClashes) {
   EXPECT_TRUE(ended(with(noise, "scan", {}, {}, 500'000), Error::bad_framing, "bit rate"));
 }
 
-/// Returns the identifiers of the frames that a command sends if no node answers.
+/// Returns the identifiers of all frames that a command sends on a bus without an encoder.
 std::vector<std::uint32_t> identifiers_of(std::string_view command, const Format& format) {
   sim::Line<CanFrame> line(LinkKind::can, {.rate = format.bit_rate()});
   std::vector<std::uint32_t> sent;
   line.observe([&](std::size_t, Time, Time, const CanFrame& frame) { sent.push_back(frame.id); });
-  Scripted listener([](const CanFrame&) { return Frames{}; });  // acknowledges frames on the bus
+  // a node that answers nothing, but whose controller acknowledges frames
+  Scripted listener([](const CanFrame&) { return Frames{}; });
   line.attach(sim::NodeRole::device, listener);
   raa38::testing::Talk<CanFrame> talk(can_unit, options_of(format), command, {});
   EXPECT_TRUE(line.run(line.attach(sim::NodeRole::host, *talk), 20s));
@@ -88,7 +89,7 @@ TEST(Raa38CanNode, ReportsNodeThatAnswers) {
   EXPECT_TRUE(ended(bench.run_command(Format{}, "node"), Error::timeout, "`absenc scan` asks them all"));
 }
 
-// Through a slow adapter, an answer may arrive while the next number is requested.
+// If the adapter is slow, the answer to one node number may arrive while the next number is requested.
 TEST(Raa38CanScan, AcceptsAnswersWhileSendingNextRequest) {
   for (const bool unasked_too : {false, true}) {
     Talk conversation("scan");
@@ -164,10 +165,10 @@ TEST(Raa38CanSetNode, RefusesWithOtherNodesOnTheBus) {
   EXPECT_TRUE(ended(bench.run_command("set-node", {0x42}), Error::timeout, "no node answers"));
 }
 
-/// A node that may answer a setting, but does not obey it.
+/// A node that does not obey a setting, and answers it with `answer`.
 struct Settings {
   Frames answer{};
-  bool dies = false;         // whether the node answers nothing after a setting
+  bool dies = false;         // whether the node no longer answers after a setting
   std::uint8_t appears = 0;  // number of another node that answers after a setting; 0: none
 };
 

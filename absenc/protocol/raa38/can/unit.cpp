@@ -76,7 +76,7 @@ constexpr auto fields = author::fields_of<Values>(
     field<&Values::before>("before", "counts", "position before the command"),
     field<&Values::after>("after", "counts", "position after it"));
 
-// Puts the fields into `sink`, and the position, if there is one, as a reading.
+// Puts the fields of a decoded frame into `sink`, and its position, if it has one, as a reading.
 constexpr void put_found(FieldSink& sink, const Format& format, const Values& found) {
   fields.put(sink, found);
   if (!found.singleturn) return;
@@ -170,22 +170,22 @@ constexpr Error decode_frames(const Format& format, Frame request, Frame reply, 
   if (values) put_found(sink, format, *values);
   return values.error();
 }
-// The CAN controller delivers whole frames.
+// A CAN frame is always complete, because the controller delivers whole frames.
 constexpr FrameEnd end_of_frame(const Options&, Direction, Bytes bytes) {
   return {FrameEnd::Kind::complete, bytes.size()};
 }
-// Returns whether this protocol detects a wrong bit in a reply; CAN itself has a CRC.
+// Returns whether decoding detects a wrong `bit` in the data of a reply; the CRC of CAN is not considered.
 bool is_checked(const Options& values, Frame request, Frame reply, std::size_t bit) {
   if (is_only_named(function_of(*reply.can))) return false;
   const OrderInfo* const asked = request.can != nullptr ? order_of(*request.can) : &info_of(Order::read);
   return (asked != nullptr && asked->answer != Answer::position) || bit >= options.format(values).bits;
 }
-// Returns the bits of the position in the data; none for any other field.
+// Returns which data bits carry `field`; only the field of the position has any.
 BitRanges bits_in(const Options& values, Frame, Frame, const FieldInfo& field) {
   if (&field != fields.of<&Values::singleturn>()) return {};
   return author::bits_of(0, 0, options.format(values).bits);
 }
-// Returns whether an answer to a request is to be expected.
+// Returns whether a node answers `request`.
 bool awaits_answer(const Options&, Frame request) {
   const Function function = function_of(*request.can);
   if (function != Function::command && function != Function::configuration) return function == Function::sdo_request;

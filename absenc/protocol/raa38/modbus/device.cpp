@@ -11,7 +11,8 @@ using modbus::Exception;
 using modbus::FrameBytes;
 using namespace std::chrono_literals;
 
-// More settings than this in one window of time break the document's rule "Do not regularly send".
+// A host that writes more than `most_settings` settings within `settings_window` breaks the document's rule "Do not
+// regularly send".
 constexpr std::uint32_t most_settings = 10;
 constexpr Time settings_window = 1min;
 
@@ -21,7 +22,7 @@ constexpr bool is_address(std::uint8_t address) {
 
 }  // namespace
 
-// A memory from a file may have any content; the format's values replace invalid ones.
+// A memory from a file may hold an invalid address or baud rate; the format's value then replaces it.
 void VirtualEncoder::started() {
   if (!is_address(address())) memory()[Settings::number_at] = format_.address;
   if (settings_.rate() >= bauds.size()) memory()[Settings::rate_at] = static_cast<std::uint8_t>(format_.baud);
@@ -47,7 +48,8 @@ void VirtualEncoder::request(Bytes body, Time at, FrameBytes& reply) {
     case function::set_parameter:
       return set_parameter(body, at, reply);
     default:
-      // Ignores the other function codes from 80 on: refusals, and A0, which is only for address FF.
+      // Function codes from 80 (hex) on get no reply: they are refusals of other slaves, and A0, which only address FF
+      // may carry.
       if (body[1] < modbus::refusal_bit) refuse(reply, address(), body[1], Exception::illegal_function);
   }
 }
@@ -59,7 +61,8 @@ void VirtualEncoder::read(Bytes body, Time at, FrameBytes& reply) {
   const auto registers = static_cast<std::uint16_t>(body[4] << 8 | body[5]);
   if (registers == 0 || registers > modbus::most_registers) return refused(Exception::illegal_data_value);
   if (first != 0 || registers > 2) return refused(Exception::illegal_data_address);
-  // A single register would carry only the lower 16 bits, which look like a whole position.
+  // A request of one register is refused if the position has more than 16 bits: the lower 16 bits would look like a
+  // whole position.
   if (registers == 1 && format_.bits > 16) return refused(Exception::illegal_data_value);
   append_position(registers, at, reply);
 }
@@ -100,7 +103,7 @@ bool VirtualEncoder::apply(std::uint8_t value, Time at) {
   } else if (baud_found != baud_parameters.end()) {
     const auto index = static_cast<std::uint8_t>(baud_found - baud_parameters.begin());
     wrote(settings_.write(Settings::rate_at, {&index, 1}), at);
-    set_rate(baud());  // the reply is still sent at the old baud rate
+    set_rate(baud());  // the reply to the setting is still sent at the old baud rate
   } else {
     return false;
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A virtual RAA38S6 as a Modbus RTU slave. Several can share a line.
+// A virtual RAA38S6 that is a Modbus RTU slave. Several of them can share a line.
 #pragma once
 
 #include <cstdint>
@@ -44,7 +44,7 @@ class VirtualEncoder final : public modbus::Server {
 
   Format format_;
   Settings settings_;
-  std::uint32_t recent_settings_ = 0;  // number of settings within the minute that began at `recent_since_`
+  std::uint32_t recent_settings_ = 0;  // number of settings written within the minute that began at `recent_since_`
   Time recent_since_{};
 };
 

@@ -25,10 +25,10 @@ TEST(Raa38ModbusDevice, AnswersExamplesOfTheManual) {
 TEST(Raa38ModbusDevice, RefusesWithExceptionsOfTheStandard) {
   Bench bench;
   const std::pair<Wire, Wire> rows[]{
-      {{1, 4, 0, 0, 0, 1}, {1, 0x84, 1}},  // function 04, read input registers, does not exist
-      {{1, 1, 0, 0, 0, 1}, {1, 0x81, 1}},  // function 01, read coils, does not exist
-      {{1, 6, 0, 0, 0, 1}, {1, 0x86, 1}},  // function 06, write a register, does not exist
-      {{1, 0x11}, {1, 0x91, 1}},           // function 11, report server id, does not exist
+      {{1, 4, 0, 0, 0, 1}, {1, 0x84, 1}},  // function 04, read input registers: the encoder does not have it
+      {{1, 1, 0, 0, 0, 1}, {1, 0x81, 1}},  // function 01, read coils: the encoder does not have it
+      {{1, 6, 0, 0, 0, 1}, {1, 0x86, 1}},  // function 06, write a register: the encoder does not have it
+      {{1, 0x11}, {1, 0x91, 1}},           // function 11, report server id: the encoder does not have it
       {{1, 3, 0, 1, 0, 1}, {1, 0x83, 2}},  // request that does not begin at register 0
       {{1, 3, 0, 0, 0, 3}, {1, 0x83, 2}},  // request of three registers, but only two exist
       {{1, 3, 0xFF, 0xFF, 0, 1}, {1, 0x83, 2}},
@@ -48,9 +48,9 @@ TEST(Raa38ModbusDevice, IgnoresFramesOfOthers) {
   Bench bench;
   for (const Wire& request : {
            Wire{2, 3, 0, 0, 0, 1},
-           Wire{0, 3, 0, 0, 0, 1},  // address 0: broadcast
+           Wire{0, 3, 0, 0, 0, 1},  // address 0: a broadcast, which no slave answers
            Wire{0xFF, 3, 0, 0, 0, 1},
-           Wire{1, 0xA0},     // A0 is only for address FF
+           Wire{1, 0xA0},     // function A0 (read the address) is only answered at address FF
            Wire{1, 0x83, 2},  // a refusal, which only a slave sends
            Wire{1, 0xA1},
            Wire{1, 0xCC, 1, 1},

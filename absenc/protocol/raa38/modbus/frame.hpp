@@ -19,7 +19,8 @@ using modbus::CrcOrder;
 
 namespace function {
 inline constexpr std::uint8_t read = modbus::read_holding_registers;  ///< Function code that reads registers.
-/// Function code that reads the address; A0, A1 and CC are specific to the maker.
+/// Function code that reads the encoder's address. The codes A0, A1 and CC are the maker's own, not of the Modbus
+/// standard.
 inline constexpr std::uint8_t read_address = 0xA0;
 inline constexpr std::uint8_t set_address = 0xA1;    ///< Function code that sets the address.
 inline constexpr std::uint8_t set_parameter = 0xCC;  ///< Function code that sets a parameter.
@@ -30,19 +31,20 @@ inline constexpr std::uint8_t set_parameter = 0xCC;  ///< Function code that set
 }
 }  // namespace function
 
-inline constexpr std::uint8_t any_address = 0xFF;  ///< Address to which the request for the encoder's address is sent.
+/// Address (FF) to which a host sends the request that reads the encoder's address.
+inline constexpr std::uint8_t any_address = 0xFF;
 
 namespace parameter {
-inline constexpr std::uint8_t zero = 0x00;      ///< Parameter that makes the present position zero.
-inline constexpr std::uint8_t positive = 0x01;  ///< Parameter that sets the positive direction.
-inline constexpr std::uint8_t negative = 0x02;  ///< Parameter that sets the negative direction.
+inline constexpr std::uint8_t zero = 0x00;      ///< Parameter of function CC that makes the present position zero.
+inline constexpr std::uint8_t positive = 0x01;  ///< Parameter of function CC that sets the positive counting direction.
+inline constexpr std::uint8_t negative = 0x02;  ///< Parameter of function CC that sets the negative counting direction.
 }  // namespace parameter
 
 /// Baud rates of the encoder in bits per second.
 inline constexpr std::array<std::uint32_t, 5> bauds{2400, 4800, 9600, 19'200, 57'600};
-/// Parameters of function CC that set the rates in `bauds`.
+/// Parameters of function CC that set the baud rates in `bauds`, in the same order.
 inline constexpr std::array<std::uint8_t, bauds.size()> baud_parameters{0x24, 0x48, 0x96, 0x19, 0x57};
-inline constexpr std::size_t baud_at_shipping = 3;  ///< Index in `bauds` of the rate at shipping.
+inline constexpr std::size_t baud_at_shipping = 3;  ///< Index in `bauds` of the factory setting.
 
 /// Returns the meaning of a parameter of function CC in words, or "unknown".
 [[nodiscard]] constexpr std::string_view name_of_setting(std::uint8_t value) {
@@ -64,23 +66,25 @@ inline constexpr std::size_t baud_at_shipping = 3;  ///< Index in `bauds` of the
   return std::nullopt;
 }
 
-inline constexpr LineSettings line_settings{.rate = bauds[baud_at_shipping]};  ///< Settings of the line at shipping.
+/// Line settings of an encoder as delivered.
+inline constexpr LineSettings line_settings{.rate = bauds[baud_at_shipping]};
 
-/// Form of the virtual encoder's reply to a request of two registers; the document has all three.
+/// Form of the virtual encoder's reply to a request of two registers; examples in the document have all three.
 enum class Data : std::uint8_t {
-  four_bytes,     ///< Byte count 04, four bytes of data.
-  three_bytes,    ///< Byte count 03, three bytes of data.
-  three_as_four,  ///< Byte count 04, but three bytes of data.
+  four_bytes,     ///< Reply with byte count 04 and four bytes of data.
+  three_bytes,    ///< Reply with byte count 03 and three bytes of data.
+  three_as_four,  ///< Reply with byte count 04, but only three bytes of data.
 };
 
 /// Frame layout and settings of one encoder, as the unit's options select them.
 struct Format {
-  std::uint8_t address = 1;             ///< Address of the encoder, 1 to 247.
-  unsigned bits = 14;                   ///< Number of bits of the position, 10 to 21.
-  unsigned registers = 0;               ///< Number of registers to request, 1 or 2; 0: as many as the bits need.
+  std::uint8_t address = 1;  ///< Address of the encoder, 1 to 247.
+  unsigned bits = 14;        ///< Number of bits of the position, 10 to 21.
+  /// Number of registers that the host requests, 1 or 2; 0: as many as the bits of the position need.
+  unsigned registers = 0;
   std::size_t baud = baud_at_shipping;  ///< Index of the baud rate in `bauds`.
   Data data = Data::four_bytes;         ///< Form of the virtual encoder's reply to a request of two registers.
-  /// Byte order of the CRC in the virtual encoder's reply to A0, low_first or high_first.
+  /// Byte order of the CRC in the virtual encoder's reply to the function A0, low_first or high_first.
   CrcOrder address_crc = CrcOrder::low_first;
 
   /// Returns the number of registers that the host requests.
@@ -101,7 +105,7 @@ struct Request {
   std::uint16_t registers = 1;       ///< Only for the function `read`: number of registers to read.
 };
 
-/// Bytes of one request.
+/// Buffer for the bytes of one request.
 using RequestBytes = ByteBuffer<8>;
 
 /// Returns the length in bytes of a request with a known function code.
@@ -156,13 +160,13 @@ struct Reply {
   std::uint8_t function = function::read;  ///< Function code of the reply.
   std::uint8_t address = 1;                ///< Address of the encoder; in the reply to set_address, the new address.
   std::uint32_t singleturn = 0;            ///< Only for the function `read`: position in counts.
-  std::uint8_t value = 0;                  ///< Only for the function `set_parameter`: the parameter.
+  std::uint8_t value = 0;                  ///< Only in the reply to the function `set_parameter`: the parameter.
   CrcOrder order = CrcOrder::low_first;    ///< Byte order of the CRC in the reply.
-  /// Length of a reply to `read` in bytes if the CRC cannot prove this length; otherwise 0.
+  /// Only for the function `read`: length of the reply in bytes if the CRC cannot prove this length; otherwise 0.
   std::size_t doubtful_size = 0;
 };
 
-/// Returns whether the CRC of a valid reply leaves open if it has three or four bytes of data.
+/// Returns whether a valid reply may have three or four bytes of data: its CRC fits both lengths.
 [[nodiscard]] constexpr bool length_is_doubtful(Bytes reply) {
   return reply.size() > 7 && reply[1] == function::read && reply[2] == 4 && (reply.size() == 8 || reply.back() == 0);
 }
@@ -174,7 +178,7 @@ struct Reply {
 
 namespace detail {
 
-// Returns the exception code of a refusal of 03 or A1; no value for another reply.
+// Returns the exception code if the reply refuses function 03 or A1; no value for any other reply.
 constexpr std::optional<std::uint8_t> refusal_of(const Request& request, Bytes reply) {
   if (request.function != function::read && request.function != function::set_address) return std::nullopt;
   return modbus::refusal_code(reply, request.function);
@@ -215,7 +219,7 @@ constexpr bool is_answer(const Request& request, Bytes reply) {
   const std::optional<std::uint8_t> refusal = detail::refusal_of(request, bytes);
   if (!refusal && !detail::length_is_right(request, bytes)) return Error::wrong_length;
   Reply reply{.function = request.function, .address = bytes[0], .order = modbus::crc_order(bytes)};
-  // The document labels the CRC of the reply to A0 "MSB first", unlike all other CRCs.
+  // The document draws the CRC of the reply to function A0 as "MSB first", unlike all other CRCs.
   const bool either = request.function == function::read_address;
   if (reply.order == CrcOrder::wrong || (reply.order == CrcOrder::high_first && !either)) return Error::bad_checksum;
   if (refusal) return bytes[0] == request.address ? Error::request_rejected : Error::unexpected_reply;
@@ -235,7 +239,7 @@ constexpr bool is_answer(const Request& request, Bytes reply) {
   return reply;
 }
 
-/// Returns the request that a reply captured without one is taken to answer.
+/// Returns the request that a captured reply probably answers, if the capture does not contain the request.
 [[nodiscard]] constexpr Request assumed_request(const Format& format, Bytes reply) {
   Request request = read_request(format);
   if (reply.size() < modbus::shortest_frame) return request;
@@ -257,10 +261,10 @@ constexpr bool is_answer(const Request& request, Bytes reply) {
 
 // ---- Protocol of the host
 
-/// Timeout of a reply. The document gives no time.
+/// Timeout of a reply, assumed: the document gives no reply time.
 inline constexpr Time answer_limit = std::chrono::milliseconds(50);
 
-/// Frames, lengths and times for the classes in absenc/protocol/author.
+/// Types, frames, lengths and times that the classes in absenc/protocol/author require.
 struct Protocol {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = rtu::Format;
@@ -270,19 +274,19 @@ struct Protocol {
   using Reply = rtu::Reply;
   static constexpr std::size_t longest_reply = 9;  ///< Greatest length of a reply in bytes.
 
-  /// Returns the host's times on a line with this baud rate.
+  /// Returns a host's timeouts and pauses on a line with this baud rate.
   static constexpr author::HostTimes host_times(const Format&, std::uint32_t rate) {
     return modbus::client_times({.rate = rate}, answer_limit);
   }
-  /// Returns the host's times on a line with the baud rate of the format.
+  /// Returns a host's timeouts and pauses on a line with the baud rate of the format.
   static constexpr author::HostTimes host_times(const Format& format) { return host_times(format, format.line().rate); }
-  /// Returns how a request is sent: once by default, because each setting wears the memory.
+  /// Returns how a request is sent: once, unless a procedure repeats it, because each setting wears the memory.
   static constexpr author::Manner manner(const Format&, const Request&) { return {}; }
   /// Returns the bytes of `request` as they are sent.
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
   /// Decodes a request; returns an error if its bytes are invalid.
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return rtu::decode_request(bytes); }
-  /// Returns the probable length in bytes of a reply with these first bytes.
+  /// Returns the probable length in bytes of a reply to `request` of which these first bytes were received.
   static constexpr std::size_t expected(const Format&, const Request& request, Bytes reply) {
     return reply_length(request, reply);
   }
@@ -297,7 +301,7 @@ struct Protocol {
     if (request.function != function::read) return {};
     return author::position_reading(reply.singleturn, format.bits);
   }
-  /// Returns the end of the request: the document does not say when the encoder latches.
+  /// Returns `sent_at`, the end of the request: the document does not say when the encoder latches the position.
   static constexpr Time latched(const Format&, Time sent_at) { return sent_at; }
   /// Returns whether a second reply must confirm this reply, because its length is in doubt.
   static constexpr bool needs_another(const Format&, const Reply& reply) { return reply.doubtful_size != 0; }

@@ -68,7 +68,7 @@ TEST(Raa38ModbusFrame, ChecksAddressRangeAndExplainsEachRefusal) {
   }
   EXPECT_EQ(error_of({}, ask, {0x01, 0xA0, 0x01}), Error::unexpected_reply);
   EXPECT_EQ(error_of({}, one_register, {2, 0x83, 2}), Error::unexpected_reply);
-  // A refusal of CC would equal the echo of another parameter.
+  // A refusal of function CC cannot be recognized, because it would equal the reply to another parameter.
   EXPECT_EQ(error_of({}, {.function = function::set_parameter, .value = 0x19}, {1, 0xCC, 1}), Error::unexpected_reply);
 }
 
@@ -88,7 +88,7 @@ TEST(Raa38ModbusFrame, AssumesRequestFromReply) {
   EXPECT_EQ(assumed_request({}, {}).function, function::read);
 }
 
-// A valid frame may stay valid with a 00 appended.
+// A valid frame that ends with a certain CRC may stay valid if a 00 is appended.
 TEST(Raa38ModbusFrame, RecognizesLengthThatTheCrcDoesNotProve) {
   Wire followed = framed({1, 3, 4, 0x00, 0x00, 0x05});
   EXPECT_TRUE(decode_reply(fine, two_registers, followed));
@@ -141,7 +141,8 @@ TEST(Raa38ModbusProbe, FindsRegistersAndLeastBits) {
   Evidence evidence;
   ASSERT_TRUE(modbus_unit.probe(options, std::vector<Capture>{{{}, hex<"010304001fabcd7550">}}, evidence));
   EXPECT_EQ(options.values, options_of(fine).values) << "two registers are what so many bits need";
-  EXPECT_EQ(evidence.possible, 3u);  // three option values are possible: 21 bits, and registers auto and 2
+  // three option values are possible: 21 for the option bits, auto and 2 for the option registers
+  EXPECT_EQ(evidence.possible, 3u);
   const std::vector<Capture> damaged{{{}, hex<"010302017ff834">}, {{}, hex<"010302017ff835">}};
   EXPECT_FALSE(modbus_unit.probe(options, damaged, evidence));
   EXPECT_TRUE(says(evidence.reasons, "checksum"));

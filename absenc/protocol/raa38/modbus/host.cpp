@@ -114,7 +114,8 @@ constexpr Request setting(const Format& format, std::uint8_t value) {
   return {.function = function::set_parameter, .address = format.address, .value = value};
 }
 
-// Reads the position in up to `attempts` attempts. Stops the procedure if one register is too few.
+// Tries up to `attempts` times to read the position. Stops the procedure if the position has more bits than the one
+// register that is requested.
 Part<Result<Reply>> read_position(Dialog& dialog, std::uint8_t address, unsigned attempts) {
   Request request = read_request(dialog.format());
   request.address = address;
@@ -138,7 +139,8 @@ void set_rate(Dialog& dialog, std::uint32_t rate) {
   dialog.set_rate(rate, Protocol::host_times(dialog.format(), rate));
 }
 
-// Sends A0; ends the command if another address answers. `baud`: present rate of the line.
+// Reads the address with function A0; ends the command if another address than the format's answers. `baud`: present
+// rate of the line.
 Part<bool> check_other_address(Dialog& dialog, CommandValues& found, std::uint32_t baud) {
   const std::uint8_t asked = dialog.format().address;
   const Result<Reply> reply_to_a0 = co_await dialog.attempt(address_request).repeated(2);
@@ -167,14 +169,14 @@ Part<Reply> read_own_position(Dialog& dialog, CommandValues& found, unsigned att
   co_return *reply;
 }
 
-// Stores the last position that was received in `found`.
+// Copies the dialog's last position into `found`.
 void show_position(const Dialog& dialog, CommandValues& found) {
   found.reading = dialog.last_reading();
   found.singleturn = dialog.last().singleturn;
   found.angle = degrees(dialog.last().singleturn, dialog.format().bits);
 }
 
-// Checks whether the encoder answers at the new setting, or else at the old one.
+// Checks whether the encoder answers with the new address or baud rate, or else with the old one.
 Part<Outcome> verify_setting(Dialog& dialog, std::uint8_t address, std::uint32_t rate,
                              std::string_view at_the_old_one) {
   const Format& format = dialog.format();
@@ -224,7 +226,7 @@ Procedure find_baud(Dialog& dialog, CommandValues& found) {
   const std::size_t own = dialog.format().baud;
   found.baud = bauds[own];
   const Result<Reply> first = co_await read_position(dialog, dialog.format().address, 2);
-  // An encoder that refuses the request has answered, so this is its baud rate.
+  // The present baud rate is right if the encoder answers, even with a refusal.
   if (first || first.error() == Error::request_rejected) co_return done;
   if (dialog.is_noisy()) co_return {first.error()};
   const Explanation reason = explain_reply(read_request(dialog.format()), first.error(), dialog.reply());

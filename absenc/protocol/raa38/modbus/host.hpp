@@ -25,17 +25,17 @@ struct Values {
   std::optional<std::uint32_t> singleturn{};      ///< Position within the turn, in counts.
   std::optional<double> angle{};                  ///< Position within the turn, in degrees.
   std::optional<std::uint16_t> new_address{};     ///< Address that function A1 gives to the encoder.
-  std::optional<std::uint16_t> parameter{};       ///< Parameter of function CC.
-  std::optional<std::string_view> setting{};      ///< Meaning of the parameter in words.
+  std::optional<std::uint16_t> parameter{};       ///< Parameter of function CC in the request or reply.
+  std::optional<std::string_view> setting{};      ///< Meaning of the parameter of function CC in words.
   std::optional<std::string_view> crc_order{};    ///< Byte order of the CRC: low_first or high_first.
   std::optional<std::uint32_t> baud{};            ///< Baud rate at which the encoder answers, in bits per second.
-  std::optional<std::string_view> direction{};    ///< Sentence about the counting direction, which no request reads.
-  /// Sentence about the change of the position by a direction setting.
+  std::optional<std::string_view> direction{};    ///< Sentence for the user: no request reads the counting direction.
+  /// Sentence for the user about how the position changed when the direction was set.
   std::optional<std::string_view> effect{};
-  std::optional<bool> written{};                   ///< Whether a setting was sent; false if the encoder has it already.
-  std::optional<std::uint16_t> encoder_address{};  ///< Address that answered during a scan.
-  std::optional<bool> clash{};                     ///< Whether the answers of this address were damaged every time.
-  /// True: this address answers with an exception; otherwise no value.
+  std::optional<bool> written{};  ///< True if a setting was sent; false if the encoder had this value already.
+  std::optional<std::uint16_t> encoder_address{};  ///< Scan: an address that answered.
+  std::optional<bool> clash{};  ///< Scan: whether all answers of the address `encoder_address` were damaged.
+  /// Scan: true if the address `encoder_address` answers with an exception; otherwise no value.
   std::optional<bool> refuses{};
 };
 
@@ -51,10 +51,10 @@ using Dialog = author::DialogOf<Protocol>;
 /// Reads the position once and reports it.
 author::Procedure read_position_once(Dialog& dialog, CommandValues& found);
 
-/// Reads the position for the direction command: no request reads the direction.
+/// Reads the position and reports it with a sentence that no request reads the counting direction.
 author::Procedure read_direction(Dialog& dialog, CommandValues& found);
 
-/// Reads the address with A0; if that fails, checks that an encoder answers at the format's one.
+/// Reads the address with function A0; if that fails, checks that an encoder answers at the format's address.
 author::Procedure read_address(Dialog& dialog, CommandValues& found);
 
 /// Finds the baud rate at which the encoder answers. Errors: invalid_argument, timeout, or that of an exchange.
@@ -64,23 +64,25 @@ author::Procedure find_baud(Dialog& dialog, CommandValues& found);
 struct Slaves {
   /// Result of polling one address: no answer, a valid answer, damaged answers, or a refusal.
   enum class Kind : std::uint8_t { none, answers, clash, refuses };
-  std::array<Kind, modbus::last_address + 1> at{};  ///< Result of each address, which is the index; 0 is unused.
+  /// Result of polling each address, which is the index; index 0 is unused.
+  std::array<Kind, modbus::last_address + 1> at{};
 };
-/// Scans the line for slaves. Errors: invalid_argument, timeout, or that of an exchange.
+/// Polls each address on the line for a slave. Errors: invalid_argument, timeout, or that of an exchange.
 author::Procedure scan(Dialog& dialog, Slaves& found, Arguments arguments);
 
-/// Sets the address with A1 and verifies it. Errors: invalid_argument, request_rejected, cross_check_failed, timeout,
-/// or those of reading the position.
+/// Sets the address with function A1 and verifies it. Errors: invalid_argument, request_rejected, cross_check_failed,
+/// timeout, or those of reading the position.
 author::Procedure set_address(Dialog& dialog, CommandValues& found, Arguments arguments);
 
-/// Sets the baud rate of encoder and line with CC and verifies it. Errors: invalid_argument, cross_check_failed,
-/// timeout, or those of reading the position.
+/// Sets the baud rate of encoder and line with function CC and verifies it. Errors: invalid_argument,
+/// cross_check_failed, timeout, or those of reading the position.
 author::Procedure set_baud(Dialog& dialog, CommandValues& found, Arguments arguments);
 
-/// Sets the counting direction with CC, and reports how the position changed.
+/// Sets the counting direction with function CC, and reports how the position changed.
 author::Procedure set_direction(Dialog& dialog, CommandValues& found, Arguments arguments);
 
-/// Makes the present position zero with CC 00. Errors: not_still, cross_check_failed, or those of reading the position.
+/// Makes the present position zero with function CC, parameter 00. Errors: not_still, cross_check_failed, or those of
+/// reading the position.
 author::Procedure set_zero(Dialog& dialog, CommandValues& found, Arguments arguments);
 
 }  // namespace absenc::raa38::rtu

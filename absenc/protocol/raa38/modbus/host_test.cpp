@@ -21,7 +21,8 @@ TEST(Raa38ModbusHost, ReadsAsFastAsSilencesAllow) {
     const Time start = bench.line.now();
     constexpr int readings = 200;
     for (int i = 0; i < readings; ++i) ASSERT_EQ(bench.position(), 0x1555u);
-    // Shortest time of one exchange: two silences, the answer time, and 15 characters.
+    // Shortest possible duration of an exchange: two silences, the answer time, and the 15 characters of request and
+    // reply.
     const LineSettings line = bench.format.line();
     const Time least = modbus::frame_silence(line) * 2 + 200us + 15 * line.character();
     const auto seconds = std::chrono::duration<double>(bench.line.now() - start);
@@ -52,7 +53,7 @@ TEST(Raa38ModbusHost, RefusesOneRegisterFor17Bits) {
   EXPECT_TRUE(ended(raa38::testing::result_of<std::uint8_t>(*read), Error::invalid_argument, "16 bits"));
 }
 
-// A CRC may end with 00; the frame without that byte can be valid too, in another form.
+// A reply whose CRC ends with 00 can also be valid without that byte, as a reply with three bytes of data.
 TEST(Raa38ModbusHost, RejectsReplyThatLostItsLastByte) {
   Wire whole;
   std::uint32_t position = 0x100000;
@@ -146,7 +147,7 @@ TEST(Raa38ModbusHost, NamesAddressThatAnswersA0) {
         ended(end, Error::timeout, "nobody answers at address 5, but A0 is answered by address 42 at 19200 baud"))
         << command;
     EXPECT_EQ(bench.encoder().settings().writes(), 0u);
-    bench.add({.address = 43});  // the answers of both slaves to A0 collide
+    bench.add({.address = 43});  // the answers of both slaves to function A0 collide
     EXPECT_TRUE(
         ended(bench.run_command(Format{.address = 5}, command, arguments), Error::timeout, "nobody answers at this"));
   }
@@ -231,7 +232,8 @@ TEST(Raa38ModbusSettings, RefusesAddressInUse) {
     return request[0] == 1 ? position_of_1 : Wire{2, 3, 2, 0, 9, 0, 0};
   };
   EXPECT_TRUE(ended(with(damaged, "set-address", {2}), Error::invalid_argument, "though not well"));
-  // One damaged reply is enough to refuse the address, even if the next requests are not answered.
+  // After one damaged reply of the wanted new address the host does not use this address, even if its next requests are
+  // not answered.
   unsigned asked = 0;
   const auto damaged_once = [&asked](Bytes request, unsigned) {
     if (request[0] == 1) return position_of_1;
@@ -319,7 +321,7 @@ TEST(Raa38ModbusSettings, SwitchesHostToNewBaudRate) {
     }
   }
   EXPECT_TRUE(ended(Bench().run_command("set-baud", {38'400}), Error::invalid_argument, "57600"));
-  // A port that cannot change its rate must fail before the encoder has changed.
+  // The first step changes the port's baud rate, so that a port that cannot do so fails before the encoder has changed.
   EXPECT_EQ(Talk({}, "set-baud", {9600})->next(Time{}).kind, Step<std::uint8_t>::Kind::configure);
 }
 

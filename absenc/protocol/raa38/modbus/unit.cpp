@@ -83,7 +83,7 @@ constexpr bool is_good(Bytes bytes, std::size_t size) {
   return bytes.size() >= size && modbus::crc_order(bytes.first(size)) == CrcOrder::low_first;
 }
 
-// Returns the likely length of a reply in a byte stream without pauses.
+// Returns the likely length of a reply to `request` at the begin of `bytes`, which may have further frames behind it.
 std::size_t length_in_run(const Format& format, const Request& request, Bytes bytes) {
   const std::size_t length = reply_length(request, bytes);
   if (length != 9 || !is_good(bytes, 8)) return length;
@@ -110,7 +110,7 @@ FrameEnd frame_end(const Options& values, Direction way, Bytes bytes) {
 
 // ---- Evidence of captured frames for options; their address does not matter
 
-/// Content of a capture, or the error that it has with any options.
+/// The decoded frames of a capture, or in `wrong` the error that they have whatever the options are.
 struct CaptureContent {
   Request request{};
   std::optional<Reply> reply{};
@@ -127,7 +127,7 @@ CaptureContent examine(const Capture& capture) {
   if (capture.reply.empty()) return {*request};
   const Result<Reply> reply = decode_reply(most, *request, capture.reply);
   if (reply) return {*request, *reply};
-  // A refusal is a valid frame without evidence for the bits.
+  // A refusal is a valid frame, but tells nothing about the number of position bits.
   if (reply.error() == Error::request_rejected) return {*request};
   return {.wrong = text_of(reply.error()).description};
 }
@@ -286,7 +286,7 @@ constexpr author::Declaration<Protocol, VirtualEncoder> declaration{
     .frame_end = frame_end,
     .bits = bits_in,
     .probe = probe,
-    // Between 1.5 and 3.5 characters.
+    // The pause in bits that ends a frame lies between 1.5 and 3.5 characters.
     .timing = {.pause_bits = 25, .turnaround_limit = answer_limit},
 };
 

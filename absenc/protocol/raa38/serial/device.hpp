@@ -20,7 +20,7 @@ class VirtualEncoder final : public author::BusDevice<Protocol, VirtualEncoder, 
   /// Switches the encoder off.
   void power_off(Time now) override;
 
-  /// Returns whether a request is for this encoder, and one that it can execute.
+  /// Returns whether a request is for this encoder and can be executed.
   [[nodiscard]] bool is_mine(const Request& request) const;
   /// Executes a request and returns the reply; no value if it is not answered.
   std::optional<Position> answer(const Request& request, Time at);
@@ -32,7 +32,7 @@ class VirtualEncoder final : public author::BusDevice<Protocol, VirtualEncoder, 
   [[nodiscard]] Position position(Time at) const;
   [[nodiscard]] Step<std::uint8_t> character();
 
-  Time due_{};  // in timing mode: time of the next frame
+  Time due_{};  // time of the next frame in timing mode
   // State of a transmission that is sent character by character.
   Bytes frame_{};
   Time frame_at_{};

@@ -18,31 +18,34 @@ namespace absenc::raa38::serial {
 
 using namespace std::chrono_literals;
 
-/// Event on which the encoder sends a frame.
+/// Event that makes the encoder send a frame.
 enum class Mode : std::uint8_t {
-  timing,     ///< Each period of its refresh rate: the encoder sends without a request.
-  handshake,  ///< A falling edge on CLK.
-  bus,        ///< A request with the encoder's number.
+  timing,     ///< The end of each period of the refresh rate: the encoder sends without a request.
+  handshake,  ///< A falling edge on the encoder's input CLK.
+  bus,        ///< A request that contains the encoder's number.
 };
 
 /// Second byte of a frame: 81 (fixed), Bx with the encoder's number (echo), or either (automatic).
 enum class SecondByte : std::uint8_t { automatic, fixed, echo };
 
-/// How the zero of an encoder is set; this depends on how the encoder was ordered.
+/// How the zero of an encoder is set; the order code of the encoder decides it.
 enum class Zeroing : std::uint8_t {
   none,
-  line,     ///< By a pulse on CLR.
-  command,  ///< By the request BC AA Cx, on a bus.
+  line,     ///< The zero is set by a pulse on the wire CLR.
+  command,  ///< The zero is set by the request BC AA Cx, on a bus.
 };
 
 inline constexpr std::uint8_t header = 0xFF;  ///< First byte of each frame.
 /// Second byte of a frame that does not contain the encoder's number.
 inline constexpr std::uint8_t fixed_second_byte = 0x81;
-inline constexpr std::uint8_t number_mark = 0xB0;  ///< High digit of the third byte Bx of a request: read unit x.
-inline constexpr std::uint8_t clear_mark = 0xC0;   ///< High digit of the third byte Cx: set the zero of unit x.
-inline constexpr unsigned unit_count = 16;         ///< Most units on a bus: a number is one hexadecimal digit.
-inline constexpr unsigned least_bits = 10;         ///< Lowest number of bits of the position that can be ordered.
-/// Highest number of bits of the position that can be ordered.
+/// High digit of a request's third byte Bx, which reads the position of unit x.
+inline constexpr std::uint8_t number_mark = 0xB0;
+/// High digit of a request's third byte Cx, which sets the zero of unit x.
+inline constexpr std::uint8_t clear_mark = 0xC0;
+/// Greatest number of units on a bus: a unit's number is one hexadecimal digit.
+inline constexpr unsigned unit_count = 16;
+inline constexpr unsigned least_bits = 10;  ///< Lowest number of position bits with which an encoder can be ordered.
+/// Highest number of position bits with which an encoder can be ordered.
 inline constexpr unsigned most_bits = 21;
 inline constexpr std::size_t request_bytes = 3;   ///< Length of a request in bytes.
 inline constexpr std::size_t frame_capacity = 6;  ///< Length of the longest frame in bytes.
@@ -50,35 +53,38 @@ inline constexpr std::size_t frame_capacity = 6;  ///< Length of the longest fra
 // ---- Times. The document states only T2; all others are assumed.
 
 inline constexpr Time trigger_width = 10us;  ///< Time T2: shortest pulse on CLK (3.1.3).
-inline constexpr Time clear_width = 1ms;     ///< Width of the pulse on CLR.
+inline constexpr Time clear_width = 1ms;     ///< Duration of the pulse on CLR, which sets the zero.
 
-// Times of the host.
+// The next times are those of the host.
 /// Timeout of a reply if the options do not state T3.
 inline constexpr Time answer_limit = 100ms;
-inline constexpr Time answer_slack = 5ms;  ///< Time added to a T3 from the options to get the timeout.
-inline constexpr Time gap_limit = 10ms;    ///< Least timeout between two characters of a frame; suits 1200 baud.
+/// Time that the host adds to the T3 of the options to get the timeout of a reply.
+inline constexpr Time answer_slack = 5ms;
+inline constexpr Time gap_limit = 10ms;  ///< Shortest timeout between two characters of a frame; suits 1200 baud.
 inline constexpr Time patience = 1s;  ///< Timeout on a line that is never silent; two frames at 1200 baud take 100 ms.
-inline constexpr Time listen_limit = 1s;  ///< Least timeout of a stream without a valid frame.
+/// Shortest time without a valid frame after which listening to a stream fails.
+inline constexpr Time listen_limit = 1s;
 /// Time for which the host listens before a scan; longer than the period of most refresh rates.
 inline constexpr Time scan_silence = 200ms;
 inline constexpr Time zero_limit = 500ms;  ///< Time within which the position must become zero after zero clearing.
 inline constexpr Time zero_poll = 10ms;    ///< Pause before each poll of the position after zero clearing.
 
-// Times of the virtual encoder; options may set another period and another T3.
-inline constexpr Time virtual_period = 10ms;        ///< Time between the virtual encoder's frames: refresh rate 100 Hz.
-inline constexpr Time virtual_acquisition = 100us;  ///< Time T3 of the virtual encoder.
-inline constexpr Time most_backlog = 2s;            ///< Delay above which a stream of the virtual encoder drops frames.
+// The next times are those of the virtual encoder; options may set another period and another T3.
+inline constexpr Time virtual_period = 10ms;  ///< Time between the virtual encoder's frames: refresh rate 100 Hz.
+/// Default time T3 of the virtual encoder, from request or pulse to its frame.
+inline constexpr Time virtual_acquisition = 100us;
+inline constexpr Time most_backlog = 2s;  ///< Delay above which a stream of the virtual encoder drops frames.
 /// Silence after which the virtual encoder drops an incomplete request.
 inline constexpr Time request_gap = 2ms;
 
 /// Properties with which an encoder was ordered, as the unit's options select them.
 struct Format {
   unsigned bits = 14;                              ///< Number of bits of the position in a turn, 10 to 21.
-  SecondByte second_byte = SecondByte::automatic;  ///< Value of the second byte of the encoder's frames.
+  SecondByte second_byte = SecondByte::automatic;  ///< Rule for the second byte of the encoder's frames.
   Mode mode = Mode::timing;                        ///< Event on which the encoder sends a frame.
   std::uint8_t unit = 1;                           ///< Number of the encoder on a bus, 0 to 15.
   Zeroing zeroing = Zeroing::none;                 ///< How the zero of the encoder is set.
-  /// Number x in the request Cx that sets the zero; -1: the same as in Bx.
+  /// Number x in the request BC AA Cx that sets the zero; -1: the number in `unit`.
   std::int32_t zero_unit = -1;
   std::int64_t refresh_millihertz = 0;  ///< Frames per second in timing mode, in 0.001 Hz; 0: unknown.
   /// Time T3 from the pulse on CLK, or from a request on a bus, to the frame; 0: unknown.
@@ -98,7 +104,7 @@ struct Format {
   [[nodiscard]] constexpr std::uint8_t zeroed_unit() const {
     return zero_unit < 0 ? unit : static_cast<std::uint8_t>(zero_unit);
   }
-  /// Returns the second byte of a stream, and of the virtual encoder's frames: Bx for `echo`, else 81.
+  /// Returns the second byte that frames of a stream and of the virtual encoder have: Bx for `echo`, otherwise 81.
   [[nodiscard]] constexpr std::uint8_t own_second_byte() const {
     return second_byte == SecondByte::echo ? static_cast<std::uint8_t>(number_mark | unit) : fixed_second_byte;
   }
@@ -109,23 +115,23 @@ struct Position {
   std::uint32_t singleturn = 0;                  ///< Position within the turn, in counts.
   std::uint8_t second_byte = fixed_second_byte;  ///< Second byte of the frame.
 
-  /// Returns whether all members are equal.
+  /// Returns whether two positions and their second bytes are equal.
   friend constexpr bool operator==(const Position&, const Position&) = default;
 };
 
-/// Bytes of one frame.
+/// Buffer for the bytes of one frame.
 using FrameBytes = ByteBuffer<frame_capacity>;
-/// Bytes of one request.
+/// Buffer for the bytes of one request.
 using RequestBytes = ByteBuffer<request_bytes>;
 
-/// Returns the checksum of `bytes`, which does not detect exchanged bytes.
+/// Returns the checksum of `bytes`; it does not depend on their order.
 [[nodiscard]] constexpr std::uint8_t checksum(Bytes bytes) {
   unsigned sum = 0;
   for (const std::uint8_t byte : bytes) sum += byte;
   return static_cast<std::uint8_t>(sum);
 }
 
-/// Returns the frame of a position.
+/// Returns the frame that carries `position`.
 [[nodiscard]] constexpr FrameBytes encode_position(const Format& format, const Position& position) {
   FrameBytes bytes;
   bytes.push_back(header);
@@ -194,8 +200,8 @@ struct Request {
 
 /// Values of frames and commands. Only members with a value are reported.
 struct Values {
-  std::optional<std::uint8_t> encoder_address{};  ///< Number of a unit that answered during a scan, 0 to 15.
-  /// Scan: whether no answer of the unit was valid, as with two encoders of one number, or on a bad line.
+  std::optional<std::uint8_t> encoder_address{};  ///< Scan: number of a unit that answered, 0 to 15.
+  /// Scan: true if no answer of the unit was valid, because two encoders have its number or the line is bad.
   std::optional<bool> clash{};
   std::optional<std::uint32_t> before{};      ///< Position before the zero was set, in counts.
   std::optional<std::uint32_t> singleturn{};  ///< Position within the turn, in counts.
@@ -214,7 +220,7 @@ struct Values {
           .angle = degrees(position.singleturn, format.bits)};
 }
 
-/// Frames, lengths and times for the classes in absenc/protocol/author.
+/// Types, frames, lengths and times that the classes in absenc/protocol/author require.
 struct Protocol {
   /// Frame layout and settings of one encoder, as the unit's options select them.
   using Format = serial::Format;
@@ -245,12 +251,12 @@ struct Protocol {
   static constexpr RequestBytes encode(const Format&, const Request& request) { return encode_request(request); }
   /// Decodes a request; returns an error if its bytes are invalid.
   static constexpr Result<Request> decode_request(const Format&, Bytes bytes) { return serial::decode_request(bytes); }
-  /// Returns the length of a request in bytes; 0 if the first two bytes are not those of one.
+  /// Returns the length of a request in bytes; 0 if the bytes in `begin` do not begin a request.
   static constexpr std::size_t request_size(const Format&, Bytes begin) {
     const RequestBytes request = encode_request({});
     return begin[0] == request[0] && (begin.size() < 2 || begin[1] == request[1]) ? request_bytes : 0;
   }
-  /// Returns the length in bytes of the reply to a request of bytes; 0: it has none.
+  /// Returns the length in bytes of the reply to `request`; 0 if the request has no reply.
   static constexpr std::size_t reply_size(const Format& format, const Request& request) {
     return request.kind == Request::Kind::zero_clear ? 0 : format.frame_bytes();
   }
@@ -264,7 +270,7 @@ struct Protocol {
   }
   /// Decodes a reply with all checks; returns the first error if one fails.
   static constexpr Result<Position> decode(const Format& format, const Request& request, Bytes bytes) {
-    // The encoder does not answer zero clearing.
+    // The encoder sends no reply when its zero is set, so no reply is valid.
     if (request.kind == Request::Kind::zero_clear) return Error::unexpected_reply;
     return decode_position(format, bytes, request.kind == Request::Kind::read ? request.unit : any_unit);
   }
@@ -280,7 +286,7 @@ struct Protocol {
   }
 };
 
-/// Returns the request on which an encoder sends a position: bytes or a pulse.
+/// Returns the request that makes the encoder send its position: the bytes BC AA Bx or a pulse.
 [[nodiscard]] constexpr Request position_request(const Format& format) {
   return {format.mode == Mode::bus ? Request::Kind::read : Request::Kind::trigger, format.unit};
 }

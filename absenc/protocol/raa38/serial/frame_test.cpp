@@ -24,7 +24,8 @@ TEST(Raa38SerialFrame, FirstFailingCheckGivesError) {
   EXPECT_EQ(error({0xFF, 0xB2, 0x01, 0x7F, 0x31}), Error::none);
 }
 
-// A repeated frame, decoded from another FF 81 on, must give the same position or none.
+// A stream that repeats one frame may contain a second FF 81; decoded from there, it must give the same position or an
+// error.
 TEST(Raa38SerialFrame, RepeatedFrameHasNoOtherAlignment) {
   for (const unsigned bits : {10u, 14u, 16u, 17u, 21u}) {
     const Format format{.bits = bits};

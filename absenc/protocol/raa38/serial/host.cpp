@@ -82,7 +82,7 @@ ByteStep Listen::next(Time now) {
   // The time that the caller takes to process a result does not count towards the timeout.
   if (restart_timeout_) deadline_ = now + std::max(listen_limit, 4 * format_.period());
   restart_timeout_ = false;
-  // Only emitted results extend the deadline; other bytes do not.
+  // Only emitted results extend the deadline; bytes that belong to no result do not.
   if (!done_ && now >= deadline_) end_stream();
   if (done_) return {.kind = ByteStep::Kind::done};
   return {.at = deadline_};
@@ -124,7 +124,8 @@ void Listen::take(const StreamFrame& found) {
   ++valid_count_;
 }
 
-// Returns the time that is assumed for the position, also of frames received together.
+// Returns the time at which a frame is assumed to have been sent: frames that are received together are spread over
+// their periods.
 Time Listen::latched_time(const StreamFrame& found) const {
   if (found.at != received_at_) return found.at;
   const auto behind = static_cast<std::int64_t>(waiting_.size() - taken_);
@@ -167,7 +168,7 @@ using namespace author;
 
 constexpr unsigned scan_attempts = 2;
 
-// Listens for the newest position; an error if no frame is found in time.
+// Listens to the stream for the newest position; returns an error if no frame is found in time.
 Part<Result<Position>> receive_frame(Dialog& dialog) {
   StreamDecoder decoder(dialog.format());
   Position position{.second_byte = dialog.format().own_second_byte()};

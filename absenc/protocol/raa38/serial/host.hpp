@@ -11,7 +11,7 @@
 
 namespace absenc::raa38::serial {
 
-/// Fields in which Values are reported.
+/// Fields in which the members of Values are reported.
 inline constexpr auto fields = author::fields_of<Values>(
     author::field<&Values::encoder_address>("encoder_address", "", "the number behind B", Role::encoder),
     author::field<&Values::clash>("clash", "", "every answer is damaged: two encoders, or a bad line", Role::clash),
@@ -43,14 +43,14 @@ class Listen final : public Conversation<std::uint8_t> {
   [[nodiscard]] std::string_view advice() const override { return words_.advice; }
   [[nodiscard]] const Reading* reading() const override;
   void report(FieldSink& sink) const override;
-  /// Returns the frame of the last emitted result, which may be empty, without a request.
+  /// Returns an exchange that consists of the last emitted frame, which may be empty, and no request.
   [[nodiscard]] Exchange<std::uint8_t> exchange() const override;
 
   /// Returns the decoder that finds the frames in the stream.
   [[nodiscard]] const StreamDecoder& decoder() const { return decoder_; }
 
  private:
-  // Room for the results in the bytes that a port delivers at once.
+  // Greatest number of results that are not emitted yet, enough for the bytes that a port delivers at once.
   static constexpr std::size_t most_waiting = 1024;
 
   void take(const StreamFrame& found);
@@ -61,13 +61,14 @@ class Listen final : public Conversation<std::uint8_t> {
   Format format_;
   StreamDecoder decoder_;
   Buffer<StreamFrame, most_waiting> waiting_;
-  std::size_t taken_ = 0;  // number of results in `waiting_` that were emitted already
+  std::size_t taken_ = 0;
   bool done_ = false;
-  bool received_anything_ = false;  // whether anything was received since the last valid frame was emitted
-  bool restart_timeout_ = true;     // whether the timeout must be restarted
+  bool received_anything_ = false;  // whether any bytes were received since the last valid frame was emitted
+  bool restart_timeout_ = true;     // whether the next call of `next` restarts the timeout of the stream
   Time deadline_{};
-  Time received_at_{};             // time at which the bytes that are being processed were received
-  Time received_before_{};         // time at which the bytes before were received; for the first bytes their own
+  Time received_at_{};  // time at which the bytes that are being processed were received
+  // time at which the preceding bytes were received; for the first bytes equal to `received_at_`
+  Time received_before_{};
   std::uint64_t valid_count_ = 0;  // number of valid frames emitted so far
   StreamCounts counts_{};
   Reading reading_{};

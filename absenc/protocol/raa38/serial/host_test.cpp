@@ -26,7 +26,7 @@ TEST(Raa38SerialHandshake, ReadsOneFramePerPulse) {
   EXPECT_EQ(read.reading->latched, Time{}) << "at the edge";
   EXPECT_EQ(read.took, virtual_acquisition + frame_time) << "T1";
   EXPECT_EQ(bench.encoder().violation_count(), 0u);
-  // T3 may be shorter than the pulse on CLK.
+  // The frame may follow CLK after a time T3 that is shorter than the pulse on CLK.
   EXPECT_TRUE(ended(Bench(with(handshake, &Format::acquisition, Time(1))).run_command("position"), Error::none));
 }
 
@@ -110,11 +110,11 @@ TEST(Raa38SerialHandshake, DoesNotBlameSecondEncoderForBadChecksum) {
 TEST(Raa38SerialBus, RejectsCollisionOfTwoUnits) {
   Bench bench(bus);
   bench.add_twin(with(bus, &Format::second_byte, SecondByte::echo));
-  // the frames FF 81 01 7F 00 and FF B1 01 7E 2F collide
+  // the frames FF 81 01 7F 00 and FF B1 01 7E 2F of two encoders collide
   EXPECT_TRUE(ended(bench.run_command("position"), Error::bad_checksum));
 }
 
-// Checks that another encoder does not take BC AA inside a frame for a request.
+// Checks that an encoder on the bus takes no bytes BC AA inside another encoder's frame for a request.
 TEST(Raa38SerialBus, IgnoresRequestStartInsideFrame) {
   Bench bench(with(bus, &Format::bits, 16u));
   bench.add(with(bench.format, &Format::unit, std::uint8_t{2}));
@@ -152,7 +152,7 @@ TEST_P(Raa38SerialZero, ReportsZeroWithoutEffect) {
 }
 
 TEST_P(Raa38SerialZero, RefusesWhileShaftTurns) {
-  // the slow speed is detected because time passes between the two readings of the procedure
+  // The procedure detects even 2 rpm, because time passes between its two readings of the position.
   for (const int rpm : {60, 2}) {
     Bench bench(GetParam());
     bench.shaft.spin(rpm, Time{});

@@ -37,7 +37,7 @@ Results listen(Bench& bench, std::size_t count = SIZE_MAX) {
 
 TEST(Raa38SerialListen, ReadsEveryFrameAtStreamRate) {
   Bench bench(fast);
-  bench.shaft.spin(60, Time{});  // 60 rpm: 16.384 counts per frame
+  bench.shaft.spin(60, Time{});  // 60 rpm at 1000 frames per second: 16.384 counts per frame
   const Results results = listen(bench, 1000);
   ASSERT_EQ(results.positions.size(), 1000u);
   EXPECT_TRUE(results.errors.empty());
@@ -152,7 +152,7 @@ TEST(Raa38SerialSession, TakesNewestFrameAfterPause) {
     bench.clock += 50ms;
     const Reading reading = *bench.read(host::Take::newest).reading();
     EXPECT_GT(reading.received, bench.clock - 2ms);
-    // A frame begins each millisecond and takes less than one.
+    // The encoder begins a frame each millisecond, and a frame takes less than a millisecond.
     const auto frame = static_cast<std::uint64_t>(reading.received / 1ms);
     EXPECT_EQ(reading.singleturn, 16'384 * frame / 1000 % 16'384);
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the rows of README's table of order codes that have the option mode, with a virtual encoder.
+// Tests those rows of README's table of order codes that set the option `mode`, each with a virtual encoder.
 #include <gtest/gtest.h>
 
 #include <fstream>

@@ -15,12 +15,12 @@ namespace absenc::raa38::serial {
 /// A result of the stream decoder: a valid frame, or the error that ended the alignment.
 struct StreamFrame {
   Error error = Error::none;     ///< Error that ended the alignment; `none` for a valid frame.
-  std::uint32_t singleturn = 0;  ///< Position in the valid frame, in counts.
+  std::uint32_t singleturn = 0;  ///< Position in the valid frame, in counts; 0 with an error.
   Time at{};                     ///< Time at which the last byte of the valid frame was received.
 };
 
-/// Finds frames in received bytes. Without alignment, two valid frames must follow each other. While aligned, a frame
-/// with an FF behind its second byte waits for the next header.
+/// Finds frames in received bytes. The decoder becomes aligned by two valid frames in a row. While aligned, it accepts
+/// a frame with an FF behind its second byte only when the next frame's header follows.
 class StreamDecoder {
  public:
   /// Creates a decoder for a streaming encoder of this format.
@@ -56,7 +56,7 @@ class StreamDecoder {
   [[nodiscard]] constexpr bool in_step() const { return in_step_; }
   /// Returns the number of received bytes that belong to no frame.
   [[nodiscard]] constexpr std::uint64_t skipped() const { return discarded_.skipped(); }
-  /// Returns the number of discarded frames, as DiscardedFrames computes it.
+  /// Returns the number of discarded frames, which DiscardedFrames computes from the skipped bytes.
   [[nodiscard]] constexpr std::uint64_t discarded() const { return discarded_.count(); }
   /// Returns whether a frame was valid except for a position with more bits than the format has.
   [[nodiscard]] constexpr bool saw_larger_positions() const { return saw_larger_positions_; }
@@ -76,7 +76,8 @@ class StreamDecoder {
   template <class OnFrame>
   constexpr bool follow(OnFrame& on_frame) {
     if (size_ < frame_) return false;
-    // After lost bytes the next header may be inside a frame: FF 81 02 (00 82 lost) FF 81.
+    // A frame that lost bytes may contain the header of the next one: in FF 81 02 (00 82 lost) FF 81 the second FF 81
+    // begins the next frame.
     const bool may_hold_header =
         std::find(window_.begin() + 2, window_.begin() + end(frame_), header) != window_.begin() + end(frame_);
     const bool good = frame_at(0).has_value();
@@ -107,7 +108,7 @@ class StreamDecoder {
     return true;
   }
 
-  // Returns whether the second of two frames came too soon after the first.
+  // Returns whether the second of two frames came less than half a period after the first.
   [[nodiscard]] constexpr bool is_too_early() const {
     const Time between = times_[2 * frame_ - 1] - times_[frame_ - 1];
     return between > Time{} && between < format_.period() / 2;

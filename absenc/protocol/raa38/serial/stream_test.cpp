@@ -83,7 +83,8 @@ TEST(Raa38SerialStream, DisturbanceCostsOnlyFramesItHits) {
 TEST(Raa38SerialStream, AlignsInMiddleOfFrameWithHeaderInData) {
   const Format format{.bits = 14};
   Wire wire;
-  for (int i = 0; i < 5; ++i) append(wire, encode_position(format, {0x3F81}));  // the frame is FF 81 3F 81 40
+  // each frame is FF 81 3F 81 40, so it contains a second 81
+  for (int i = 0; i < 5; ++i) append(wire, encode_position(format, {0x3F81}));
   for (std::size_t cut = 0; cut < 5; ++cut) {
     StreamDecoder decoder(format);
     const StreamResults results = decode_stream(decoder, Bytes(wire).subspan(cut));
@@ -101,7 +102,7 @@ TEST(Raa38SerialStream, IgnoresFramesOfOtherUnits) {
   }
 }
 
-// FF 81 02 FF 81 has a valid checksum, but two bytes were lost after FF 81 02.
+// The bytes FF 81 02 FF 81 have a valid checksum, but are no frame: two bytes were lost after FF 81 02.
 TEST(Raa38SerialStream, RejectsFrameWithHeaderInside) {
   const Format format{.bits = 10};
   for (std::size_t piece = 1; piece < 20; ++piece) {
@@ -186,8 +187,8 @@ TEST(Raa38SerialStream, AlignsWhenPiecesEndInsideFrames) {
 
 struct Tally {
   std::uint64_t sent = 0;
-  std::uint64_t lost = 0;   // frames that were not received, although no disturbance hit them
-  std::uint64_t wrong = 0;  // received positions that none of the next sent ones equals
+  std::uint64_t lost = 0;   // sent frames that were not received, although no disturbance hit them
+  std::uint64_t wrong = 0;  // received positions that none of the next 12 sent frames carried
   std::uint64_t disturbances = 0;
 };
 
@@ -220,7 +221,7 @@ bool disturb(Wire& wire, std::size_t size, sim::Random& random) {
 
 // Compares sent and received positions in order, and counts lost and wrong ones.
 void judge_option(Tally& tally, const std::vector<Sent>& sent, const std::vector<std::uint32_t>& results) {
-  constexpr std::size_t most_missing = 12;  // number of sent frames in which a received one is searched
+  constexpr std::size_t most_missing = 12;  // number of sent frames among which a received position is searched
   std::size_t next = 0;
   for (const std::uint32_t position : results) {
     const std::size_t end = std::min(sent.size(), next + most_missing);

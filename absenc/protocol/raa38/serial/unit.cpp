@@ -20,7 +20,7 @@ namespace {
 constexpr std::array<std::string_view, 3> mode_choices{"timing", "handshake", "bus"};
 constexpr std::array<std::string_view, 3> second_byte_choices{"auto", "81", "echo"};
 constexpr std::array<std::string_view, 3> zeroing_choices{"none", "line", "command"};
-constexpr std::int64_t most_us = 10'000'000'000;  // greatest time of an option: 10 s in nanoseconds
+constexpr std::int64_t most_us = 10'000'000'000;  // greatest value of an option that is a time: 10 s, in nanoseconds
 
 using author::decimal;
 using author::option;
@@ -146,7 +146,7 @@ constexpr auto commands = std::array{
 
 // ---- Declaration
 
-// The document gives no highest speed of the shaft.
+// No highest speed is set, because the document gives none.
 constexpr auto models =
     std::array{author::ModelText{"RAA38S6", "10 to 21 bits, single-turn; by itself, by pulse, on a bus", 0, ""}};
 
@@ -156,11 +156,11 @@ BitRanges bits_in(const Options& values, Frame, Frame, const FieldInfo& field) {
   if (&field != fields.of<&Values::singleturn>()) return {};
   return author::big_endian_bits(2, format.data_bytes(), format.bits);
 }
-// Rate 0: the document gives no baud rate, so the user must set it.
+// Returns baud rate 0, that is none: the document gives no baud rate, so the user must set it.
 constexpr LineSettings line_of(const Format&) { return {.rate = 0}; }
 constexpr Resolution resolution_of(const Format& format) { return {format.bits, 0}; }
 constexpr Result<Request> guess_request(const Format&, Bytes) { return Request{Request::Kind::trigger}; }
-// Returns whether frames are unsolicited; a pulse has no bytes and counts as no request.
+// Returns whether frames come without a request in bytes; a pulse on CLK counts as no request.
 bool is_streaming(const Options& values) { return options.format(values).mode != Mode::bus; }
 bool is_answered(const Options&, Frame request) {
   const Result<Request> asked = decode_request(request.bytes);
@@ -175,7 +175,7 @@ constexpr author::Declaration<Protocol, VirtualEncoder> declaration{
     .id = "raa38",
     .name = "RAA38S6, RS-485, RS-232 or RS-422",
     .document = "Absolute Encoder Operation Manual, RAA38S6 series",
-    .link = LinkKind::half_duplex,  // RS-485, the most restrictive of the three kinds of line
+    .link = LinkKind::half_duplex,  // of RS-485, RS-232 and RS-422, RS-485 restricts the host most
     .options = options.infos,
     .format = author::format_of<options>,
     .models = models,
