@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The rule for the `silence` event of ports and simulated lines.
+// The rule by which ports and simulated lines report the event `silence`.
 #pragma once
 
 #include "absenc/link/step.hpp"
@@ -23,7 +23,7 @@ class Silence {
   }
   /// Records activity that did not reach this end as an item: the line is silent since `at`.
   void busy(Time at) { since_ = at; }
-  /// Records that `silence` was reported.
+  /// Records that the event `silence` was reported, so that it is reported only once.
   void reported() { reported_ = true; }
 
   /// Returns the time since which the line is silent.
