@@ -100,7 +100,7 @@ TEST(Bus, DeliversSameBytesAsLine) {
     std::vector<std::unique_ptr<Responder>> made;
     made.push_back(std::make_unique<Responder>(1, Wire{0x11, 0x22, 0x33}));
     made.push_back(std::make_unique<Responder>(2, Wire{0xF0, 0xAA, 0x55}));
-    // This device answers request 2 at the same time as the device before it.
+    // This device answers request 2 at the same time as the device that was made before it.
     made.push_back(std::make_unique<Responder>(2, Wire{0x3C, 0xFF}));
     return made;
   };

@@ -15,7 +15,8 @@ namespace absenc::sim::testing {
 template <class Item>
 class LatePort final : public Port<Item> {
  public:
-  /// `delay` returns the delay of the items after a request, or `never` if they are lost.
+  /// Makes a port behind `inner`. `delay` is called for each request and returns the delay of the items received after
+  /// it, or `never` if they are lost.
   LatePort(SimPort<Item>& inner, std::function<Time()> delay) : inner_(&inner), delay_(std::move(delay)) {}
 
   Time now() override {

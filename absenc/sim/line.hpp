@@ -58,7 +58,7 @@ class Line {
   Node attach(NodeRole role, Machine<Item>& machine, const OnEmit& on_emit = {});
   /// Replaces the machine of `node`, from now on. A transfer of the old machine is cut off.
   void replace(Node node, Machine<Item>& machine);
-  /// Takes the steps of the node's machine. Needed after a change of the machine without an event.
+  /// Takes the steps of the node's machine. Call it after the machine was changed by something else than an event.
   void wake(Node node);
   /// Sets whether a node receives what it sends.
   void set_echo(Node node, bool echo);
@@ -92,9 +92,10 @@ class Line {
   struct ScheduledEvent {
     enum class Kind : std::uint8_t { begin, character, frame, transferred, finished, arbitrate } kind;
     Time at;
-    std::uint64_t order;  // events of the same time are handled in this order, but `arbitrate` last
+    // events with the same time are handled in ascending `order`, but `arbitrate` after all others
+    std::uint64_t order;
     Node node;
-    // `begin_generation` of the node when the event was scheduled.
+    // `begin_generation` of the node when the event was scheduled: after a newer transfer the event no longer counts.
     std::uint64_t generation;
     bool operator>(const ScheduledEvent& other) const {
       if (at != other.at) return at > other.at;
@@ -135,7 +136,8 @@ class Line {
   TransferObserver transfer_observer_;
   PulseObserver pulse_observer_;
   bool frame_on_bus_ = false;
-  // Items of the transfer, and senders of the frame, that ends now; kept here, so that a line in use allocates nothing.
+  // Items of the SPI or clocked transfer, and senders of the CAN frame, that ends now; members, so that a line in use
+  // allocates nothing.
   std::vector<Item> transferred_in_{};
   std::vector<Item> transferred_out_{};
   std::vector<Node> frame_senders_{};

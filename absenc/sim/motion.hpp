@@ -29,7 +29,8 @@ class Motion final : public Shaft {
   /// std::invalid_argument outside 0 to 36 000 000 degrees or 0 to 10 000 Hz.
   [[nodiscard]] static Motion sine(std::int64_t start, double amplitude_degrees, double frequency_hz);
   /// Returns a motion in straight lines between points `seconds,degrees`, one per line, seconds rising; degrees are
-  /// relative to `start`. Lines that begin with # are skipped. Throws std::invalid_argument with `name`.
+  /// relative to `start`. Lines that begin with # are skipped. Throws std::invalid_argument, whose text names the file
+  /// as `name`.
   [[nodiscard]] static Motion path(std::int64_t start, std::istream& csv, std::string_view name);
 
   /// Starts the motion at `time`; until then the shaft rests.

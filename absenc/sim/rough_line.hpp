@@ -12,12 +12,13 @@
 
 namespace absenc::sim {
 
-/// Probabilities, 0 to 1, of damage to data for the host: `bit` per bit, the others per frame.
+/// Probabilities, 0 to 1, of damage to what the host receives: `bit` is per bit, the others are per frame.
 struct RoughRates {
   double bit = 0;  ///< probability that a data bit is flipped
-  /// Probability that some of 2 to 16 adjacent bits are flipped.
+  /// Probability that some bits in a row of 2 to 16 bits are flipped.
   double burst = 0;
-  /// Probability that a byte or CAN frame arrives twice; on SPI and clocked links a bit, and the last one is lost.
+  /// Probability that a byte or CAN frame arrives twice; on SPI and clocked links one bit arrives twice and the last
+  /// bit is lost.
   double doubled = 0;
   /// Probability that another sender sends random bytes during the frame, perhaps past its end.
   double talker = 0;
@@ -27,7 +28,7 @@ struct RoughRates {
 /// Counts of the requests, the replies and the disturbances of a rough line.
 struct RoughCounts {
   std::uint64_t requests = 0;  ///< transfers and pulses of the host
-  std::uint64_t replies = 0;   ///< frames sent to the host
+  std::uint64_t replies = 0;   ///< frames that the device sent to the host
   std::uint64_t damaged = 0;   ///< frames damaged by any fault except `late`
   std::uint64_t late = 0;      ///< frames that were delayed
 };
@@ -46,11 +47,11 @@ class RoughLine final : public Port<Item> {
 
   [[nodiscard]] Time now() override;
   void begin(const Step<Item>& step) override;
-  /// Throws std::logic_error if no event can ever end the wait.
+  /// Blocks until the next event. Throws std::logic_error if no event can ever end the wait.
   [[nodiscard]] Event<Item> wait(const Step<Item>& step) override;
   /// Advances the time to `until` while the host is not waiting.
   void rest(Time until);
-  /// Discards frames that have arrived but were not reported.
+  /// Discards frames that have arrived but were not yet reported to the host.
   void drop();
 
   /// Marks all frames that the device began to send before now as old.
@@ -113,7 +114,7 @@ class RoughLine final : public Port<Item> {
   Random random_;
   RoughRates rates_{};
   RoughCounts counts_{};
-  std::uint64_t skip_ = ~std::uint64_t{0};  // number of good bits before the next flipped bit
+  std::uint64_t skip_ = ~std::uint64_t{0};  // number of undamaged bits before the next flipped bit
 
   Time time_{};
   Time last_event_at_{};
@@ -125,7 +126,8 @@ class RoughLine final : public Port<Item> {
   std::vector<Item> out_;  // items that the device sent last
   std::uint8_t behind_out_ = 0xFF;
   std::size_t bits_ = 0;
-  std::vector<InTransit> in_transit_;  // entries front_ to back_ - 1 are in transit; the others are reused
+  // ring buffer: the entries front_ to back_ - 1 are in transit, the others are reused
+  std::vector<InTransit> in_transit_;
   std::size_t front_ = 0;
   std::size_t back_ = 0;
   std::vector<Item> reported_items_;

@@ -13,7 +13,7 @@ namespace absenc::sim {
 
 namespace {
 
-// Indices of the wires of each kind of link, in the order in which the constructor names them.
+// Indices of the wires of each kind of link, in the order in which the constructor of Waveform lists them.
 constexpr std::size_t line = 0;
 constexpr std::size_t host = 0, device = 1;
 constexpr std::size_t cs = 0, sck = 1, mosi = 2, miso = 3;
@@ -115,7 +115,7 @@ void Waveform::byte(NodeRole sender, Time start, Time end, std::uint8_t byte) {
   first = {sender, start, end, byte};
 }
 
-// The second byte was never sent: the line rests at 1 instead.
+// Draws a character of two bytes whose second byte was never sent: the line rests at 1 in its place.
 void Waveform::draw_lone(FirstByte& first) {
   if (first.start == never) return;
   const Time start = std::exchange(first.start, never);
@@ -160,7 +160,7 @@ void Waveform::draw_clocked(const Line<std::uint8_t>::Transfer& seen) {
   const auto bits = static_cast<std::int64_t>(seen.bits);
   const std::int64_t idle = settings_.idle_clocks;
   const EvenDivision half{seen.start, seen.end - seen.start, 2 * bits};
-  // A clock line that the host held low rises half a period before the first clock edge.
+  // If the host held the clock line low, it rises half a period before the first clock edge.
   if (seen.held_low != never) drive(clock, seen.held_low + half(1) - half(0), half(-1));
   for (std::int64_t i = 0; i < bits + idle; ++i) drive(clock, half(2 * i), half(2 * i + 1));
   for (std::int64_t i = 0; i < bits; ++i) {

@@ -32,7 +32,7 @@ class Waveform {
   };
   /// Receiver of level changes and of comments, each in the order of time.
   struct Sink {
-    /// Receives a level change of the wire with this index in `wires()`.
+    /// Receives a level change of the wire that has the index `wire` in `wires()`.
     virtual void change(Time at, std::size_t wire) = 0;
     /// Receives a description of one drawn item in words.
     virtual void comment(Time at, std::string_view words) = 0;
@@ -71,7 +71,7 @@ class Waveform {
   [[nodiscard]] Time end() const { return end_; }
 
  private:
-  // The begin (`by` 1) or the end (-1) of a drive of a wire away from its idle level.
+  // The time from which (`by` 1) or up to which (`by` -1) a sender drives a wire away from its idle level.
   struct LevelChange {
     Time at;
     std::size_t wire;
@@ -83,10 +83,10 @@ class Waveform {
     std::string words;
   };
 
-  // The first byte of a character of two, whose second byte has not been on the line yet.
+  // The first byte of a character of two bytes, stored until its second byte is on the line.
   struct FirstByte {
     NodeRole sender{};
-    Time start = never;  // never: there is none
+    Time start = never;  // `never`: no first byte is stored
     Time end{};
     std::uint8_t byte = 0;
   };
@@ -107,7 +107,7 @@ class Waveform {
   // Level changes that the sink has not received yet, the earliest on top.
   std::priority_queue<LevelChange, std::vector<LevelChange>, std::greater<>> changes_;
   std::vector<Comment> comments_;           // comments that the sink has not received, in the order of time
-  std::array<FirstByte, 2> first_bytes_{};  // by the index of the data wire
+  std::array<FirstByte, 2> first_bytes_{};  // stored first bytes, indexed by the wire
   Time end_{};
 };
 
