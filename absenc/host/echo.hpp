@@ -10,7 +10,7 @@
 
 namespace absenc::host {
 
-/// Setting for the echo of an adapter: whether it receives the bytes that it sends.
+/// Whether the adapter echoes, which means that it receives the bytes that it sends.
 enum class EchoMode : std::uint8_t {
   automatic,  ///< the first good exchange with a request shows whether the adapter echoes
   on,
@@ -34,7 +34,7 @@ class EchoFilter final : public Machine<std::uint8_t> {
     sent_.clear();
     held_.clear();
   }
-  /// Ends the exchange; `good`: without an error. Only a good one makes the detected mode final.
+  /// Ends the exchange; `good`: without an error. Only a good exchange makes the detected echo mode final.
   void conclude(bool good);
 
   /// Processes an event that the port reports.
@@ -66,7 +66,7 @@ class EchoFilter final : public Machine<std::uint8_t> {
   EchoMode detected_ = EchoMode::automatic;  // echo mode detected in this conversation; automatic: not yet
   Machine<std::uint8_t>* inner_ = nullptr;
   ByteBuffer<capacity> sent_;
-  ByteBuffer<capacity> held_;  // automatic mode: received bytes that may be the echo
+  ByteBuffer<capacity> held_;  // automatic mode: received bytes, stored because they may be the echo
   std::size_t echo_due_ = 0;   // mode on: number of echo bytes still to be received
   std::size_t echoed_ = 0;     // number of echo bytes received after the last request
   std::size_t reply_due_ = 0;  // number of reply bytes that the conversation expects; 0: unknown

@@ -47,7 +47,7 @@ TEST(Extrapolation, WrapsAsTheEncoderDoes) {
   EXPECT_EQ(one.at(Time(3000)), 0xFFD0u);
 }
 
-// A motion with constant acceleration, whose error the class states.
+// The motion has constant acceleration, for which the class states its greatest error.
 RC_GTEST_PROP(ExtrapolationProperty, KeepsItsStatedError, ()) {
   const auto bits = *rc::gen::inRange(10u, 33u);
   const double speed = *rc::gen::inRange(-200, 201);           // revolutions/s

@@ -47,7 +47,7 @@ class OutstandingRequests {
     unit_ = &unit;
     options_ = &options;
   }
-  /// Returns whether an encoder answers `request`.
+  /// Returns whether `request` is one that an encoder answers.
   [[nodiscard]] bool is_answered(Items request) const;
   /// Returns for how long after the last received item `request` must not be sent again.
   [[nodiscard]] Time pause_after(Items request) const;
@@ -76,7 +76,7 @@ class OutstandingRequests {
   void add(Items request, std::size_t expect, Time sent_at);
   /// Marks all requests equal to `request` as lost. The oldest counts as sent at most `longest` before the newest.
   void mark_lost(Items request, Time longest);
-  /// Removes the oldest request of `entry`, because its reply was received.
+  /// Removes the oldest request with these bytes, because its reply was received.
   void remove_oldest(Entry& entry);
   /// Removes all entries.
   void clear() { entries_.clear(); }
@@ -93,7 +93,7 @@ class OutstandingRequests {
   const Unit* unit_ = nullptr;
   const Options* options_ = nullptr;
   Buffer<Entry, most> entries_{};
-  Time newest_{};            // when the last added request was sent
+  Time newest_{};            // time at which the last added request was sent
   Time longest_interval_{};  // longest time between two consecutively added requests since the list was empty
 };
 

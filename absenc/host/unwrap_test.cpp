@@ -70,7 +70,7 @@ TEST(Unwrapper, UsesTurnAloneIfTurnsAreInvalid) {
   lost.multiturn_valid = false;
   EXPECT_EQ(unwrapper.add(lost), Joined::continued);
   EXPECT_EQ(unwrapper.position(), 6 * 1024 + 8);
-  // The turns are valid again, but have another value, which no motion explains.
+  // The turns are valid again, but differ by more than any motion explains.
   EXPECT_EQ(unwrapper.add(multiturn(0, 20, 2ms)), Joined::continued);
   EXPECT_EQ(unwrapper.position(), 6 * 1024 + 20);
 }
@@ -143,7 +143,7 @@ TEST(Unwrapper, ReadingsThatArriveTogetherMayBeFarApart) {
 }
 
 TEST(Unwrapper, DetectsJumpOfShaft) {
-  // The speed limit is a tenth of a turn per ms.
+  // The speed limit of 6000 rpm is a tenth of a turn per ms.
   Unwrapper unwrapper(SpeedLimit{.rpm = 6000});
   EXPECT_FALSE(unwrapper.jumps(multiturn(9, 0, 0ms))) << "nothing is known yet";
   unwrapper.add(multiturn(5, 0, 0ms));
@@ -177,7 +177,7 @@ TEST(Unwrapper, TakesPositionsOf64Bits) {
   EXPECT_EQ(unwrapper.position(), 3);
 }
 
-// The compiler refuses an overflow in a constant.
+// The speeds are computed at compile time, where the compiler refuses an overflow.
 TEST(Unwrapper, TakesExtremeSpeedsTimesAndUnits) {
   constexpr Time begin{-(std::int64_t{1} << 62)};
   constexpr Time years{std::int64_t{1} << 58};
@@ -210,7 +210,7 @@ TEST(LongestGap, IsNearlyHalfOfTheRangeAtFullSpeed) {
 }
 
 TEST(Unwrapper, DoesNotJoinPositionsThatMayHaveBeenLatchedTooFarApart) {
-  // At 10 000 rpm half a turn takes 3 ms. The third reply was late.
+  // At 10 000 rpm half a turn takes 3 ms. The reply of the third reading was late.
   Unwrapper unwrapper;
   unwrapper.add(singleturn(0, 0ms), {0ms, 1ms});
   EXPECT_EQ(unwrapper.add(singleturn(300, 1ms), {1ms, 2ms}), Joined::continued);
