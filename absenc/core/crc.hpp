@@ -14,7 +14,7 @@ namespace absenc {
 
 /// Parameters of a CRC. `poly` is in normal notation: x8+x5+x3+x2+x+1 is 0x2F.
 struct CrcParameters {
-  unsigned width;        ///< width of the checksum in bits, 3 to 16; for BitCrc 0 to 16
+  unsigned width;        ///< width of the checksum in bits: 3 to 16, but 0 to 16 for the class BitCrc
   std::uint16_t poly;    ///< Polynomial of the CRC without its highest term.
   std::uint16_t init;    ///< Value of the register before the first byte.
   bool refin;            ///< Whether each byte is processed lowest bit first.
