@@ -34,7 +34,8 @@ constexpr std::size_t unpacked_size = 24;
 struct Expanded {
   bool whole = false;
   FileBytes bytes;
-  bool found_by_reading = false;  // `open` and `read` gave the right content and a good end
+  // true: `open` and `read` returned the right content, and the end of the entry was good
+  bool found_by_reading = false;
   std::string problem;
 };
 

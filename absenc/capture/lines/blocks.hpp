@@ -88,7 +88,7 @@ class BlockRun {
     bool wanted = true;
     {
       std::vector<std::jthread> workers;
-      const Stop stop{*this};  // destroyed before the worker threads, which wait for the stop
+      const Stop stop{*this};  // its destructor runs before the worker threads are joined, and stops them
       for (unsigned i = 1; i < threads_; ++i) workers.emplace_back([this, i] { work(i); });
       wanted = join_all();
       stop.now();
@@ -103,7 +103,7 @@ class BlockRun {
     Block block;
     Levels levels;
     typename Decoding::Guess guess;
-    unsigned thread = 0;  // thread whose cache holds the block
+    unsigned thread = 0;  // index of the thread whose cache holds the block
     bool ready = false;
   };
   struct Stop {

@@ -41,7 +41,7 @@ class CanDecoder {
   bool level_ = true;
   Tick level_since_ = 0;  // begin of the present level, as far as known, in ticks
   Tick end_ = 0;
-  std::size_t bits_taken_ = 0;  // number of bits at the present level that were handled already
+  std::size_t bits_taken_ = 0;  // number of bits of the present level that were already handled
 
   State state_ = State::waiting;
   unsigned recessive_ = 0;  // number of consecutive recessive bits

@@ -13,7 +13,7 @@ namespace {
 
 // A drawing of a clock with data lines and optional chip select, with 4 ticks per clock period.
 struct ClockedDrawing {
-  Wires wires{std::vector<Drawn>(4)};  // wires in the order clock, in, out, select
+  Wires wires{std::vector<Drawn>(4)};  // levels of the wires clock, in, out and select, in this order
 
   void hold(bool clock, bool in, bool out, bool select, std::size_t ticks) {
     const std::array levels{clock, in, out, select};

@@ -18,7 +18,7 @@ struct CheckedFrame {
   std::size_t bits = 0;  // number of bits of the frame; 0: it consists of whole bytes
 };
 
-/// Limits of the search; callers must refuse longer frames.
+/// Limits of the search; callers must refuse frames that are longer.
 inline constexpr std::size_t longest_checked_frame = 64;  // longest frame of bytes, in bytes
 inline constexpr std::size_t longest_checked_word = 128;  // longest frame of bits, in bits
 
@@ -35,7 +35,7 @@ struct CheckSolution {
   CrcParameters parameters{};  // for kinds other than crc: width is 8 and init is the constant
   bool low_first = false;      // width above 8 in frames of bytes: the checksum's low byte comes first in the frame
   bool padded = false;         // the checksum is computed as if a byte 00 followed the covered part
-  // every init fits, with an xorout of its own: all frames have one length
+  // every init fits, each with its own xorout, because all frames have the same length
   bool init_open = false;
   std::vector<std::size_t> first;  // possible positions of the first covered byte or bit
   std::size_t check_size = 0;      // number of bytes, or bits in frames of bits, of the checksum
@@ -44,8 +44,10 @@ struct CheckSolution {
 };
 
 struct CheckSearch {
-  std::vector<CheckSolution> solutions;  // sorted: the solution that is least likely to be chance comes first
-  std::size_t open = 0;  // number of attempts at a layout for which the frames determine too little to list solutions
+  // the solutions, sorted: the one that is least likely to be an accident comes first
+  std::vector<CheckSolution> solutions;
+  // number of layouts of the checksum for which the frames determine too little to list solutions
+  std::size_t open = 0;
 };
 
 /// Returns checksums of 3 to 16 bits that explain every frame. The frames must be all of bytes or all of bits. A

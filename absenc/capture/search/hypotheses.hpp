@@ -14,12 +14,12 @@ namespace absenc::capture {
 struct Hypothesis {
   Options options{};
   Evidence evidence{};
-  std::size_t tried = 1;  // number of attempts, including this one, each of which may match by chance
-  bool at_least = false;  // the position may have more bits than `options` state
+  std::size_t tried = 1;  // number of hypotheses that were tried, including this one: each may match by chance
+  bool at_least = false;  // true: the encoder may have more bits than `options` state
 
-  /// Returns log10 of the probability that one of `tried` hypotheses is as good by chance.
+  /// Returns log10 of the probability that at least one of `tried` hypotheses fits this well by chance.
   [[nodiscard]] double chance() const;
-  /// Returns whether the evidence of the frames suffices without that of the motion.
+  /// Returns whether the evidence of the frames alone is enough, without that of the motion.
   [[nodiscard]] bool is_proven() const;
 };
 
