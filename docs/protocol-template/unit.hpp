@@ -44,7 +44,7 @@ struct Protocol {
   static constexpr author::HostTimes host_times(const Format&) {
     return {.answer_limit = answer_limit, .gap_limit = 50us};
   }
-  /// Returns how often a request is repeated after an error: requests that change the encoder never.
+  /// Returns how often a request is repeated after an error. Requests that change the encoder are never repeated.
   static constexpr author::Manner manner(const Format&, const Request& request) {
     return {.repeats = request.ask == Ask::position ? 2u : 0u};
   }
@@ -107,6 +107,6 @@ struct Protocol {
 };
 
 extern const Unit unit;
-extern const Clauses unit_clauses;  ///< The demands of its document.
+extern const Clauses unit_clauses;  ///< The demands of the encoder's document.
 
 }  // namespace absenc::protocol_name
