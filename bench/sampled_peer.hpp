@@ -13,7 +13,7 @@ namespace absenc::bench {
 /// Configuration of the decoder that is compared.
 struct SampledPeer {
   unsigned pin;
-  unsigned bits;  // number of bits of the position, up to 58
+  unsigned bits;  // number of bits of the encoder's position, up to 58
 };
 
 struct SampledPosition {

@@ -60,7 +60,7 @@ if(CMAKE_SYSTEM_PROCESSOR STREQUAL riscv)
   return()
 endif()
 
-# The whole library for a Cortex-M4 with FPU.
+# Builds the whole library for a Cortex-M4 with FPU.
 absenc_sources(m4f_sources ${absenc_firmware_folders})
 add_library(absenc-m4f STATIC EXCLUDE_FROM_ALL ${m4f_sources})
 absenc_settings(absenc-m4f)

@@ -198,9 +198,9 @@ struct Plan {
   std::string_view temperature{};  ///< command that is run every second; "": none
   std::uint32_t alarm = 0;         ///< alarm that the encoder raises in each rest of the shaft; 0: none
   std::string_view clear{};        ///< command that clears the alarm; "": no command is run
-  std::int64_t page = 0;           ///< page of the memory that is written and read
+  std::int64_t page = 0;           ///< page of the encoder's memory that is written and read
   std::int64_t addresses = 0;      ///< number of addresses on each page of the memory
-  std::int64_t bytes = 0;          ///< number of bytes that are written and read
+  std::int64_t bytes = 0;          ///< number of bytes of the encoder's memory that are written and read
   bool takes_cycles = false;       ///< whether commands may take cycles, in which no position is read
 };
 

@@ -40,7 +40,7 @@ struct Changes {
 
 /// A character of an asynchronous line.
 struct Character {
-  Tick begin = 0;  // begin of the start bit, as far as known
+  Tick begin = 0;  // tick at which the start bit begins, as far as known
   Tick end = 0;    // end of the stop bit, as far as known, or an earlier falling edge after the middle of the stop bit
   std::uint8_t value = 0;
   std::uint8_t channel = 0;  // index of the decoded line, or of the channel in a file of bytes
@@ -57,8 +57,8 @@ struct Burst {
   Tick end = 0;
   std::size_t bits = 0;           // number of clocks in the burst
   std::vector<std::uint8_t> in;   // bits sent by the encoder, packed MSB first, the last byte left-aligned
-  std::vector<std::uint8_t> out;  // SPI: bits sent by the host, packed like `in`
-  // bits may be missing at the beginning or the end
+  std::vector<std::uint8_t> out;  // SPI: bits sent by the host, packed MSB first, the last byte left-aligned
+  // true: bits of the burst may be missing at its beginning or end
   bool cut = false;
   // The following members are used only for clocked words without chip select.
   bool low_before = false;  // the clock rested at its low level before the burst
@@ -74,12 +74,12 @@ struct CanRecord {
   Tick at = 0;
   CanFrame frame{};
   bool error_frame = false;  // an error of the bus: `frame` holds class and data of the kernel's error frames
-  std::uint8_t channel = 0;  // index into the layout's channels
+  std::uint8_t channel = 0;  // index of the bus among the channels of the capture
 };
 
 /// A problem in a capture file, with the place in the file.
 struct Damage {
-  std::uint64_t offset = 0;  // bytes from the beginning of the file
+  std::uint64_t offset = 0;  // place of the problem in the file, in bytes from its beginning
   Tick tick = 0;             // tick up to which the data was decoded before the damage
   std::string what;          // description of the problem as a sentence; "": none
   bool note = false;  // true: only a remark, for example that columns are left out; false: data is bad or missing

@@ -12,7 +12,7 @@ namespace absenc {
 
 /// How far one part of a reading (single-turn position or turns) can be trusted.
 enum class Validity : std::uint8_t {
-  absent,   ///< the reply does not carry this part
+  absent,   ///< the reply does not contain this part
   unknown,  ///< it is not known whether this part is valid: do not use it
   invalid,  ///< a reported alarm or state marks this part as invalid
   valid,    ///< every alarm and state that could make this part invalid was reported, and is clear

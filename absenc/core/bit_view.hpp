@@ -19,7 +19,7 @@ namespace absenc {
 /// A sequence of bits in bytes, the highest bit of each byte first.
 struct BitView {
   Bytes bytes{};         ///< bits, packed with the first bit highest; the last byte is left-aligned
-  std::size_t size = 0;  ///< number of bits, at most eight for each byte
+  std::size_t size = 0;  ///< number of bits in the view, at most eight for each byte
 
   /// Returns the bit at `index`, which is less than `size`.
   [[nodiscard]] constexpr bool operator[](std::size_t index) const {
@@ -36,7 +36,7 @@ struct BitView {
     return value << count | window(first) >> (register_bits - count);
   }
 
-  /// Returns the same as `load`, for 1 to 64 bits.
+  /// Returns the same as `load`, but must be called only for 1 to 64 bits.
   [[nodiscard, gnu::always_inline]] constexpr std::uint64_t load_quickly(std::size_t first, unsigned count) const {
     if constexpr (register_bits < 64) return load(first, count);
     const std::uint64_t begin = window(first);

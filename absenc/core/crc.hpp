@@ -43,7 +43,7 @@ struct CrcParameters {
   return static_cast<std::uint16_t>((remainder ^ parameters.xorout) & mask);
 }
 
-/// Size of the constant table that `Crc` uses.
+/// Sizes of the constant table that `Crc` uses.
 enum class CrcTable {
   byte,    ///< table of 256 entries, one look-up per byte: 256 bytes up to width 8, 512 above
   nibble,  ///< table of 16 entries, two look-ups per byte: 16 or 32 bytes, for firmware
@@ -96,7 +96,7 @@ class Crc {
     return crc.value();
   }
 
-  /// Size of the look-up table in constant memory, in bytes.
+  /// Size of this CRC's look-up table in constant memory, in bytes.
   static constexpr std::size_t table_bytes = (std::size_t{1} << (table_kind == CrcTable::byte ? 8 : 4)) * sizeof(Word);
 
  private:

@@ -74,7 +74,7 @@ class Carrier {
   void wake(Time now) {
     if (is_busy() && !waiting_ && !sending_) take_steps(now);
   }
-  /// Returns the time at which `tick` must be called, or `never`.
+  /// Returns the next time at which `tick` must be called; `never` if it need not be called.
   [[nodiscard]] Time due() const {
     if (!is_busy()) return never;
     return waiting_ ? step_.at : std::min(at_, silence_end());
@@ -178,7 +178,7 @@ class Carrier {
     }
   }
 
-  // greatest number of items that are gathered
+  // greatest number of received characters that are gathered
   static constexpr std::size_t room = sizeof(Item) == 1 ? 16 : 1;
 
   // Members that are used for every received character come first, so that short instructions can address them.
@@ -189,7 +189,7 @@ class Carrier {
   bool item_received_ = false;  // an item or line error arrived since the last transfer or pulse was sent
   bool silence_reported_ = true;
   Time silent_since_{};
-  std::array<Item, room> items_;  // characters gathered and not yet delivered
+  std::array<Item, room> items_;  // received characters that were gathered and not yet delivered to the machine
   Line* line_;
   Machine<Item>* machine_ = nullptr;
   Time latency_;

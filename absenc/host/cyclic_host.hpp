@@ -30,14 +30,14 @@ class Service {
   Service(const Service&) = delete;
   Service& operator=(const Service&) = delete;
 
-  /// Returns how far the service is.
+  /// Returns the state of the service.
   [[nodiscard]] State state() const { return state_; }
   /// Returns whether the service is done or refused.
   [[nodiscard]] bool is_over() const { return state_ >= State::done; }
   /// Returns the time that a refused request needs, `never` if its reply has no known length; 0 if the service was not
   /// refused.
   [[nodiscard]] Time needs() const { return needs_; }
-  /// Returns the conversation.
+  /// Returns the conversation that executes the service's command.
   [[nodiscard]] Conversation<Item>& conversation() const { return *conversation_; }
 
  private:
@@ -71,7 +71,7 @@ struct Cycle {
     fresh,     ///< a valid position was read
     invalid,   ///< a good reply, but the encoder marks its position as not valid, or itself as not ready
     missing,   ///< no good reply with a position in this cycle
-    repeated,  ///< a service took this cycle
+    repeated,  ///< a service used this cycle, so no position was requested
   };
   Kind kind = Kind::missing;  ///< kind of this cycle
   /// missing: the error of the reading; `busy` if the reading had not ended when the next cycle began
@@ -153,23 +153,23 @@ class CyclicHost final : public Machine<Item> {
   CyclePlan plan_;
   Time due_;  // begin of the next cycle
   Cycle cycle_{};
-  Conversation<Item>* position_ = nullptr;  // reading that has not ended
+  Conversation<Item>* position_ = nullptr;  // conversation that reads the position; null: none runs
   Service<Item>* service_ = nullptr;        // first service of the queue
   Service<Item>* last_ = nullptr;
   Step<Item> step_{};        // transfer, pulse or change of the rate that the service wants, if `wants_`
   Time wake_ = Time::min();  // time at which the service wants to continue, if it has no step to begin
   Time rested_at_{};         // earliest time at which a service may send its request
-  Time free_since_ = never;  // end of the last reading
+  Time free_since_ = never;  // time at which the last reading ended
   std::uint32_t unasked_ = 0;
   User user_ = User::nobody;
   bool wants_ = false;
   bool is_row_ = false;       // no position may be requested before the service's next request
-  bool is_too_long_ = false;  // `step_` did not fit behind a position
+  bool is_too_long_ = false;  // the service's next request did not fit between two positions
   bool takes_ = false;        // the running cycle belongs to the service, so that no position is read
   bool carries_ = false;      // the position of the running cycle comes with the service's reply
   bool is_concluded_ = true;  // the result of the running cycle was emitted
   bool emitting_ = false;
-  bool in_transfer_ = false;    // the transfer has not ended
+  bool in_transfer_ = false;    // the transfer on the line has not ended
   bool ends_by_items_ = false;  // the transfer ends when its items are received: on SPI and clocked links
 };
 
@@ -407,7 +407,8 @@ Time CyclicHost<Item, Read>::transfer_time(const Step<Item>& step) const {
   if (step.kind == Kind::pulse) return step.width;
   if (step.bits != 0) return line.bits(step.bits + line.idle_clocks);
   if constexpr (is_can) {
-    constexpr unsigned longest_frame = 160;  // bits of an extended CAN frame of 8 bytes with stuff bits
+    // number of bits of an extended CAN frame with 8 data bytes, with stuff bits
+    constexpr unsigned longest_frame = 160;
     return line.bits(longest_frame * (step.out.size() + step.expect));
   } else {
     if (step.answer == Time{} && step.expect != 0) {  // SPI

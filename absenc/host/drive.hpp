@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a machine on a port: the loop of programs that may wait.
+// Runs a machine on a port: the loop for programs that may block while they wait.
 #pragma once
 
 #include "absenc/link/port.hpp"

@@ -63,7 +63,7 @@ class Extrapolation {
   }
 
   std::uint64_t position_ = 0;
-  std::int64_t step_ = 0;  // counts from the second last reading to the last one
+  std::int64_t step_ = 0;  // distance in counts from the second last reading to the last one
   Time span_{};            // time from the second last reading to the last one
   Time latched_{};
   unsigned bits_ = 0;  // width of the last position in bits; 0: no reading is known

@@ -76,7 +76,7 @@ class FirstReading {
   // A position in counts, which includes the turns if they are valid and both fit in 64 bits.
   struct Place {
     std::uint64_t counts = 0;
-    std::uint8_t bits = 0;  // number of bits of `counts`; 0: no position
+    std::uint8_t bits = 0;  // number of bits of `counts`; 0: there is no position
     std::uint8_t singleturn_bits = 0;
   };
 
@@ -117,7 +117,7 @@ class FirstReading {
   Reach reach_;
   Place last_{};
   bool has_step_ = false;
-  std::uint64_t step_ = 0;  // counts from the second last position to the last one
+  std::uint64_t step_ = 0;  // distance in counts from the second last position to the last one
   Time latched_{};
 };
 

@@ -73,7 +73,7 @@ RC_GTEST_PROP(UnwrapProperty, TheLongestGapKeepsWithinThatLimit, ()) {
   RC_ASSERT(counts * static_cast<double>(gap.count() + 2) >= half * 0.9);
 }
 
-// The integer arithmetic of Reach rounds up by at most 2^-29.
+// The integer arithmetic of Reach rounds a distance up by at most 2^-29 of its value.
 RC_GTEST_PROP(ReachProperty, EqualsDistanceAtHighestSpeed, ()) {
   const auto bits = *rc::gen::inRange(1u, 65u);
   const auto speed = *rc::gen::inRange<std::uint32_t>(1, 1'000'001);

@@ -17,10 +17,11 @@ namespace absenc::host {
 template <class Item>
 class OutstandingRequests {
  public:
-  static constexpr bool is_can = std::is_same_v<Item, CanFrame>;  ///< Whether items are CAN frames, not bytes.
+  /// Whether the items are CAN frames; otherwise they are bytes.
+  static constexpr bool is_can = std::is_same_v<Item, CanFrame>;
   /// Items of a request: at most 16 bytes or one CAN frame.
   using Request = Buffer<Item, is_can ? 1 : 16>;
-  /// Items as they were sent or received.
+  /// A view of items that were sent or received.
   using Items = std::span<const Item>;
 
   /// Requests with the same bytes, which may have been sent several times.
@@ -28,10 +29,10 @@ class OutstandingRequests {
     Request request;            ///< Items of the request.
     std::size_t expect = 0;     ///< Number of items of the reply to this request; 0: unknown before it ends.
     Buffer<Time, 4> sent_at{};  ///< Times at which the requests that are not lost were sent, the oldest first.
-    /// Time at which the oldest lost request counts as sent.
+    /// Time at which the oldest lost request is assumed to have been sent.
     Time lost_first{};
     Time lost_last{};   ///< Time at which the newest lost request was sent.
-    unsigned lost = 0;  ///< Number of lost requests.
+    unsigned lost = 0;  ///< Number of these requests that count as lost, but may still be answered.
 
     /// Returns the time at which the newest request of this entry was sent.
     [[nodiscard]] Time newest() const { return sent_at.empty() ? lost_last : sent_at[sent_at.size() - 1]; }

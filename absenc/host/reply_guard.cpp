@@ -158,7 +158,7 @@ Step<Item> ReplyGuard<Item>::next(Time now) {
           const std::size_t due = expected - std::min(expected, received_.size());
           return {.expect = due, .at = matching_.until, .answer = pending_.step.answer, .gap = pending_.step.gap};
         }
-        // The time limit for the reply has passed.
+        // The time limit for the reply has passed, so the phase matching ends.
         received_.clear();
         matching_.damaged = !is_can;
         conclude_matching(true);

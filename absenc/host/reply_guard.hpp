@@ -81,12 +81,12 @@ class ReplyGuard final : public Machine<Item> {
   struct Delaying {
     Time until{};            // earliest time at which the delayed request is sent
     Time received_at{};      // when the last item was received while delaying; if none was, `gap` before delaying began
-    Time noise_end = never;  // when the request is sent even if items still arrive
+    Time noise_end = never;  // time at which the request is sent even if items still arrive
   };
   struct Matching {
     // End of the time limit for the reply, which starts at the end of the request.
     Time until = never;
-    Time first_at{};       // when the first of the stored items was received
+    Time first_at{};       // time at which the first of the stored items was received
     Time received_at{};    // when the last of the stored items was received; if none was stored, end of the request
     bool damaged = false;  // a line error was received, or, except on CAN, the time limit passed
     // CAN: a frame that would be the reply if its identifier had 11 bits and not 29.
@@ -103,7 +103,7 @@ class ReplyGuard final : public Machine<Item> {
   };
   struct LastRequest {
     bool exists = false;
-    Request items{};  // items of the last request; empty if it was a pulse
+    Request items{};  // items of the last request; empty if the request was a pulse
     std::size_t expect = 0;
     // time of the last `sent` event, even if not of a request; before that, the time when the request was handed over
     Time sent_at{};

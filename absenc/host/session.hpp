@@ -20,7 +20,7 @@
 
 namespace absenc::host {
 
-/// Counters of a session: its conversations and their errors.
+/// Counters of a session: conversations and errors.
 struct Counters {
   /// conversations without an error whose position was not found wrong later; each result of a stream counts
   std::uint64_t good = 0;
@@ -302,8 +302,8 @@ class Session {
   Options options_;
   Port<Item>* port_;
   std::span<std::byte> storage_;
-  Conversation<Item>* current_ = nullptr;  // present conversation, constructed in `storage_`
-  const Command* command_ = nullptr;       // command that `current_` executes
+  Conversation<Item>* current_ = nullptr;  // present conversation, which was constructed in the session's storage
+  const Command* command_ = nullptr;       // command that the present conversation executes
   ReplyGuard<Item> own_guard_;
   ReplyGuard<Item>* guard_ = &own_guard_;
   bool guarded_ = false;  // whether the reply guard serves the present conversation
@@ -317,7 +317,7 @@ class Session {
   Time shortest_interval_ = never;      // shortest time between a reading and one that was read directly after it
   bool confirmed_ = false;              // the last reading was confirmed
   bool known_ = false;                  // a reading was confirmed since the last call of `doubt`
-  bool streaming_ = false;              // `current_` has stopped at a result and can continue
+  bool streaming_ = false;              // the present conversation has stopped at a result and can continue
   std::uint64_t discarded_before_ = 0;  // number of discarded frames of the present stream when it stopped last
   Counters counters_;
   Statistics<Item>* statistics_ = nullptr;

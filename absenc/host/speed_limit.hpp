@@ -55,7 +55,8 @@ class Reach {
  public:
   /// Returns the reach of a shaft of at most `rpm` revolutions per minute.
   [[nodiscard]] static constexpr Reach of_shaft(std::uint32_t rpm) {
-    constexpr std::uint64_t turns_a_ns_of_1_rpm = 2'459'565'877;  // 1 rpm in turns per ns, times 2^67, rounded up
+    // the speed 1 rpm in turns per ns, times 2^67, rounded up
+    constexpr std::uint64_t turns_a_ns_of_1_rpm = 2'459'565'877;
     return {turns_a_ns_of_1_rpm * rpm, 67, true};
   }
   /// Returns the reach of a carriage of at most `mm_s` mm/s with counts of `unit_um` micrometres, above 0.

@@ -25,7 +25,7 @@ TEST(Latencies, AreAtMostA32ndTooLong) {
   for (std::int64_t value = 1; value < 68'000'000'000; value += value / 7 + 1) {
     Latencies latencies;
     latencies.add(Time(value));
-    latencies.add(70s);  // the 70 s follow because the longest latency is stored exactly, and `value` must not be
+    latencies.add(70s);  // a longer latency must follow, because the longest latency is stored exactly
     const std::int64_t told = latencies.percentile(0).count();
     ASSERT_GE(told, value);
     ASSERT_LE(told, value + value / 32);

@@ -96,7 +96,7 @@ class Unwrapper {
   [[nodiscard]] constexpr std::uint64_t share(const Reading& reading, Time between) const {
     return reach_of(reading).share(between, resolution_of(reading));
   }
-  static constexpr std::uint64_t half = std::uint64_t{1} << 31;  // half the counted range, times 2^32
+  static constexpr std::uint64_t half = std::uint64_t{1} << 31;  // half the counted range, as a fraction times 2^32
 
   // Returns whether the shaft can have moved by at most 15/16 of half the counted range since the last reading;
   // `longest_gap` has the same limit.
@@ -120,12 +120,13 @@ class Unwrapper {
   }
 
   SpeedLimit limit_;
-  Reach reach_;  // reach within `limit_`, in the unit of `last_`
+  // distances that are possible within the speed limit, for counts of the length that the last reading has
+  Reach reach_;
   Times times_;
   Apart apart_;
   bool started_ = false;
   bool counts_turns_ = false;
-  std::uint64_t position_ = 0;  // unsigned, so that a wrap after 2^63 counts is defined
+  std::uint64_t position_ = 0;  // the number is unsigned, so that its wrap after 2^63 counts is defined
   Reading last_{};
   LatchTime last_at_{};
 };

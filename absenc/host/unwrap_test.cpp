@@ -89,7 +89,7 @@ TEST(Unwrapper, IgnoresInvalidReadings) {
 }
 
 TEST(Unwrapper, RestartsAfterTooLongAPause) {
-  Unwrapper unwrapper(SpeedLimit{.rpm = 6000});  // at this speed half a turn takes 5 ms
+  Unwrapper unwrapper(SpeedLimit{.rpm = 6000});  // at 6000 rpm half a turn takes 5 ms
   unwrapper.add(singleturn(1000, 0ms));
   EXPECT_EQ(unwrapper.add(singleturn(10, 4ms)), Joined::continued);
   EXPECT_EQ(unwrapper.position(), 1034);
@@ -106,7 +106,7 @@ TEST(Unwrapper, HasADefaultLimit) {
 }
 
 TEST(Unwrapper, UsesTurnsThatTheReadingsHave) {
-  Unwrapper unwrapper(SpeedLimit{.rpm = 600});  // at this speed 8 turns take 800 ms, and half a turn 50 ms
+  Unwrapper unwrapper(SpeedLimit{.rpm = 600});  // at 600 rpm 8 turns take 800 ms, and half a turn takes 50 ms
   unwrapper.add(multiturn(3, 0, 0ms));
   EXPECT_EQ(unwrapper.add(multiturn(9, 0, 700ms)), Joined::continued);
   EXPECT_EQ(unwrapper.add(multiturn(1, 0, 1500ms)), Joined::restarted);
@@ -119,7 +119,7 @@ TEST(Unwrapper, UsesTurnsThatTheReadingsHave) {
 TEST(Unwrapper, UsesSpeedOfLinearEncoder) {
   Unwrapper unwrapper;
   Reading reading = singleturn(1000, 0ms);
-  reading.unit_um = 1000;  // with 1000 um per count the counted range is 1.024 m
+  reading.unit_um = 1000;  // 1024 counts of 1000 um each are a range of 1.024 m
   unwrapper.add(reading);
   reading.singleturn = 10;
   reading.latched = 20ms;

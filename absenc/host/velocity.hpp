@@ -119,7 +119,8 @@ class Velocity {
   // of its value at most.
   [[nodiscard]] static constexpr std::int64_t rate(std::uint64_t counts, Time time, Rounding rounding) {
     const Rounding opposite = rounding == Rounding::up ? Rounding::down : Rounding::up;
-    constexpr std::uint64_t five_to_the_12th = 244'140'625;  // 1000 s are 10^12 ns: 5^12 * 2^12
+    // the unit is counts per 1000 s, which are 10^12 ns: 5^12 * 2^12
+    constexpr std::uint64_t five_to_the_12th = 244'140'625;
     const std::uint64_t carry = rounding == Rounding::up ? 1 : 0;
     if (counts == 0) return 0;
     if (time <= Time{}) return MilliSpeed::most;
@@ -210,7 +211,7 @@ class Velocity {
   Time window_;
   std::array<Sample, most_positions> positions_{};  // stored positions with their latch times, the oldest first
   std::size_t size_ = 0;
-  std::size_t start_ = none;  // index of the position that begins the selected window
+  std::size_t start_ = none;  // index of the stored position with which the selected window begins
 };
 
 }  // namespace absenc::host

@@ -10,7 +10,7 @@ namespace absenc {
 class Silence {
  public:
   Silence() = default;
-  /// Makes a timer for a line that is silent since `since`.
+  /// Makes a timer for a line that has been silent since the time `since`.
   explicit Silence(Time since) : since_(since) {}
 
   /// Records the end of a transfer or pulse of this end: the `answer` limit now applies.

@@ -57,14 +57,14 @@ std::size_t put_stuffed(const CanFrame& frame, std::vector<bool>* bits) {
   stuffed.append(false);
   if (frame.extended) {
     stuffed.append(frame.id >> 18, 11);
-    stuffed.append(0b11, 2);  // the recessive bits SRR and IDE
+    stuffed.append(0b11, 2);  // the bits SRR and IDE, which are recessive (1)
     stuffed.append(frame.id & 0x3FFFF, 18);
     stuffed.append(frame.remote);
     stuffed.append(0, 2);  // the reserved bits r1 and r0
   } else {
     stuffed.append(frame.id, 11);
     stuffed.append(frame.remote);
-    stuffed.append(0, 2);  // the dominant bits IDE and r0
+    stuffed.append(0, 2);  // the bits IDE and r0, which are dominant (0)
   }
   stuffed.append(frame.size, 4);
   for (const std::uint8_t byte : frame.remote ? Bytes() : frame.bytes()) stuffed.append(byte, 8);

@@ -102,7 +102,7 @@ class FaultyDevice final : public Machine<std::uint8_t> {
   Time last_ignored_at_ = -std::chrono::hours(1);  // time at which a byte was last ignored
   Time device_gap_{};                              // longest `gap` that the device has requested so far
   Time silent_until_ = never;                      // time at which a suppressed reply counts as sent
-  Time device_timer_ = never;                      // time of the timer that the device requested
+  Time device_timer_ = never;                      // time of the `timer` event that the device has requested
 };
 
 }  // namespace absenc::sim

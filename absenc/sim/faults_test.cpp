@@ -204,7 +204,7 @@ TEST_F(Faults, WholeCharactersOfTwoBytesAreLostOrAdded) {
 
 TEST_F(Faults, DeviceContinuesAfterSuppressedReply) {
   damage(FaultKind::silence);
-  device.timer_at = microseconds(500);  // the device's timer must still expire
+  device.timer_at = microseconds(500);  // the device's `timer` event must still be reported
   EXPECT_TRUE(exchange().empty());
   EXPECT_FALSE(device.sending);
   EXPECT_EQ(device.timers, 1);
@@ -270,7 +270,7 @@ TEST_F(Faults, EarlyRequestIsAViolation) {
   damage(FaultKind::corrupt);
   host.send_now = true;
   line.wake(node);
-  line.run_until(microseconds(40));  // at 40 us the reply has begun
+  line.run_until(microseconds(40));  // at 40 us the reply has begun, so a request now is too early
   host.send_now = true;
   line.wake(node);
   line.run_until(microseconds(1000));

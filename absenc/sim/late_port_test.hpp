@@ -27,7 +27,7 @@ class LatePort final : public Port<Item> {
 
   void begin(const Step<Item>& step) override {
     if (step.kind == Step<Item>::Kind::transfer || step.kind == Step<Item>::Kind::pulse) {
-      // Stores the items that arrive before the transfer begins.
+      // Stores the items that arrive before the next transfer begins.
       rest(std::max(time_, step.at));
       quiet_since_ = time_;
       received_ = silence_reported_ = false;

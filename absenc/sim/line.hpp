@@ -13,7 +13,7 @@
 
 namespace absenc::sim {
 
-/// Whether a node is host or device.
+/// The two roles of a node: host or device.
 enum class NodeRole : std::uint8_t { host, device };
 
 /// One shared line with the machines on it.
@@ -35,8 +35,8 @@ class Line {
   /// One transfer of SPI bytes or clocked bits. The last byte is left-aligned.
   struct Transfer {
     Time start;                 ///< spi: time of chip select; clocked: time of the first clock edge
-    Time end;                   ///< End of the last bit.
-    std::size_t bits;           ///< number of clocks; spi: eight per byte
+    Time end;                   ///< End of the last bit of the transfer.
+    std::size_t bits;           ///< number of clocks of the transfer; SPI has eight per byte
     std::span<const Item> out;  ///< Items that the host sent.
     std::span<const Item> in;   ///< Items that the host received.
     Time lead{};                ///< Time from chip select to the first clock.

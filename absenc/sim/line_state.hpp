@@ -32,12 +32,13 @@ struct Line<Item>::State {
 
   /// The sender whose character this node's receiver is synchronised to.
   Node framed_sender = 0;
-  Time framed_from = never;  ///< Time at which the character of `framed_sender` begins.
-  Time framed_until{};       ///< Time at which the character of `framed_sender` ends.
+  Time framed_from = never;  ///< Begin of the character that this node's receiver is synchronised to.
+  Time framed_until{};       ///< End of the character that this node's receiver is synchronised to.
 
   /// Kind of the step in progress or about to begin: transfer or pulse; wait if there is none.
   typename Step<Item>::Kind active_step = Step<Item>::Kind::wait;
-  std::uint64_t begin_generation = 0;  ///< number of transfers, pulses and replaced machines so far
+  /// counts the node's transfers, pulses and replaced machines, to recognise stale events
+  std::uint64_t begin_generation = 0;
   /// whether the transfer or pulse has begun; of a transfer in frames: whether its present frame has
   bool begun = false;
   std::vector<Item> out;           ///< items of the transfer that the node sends

@@ -18,7 +18,7 @@ namespace absenc::sim {
 
 namespace {
 
-constexpr double revolution = 4294967296.0;  // position units per revolution, 2^32
+constexpr double revolution = 4294967296.0;  // number of position units in a revolution: 2^32
 
 struct Quotient {
   std::uint64_t whole;

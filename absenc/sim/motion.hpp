@@ -17,7 +17,7 @@ class Motion final : public Shaft {
  public:
   /// A point of a path: position of the shaft at `time`, relative to the start position.
   struct Knot {
-    Time time;              ///< time of the point
+    Time time;              ///< time at which the shaft reaches the point
     std::int64_t position;  ///< position relative to the start position, unit 2^-32 revolution
   };
 
@@ -47,7 +47,7 @@ class Motion final : public Shaft {
     std::int64_t micro_rpm;
   };
   struct Sine {
-    double amplitude;  // amplitude in revolutions
+    double amplitude;  // amplitude of the sine in revolutions
     std::uint64_t micro_hertz;
   };
   struct Path {

@@ -69,10 +69,11 @@ TEST(Motion, BeginsAtSetTime) {
 TEST(Motion, SineHasExactPhaseAndDerivatives) {
   const Motion motion = Motion::sine(0, 90, 0.5);
   EXPECT_EQ(motion.at(0s).position, 0);
-  EXPECT_EQ(motion.at(0s).speed_millirpm, 47'124);  // amplitude pi/2 rad * pi rad/s = 47.1239 rpm
+  EXPECT_EQ(motion.at(0s).speed_millirpm, 47'124);  // amplitude of the speed: pi/2 rad * pi rad/s = 47.1239 rpm
   EXPECT_EQ(motion.at(500ms).position, revolution / 4);
   EXPECT_EQ(motion.at(500ms).speed_millirpm, 0);
-  EXPECT_EQ(motion.at(500ms).acceleration, -16);  // amplitude pi/2 rad * (pi rad/s)^2 = 15.50 rad/s^2
+  // amplitude of the acceleration: pi/2 rad * (pi rad/s)^2 = 15.50 rad/s^2
+  EXPECT_EQ(motion.at(500ms).acceleration, -16);
   EXPECT_EQ(motion.at(24h + 500ms).position, revolution / 4);
   EXPECT_EQ(motion.at(-500ms).position, -revolution / 4);
   EXPECT_EQ(motion.at(-500ms).acceleration, 16);

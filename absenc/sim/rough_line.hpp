@@ -27,10 +27,10 @@ struct RoughRates {
 
 /// Counts of the requests, the replies and the disturbances of a rough line.
 struct RoughCounts {
-  std::uint64_t requests = 0;  ///< transfers and pulses of the host
+  std::uint64_t requests = 0;  ///< number of transfers and pulses of the host
   std::uint64_t replies = 0;   ///< frames that the device sent to the host
-  std::uint64_t damaged = 0;   ///< frames damaged by any fault except `late`
-  std::uint64_t late = 0;      ///< frames that were delayed
+  std::uint64_t damaged = 0;   ///< number of frames that were damaged by any fault except `late`
+  std::uint64_t late = 0;      ///< number of frames that were delayed
 };
 
 /// A line that damages frames to the host at random. A frame arrives in one piece at its end; use Line for collisions
@@ -70,7 +70,7 @@ class RoughLine final : public Port<Item> {
  private:
   // A frame in transit to the host; without items it arrives as a `line_error`.
   struct InTransit {
-    Time sent;   // time at which its transmission began
+    Time sent;   // time at which the transmission of the frame began
     Time first;  // arrival time of the first item
     Time at;     // arrival time of the whole frame
     std::vector<Item> items;
@@ -123,7 +123,7 @@ class RoughLine final : public Port<Item> {
   std::uint32_t device_rate_;
   Side side_;
   std::vector<Item> request_;
-  std::vector<Item> out_;  // items that the device sent last
+  std::vector<Item> out_;  // items that the device sent in its last frame
   std::uint8_t behind_out_ = 0xFF;
   std::size_t bits_ = 0;
   // ring buffer: the entries front_ to back_ - 1 are in transit, the others are reused

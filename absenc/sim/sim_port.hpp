@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The host's end of a simulated line as a Port.
+// A Port for the host's end of a simulated line.
 #pragma once
 
 #include <cstddef>
@@ -76,12 +76,12 @@ class SimPort final : public Port<Item> {
   void run_until(const Done& done);
 
   RealTime real_time_;
-  Time start_{};          // start of virtual time, on the caller's clock
+  Time start_{};          // time of the caller's clock at which virtual time begins
   Time last_event_at_{};  // time of the last reported event, or of a later call of `now`
   Line<Item> line_;
   HostEnd host_end_;
   typename Line<Item>::Node host_node_;
-  std::vector<Item> items_;  // items of the last returned event
+  std::vector<Item> items_;  // items of the event that was returned last
 };
 
 extern template class SimPort<std::uint8_t>;

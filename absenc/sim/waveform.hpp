@@ -103,7 +103,7 @@ class Waveform {
   LineSettings settings_;
   Sink* sink_;
   std::vector<Wire> wires_;
-  std::vector<int> drivers_;  // number of active drives of each wire
+  std::vector<int> drivers_;  // for each wire, the number of drives that hold it away from its idle level at present
   // Level changes that the sink has not received yet, the earliest on top.
   std::priority_queue<LevelChange, std::vector<LevelChange>, std::greater<>> changes_;
   std::vector<Comment> comments_;           // comments that the sink has not received, in the order of time

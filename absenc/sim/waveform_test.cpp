@@ -131,7 +131,7 @@ TEST(Waveform, Character) {
 TEST(Waveform, ParityAndTwoStopBits) {
   for (const auto& [parity, high] : {std::pair{Parity::even, true}, std::pair{Parity::odd, false}}) {
     Picture waveform(LinkKind::full_duplex, {.rate = 1'000'000, .parity = parity, .stop_bits = 2});
-    waveform.character(NodeRole::device, 0us, 12us, 0x80);  // bits on the line: 0 00000001 p 11
+    waveform.character(NodeRole::device, 0us, 12us, 0x80);  // bits on the line: 0 00000001 p 11, with the parity bit p
     EXPECT_THAT(body(waveform), HasSubstr(high ? "#8000\n1\"\n#22000\n" : "#8000\n1\"\n#9000\n0\"\n#10000\n1\"\n"));
   }
 }
@@ -373,7 +373,7 @@ TEST_F(Sigrok, ReadsFramesOfCan) {
     waveform.frame(at, frame);
     at += settings.bits(can_bits(frame).size() + can_intermission_bits);
   };
-  add({.id = 0x000, .size = 8});  // a frame with many stuff bits
+  add({.id = 0x000, .size = 8});  // the data bytes of this CAN frame cause many stuff bits
   add({.id = 0x120, .size = 3, .data = {0x47, 0x26, 0xFF}});
   add({.id = 0x1ABCDE01, .extended = true, .size = 1, .data = {0x5A}});
   add({.id = 0x7E5, .remote = true});

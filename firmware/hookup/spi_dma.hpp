@@ -58,7 +58,7 @@ class SpiDma {
   }
 
   Hardware* hardware_;
-  unsigned idle_clocks_;  // number of clocks before the frame, fewer than 8
+  unsigned idle_clocks_;  // number of clocks before the first bit of the frame, fewer than 8
   host::Carrier<std::uint8_t, SpiDma> carrier_;
   std::array<std::uint8_t, 64> buffer_{};
   std::size_t bits_ = 0;

@@ -36,7 +36,7 @@ class LineContent {
   Buffer<Item, 512> items_;
 };
 
-/// Calls `visit` with each bit of `byte` inverted.
+/// Calls `visit` once for each bit of `byte`, with that bit inverted.
 template <class Visit>
 void damage(std::uint8_t& byte, const Visit& visit) {
   const std::uint8_t sound = byte;

@@ -6,7 +6,7 @@
 
 namespace absenc::tool {
 
-using namespace client;  // the command uses the library's names without a prefix
+using namespace client;  // the command uses the names of namespace client without a prefix
 
 inline constexpr int exit_good = 0;
 inline constexpr int exit_failed = 1;  // exit status of a failure, for example of the encoder, the line or the system

@@ -59,7 +59,7 @@ class ArgumentParser {
   }
 
  private:
-  // "-5" is a negative number, not an option.
+  // A word like "-5" is a negative number, not an option.
   static bool is_name(std::string_view word) {
     return word.size() > 1 && word[0] == '-' && word[1] != '.' && (word[1] < '0' || word[1] > '9');
   }
@@ -285,7 +285,7 @@ int main(int argument_count, char** arguments) {
   using namespace absenc::tool;
   std::string understood;
   std::vector<char*> words(arguments, arguments + argument_count);
-  words.erase(words.begin(), words.begin() + std::min(argument_count, 1));  // POSIX allows argc to be 0
+  words.erase(words.begin(), words.begin() + std::min(argument_count, 1));  // POSIX allows that argc is 0
   if (words.size() == 1 && words.front() == absenc::serve::mqtt_process_verb) return absenc::serve::run_mqtt_process();
   std::string help_option = "--help", version_option = "--version";
   // `absenc help read` prints the same as `absenc read --help`.

@@ -123,13 +123,13 @@ class Annotator {
 
   bool is_first_ = true;  // no frame was parsed yet: the capture may have begun within a frame or exchange
 
-  // State while a run is parsed.
+  // The following members are the state while a run is parsed.
   Channel* channel_ = nullptr;
   std::size_t at_ = 0;
   bool whole_ = true;  // true: no further characters will be added to the run
   bool cut_ = false;   // true: the capture ends without a pause behind this run, so perhaps within a frame
   std::size_t last_reply_at_ = 0;
-  std::size_t last_reply_size_ = 0;  // size of the reply that begins at `last_reply_at_`; 0: none
+  std::size_t last_reply_size_ = 0;  // size of the last reply of this run; 0: there is none
 };
 
 }  // namespace absenc::capture

@@ -15,7 +15,7 @@
 
 namespace absenc::capture {
 
-/// Information about an exchange that its frames do not contain.
+/// Remarks on an exchange: information that its frames do not contain.
 enum class Remark : std::uint8_t {
   none,
   unanswered,    // no reply followed the request

@@ -71,7 +71,7 @@ class Talker {
     }
   }
 
-  /// Runs one random command and returns the traffic.
+  /// Runs one random command and returns what host and encoder sent.
   TalkRecord talk() {
     record_ = {};
     shaft_.put(static_cast<std::int64_t>(random_.below(60'000)), static_cast<std::int64_t>(random_.below(4096)));

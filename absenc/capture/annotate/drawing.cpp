@@ -160,7 +160,7 @@ class Samples {
 /// One part of the samples, which is one file in the sigrok archive.
 struct SamplesPart {
   Samples* samples;
-  std::uint64_t size;  // number of bytes in the part
+  std::uint64_t size;  // number of bytes in this part of the samples
   std::uint64_t given = 0;
 };
 

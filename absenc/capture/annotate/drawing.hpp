@@ -100,7 +100,7 @@ class WaveformSink final : public Waveform::Sink {
 /// Writes `drawing` as a value change dump (IEEE 1364, clause 18); labels become comments.
 void write_vcd(std::ostream& out, Drawing& drawing);
 
-/// Writes `drawing` like the CSV export of Saleae Logic 2.
+/// Writes `drawing` as CSV in the form of Saleae Logic 2's export.
 void write_saleae_csv(std::ostream& out, Drawing& drawing);
 
 /// Writes `drawing` as a sigrok session with `rate` samples per second, at most 1 GHz. Replaces the file at `path`.

@@ -15,7 +15,7 @@ namespace absenc::capture {
 
 /// Time limits of a line, in ticks of the capture.
 struct LineTicks {
-  static constexpr Tick never = UINT64_MAX / 4;  // a time that is never reached; sums with it do not overflow
+  static constexpr Tick never = UINT64_MAX / 4;  // a time that is never reached; adding times to it cannot overflow
 
   Tick pause = 1;        // a silence shorter than this, in ticks, does not end a run of characters
   Tick frame_pause = 0;  // a silence shorter than this ends a run only after a complete request; 0: unused

@@ -12,7 +12,7 @@
 
 namespace absenc::capture {
 
-/// Form of a text file with bytes; see hex_text.hpp.
+/// The forms of text files that contain bytes; see hex_text.hpp.
 enum class HexForm : std::uint8_t { plain, dump, xxd, sigrok };
 
 struct HexLine {

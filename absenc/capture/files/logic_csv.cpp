@@ -38,7 +38,8 @@ const TimeUnit* find_unit(std::string_view name) {
 }
 
 std::string_view take_field(std::string_view& row) {
-  const std::size_t comma = row.size() > 1 && row[1] == ',' ? 1 : row.find(',');  // most fields are a single digit
+  // shortcut: most fields are a single digit
+  const std::size_t comma = row.size() > 1 && row[1] == ',' ? 1 : row.find(',');
   const std::string_view field = row.substr(0, comma);
   row.remove_prefix(comma == std::string_view::npos ? row.size() : comma + 1);
   return field;

@@ -183,7 +183,8 @@ TEST(Sigrok, APieceWithAWrongChecksumIsLeftOutAndTheOthersCount) {
     std::vector<std::pair<std::string, FileBytes>> pieces;
     for (int i = 1; i <= 12; ++i) pieces.emplace_back("logic-1-" + std::to_string(i), samples);
     FileBytes file = session(sigrok_metadata("1 MHz", 8, 1), pieces, "2", deflate);
-    constexpr std::string_view name = "logic-1-7";  // the name is stored in front of the piece and in the directory
+    // the archive contains the name twice: in front of the piece and in the directory
+    constexpr std::string_view name = "logic-1-7";
     const auto in_directory = std::find_end(file.begin(), file.end(), name.begin(), name.end());
     *(in_directory - 30) ^= 1;  // changes a byte of the piece's checksum
     const auto reader = open_bytes(file);
@@ -245,7 +246,7 @@ TEST(Sigrok, ReadsEverythingBeforeACut) {
     for (std::size_t size = 4; size < good.size(); ++size) {
       SCOPED_TRACE(size);
       const FileBytes file = cut_at(good, size);
-      if (size < first + 39) {  // the first piece is completely missing
+      if (size < first + 39) {  // the file is cut off before the samples of the first piece
         const std::string why = problem(file);
         // The deflated data of these entries is complete even without its last byte.
         const std::size_t seen = size + (deflate ? 1 : 0);

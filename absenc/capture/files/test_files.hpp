@@ -135,7 +135,7 @@ inline FileBytes make_zip(const std::vector<std::pair<std::string, FileBytes>>& 
   return made;
 }
 
-/// Returns a zip archive with these entries, deflated or stored.
+/// Returns a zip archive with the given entries, all deflated or all stored.
 inline FileBytes make_zip(const std::vector<std::pair<std::string, FileBytes>>& entries, bool deflate = true) {
   return make_zip(entries, deflate ? zip_int32_t{ZIP_CM_DEFLATE} : zip_int32_t{ZIP_CM_STORE});
 }

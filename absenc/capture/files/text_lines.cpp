@@ -53,7 +53,7 @@ std::optional<Decimal> parse_decimal(std::string_view text) {
     } else if (is_digit(c) && decimal.count < decimal.digits.size()) {
       decimal.digits[decimal.count++] = c;
       if (!point) ++before;
-    } else if (!is_digit(c) || !point) {  // the number of digits behind the decimal point is not limited
+    } else if (!is_digit(c) || !point) {  // there may be any number of digits behind the decimal point
       return std::nullopt;
     }
   }

@@ -71,7 +71,7 @@ TEST(ZipArchive, ReadingReportsDamage) {
     EXPECT_EQ(result.problem, "CRC error");
 
     file = good;
-    file[200] ^= 0x10;  // damages a byte of the entry's data
+    file[200] ^= 0x10;  // damages one byte of the entry's data
     result = expanded(file);
     EXPECT_FALSE(result.whole || result.found_by_reading);
     EXPECT_NE(result.problem, "");

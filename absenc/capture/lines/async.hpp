@@ -54,7 +54,7 @@ class AsyncDecoder {
   /// Ends the capture; appends the remaining characters.
   void finish(std::vector<Character>& characters);
 
-  /// Returns a time before which no further character begins.
+  /// Returns a time before which no character begins that is still to be returned.
   [[nodiscard]] Tick settled() const;
   [[nodiscard]] const Statistics& statistics() const { return statistics_; }
   [[nodiscard]] const AsyncFormat& format() const { return format_; }
@@ -90,8 +90,8 @@ class AsyncDecoder {
   // level after all changes given so far; idle is high, also for an inverted line
   bool line_ = true;
   bool level_ = true;           // level before the first change in `edges_`
-  std::vector<Tick> edges_;     // changes from the first incomplete character on
-  std::optional<Tick> unsure_;  // time of a change that may be part of a glitch
+  std::vector<Tick> edges_;     // level changes from the first incomplete character on, in ticks
+  std::optional<Tick> unsure_;  // time of a level change that may be part of a noise pulse
   Statistics statistics_;
 };
 

@@ -129,7 +129,7 @@ class BlockRun {
 
   // Claims a block and prepares it; the lock is held before and after the call.
   void prepare(std::unique_lock<std::mutex>& lock, unsigned thread) {
-    // The block that this thread used last is still in its cache.
+    // Takes the block that this thread used last, because it is still in the cache of the processor.
     const auto last =
         std::find_if(free_jobs_.rbegin(), free_jobs_.rend(), [&](const Job* job) { return job->thread == thread; });
     const auto own = last == free_jobs_.rend() ? free_jobs_.begin() : last.base() - 1;
@@ -198,7 +198,7 @@ class BlockRun {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<Job*> free_jobs_;
-  std::deque<Job*> in_order_;  // claimed blocks in the order of the capture
+  std::deque<Job*> in_order_;  // blocks that were claimed, in the order of the capture
   bool claiming_ = false;
   bool exhausted_ = false;
   bool stopped_ = false;

@@ -109,7 +109,7 @@ void CanDecoder::take_stuffed(bool bit, std::vector<CanRecord>& frames) {
     bits_.push_back(bit);
     interpret();
   }
-  // A stuff bit may follow the last bit of the CRC.
+  // The last bit of the CRC may be followed by a stuff bit.
   if (length_ == 0 || bits_.size() < length_ || run_ == most_equal) return;
   state_ = State::tail;
   tail_ = 0;

@@ -11,7 +11,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "absenc/capture/lines/edges.cpp"
 #include <hwy/foreach_target.h>
-// Highway requires this include behind foreach_target.h.
+// The library Highway requires that this file is included after foreach_target.h.
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();

@@ -24,20 +24,21 @@ inline constexpr std::size_t longest_checked_word = 128;  // longest frame of bi
 
 enum class CheckKind : std::uint8_t {
   crc,
-  sum,           // checksum of 8 bits: constant + sum of the bytes
-  difference,    // checksum of 8 bits: constant - sum of the bytes
-  exclusive_or,  // checksum of 8 bits: constant ^ all bytes
+  sum,           // checksum of 8 bits: a constant plus the sum of the bytes
+  difference,    // checksum of 8 bits: a constant minus the sum of the bytes
+  exclusive_or,  // checksum of 8 bits: exclusive or of a constant and all bytes
 };
 
 /// A checksum that explains all frames. Positions and sizes are in bytes, or in bits in frames of bits.
 struct CheckSolution {
   CheckKind kind = CheckKind::crc;
-  CrcParameters parameters{};  // for kinds other than crc: width is 8 and init is the constant
-  bool low_first = false;      // width above 8 in frames of bytes: the checksum's low byte comes first in the frame
-  bool padded = false;         // the checksum is computed as if a byte 00 followed the covered part
+  // parameters of the CRC; for other kinds of checksum, the width is 8 and init is the constant
+  CrcParameters parameters{};
+  bool low_first = false;  // width above 8 in frames of bytes: the checksum's low byte comes first in the frame
+  bool padded = false;     // the checksum is computed as if a byte 00 followed the covered part
   // every init fits, each with its own xorout, because all frames have the same length
   bool init_open = false;
-  std::vector<std::size_t> first;  // possible positions of the first covered byte or bit
+  std::vector<std::size_t> first;  // possible positions of the first byte or bit that the checksum covers
   std::size_t check_size = 0;      // number of bytes, or bits in frames of bits, of the checksum
   std::size_t trailing = 0;        // number of bytes, or bits in frames of bits, behind the checksum
   double chance_log2 = 0;          // log2 of the expected number of such solutions if the frames were random

@@ -255,7 +255,7 @@ RC_GTEST_PROP(PolynomialProperty, ListsAllDivisorsOnce, (std::uint64_t value)) {
 }
 
 TEST(Polynomial, DividesAcrossWords) {
-  Polynomial product;  // the product (x^200 + x^7 + 1)(x^8 + x^2 + 1)
+  Polynomial product;  // the product of the polynomials x^200 + x^7 + 1 and x^8 + x^2 + 1
   for (int i = 208; i >= 0; --i)
     product.append(i == 208 || i == 202 || i == 200 || i == 15 || i == 9 || i == 8 || i == 2 || i == 0 || i == 7);
   Polynomial rest = product;

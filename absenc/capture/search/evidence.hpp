@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Weighs exchanges as evidence for a protocol.
+// Estimates how strongly exchanges are evidence for a protocol.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@ namespace absenc::capture {
 /// A frame that owns its bytes.
 struct ObservedFrame {
   std::vector<std::uint8_t> bytes{};
-  std::size_t bits = 0;  // number of bits, on clocked links; otherwise 0
+  std::size_t bits = 0;  // number of bits of the frame on clocked links; otherwise 0
   std::optional<CanFrame> can{};
 
   /// Returns a view of this frame, which is valid as long as this object exists.
@@ -33,7 +33,7 @@ struct ObservedExchange {
 
 /// The evidence for a protocol that captured exchanges give.
 struct Evidence {
-  std::size_t tried = 0;      // number of exchanges examined
+  std::size_t tried = 0;      // number of exchanges that were examined
   std::size_t explained = 0;  // number of exchanges with a good reply
   std::size_t distinct = 0;   // number of different good exchanges, because a repeated one proves no more
   /// log10 of the probability that the unit would accept as many random frames as good.

@@ -10,7 +10,7 @@
 
 namespace absenc::capture {
 
-/// Options that explain exchanges, with their evidence.
+/// Option values that explain exchanges, with the evidence for them.
 struct Hypothesis {
   Options options{};
   Evidence evidence{};

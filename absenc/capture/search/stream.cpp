@@ -12,7 +12,7 @@ namespace absenc::capture {
 namespace {
 
 constexpr std::size_t noise_size = 1 << 15;
-constexpr std::size_t least_frames = 3;  // number of good frames below which a stream is no evidence
+constexpr std::size_t least_frames = 3;  // a stream with fewer good frames than this is no evidence
 
 // Returns the size of the good reply that begins with the first of `bytes`, or 0 if none does.
 std::size_t reply_size(const Unit& unit, const Options& options, Bytes bytes) {
@@ -95,7 +95,7 @@ std::vector<ObservedExchange> split_stream(const Unit& unit, const Options& opti
   std::vector<ObservedExchange> replies;
   std::size_t longest = 0;        // size of the longest good reply in the stream, in bytes
   std::size_t begin_of_good = 0;  // index in `replies` of the first good reply
-  std::size_t end_of_good = 0;    // index in `replies` behind the last good reply
+  std::size_t end_of_good = 0;    // index in `replies` after the last good reply
   for (std::size_t at = 0; at < bytes.size();) {
     const std::size_t size = reply_size(unit, options, bytes.subspan(at));
     const auto from = bytes.begin() + static_cast<std::ptrdiff_t>(at);

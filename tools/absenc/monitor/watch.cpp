@@ -45,7 +45,7 @@ class OtherFields final : public FieldSink {
     // fields.
     const FieldInfo* in_line = unit_->alarms != nullptr ? unit_->alarms : unit_->status;
     const bool is_in_line = &info == in_line && unit_->second_status == nullptr && unit_->second_alarms == nullptr;
-    const bool is_exchange = info.role == Role::exchange;  // the field repeats a part of the request
+    const bool is_exchange = info.role == Role::exchange;  // the field only repeats a part of the request
     if (is_in_line || is_exchange || info.role == Role::position || info.role == Role::turns) return;
     const std::string shown = fmt::format("{}{}{}", to_text(value), info.unit.empty() ? "" : " ", info.unit);
     fields_.emplace_back(info, shown);

@@ -221,7 +221,7 @@ class Survey {
   Resolution resolution_;
   bool all_;
   bool heard_ = false;          // a reply has reported the resolution
-  std::string failed_setting_;  // reason why the last failed setting failed
+  std::string failed_setting_;  // reason why the setting that failed last could not be read
 };
 
 int run_info(const Invocation& invocation) {
