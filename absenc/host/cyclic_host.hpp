@@ -156,14 +156,15 @@ class CyclicHost final : public Machine<Item> {
   Conversation<Item>* position_ = nullptr;  // conversation that reads the position; null: none runs
   Service<Item>* service_ = nullptr;        // first service of the queue
   Service<Item>* last_ = nullptr;
-  Step<Item> step_{};        // transfer, pulse or change of the rate that the service wants, if `wants_`
+  // transfer, pulse or change of the bit rate that the service wants to begin next, if there is one
+  Step<Item> step_{};
   Time wake_ = Time::min();  // time at which the service wants to continue, if it has no step to begin
   Time rested_at_{};         // earliest time at which a service may send its request
   Time free_since_ = never;  // time at which the last reading ended
   std::uint32_t unasked_ = 0;
   User user_ = User::nobody;
   bool wants_ = false;
-  bool is_row_ = false;       // no position may be requested before the service's next request
+  bool is_row_ = false;       // no position may be requested before the service has sent its next request
   bool is_too_long_ = false;  // the service's next request did not fit between two positions
   bool takes_ = false;        // the running cycle belongs to the service, so that no position is read
   bool carries_ = false;      // the position of the running cycle comes with the service's reply

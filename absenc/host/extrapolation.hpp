@@ -36,7 +36,8 @@ class Extrapolation {
 
   /// Returns whether two readings are known.
   [[nodiscard]] constexpr bool valid() const { return bits_ != 0 && span_ > Time{}; }
-  /// Returns the width of `at` in bits: the single-turn bits and, if they are valid, those of the turns.
+  /// Returns the width in bits of the positions that `at` returns: single-turn bits and, if they are valid, those of
+  /// the turns.
   [[nodiscard]] constexpr unsigned bits() const { return bits_; }
   /// Returns the position at `time`, the turns above the single-turn counts, as the encoder would count it. Call it
   /// only while `valid()` is true.

@@ -17,7 +17,7 @@ using Wire = std::vector<std::uint8_t>;
 
 constexpr LineSettings settings{.rate = 1'000'000};
 
-/// A device that sends `reply` a time `after` it received the byte `key` on an idle line.
+/// A device that sends `reply` when the time `after` has passed since it received the byte `key` on an idle line.
 struct Responder final : Machine<std::uint8_t> {
   Responder(std::uint8_t its_key, Wire its_reply, Time its_after = 5us)
       : key(its_key), reply(std::move(its_reply)), after(its_after) {}

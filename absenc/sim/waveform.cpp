@@ -69,7 +69,8 @@ Waveform::Waveform(LinkKind kind, const LineSettings& settings, Sink& sink)
 void Waveform::observe(Line<std::uint8_t>& observed) {
   observed.observe([this, &observed](std::size_t sender, Time start, Time end, std::uint8_t byte) {
     this->byte(observed.role(sender), start, end, byte);
-    // A character of two bytes is drawn after its second one, from the begin of the first.
+    // A character of two bytes is drawn when its second byte is known. The drawing begins at the begin of the first
+    // byte.
     settle(std::min({observed.settled(), first_bytes_[0].start, first_bytes_[1].start}));
   });
   observed.observe_transfers([this, &observed](const Line<std::uint8_t>::Transfer& seen) {
@@ -103,7 +104,7 @@ std::size_t Waveform::data_wire(NodeRole sender) const {
   return kind_ == LinkKind::half_duplex ? line : sender == NodeRole::host ? host : device;
 }
 
-// Draws a byte; the two bytes of one character are drawn with the second one.
+// Draws a byte. If a character carries two bytes, both are drawn when the second one is added.
 void Waveform::byte(NodeRole sender, Time start, Time end, std::uint8_t byte) {
   if (settings_.character_bytes() == 1) return character(sender, start, end, byte);
   FirstByte& first = first_bytes_[data_wire(sender)];

@@ -49,7 +49,7 @@ class Waveform {
   /// Draws all frames on `line` from now on and replaces its observer. The waveform must outlive the line.
   void observe(Line<CanFrame>& line);
 
-  /// Draws a byte; the two bytes of one asynchronous character are drawn with the second one.
+  /// Draws a byte. If an asynchronous character carries two bytes, both are drawn when the second one is added.
   void byte(NodeRole sender, Time start, Time end, std::uint8_t byte);
   /// Draws one asynchronous character with the data bits `value`.
   void character(NodeRole sender, Time start, Time end, std::uint16_t value);

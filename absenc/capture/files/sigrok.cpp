@@ -151,8 +151,8 @@ class SigrokReader final : public Reader {
     std::string name;
     ZipArchive::Entry entry{};
     Tick first = 0;
+    // Number of bytes at the beginning of this piece that belong to the last sample of the previous piece, because
     // sigrok may split a sample between two pieces.
-    // number of bytes at the beginning of this piece that belong to the last sample of the previous piece
     unsigned skip = 0;
     unsigned tail = 0;  // number of bytes of this piece's last sample that are in the next piece
   };

@@ -70,7 +70,8 @@ class AsyncDecoding {
   [[nodiscard]] AsyncDecoder::Statistics statistics(std::size_t line) const { return decoders_[line].statistics(); }
 
  private:
-  // Prepares for a part. If a gap is before it, the characters in progress end.
+  // Prepares the decoders for the next part. If there is a gap in the capture before it, the characters in progress
+  // end.
   void begin(const Levels& levels) {
     if (begun_ && levels.first != end_) finish_lines();
     begun_ = true;

@@ -73,7 +73,7 @@ class ClockedDecoding {
   [[nodiscard]] bool selected() const { return selected_; }
 
  private:
-  // Prepares for a part. If a gap is before it, the burst in progress ends.
+  // Prepares the decoder for the next part. If there is a gap in the capture before it, the burst in progress ends.
   void begin(const Levels& levels) {
     if (begun_ && levels.first != end_) decoder_.finish(bursts_);
     const Changes& clock = levels.changes[0];

@@ -55,7 +55,7 @@ struct CheckSearch {
 /// checksum that never changes is not accepted.
 [[nodiscard]] CheckSearch find_checks(std::span<const CheckedFrame> frames);
 
-/// Returns how many more different frames would bring the chance to one in a million.
+/// Returns how many more different frames would reduce the chance that the solution is an accident to one in a million.
 [[nodiscard]] unsigned frames_to_settle(const CheckSolution& solution);
 
 }  // namespace absenc::capture

@@ -30,7 +30,7 @@ bool contains(std::span<const Hypothesis> all, const Options& options) {
                      [&](const Hypothesis& one) { return one.options.values == options.values; });
 }
 
-/// A hash of the decoded content of frames, to compare what options decode.
+/// A hash of the decoded content of frames, by which hypotheses that decode the same are recognised.
 class Meaning final : public FieldSink {
  public:
   void put(const FieldValue& value) override {

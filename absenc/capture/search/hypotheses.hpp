@@ -23,7 +23,7 @@ struct Hypothesis {
   [[nodiscard]] bool is_proven() const;
 };
 
-/// Limit of `Hypothesis::chance`: a result at or below it is found, one above only possible.
+/// Limit of `Hypothesis::chance`: a hypothesis at or below it counts as found, one above it only as possible.
 inline constexpr double is_found = -3;
 
 /// Returns whether `one` is ranked before `other`: proven hypotheses first, then by chance.

@@ -126,7 +126,8 @@ std::vector<Hypothesis> find_stream_hypotheses(const Unit& unit, Bytes bytes, Ti
     one.tried *= all.size();
     found.push_back(std::move(one));
   }
-  // The fewest bytes outside of frames come first, then models, then the smallest `bits_of`.
+  // Sorts the hypotheses: those with the fewest bytes outside of frames come first, then models, then the smallest key
+  // of `bits_of`.
   std::stable_sort(found.begin(), found.end(), [&](const Hypothesis& one, const Hypothesis& other) {
     const std::size_t noise = one.evidence.tried - one.evidence.explained;
     const std::size_t other_noise = other.evidence.tried - other.evidence.explained;
